@@ -1,0 +1,95 @@
+# `make help` lists the commands. Everything is set up in .venv and build; nothing outside this folder is touched.
+PYTHON ?= python3
+CXX ?= g++
+JOBS ?= $(shell nproc 2>/dev/null || echo 2)
+DEMO_DIR ?= build/demo
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export CXX
+
+# Recorded data, for the tests and the part of the demo that use real drives; both go without it where there is none.
+ifeq ($(origin GAIDENT_DATA),undefined)
+ifneq ($(wildcard ../shared/data),)
+export GAIDENT_DATA := $(abspath ../shared/data)
+endif
+endif
+
+BIN := .venv/bin
+PIP_INSTALL := $(BIN)/python -m pip install --quiet
+# Built in a folder that stays, so that a small change is a small build.
+PACKAGE := --no-build-isolation --config-settings=build-dir=build/python
+CMAKE := $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja)
+export CMAKE_BUILD_PARALLEL_LEVEL := $(JOBS)
+
+# Folders stand in the list for files that were added or deleted.
+SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
+	$(shell find csrc python -name '__pycache__' -prune -o \( -type d -o -name '*.?pp' -o -name '*.py' -o -name '*.pyi' -o -name py.typed \) -print)
+
+.NOTPARALLEL:
+.PHONY: help install demo test bench tidy lint test-cpp test-python clean
+.DEFAULT_GOAL := help
+
+help: ## list the commands
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1@/p' $(MAKEFILE_LIST) | column -t -s @ 2>/dev/null || sed -n 's/^\([a-z-]*\):.*## /  make \1: /p' $(MAKEFILE_LIST)
+
+install: .venv/.installed ## set up .venv and install the package into it
+
+demo: .venv/.installed ## identify a two-mass drive; table on the screen, picture in build/demo
+	@mkdir -p "$(DEMO_DIR)"
+	@gaident="$(abspath $(BIN)/gaident)" && cd "$(DEMO_DIR)" && "$$gaident" demo
+
+test: lint test-cpp test-python ## every check: ruff, mypy, C++ tests (plain and sanitized), Python tests
+
+lint: .venv/.tested
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+test-cpp: .venv/.tested
+	$(CMAKE) -B build/release -DGAIDENT_PYTHON=OFF > build/release.log || { cat build/release.log; exit 1; }
+	$(BIN)/cmake --build build/release
+	$(BIN)/ctest --test-dir build/release --output-on-failure --no-tests=error -j $(JOBS)
+	$(CMAKE) -B build/sanitize -DGAIDENT_PYTHON=OFF -DGAIDENT_SANITIZE=ON -DGAIDENT_BENCH=OFF > build/sanitize.log || { cat build/sanitize.log; exit 1; }
+	$(BIN)/cmake --build build/sanitize
+	$(BIN)/ctest --test-dir build/sanitize --output-on-failure --no-tests=error -j $(JOBS)
+
+test-python: .venv/.tested
+	$(BIN)/python -m pytest
+
+bench: .venv/.tools ## build and run the C++ benchmark
+	$(CMAKE) -B build/release -DGAIDENT_PYTHON=OFF > build/release.log || { cat build/release.log; exit 1; }
+	$(BIN)/cmake --build build/release --target gaident_bench
+	build/release/bench/gaident_bench $(BENCH_FLAGS)
+
+tidy: .venv/.tidied ## repair and format the Python and C++ sources
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	$(BIN)/clang-format -i $$(find csrc bench tests/cpp -name '*.?pp')
+
+clean: ## remove everything that these commands made
+	rm -rf build .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find python tests bench -name __pycache__ -prune -exec rm -rf {} +
+
+# The environment, in steps. A stamp is renewed when what it was made from changes.
+.venv/.tools: pyproject.toml Makefile
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || { echo "gaident needs Python 3.10 or newer as '$(PYTHON)' (name another one: make PYTHON=python3.12 ...)" >&2; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "Python's venv module is missing; on Debian: apt install python3-venv" >&2; exit 1; }
+	@$(PYTHON) -c 'import os, sysconfig; open(os.path.join(sysconfig.get_path("include"), "Python.h")).close()' 2>/dev/null || { echo "Python.h is missing; on Debian: apt install python3-dev" >&2; exit 1; }
+	@command -v $(firstword $(CXX)) >/dev/null || { echo "no C++ compiler '$(CXX)'; on Debian: apt install g++" >&2; exit 1; }
+	$(PYTHON) -m venv .venv
+	mkdir -p build
+	@$(BIN)/python -c 'import ast, re; text = open("pyproject.toml").read(); print(*ast.literal_eval(re.search(r"(?ms)^requires = (\[.*?\])", text)[1]), sep="\n")' > .venv/build-requires.txt
+	$(PIP_INSTALL) -r .venv/build-requires.txt cmake ninja
+	@touch $@
+
+.venv/.installed: .venv/.tools $(SOURCES)
+	$(PIP_INSTALL) $(PACKAGE) .
+	@touch $@
+
+.venv/.tested: .venv/.tools $(SOURCES)
+	$(PIP_INSTALL) $(PACKAGE) ".[test]"
+	@touch .venv/.installed $@
+
+.venv/.tidied: .venv/.tools
+	@$(BIN)/python -c 'import ast, re; text = open("pyproject.toml").read(); print(*ast.literal_eval(re.search(r"(?ms)^tidy = (\[.*?\])", text)[1]), sep="\n")' > .venv/tidy-requires.txt
+	$(PIP_INSTALL) -r .venv/tidy-requires.txt
+	@touch $@

@@ -1,0 +1,291 @@
+"""The rules of the house, checked over the real sources: who includes and imports whom, sizes, names."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shutil
+import subprocess
+import sys
+import types
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+import gaident
+
+ROOT = Path(__file__).resolve().parents[2]
+CORE = ROOT / "csrc" / "gaident"
+PACKAGE = ROOT / "python" / "gaident"
+
+# The core, lowest first: a file includes only what stands above it. Files of one folder share its place.
+CORE_ORDER = [
+    *(
+        "rng",
+        "arithmetic",
+        "lanes",
+        "denormals",
+        "chromosome",
+        "genome",
+        "factors",
+        "decode",
+        "delta",
+        "bilinear",
+    ),
+    *(
+        "held",
+        "controller",
+        "closed_loop",
+        "loop",
+        "record",
+        "fitness",
+        "kernels/",
+        "batch",
+        "whiten",
+        "refine",
+    ),
+    *("operators", "engine", "reference/"),
+]
+
+# Python: what each room may import of gaident, beside itself; a room is a module or folder of the package.
+# "later" names what it may import inside a function only.
+ROOMS: dict[str, tuple[set[str], set[str]]] = {
+    "errors": (set(), set()),
+    "data": ({"errors"}, set()),
+    "models": ({"errors", "data", "_core"}, set()),
+    "identification": ({"errors", "data", "models", "_core"}, {"show"}),
+    "show": ({"errors"}, set()),
+    "cli": ({"errors", "data", "models", "identification"}, {"show", "_core"}),
+    "__main__": ({"cli"}, set()),
+    "__init__": ({"errors", "data", "models", "identification"}, {"show"}),
+}
+
+
+def repository_files() -> list[Path]:
+    """Return every file of the repository that is not ignored (every file, where there is no git)."""
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"]
+    listed = (
+        subprocess.run(command, cwd=ROOT, capture_output=True, text=True) if shutil.which("git") else None
+    )
+    if listed is not None and listed.returncode == 0:
+        return [f for f in (ROOT / name for name in listed.stdout.split("\0") if name) if f.is_file()]
+    folders = ("csrc", "python", "tests", "bench", ".ci", "docs", "examples")
+    deep = [f for folder in folders for f in (ROOT / folder).rglob("*")]
+    return [f for f in [*ROOT.iterdir(), *deep] if f.is_file() and "__pycache__" not in f.parts]
+
+
+def sources(folder: Path, *suffixes: str) -> list[Path]:
+    return sorted(f for f in folder.rglob("*") if f.suffix in suffixes)
+
+
+def place(file: Path) -> int:
+    """Return the place of a core file in CORE_ORDER."""
+    relative = file.relative_to(CORE)
+    name = f"{relative.parts[0]}/" if len(relative.parts) > 1 else relative.stem
+    assert name in CORE_ORDER, (
+        f"{file.relative_to(ROOT)}: give it a place in CORE_ORDER ({Path(__file__).name})"
+    )
+    return CORE_ORDER.index(name)
+
+
+def includes(file: Path) -> list[tuple[str, bool]]:
+    """Return what a C++ file includes, each with whether it stands in angle brackets."""
+    lines = re.findall(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"]+)[>"]', file.read_text(), re.MULTILINE)
+    return [(name, bracket == "<") for bracket, name in lines]
+
+
+def resolved(file: Path, name: str) -> Path:
+    """Return the file that an #include in quotes means."""
+    for folder in (file.parent, ROOT / "csrc"):
+        if (folder / name).is_file():
+            return (folder / name).resolve()
+    raise AssertionError(f'{file.relative_to(ROOT)}: #include "{name}" names no file of the core')
+
+
+def test_core_includes_only_what_stands_above() -> None:
+    wrong = []
+    for file in sources(CORE, ".hpp", ".cpp"):
+        own_place = place(file)
+        for name, in_brackets in includes(file):
+            if in_brackets:
+                # Headers of the standard library have no suffix; intrinsics are the compiler's own.
+                if "." in name and name not in {"immintrin.h", "xmmintrin.h", "emmintrin.h"}:
+                    wrong.append(f"{file.relative_to(ROOT)}: <{name}> is not the standard library")
+                continue
+            target = resolved(file, name)
+            own_header = target.with_suffix("") == file.with_suffix("")
+            same_folder = target.parent == file.parent != CORE
+            if not (own_header or same_folder or place(target) < own_place):
+                wrong.append(f"{file.relative_to(ROOT)}: {name} does not stand above it")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_only_the_bindings_name_pybind11_and_python() -> None:
+    files = [f for f in sources(ROOT / "csrc", ".hpp", ".cpp") if "bindings" not in f.relative_to(ROOT).parts]
+    files += sources(ROOT / "tests" / "cpp", ".hpp", ".cpp") + sources(ROOT / "bench", ".hpp", ".cpp")
+    named = [f for f in files if re.search(r"pybind11|\bPy_\w|Python\.h", f.read_text())]
+    assert not named, named
+
+
+def test_headers_compile_when_included_first() -> None:
+    compiler = shutil.which("g++") or shutil.which("c++")
+    if compiler is None:
+        pytest.skip("no C++ compiler on the path")
+    flags = (
+        "-std=c++20 -fsyntax-only -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wno-psabi -Werror -x c++ -"
+    )
+
+    def compile_alone(header: Path) -> str:
+        name = header.relative_to(ROOT / "csrc").as_posix()
+        command = [compiler, "-I", str(ROOT / "csrc"), *flags.split()]
+        # Twice: a header without a guard would define things again.
+        text = f'#include "{name}"\n#include "{name}"\n'
+        return subprocess.run(command, input=text, capture_output=True, text=True).stderr
+
+    with ThreadPoolExecutor(2) as pool:
+        messages = [m for m in pool.map(compile_alone, sources(CORE, ".hpp")) if m]
+    assert not messages, "\n".join(messages)
+
+
+def test_check_hpp_fails_when_a_check_fails(tmp_path: Path) -> None:
+    compiler = shutil.which("g++") or shutil.which("c++")
+    if compiler is None:
+        pytest.skip("no C++ compiler on the path")
+    bad = [
+        "CHECK(false)",
+        "CHECK_NEAR(1, 2, 0.5)",
+        'CHECK_NEAR(std::nan(""), 0, 1)',
+        "CHECK_THROWS(0, std::range_error)",
+        "refuse()",
+    ]
+    lines = [
+        '#include "check.hpp"',
+        "#include <stdexcept>",
+        'static int refuse() { throw std::range_error("no"); }',
+        'TEST_CASE("good") { CHECK_NEAR(1, 1.5, 0.5); CHECK_THROWS(refuse(), std::range_error); }',
+        *(f'TEST_CASE("bad {i}") {{ {body}; }}' for i, body in enumerate(bad, 1)),
+    ]
+    (tmp_path / "case.cpp").write_text("\n".join(lines) + "\n")
+    main = ROOT / "tests" / "cpp" / "main.cpp"
+    built = [
+        "-std=c++20",
+        "-I",
+        str(main.parent),
+        str(main),
+        str(tmp_path / "case.cpp"),
+        "-o",
+        str(tmp_path / "case"),
+    ]
+    subprocess.run([compiler, *built], check=True)
+
+    def exit_code(*names: str) -> int:
+        return subprocess.run([str(tmp_path / "case"), *names], capture_output=True).returncode
+
+    assert exit_code("good") == 0
+    assert [exit_code(f"bad {i}") for i in range(1, len(bad) + 1)] == [1] * len(bad)
+    assert exit_code() == 1
+    assert exit_code("no such case") == 2
+    assert exit_code("--list") == 0
+
+
+def imports(tree: ast.Module, package: str) -> list[tuple[str, bool, int]]:
+    """Return (absolute module, whether inside a function, line) of every import of a module of `package`."""
+    functions = [n for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.AsyncFunctionDef))]
+    inside = {node for function in functions for node in ast.walk(function)}
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found += [(alias.name, node in inside, node.lineno) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            up = package.split(".")[: len(package.split(".")) - node.level + 1]
+            base = (
+                ".".join([*up, *([node.module] if node.module else [])]) if node.level else str(node.module)
+            )
+            # `from gaident import x` reaches the module x
+            names = [f"{base}.{a.name}" for a in node.names] if base == "gaident" else [base]
+            found += [(name, node in inside, node.lineno) for name in names]
+    return found
+
+
+def test_python_imports_follow_the_rooms() -> None:
+    wrong = []
+    for file in sources(PACKAGE, ".py"):
+        relative = file.relative_to(PACKAGE)
+        room = relative.parts[0].removesuffix(".py")
+        assert room in ROOMS, (
+            f"{file.relative_to(ROOT)}: give the room {room!r} its line in ROOMS ({Path(__file__).name})"
+        )
+        always, later = ROOMS[room]
+        package = ".".join(["gaident", *relative.parts[:-1]])
+        for module, in_function, line in imports(ast.parse(file.read_text()), package):
+            parts = module.split(".")
+            if parts[0] != "gaident":
+                continue
+            target = parts[1] if len(parts) > 1 else "__init__"
+            if target != room and target not in always and not (in_function and target in later):
+                wrong.append(f"{file.relative_to(ROOT)}:{line}: {room} may not import {module} here")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_importing_gaident_is_light() -> None:
+    code = (
+        "import time, numpy, sys; t = time.perf_counter(); import gaident; print(time.perf_counter() - t); "
+    )
+    code += "print([m for m in ('scipy', 'matplotlib', 'control', 'argparse') if m in sys.modules])"
+    runs = []
+    for _ in range(3):
+        out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+        seconds, loaded = out.splitlines()
+        assert loaded == "[]", f"import gaident also imports {loaded}"
+        runs.append(float(seconds))
+    assert min(runs) < 0.25
+
+
+def test_files_stay_readable() -> None:
+    files = sources(ROOT / "csrc", ".hpp", ".cpp") + sources(PACKAGE, ".py", ".pyi")
+    files += sources(ROOT / "bench", ".hpp", ".cpp", ".py")
+    long = {str(f.relative_to(ROOT)): n for f in files if (n := len(f.read_text().splitlines())) > 400}
+    assert not long, f"over 400 lines: {long}"
+
+
+def test_library_code_prints_nothing() -> None:
+    printing = []
+    for file in sources(PACKAGE, ".py"):
+        if file.name == "cli.py":
+            continue
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print":
+                printing.append(f"{file.relative_to(ROOT)}:{node.lineno}")
+    for file in sources(ROOT / "csrc", ".hpp", ".cpp"):
+        if re.search(r"\b(printf|puts|fputs|std::cout|std::cerr|std::clog)\b", file.read_text()):
+            printing.append(str(file.relative_to(ROOT)))
+    assert not printing, printing
+
+
+def test_no_file_needs_this_machine() -> None:
+    # Written in two parts, so that this file does not find itself.
+    forbidden = re.compile("/wo" + r"rk/|\.\./sha" + "red|/ro" + r"ot/|/ho" + r"me/\w")
+    # The place of the recorded data when nothing else is said; both go without it.
+    allowed = {ROOT / "Makefile", ROOT / "tests" / "python" / "conftest.py"}
+    found = []
+    for file in repository_files():
+        if file in allowed:
+            continue
+        try:
+            lines = file.read_text().splitlines()
+        except UnicodeDecodeError:
+            continue  # a picture or a recording
+        found += [f"{file.relative_to(ROOT)}:{i}: {s}" for i, s in enumerate(lines, 1) if forbidden.search(s)]
+    assert not found, "\n".join(found)
+
+
+def test_public_names_exist_and_explain_themselves() -> None:
+    assert gaident.__all__
+    assert len(set(gaident.__all__)) == len(gaident.__all__)
+    for name in gaident.__all__:
+        thing = getattr(gaident, name)
+        if isinstance(thing, (type, types.FunctionType, types.ModuleType)):
+            assert (thing.__doc__ or "").strip(), f"gaident.{name} has no docstring"
+            # A dataclass writes its own signature where there is no docstring.
+            assert not (thing.__doc__ or "").startswith(f"{name}("), f"gaident.{name} has no docstring"
