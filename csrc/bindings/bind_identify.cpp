@@ -1,0 +1,188 @@
+#include "../gaident/decode.hpp"
+#include "../gaident/species.hpp"
+#include "bindings.hpp"
+
+using namespace gaident;
+
+namespace {
+
+using RecordTuple = std::tuple<RealArray, RealArray, double, std::string, double>;
+
+Start start_named(const std::string& name) {
+    if (name == "rest") return Start::rest;
+    if (name == "steady") return Start::steady;
+    if (name == "free") return Start::free;
+    throw std::invalid_argument("start must be 'rest', 'steady' or 'free', not '" + name + "'");
+}
+
+// The records of an identification, with the arrays they borrow.
+struct PyExperiment {
+    std::vector<RecordTuple> arrays;
+    Experiment experiment;
+    std::atomic<bool> stop{false};
+
+    PyExperiment(std::vector<RecordTuple> records, const std::string& loop, double kp, double ki, double torque_limit,
+                 double integrator_limit, const std::string& kernels)
+        : arrays(std::move(records)) {
+        for (const auto& [input, output, dt, start, velocity0] : arrays)
+            experiment.records.push_back(Record{view(input), view(output), dt, start_named(start), velocity0});
+        experiment.loop = make_loop(loop, kp, ki, torque_limit, integrator_limit);
+        if (!kernels.empty()) {
+            experiment.kernels = kernels_named(kernels.c_str());
+            if (experiment.kernels == nullptr)
+                throw std::invalid_argument("kernels: '" + kernels + "' is not available on this machine");
+        }
+        experiment.stop = &stop;
+        experiment.check();
+    }
+};
+
+struct PyRefined {
+    Refined r;
+};
+
+RefineOptions options_of(const std::optional<SearchRanges>& ranges, const std::vector<double>& whitening) {
+    RefineOptions o;
+    if (ranges) o.ranges = *ranges;
+    o.bounded = ranges.has_value();
+    o.whitening = whitening;
+    if (whitening.size() >= chunk_samples) throw std::invalid_argument("whitening: at most 511 coefficients");
+    return o;
+}
+
+std::vector<Trial> search_records(PyExperiment& e, const SearchRanges& ranges, const Settings& settings, int trials,
+                                  std::uint64_t seed, int workers, const std::optional<std::function<void(std::size_t, double)>>& report) {
+    std::vector<Trial> result;
+    Progress progress;
+    e.stop = false;
+    run_interruptibly(
+        e.stop, [&] { result = search(e.experiment, ranges, settings, trials, seed, workers, progress); },
+        [&] {
+            if (report) (*report)(progress.done.load(), progress.best.load());
+        });
+    return result;
+}
+
+// Refines several starting models at once: one list entry each, in the order given.
+std::vector<PyRefined> refine(PyExperiment& e, const std::vector<std::tuple<double, ComplexArray, ComplexArray, RealArray>>& models,
+                              const std::optional<SearchRanges>& ranges, const std::vector<double>& whitening, int max_iterations,
+                              int workers) {
+    std::vector<Factors<double>> factors;
+    std::vector<std::vector<double>> starts;
+    for (const auto& [gain, poles, zeros, start] : models) {
+        factors.push_back(make_factors(gain, poles, zeros));
+        starts.emplace_back(start.data(), start.data() + start.size());
+    }
+    std::vector<PyRefined> result(models.size());
+    const Refiner refiner(e.experiment, options_of(ranges, whitening));
+    e.stop = false;
+    run_interruptibly(
+        e.stop,
+        [&] {
+            parallel(models.size(), workers, [&](std::size_t i) { result[i].r = refiner.fit(factors[i], starts[i], max_iterations); });
+        },
+        [] {});
+    return result;
+}
+
+py::tuple sensitivities(PyExperiment& e, double gain, const ComplexArray& poles, const ComplexArray& zeros,
+                        const std::vector<double>& starts, const std::vector<double>& whitening) {
+    const Factors<double> g = make_factors(gain, poles, zeros);
+    std::vector<double> error, columns;
+    const Refiner refiner(e.experiment, options_of(std::nullopt, whitening));
+    e.stop = false;
+    run_interruptibly(
+        e.stop, [&] { refiner.sensitivities(g, starts, error, columns); }, [] {});
+    RealArray J({static_cast<py::ssize_t>(refiner.parameters(g.structure)), static_cast<py::ssize_t>(error.size())});
+    std::copy(columns.begin(), columns.end(), J.mutable_data());
+    std::vector<double> factors;
+    const auto pair = [&](Pair<double> f) { factors.insert(factors.end(), {f.e1, f.e0}); };
+    for (int i = 0; i < g.structure.pole_pairs(); ++i) pair(g.pole_pair[i]);
+    if (g.structure.single_pole()) factors.push_back(g.pole);
+    for (int i = 0; i < g.structure.zero_pairs(); ++i) pair(g.zero_pair[i]);
+    if (g.structure.single_zero()) factors.push_back(g.zero);
+    return py::make_tuple(to_array(error), J, to_array(factors));
+}
+
+std::tuple<double, ComplexArray, ComplexArray> decode_bits(const std::vector<Word>& words, const SearchRanges& ranges, bool gray,
+                                                           bool logarithmic) {
+    const Genome genome(ranges, gray ? Code::gray : Code::binary, logarithmic ? Scale::logarithmic : Scale::linear);
+    if (static_cast<int>(words.size()) != genome.words()) throw std::invalid_argument("words: wrong number of words for this genome");
+    const Factors<double> f = decode(words.data(), genome);
+    return {f.gain, poles_of(f), zeros_of(f)};
+}
+
+}  // namespace
+
+void bind_identify(py::module_& m) {
+    py::class_<SearchRanges>(m, "SearchRanges")
+        .def(py::init([](std::pair<double, double> gain, std::pair<double, double> real, std::pair<double, double> imaginary,
+                         std::pair<int, int> p, std::pair<int, int> q, int bits, double gain_scale) {
+                 return SearchRanges{{gain.first, gain.second}, {real.first, real.second}, {imaginary.first, imaginary.second},
+                                     p.first, p.second, q.first, q.second, bits, gain_scale};
+             }),
+             py::arg("gain"), py::arg("real"), py::arg("imaginary"), py::arg("p"), py::arg("q"), py::arg("bits"), py::arg("gain_scale") = 1.0);
+
+    py::class_<Settings>(m, "EngineSettings")
+        .def(py::init([](int population, int tournament, double crossover, double mutation, int generations, int elites, bool gray,
+                         bool logarithmic, double error_weight, double order_weight, bool species, int round, int quiet_rounds,
+                         bool in_float) {
+                 Settings s;
+                 s.population = population;
+                 s.tournament = tournament;
+                 s.crossover = crossover;
+                 s.mutation = mutation;
+                 s.generations = generations;
+                 s.elites = elites;
+                 s.code = gray ? Code::gray : Code::binary;
+                 s.roots = logarithmic ? Scale::logarithmic : Scale::linear;
+                 s.weights = {error_weight, order_weight};
+                 s.species = species;
+                 s.round = round;
+                 s.quiet_rounds = quiet_rounds;
+                 s.in_float = in_float;
+                 s.check();
+                 return s;
+             }),
+             py::arg("population"), py::arg("tournament"), py::arg("crossover"), py::arg("mutation"), py::arg("generations"),
+             py::arg("elites"), py::arg("gray"), py::arg("logarithmic"), py::arg("error_weight"), py::arg("order_weight"),
+             py::arg("species"), py::arg("round"), py::arg("quiet_rounds"), py::arg("in_float"));
+
+    py::class_<PyRefined>(m, "Refined")
+        .def_property_readonly("gain", [](const PyRefined& f) { return f.r.factors.gain; })
+        .def_property_readonly("poles", [](const PyRefined& f) { return poles_of(f.r.factors); })
+        .def_property_readonly("zeros", [](const PyRefined& f) { return zeros_of(f.r.factors); })
+        .def_property_readonly("p", [](const PyRefined& f) { return f.r.factors.structure.p; })
+        .def_property_readonly("q", [](const PyRefined& f) { return f.r.factors.structure.q; })
+        .def_property_readonly("starts", [](const PyRefined& f) { return to_array(f.r.starts); })
+        .def_property_readonly("cost", [](const PyRefined& f) { return f.r.cost; })
+        .def_property_readonly("iterations", [](const PyRefined& f) { return f.r.iterations; })
+        .def_property_readonly("converged", [](const PyRefined& f) { return f.r.converged; })
+        .def_property_readonly("at_bound", [](const PyRefined& f) { return f.r.at_bound; });
+
+    py::class_<Trial>(m, "Trial")
+        .def_property_readonly("history", [](const Trial& t) { return to_array(t.history); })
+        .def_property_readonly("best_fitness", [](const Trial& t) { return t.best_fitness; })
+        .def_property_readonly("best_generation", [](const Trial& t) { return t.best_generation; })
+        .def_property_readonly("best", [](const Trial& t) { return t.best; })
+        .def_property_readonly("evaluations", [](const Trial& t) { return t.evaluations; })
+        .def_property_readonly("species", [](const Trial& t) {
+            std::vector<PyRefined> all;
+            for (const Refined& r : t.species) all.push_back({r});
+            return all;
+        });
+
+    py::class_<PyExperiment>(m, "Experiment")
+        .def(py::init<std::vector<RecordTuple>, const std::string&, double, double, double, double, const std::string&>(),
+             py::arg("records"), py::arg("loop"), py::arg("kp"), py::arg("ki"), py::arg("torque_limit"),
+             py::arg("integrator_limit"), py::arg("kernels") = "")
+        .def_property_readonly("kernels", [](const PyExperiment& e) { return e.experiment.kernels->name; })
+        .def("search", &search_records, py::arg("ranges"), py::arg("settings"), py::arg("trials"), py::arg("seed"),
+             py::arg("workers"), py::arg("progress") = py::none())
+        .def("refine", &refine, py::arg("models"), py::arg("ranges"), py::arg("whitening"), py::arg("max_iterations"),
+             py::arg("workers"))
+        .def("sensitivities", &sensitivities, py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("starts"),
+             py::arg("whitening"));
+
+    m.def("decode", &decode_bits, py::arg("words"), py::arg("ranges"), py::arg("gray"), py::arg("logarithmic"));
+}

@@ -1,0 +1,54 @@
+#include "../gaident/simulate.hpp"
+#include "bindings.hpp"
+
+using namespace gaident;
+
+namespace {
+
+py::tuple simulate_model(double gain, const ComplexArray& poles, const ComplexArray& zeros, double dt, const RealArray& input,
+                         const std::string& loop, double kp, double ki, double torque_limit, double integrator_limit,
+                         const RealArray& initial_state, const std::string& arithmetic) {
+    const Factors<double> g = make_factors(gain, poles, zeros);
+    const Loop l = make_loop(loop, kp, ki, torque_limit, integrator_limit);
+    if (l.kind != LoopKind::continuous && g.structure.p < 1)
+        throw std::invalid_argument("poles: a model without more poles than zeros exists only in the continuous loop");
+    const auto states = static_cast<py::ssize_t>(start_states(g.structure, l));
+    if (initial_state.size() != 0 && initial_state.size() != states)
+        throw std::invalid_argument("initial_state: " + std::to_string(initial_state.size()) + " numbers given, " +
+                                    std::to_string(states) + " needed");
+    RealArray velocity(input.size()), torque(input.size());
+    const std::span<double> w{velocity.mutable_data(), static_cast<std::size_t>(input.size())};
+    const std::span<double> u{torque.mutable_data(), static_cast<std::size_t>(input.size())};
+    const std::span<const double> in = view(input);
+    const double* const start = initial_state.size() == 0 ? nullptr : initial_state.data();
+    {
+        const py::gil_scoped_release release;
+        if (arithmetic == "double") simulate<double>(g, in, dt, l, start, w, u);
+        else if (arithmetic == "float") simulate<float>(g, in, dt, l, start, w, u);
+        else throw std::invalid_argument("arithmetic must be 'double' or 'float', not '" + arithmetic + "'");
+    }
+    return py::make_tuple(velocity, torque);
+}
+
+py::tuple discrete_model(double gain, const ComplexArray& poles, const ComplexArray& zeros, double dt, const std::string& loop,
+                         double kp, double ki) {
+    const Factors<double> g = make_factors(gain, poles, zeros);
+    const Loop l = make_loop(loop, kp, ki, 0.0, 0.0);
+    if (l.kind != LoopKind::continuous && g.structure.p < 1)
+        throw std::invalid_argument("poles: a model without more poles than zeros exists only in the continuous loop");
+    const Delta<double> plant = plant_of(g, l, dt);
+    const Delta<double> h = l.kind == LoopKind::open ? plant : close_loop(plant, kp, ki, dt);
+    RealArray alpha(h.order + 1), beta(h.order);
+    powers_of_z(h, alpha.mutable_data(), beta.mutable_data());
+    return py::make_tuple(alpha, beta);
+}
+
+}  // namespace
+
+void bind_simulate(py::module_& m) {
+    m.def("simulate", &simulate_model, py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("dt"), py::arg("input"),
+          py::arg("loop"), py::arg("kp"), py::arg("ki"), py::arg("torque_limit"), py::arg("integrator_limit"),
+          py::arg("initial_state"), py::arg("arithmetic") = "double");
+    m.def("discrete", &discrete_model, py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("dt"), py::arg("loop"),
+          py::arg("kp"), py::arg("ki"));
+}

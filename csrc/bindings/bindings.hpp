@@ -1,0 +1,32 @@
+// Shared by the binding files: array types and the way long work is run so that Ctrl-C and progress reach Python.
+#pragma once
+
+#include "../gaident/engine.hpp"
+
+#include <pybind11/complex.h>
+#include <pybind11/functional.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <functional>
+
+namespace py = pybind11;
+
+using RealArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using ComplexArray = py::array_t<std::complex<double>, py::array::c_style | py::array::forcecast>;
+
+inline std::span<const double> view(const RealArray& a) { return {a.data(), static_cast<std::size_t>(a.size())}; }
+
+gaident::Loop make_loop(const std::string& kind, double kp, double ki, double torque_limit, double integrator_limit);
+gaident::Factors<double> make_factors(double gain, const ComplexArray& poles, const ComplexArray& zeros);
+ComplexArray poles_of(const gaident::Factors<double>& f);
+ComplexArray zeros_of(const gaident::Factors<double>& f);
+RealArray to_array(const std::vector<double>& v);
+
+// Runs `work` on a thread of its own with the GIL released; every 50 ms looks for Ctrl-C (sets `stop`, waits for the work to end, raises
+// KeyboardInterrupt) and calls `tick`. A Python exception raised by `tick` stops the work likewise.
+void run_interruptibly(std::atomic<bool>& stop, const std::function<void()>& work, const std::function<void()>& tick);
+
+void bind_simulate(py::module_& m);
+void bind_identify(py::module_& m);

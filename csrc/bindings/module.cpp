@@ -1,0 +1,7 @@
+#include "bindings.hpp"
+
+PYBIND11_MODULE(_core, m) {
+    m.doc() = "The core of gaident: recurrences, genetic search and local fit. Use the package's own functions instead.";
+    bind_simulate(m);
+    bind_identify(m);
+}

@@ -1,0 +1,86 @@
+// The centre of the core: simulate many candidates against the records.
+#pragma once
+
+#include "fitness.hpp"
+#include "kernels/kernels.hpp"
+#include "loop.hpp"
+#include "record.hpp"
+
+#include <atomic>
+#include <vector>
+
+namespace gaident {
+
+// Thrown inside the core when the stop flag is seen; the caller asked for it.
+struct Stopped {};
+
+struct Experiment {
+    std::vector<Record> records;
+    Loop loop;
+    const Kernels* kernels = &best_kernels();
+    const std::atomic<bool>* stop = nullptr;
+
+    void check() const;  // throws std::invalid_argument, naming what is wrong
+    std::size_t samples() const;
+    void stop_if_asked() const {
+        if (stop != nullptr && stop->load(std::memory_order_relaxed)) throw Stopped{};
+    }
+};
+
+// Number of states a record's start is described by: the plant's p + q, and the controller's stored torque in a closed loop.
+inline int start_states(Structure s, const Loop& loop) { return s.poles() + (loop.kind == LoopKind::open ? 0 : 1); }
+
+// Samples between two looks at the stop flag, and the chunk a long record is run in.
+inline constexpr std::size_t chunk_samples = 512;
+
+// The plant as the loop discretises it: bilinear in the continuous loop, behind a zero-order hold otherwise.
+Delta<double> plant_of(const Factors<double>& g, const Loop& loop, double sample_time);
+
+// The start of a record in steady motion: constant velocity y0 needs the torque y0 / G(0), which in a closed loop the integrator
+// holds. Writes start_states() numbers.
+void steady_start(const Delta<double>& plant, const Record& record, const Loop& loop, double* start);
+
+// Response (closed loop, or plant where the loop is stepped or open) and initial state of one candidate on one record.
+struct Prepared {
+    Delta<double> response;
+    double x[max_loop_order]{};
+    double s = 0.0;
+};
+
+// `start` holds start_states() numbers, or is null: then the record's own start (rest, or steady motion) is used.
+Prepared prepare(const Factors<double>& g, const Record& record, const Loop& loop, const double* start);
+
+template <class T, int W>
+void place(Group<T, W>& group, int lane, const Prepared& c) {
+    const int n = c.response.order;
+    for (int i = 0; i < group.order; ++i) {
+        group.a[i][lane] = static_cast<T>(i < n ? c.response.a[i] : 0.0);
+        group.x[i][lane] = static_cast<T>(i < n ? c.x[i] : 0.0);
+    }
+    for (int i = 0; i <= group.order; ++i) group.b[i][lane] = static_cast<T>(i <= n ? c.response.b[i] : 0.0);
+    group.s[lane] = static_cast<T>(c.s);
+}
+
+// Error sums of candidates of any mixture of structures. All memory is taken in the constructor.
+class Batch {
+public:
+    Batch(const Experiment& experiment, std::size_t capacity, bool in_float);
+
+    // sums[i] = sum over records and samples of (output - y_i)^2; worst_fitness where a candidate diverges.
+    void errors(std::span<const Factors<double>> candidates, std::span<double> sums);
+
+private:
+    template <class G, class T>
+    void run(const KernelSet<G, T>& kernels, G& group, std::span<const T> in, std::span<const T> out, const Record& record,
+             std::size_t count, double* sums);
+
+    const Experiment& experiment_;
+    bool in_float_;
+    std::vector<std::size_t> order_;      // candidates sorted by order, stable
+    std::vector<Prepared> prepared_;
+    std::vector<float> inputs_, outputs_;  // the records in float, one after the other
+    DoubleGroup double_group_;
+    FloatGroup float_group_;
+};
+
+}  // namespace gaident

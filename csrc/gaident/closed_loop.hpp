@@ -1,0 +1,64 @@
+// The linear closed loop as ONE difference equation (equation 7), in delta form: where a genetic run spends its life.
+//
+// With the plant B/A and the controller ((kp + ki Ts/2) delta + ki Ts)/delta,
+//
+//     N = (PI numerator) B,   D = delta A,   w/w* = N/(D + N)        (the algebraic loop, if any, is solved by dividing by
+//                                                                     the leading coefficient of D + N)
+#pragma once
+
+#include "controller.hpp"
+
+namespace gaident {
+
+template <class R>
+Delta<R> close_loop(const Delta<R>& plant, double kp, double ki, double sample_time) {
+    const R c1 = R(kp + 0.5 * ki * sample_time), c0 = R(ki * sample_time);
+    Delta<R> loop;
+    const int n = plant.order;
+    loop.order = n + 1;
+    R numerator[max_loop_order + 1], sum[max_loop_order + 1];
+    for (int i = 0; i <= n + 1; ++i) {
+        const R head = i <= n ? c1 * plant.b[i] : R(0.0);
+        numerator[i] = i > 0 ? head + c0 * plant.b[i - 1] : head;
+        const R d = i == 0 ? R(1.0) : (i <= n ? plant.a[i - 1] : R(0.0));
+        sum[i] = d + numerator[i];
+    }
+    for (int i = 0; i <= n; ++i) loop.a[i] = sum[i + 1] / sum[0];
+    for (int i = 0; i <= n + 1; ++i) loop.b[i] = numerator[i] / sum[0];
+    return loop;
+}
+
+// The recurrence, in observer form; every arithmetic runs these lines:
+//
+//     y(n)       = x[0](n) + b[0] r(n)
+//     x[i](n+1)  = x[i](n) + (x[i+1](n) - a[i] y(n) + b[i+1] r(n)),   x[N] = 0
+//
+// `N` is the order when known at compile time, so that the state lives in registers; -1 otherwise.
+template <class R, int N>
+[[gnu::always_inline]] inline R recurrence_step(int order, const R* a, const R* b, R* x, R r) {
+    const int n = N >= 0 ? N : order;
+    const R y = x[0] + b[0] * r;
+    for (int i = 0; i + 1 < n; ++i) x[i] = x[i] + ((x[i + 1] - a[i] * y) + b[i + 1] * r);
+    if (n > 0) x[n - 1] = x[n - 1] + (b[n] * r - a[n - 1] * y);
+    return y;
+}
+
+// A loop at constant velocity y0 under constant input r0, the state a record that starts in steady motion starts from.
+template <class R>
+void steady_state(const Delta<R>& h, double y0, double r0, R* x) {
+    const R y = R(y0), r = R(r0);
+    for (int i = 0; i < h.order; ++i) x[i] = i == 0 ? y - h.b[0] * r : h.a[i - 1] * y - h.b[i] * r;
+}
+
+// From the plant's states (observer form) and the controller's stored torque s to the states of the closed loop's difference equation:
+// (D + N) Y = N R + (delta + 1) (B s + delta X),  X = x[0] delta^(n-1) + ... + x[n-1].
+template <class R>
+void loop_state(const Delta<R>& plant, double kp, double ki, double sample_time, const R* x, R s, R* out) {
+    const R lead = R(1.0) + R(kp + 0.5 * ki * sample_time) * plant.b[0];
+    for (int i = 0; i <= plant.order; ++i) {
+        const R own = i < plant.order ? x[i] : R(0.0);
+        out[i] = (own + plant.b[i] * s) / lead;
+    }
+}
+
+}  // namespace gaident

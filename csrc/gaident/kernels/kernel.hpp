@@ -1,0 +1,137 @@
+// The one source of the sample loops; included by one .cpp per instruction set, each with its own tag type.
+#pragma once
+
+#include "../lanes.hpp"
+#include "../loop.hpp"
+#include "kernels.hpp"
+
+namespace gaident {
+
+template <class Isa>
+struct KernelSource {
+    template <class T, int W, int N>
+    struct Bank {  // a group in registers
+        using L = Lanes<T, W, Isa>;
+        static constexpr int capacity = N >= 0 ? (N > 0 ? N : 1) : max_loop_order;
+        L a[capacity], b[capacity + 1], x[capacity];
+        int order;
+
+        explicit Bank(const Group<T, W>& g) : order(N >= 0 ? N : g.order) {
+            for (int i = 0; i < order; ++i) a[i] = L::load(g.a[i]);
+            for (int i = 0; i <= order; ++i) b[i] = L::load(g.b[i]);
+            for (int i = 0; i < order; ++i) x[i] = L::load(g.x[i]);
+            if (order == 0) x[0] = L(0.0);
+        }
+        void save(Group<T, W>& g) const {
+            for (int i = 0; i < order; ++i) x[i].store(g.x[i]);
+        }
+    };
+
+    template <class T, int W, int N>
+    struct Linear {
+        static void errors(Group<T, W>& g, const T* input, const T* output, std::size_t n, T* sums) {
+            using L = Lanes<T, W, Isa>;
+            Bank<T, W, N> k(g);
+            L sum(0.0);
+            for (std::size_t i = 0; i < n; ++i) {
+                const L e = splat<T, W>(output[i]) -
+                            recurrence_step<L, N>(k.order, k.a, k.b, k.x, splat<T, W>(input[i]));
+                sum = sum + e * e;
+            }
+            k.save(g);
+            sum.store(sums);
+        }
+        static void outputs(Group<T, W>& g, const T* input, std::size_t n, T* y) {
+            using L = Lanes<T, W, Isa>;
+            Bank<T, W, N> k(g);
+            for (std::size_t i = 0; i < n; ++i)
+                recurrence_step<L, N>(k.order, k.a, k.b, k.x, splat<T, W>(input[i])).store(y + i * W);
+            k.save(g);
+        }
+    };
+
+    template <class T, int W, int N>
+    struct Stepped {
+        using L = Lanes<T, W, Isa>;
+        static SteppedLoop<L, N> loop_of(const Group<T, W>& g, const Controller<T>& c) {
+            SteppedLoop<L, N> loop{Controller<L>(Loop{}, 0.0)};
+            loop.pi.kp = splat<T, W>(c.kp);
+            loop.pi.g = splat<T, W>(c.g);
+            loop.pi.torque_limit = splat<T, W>(c.torque_limit);
+            loop.pi.integrator_limit = splat<T, W>(c.integrator_limit);
+            loop.pi.s = L::load(g.s);
+            return loop;
+        }
+        static void errors(Group<T, W>& g, const Controller<T>& c, const T* input, const T* output, std::size_t n, T* sums) {
+            Bank<T, W, N> k(g);
+            SteppedLoop<L, N> loop = loop_of(g, c);
+            L sum(0.0), u(0.0);
+            for (std::size_t i = 0; i < n; ++i) {
+                const L e = splat<T, W>(output[i]) - loop.step(k.order, k.a, k.b, k.x, splat<T, W>(input[i]), u);
+                sum = sum + e * e;
+            }
+            k.save(g);
+            loop.pi.s.store(g.s);
+            sum.store(sums);
+        }
+        static void outputs(Group<T, W>& g, const Controller<T>& c, const T* input, std::size_t n, T* y) {
+            Bank<T, W, N> k(g);
+            SteppedLoop<L, N> loop = loop_of(g, c);
+            L u(0.0);
+            for (std::size_t i = 0; i < n; ++i)
+                loop.step(k.order, k.a, k.b, k.x, splat<T, W>(input[i]), u).store(y + i * W);
+            k.save(g);
+            loop.pi.s.store(g.s);
+        }
+    };
+
+    template <class T, int W>
+    [[gnu::always_inline]] static inline Lanes<T, W, Isa> splat(T x) {
+        typename Lanes<T, W, Isa>::Vector v{};
+        return Lanes<T, W, Isa>(typename Lanes<T, W, Isa>::Vector(v + x));
+    }
+
+    // Orders up to 8 have a loop of their own, with the states in registers.
+    template <template <class, int, int> class Form, class T, int W, class Call>
+    static void by_order(int order, Call&& call) {
+        switch (order) {
+            case 0: return call(Form<T, W, 0>{});
+            case 1: return call(Form<T, W, 1>{});
+            case 2: return call(Form<T, W, 2>{});
+            case 3: return call(Form<T, W, 3>{});
+            case 4: return call(Form<T, W, 4>{});
+            case 5: return call(Form<T, W, 5>{});
+            case 6: return call(Form<T, W, 6>{});
+            case 7: return call(Form<T, W, 7>{});
+            case 8: return call(Form<T, W, 8>{});
+            default: return call(Form<T, W, -1>{});
+        }
+    }
+
+    template <class T, int W>
+    static void errors(Group<T, W>& g, const T* in, const T* out, std::size_t n, T* sums) {
+        by_order<Linear, T, W>(g.order, [&](auto form) { form.errors(g, in, out, n, sums); });
+    }
+    template <class T, int W>
+    static void outputs(Group<T, W>& g, const T* in, std::size_t n, T* y) {
+        by_order<Linear, T, W>(g.order, [&](auto form) { form.outputs(g, in, n, y); });
+    }
+    template <class T, int W>
+    static void stepped_errors(Group<T, W>& g, const Controller<T>& c, const T* in, const T* out, std::size_t n, T* sums) {
+        by_order<Stepped, T, W>(g.order, [&](auto form) { form.errors(g, c, in, out, n, sums); });
+    }
+    template <class T, int W>
+    static void stepped_outputs(Group<T, W>& g, const Controller<T>& c, const T* in, std::size_t n, T* y) {
+        by_order<Stepped, T, W>(g.order, [&](auto form) { form.outputs(g, c, in, n, y); });
+    }
+
+    template <class T, int W>
+    static constexpr KernelSet<Group<T, W>, T> set() {
+        return {errors<T, W>, outputs<T, W>, stepped_errors<T, W>, stepped_outputs<T, W>};
+    }
+    static Kernels all(const char* name) {
+        return {name, set<double, double_lanes>(), set<float, float_lanes>()};
+    }
+};
+
+}  // namespace gaident

@@ -1,0 +1,37 @@
+// The closed loop sample by sample, controller and plant apart: what the one difference equation cannot do, because
+// something in the loop is not linear. Here that is the controller's own limits; effects join at their places.
+#pragma once
+
+#include "closed_loop.hpp"
+
+namespace gaident {
+
+template <class R, int N>
+struct SteppedLoop {
+    Controller<R> pi;
+
+    // One sample: reads the plant's state, solves for torque u and velocity y of this sample, advances both.
+    //
+    // With direct feed-through b0 (bilinear plant) the velocity answers the torque within the sample:
+    //     y = h + b0 u,   e = r - y,   u = clamp(kp e + clamp(s + g e, Imax), umax).
+    // u falls as e falls and e falls as u rises, so the solution is unique; where a clamp acts the torque is known and
+    // the rest follows. Without feed-through (held plant, b0 = 0) the same lines reduce to the plain digital controller.
+    [[gnu::always_inline]] R step(int order, const R* a, const R* b, R* x, R r, R& u) {
+        const R h = r - x[0], one = R(1.0);
+        const R free_error = (h - b[0] * pi.s) / (one + b[0] * (pi.kp + pi.g));
+        const R I_free = pi.s + pi.g * free_error;
+        const R I = clamp(I_free, -pi.integrator_limit, pi.integrator_limit);
+        // Where I is clamped it is a constant, and the loop closes over kp alone; where not, both lines agree.
+        const R clamped_error = (h - b[0] * I) / (one + b[0] * pi.kp);
+        u = clamp(pi.kp * clamped_error + I, -pi.torque_limit, pi.torque_limit);
+        const R e = h - b[0] * u;
+        pi.s = clamp(pi.s + pi.g * e, -pi.integrator_limit, pi.integrator_limit) + pi.g * e;
+        const int n = N >= 0 ? N : order;
+        const R y = x[0] + b[0] * u;
+        for (int i = 0; i + 1 < n; ++i) x[i] = x[i] + ((x[i + 1] - a[i] * y) + b[i + 1] * u);
+        if (n > 0) x[n - 1] = x[n - 1] + (b[n] * u - a[n - 1] * y);
+        return y;
+    }
+};
+
+}  // namespace gaident

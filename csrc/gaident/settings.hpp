@@ -1,0 +1,51 @@
+// What a genetic run is told, and what it reports.
+#pragma once
+
+#include "fitness.hpp"
+#include "genome.hpp"
+#include "refine.hpp"
+
+namespace gaident {
+
+struct Settings {
+    int population = 50;
+    int tournament = 2;
+    double crossover = 0.9;
+    double mutation = 0.01;
+    int generations = 1000;  // with species: at most so many, in rounds
+    int elites = 0;          // with species: one per species, always
+    Code code = Code::binary;
+    Scale roots = Scale::linear;
+    FitnessWeights weights;
+    bool species = false;  // one species per structure, local fits, comparison left to the caller
+    int round = 40;        // generations between two local fits of every species
+    int quiet_rounds = 1;  // rounds without progress after which the search ends
+    bool in_float = false;
+
+    void check() const {
+        const auto bad = [](const std::string& what) { throw std::invalid_argument("Settings: " + what); };
+        if (population < 2 || population > 1000000) bad("population must be 2..1000000");
+        if (tournament < 1 || tournament > population) bad("tournament must be 1..population");
+        if (!(crossover >= 0.0 && crossover <= 1.0)) bad("crossover must be 0..1");
+        if (!(mutation >= 0.0 && mutation <= 1.0)) bad("mutation must be 0..1");
+        if (generations < 1) bad("generations must be at least 1");
+        if (elites < 0 || elites >= population) bad("elites must be 0..population-1");
+        if (round < 1 || quiet_rounds < 1) bad("round and quiet_rounds must be at least 1");
+    }
+};
+
+struct Trial {
+    std::vector<double> history;  // best fitness (equation 6) in each generation
+    double best_fitness = worst_fitness;  // ever seen by the genetic search
+    int best_generation = 0;
+    std::vector<Word> best;        // its chromosome
+    std::vector<Refined> species;  // with species: the local fit of each structure, by p + q, then q
+    std::size_t evaluations = 0;   // candidates simulated by the genetic search
+};
+
+struct Progress {
+    std::atomic<std::size_t> done{0};  // generations, of all trials together
+    std::atomic<double> best{worst_fitness};
+};
+
+}  // namespace gaident
