@@ -1,0 +1,7 @@
+"""Records of drives: what they are, how they are read from logs, and how signals are prepared."""
+
+from gaident.data.conditioning import differentiate
+from gaident.data.readers import read, read_columns
+from gaident.data.record import Record
+
+__all__ = ["Record", "differentiate", "read", "read_columns"]

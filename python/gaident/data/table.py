@@ -1,0 +1,192 @@
+"""What a log file holds, whatever its format: named columns, and where each value stands."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.arrays import first_not_finite
+from gaident.errors import ReadError
+
+__all__ = ["Column", "Table"]
+
+_NUMBER_SIGN = re.compile(r"#\s*(\d+)")
+_PICK = re.compile(r"(.+)\[\s*(:|-?\d+)\s*,\s*(:|-?\d+)\s*\]")
+_LISTED = 40
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column.
+
+    key      what the file calls it; unique in its table
+    values   shape (n,); a text cell that is no number is NaN
+    names    other names it answers to; need not be unique
+    unit     as the file says, None if it does not
+    bad      (row, text) of the first cell that is no number, None if all are
+    """
+
+    key: str
+    values: NDArray[Any]
+    names: tuple[str, ...] = ()
+    unit: str | None = None
+    bad: tuple[int, str] | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """All columns of one file.
+
+    path      named in every message
+    columns   in the order of the file
+    lines     line number of each row, for text files; None where only an index makes sense
+    matrices  two-dimensional arrays, addressed as `data[:,3]`, zero based
+    others    names of what the file holds besides, such as text, which cannot be a channel
+    """
+
+    path: str
+    columns: tuple[Column, ...]
+    lines: Sequence[int] | None = None
+    matrices: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    others: tuple[str, ...] = ()
+
+    def place(self, row: int) -> str:
+        """Where a row stands, for messages."""
+        return f"index {row}" if self.lines is None else f"line {self.lines[row]}"
+
+    def find(self, address: str | int, channel: str) -> Column:
+        """The column called `address`: a name, `#k` or k (zero based), or `data[:,k]`.
+
+        Raises ReadError, naming what there is, when none or more than one answers.
+        """
+        if isinstance(address, bool) or not isinstance(address, str | int | np.integer):
+            raise ReadError(
+                f"columns: {channel}={address!r} is no column; give its name, or its number as '#0'"
+            )
+        wanted = address.strip() if isinstance(address, str) else f"#{address}"
+        # The number comes before loose spellings, but a column may really be called '#1'.
+        for matches in (
+            self._exactly(wanted),
+            self._number(wanted),
+            self._pick(wanted, channel),
+            self._loosely(wanted),
+        ):
+            if len(matches) == 1:
+                return matches[0]
+            if matches:
+                raise ReadError(self._ambiguous(wanted, matches))
+        raise ReadError(self._missing(wanted, channel))
+
+    def own(self, name: str) -> Column | None:
+        """The column that bears exactly this name, None if there is none; ReadError if there are several."""
+        matches = self._exactly(name)
+        if len(matches) > 1:
+            raise ReadError(self._ambiguous(name, matches))
+        return matches[0] if matches else None
+
+    def numbers(self, column: Column, channel: str) -> NDArray[np.float64]:
+        """A column as float64, shape (n,), all finite; else ReadError with the first line that is not."""
+        where = f"{channel} column {column.key!r}"
+        values = column.values
+        if values.dtype.kind not in "iufb":
+            raise ReadError(
+                f"{self.path}: {where} holds no real numbers (dtype {values.dtype}); name another column, "
+                f"or save its real part"
+            )
+        bad = first_not_finite(values.astype(np.float64, copy=False))
+        if column.bad is not None and (bad is None or column.bad[0] <= bad):
+            row, text = column.bad
+            raise ReadError(
+                f"{self.path}, {self.place(row)}: {where} "
+                f"{'is empty' if not text else f'holds {text!r}, not a number'}"
+                f"{_comma_hint(text)}; correct or remove that {'line' if self.lines is not None else 'value'}"
+            )
+        if bad is not None:
+            raise ReadError(
+                f"{self.path}, {self.place(bad)}: {where} holds {values[bad]}; "
+                f"cut the log before it, or correct the value"
+            )
+        return values.astype(np.float64, copy=False)
+
+    def listing(self) -> str:
+        """The columns, for messages."""
+        keys = [repr(column.key) for column in self.columns]
+        shown = ", ".join(keys[:_LISTED]) + (
+            f" and {len(keys) - _LISTED} more" if len(keys) > _LISTED else ""
+        )
+        rest = f"; besides {', '.join(self.others)}, which are no columns of numbers" if self.others else ""
+        return (shown or "no columns") + rest
+
+    def _exactly(self, wanted: str) -> list[Column]:
+        by_key = [column for column in self.columns if column.key == wanted]
+        return by_key or [column for column in self.columns if wanted in column.names]
+
+    def _number(self, wanted: str) -> list[Column]:
+        match = _NUMBER_SIGN.fullmatch(wanted)
+        return [self.columns[int(match[1])]] if match and int(match[1]) < len(self.columns) else []
+
+    def _loosely(self, wanted: str) -> list[Column]:
+        plain = wanted.casefold()
+        return [
+            column
+            for column in self.columns
+            if plain in {name.casefold() for name in (column.key, *column.names)}
+        ]
+
+    def _pick(self, wanted: str, channel: str) -> list[Column]:
+        """`data[:,3]` or `data[2,:]` out of a matrix."""
+        if wanted in self.matrices:
+            rows, cols = self.matrices[wanted].shape
+            raise ReadError(
+                f"{self.path}: {channel}={wanted!r} is an array of {rows} x {cols}; name one column of it, "
+                f"for example '{wanted}[:,0]' (zero based, as numpy counts)"
+            )
+        match = _PICK.fullmatch(wanted)
+        if match is None or match[1].strip() not in self.matrices or (match[2] == ":") == (match[3] == ":"):
+            return []
+        matrix = self.matrices[match[1].strip()]
+        axis = 1 if match[2] == ":" else 0
+        index, size = int(match[3] if axis else match[2]), matrix.shape[axis]
+        if not -size <= index < size:
+            raise ReadError(
+                f"{self.path}: {channel}={wanted!r}, but {match[1]} is an array of {matrix.shape[0]} x "
+                f"{matrix.shape[1]}; give an index from 0 to {size - 1} (zero based)"
+            )
+        return [Column(wanted, matrix[:, index] if axis else matrix[index, :])]
+
+    def _ambiguous(self, wanted: str, matches: list[Column]) -> str:
+        numbers = ", ".join(repr(f"#{self.columns.index(column)}") for column in matches)
+        return (
+            f"{self.path}: {len(matches)} columns are called {wanted!r}; say which by its number, counted "
+            "from 0: "
+            f"one of {numbers}"
+        )
+
+    def _missing(self, wanted: str, channel: str) -> str:
+        names = {name.casefold(): name for column in self.columns for name in (*column.names, column.key)}
+        near = difflib.get_close_matches(wanted.casefold(), names, n=1)
+        guess = f" (did you mean {names[near[0]]!r}?)" if near else ""
+        return (
+            f"{self.path}: there is no column {wanted!r} for {channel}{guess}; the file holds "
+            f"{self.listing()}; "
+            f"name one of these in columns={{{channel!r}: ...}}, or give a number such as '#0' (zero based)"
+        )
+
+
+def _comma_hint(text: str) -> str:
+    """What to say about a cell that would be a number with another decimal mark."""
+    if re.fullmatch(r"[+-]?\d+,\d+([eE][+-]?\d+)?", text):
+        return " (a decimal comma? then give decimal=',')"
+    if re.fullmatch(r"[+-]?\d+\.\d+", text):
+        return (
+            " (a point in a log with decimal commas? export it with one decimal mark and none for thousands)"
+        )
+    if re.fullmatch(r"[+-]?\d{1,3}([.,' ]\d{3})+([.,]\d+)?", text):
+        return " (a mark between thousands? export the log without it)"
+    return ""
