@@ -1,0 +1,54 @@
+"""Checks that the classes of this room share: a number, a name out of a list, the keys of a dictionary."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+
+from gaident.errors import GaidentError
+
+
+def real_number(value: object, name: str, error: type[GaidentError],
+                remedy: str = "give one finite number") -> float:
+    """`value` as a finite float; raises `error` naming `name`, the value and the remedy."""
+    # A string is no number here even where float() could read it: it is mostly a forgotten conversion.
+    if isinstance(value, (str, bytes)):
+        raise error(f"{name} is {value!r}: {remedy}")
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise error(f"{name} is {value!r}: {remedy}") from None
+    if not math.isfinite(number):
+        raise error(f"{name} is {value!r}: {remedy}")
+    return number
+
+
+def one_of(value: object, name: str, allowed: Iterable[str], error: type[GaidentError]) -> str:
+    """`value` if it is one of the `allowed` names; raises `error` with the nearest name."""
+    names = list(allowed)
+    if isinstance(value, str) and value in names:
+        return value
+    raise error(f"{name} is {value!r}: it must be one of {', '.join(names)}{_nearest(value, names)}")
+
+
+def known_keys(data: object, what: str, allowed: Iterable[str], needed: Iterable[str],
+               error: type[GaidentError]) -> dict[str, object]:
+    """`data` as a dictionary with all `needed` and only `allowed` keys; raises `error` otherwise."""
+    names = list(allowed)
+    if not isinstance(data, Mapping):
+        raise error(f"{what} is a {type(data).__name__}: give a dictionary with the keys {', '.join(names)}")
+    for key in data:
+        if key not in names:
+            raise error(f"{what} has the key {key!r}: its keys are {', '.join(names)}{_nearest(key, names)}")
+    missing = [name for name in needed if name not in data]
+    if missing:
+        raise error(f"{what} lacks {', '.join(missing)}: its keys are {', '.join(names)}")
+    return dict(data)
+
+
+def _nearest(value: object, names: list[str]) -> str:
+    close = difflib.get_close_matches(str(value).lower(), [name.lower() for name in names], n=1)
+    if not close:
+        return ""
+    return f" (did you mean {next(name for name in names if name.lower() == close[0])!r}?)"

@@ -1,0 +1,99 @@
+"""The natural parameters of a model: one vector of real numbers, smooth where roots merge.
+
+    x = (gain, a of each real pole (s + a), e1 and e0 of each pole pair (s^2 + e1 s + e0), the same for zeros)
+
+in the order in which Model keeps its roots. Covariances of a model are written over this vector.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gaident.errors import ModelError
+from gaident.models.model import Model
+from gaident.models.roots import quadratic_roots
+
+
+class Structure(NamedTuple):
+    """How many real roots and conjugate pairs a model has."""
+
+    real_poles: int
+    pole_pairs: int
+    real_zeros: int
+    zero_pairs: int
+
+    @classmethod
+    def of(cls, model: Model) -> Structure:
+        """The structure of `model`."""
+        pole_pairs = sum(r.imag > 0.0 for r in model.poles)
+        zero_pairs = sum(r.imag > 0.0 for r in model.zeros)
+        return cls(len(model.poles) - 2 * pole_pairs, pole_pairs,
+                   len(model.zeros) - 2 * zero_pairs, zero_pairs)
+
+    @property
+    def size(self) -> int:
+        """Length of x."""
+        return 1 + self.real_poles + 2 * self.pole_pairs + self.real_zeros + 2 * self.zero_pairs
+
+    @property
+    def p(self) -> int:
+        """Poles in excess of zeros."""
+        return self.real_poles + 2 * self.pole_pairs - self.q
+
+    @property
+    def q(self) -> int:
+        """Number of zeros."""
+        return self.real_zeros + 2 * self.zero_pairs
+
+
+def factor_parameters(model: Model) -> tuple[tuple[str, ...], NDArray[np.float64], tuple[str, ...]]:
+    """(names, values, units) of x, each of length Structure.of(model).size.
+
+    Names: "gain", "pole_1", "pole_pair_1_e1", "pole_pair_1_e0", "zero_1", "zero_pair_1_e1", ...; counted
+    from 1 within their kind. Note the sign: the value of "pole_1" is a = -pole, the paper's A.
+    """
+    names, values, units = ["gain"], [model.gain], [gain_unit(model.p)]
+    for kind, roots in (("pole", model.poles), ("zero", model.zeros)):
+        for i, root in enumerate((r for r in roots if r.imag == 0.0), start=1):
+            names.append(f"{kind}_{i}")
+            values.append(-root.real)
+            units.append("rad/s")
+        for i, root in enumerate((r for r in roots if r.imag > 0.0), start=1):
+            names += [f"{kind}_pair_{i}_e1", f"{kind}_pair_{i}_e0"]
+            values += [-2.0 * root.real, root.real**2 + root.imag**2]
+            units += ["rad/s", "rad^2/s^2"]
+    return tuple(names), np.array(values, dtype=np.float64), tuple(units)
+
+
+def model_from_factor_parameters(values: ArrayLike, structure: Structure) -> Model:
+    """The model of the vector x; the inverse of `factor_parameters`.
+
+    A pair with e1^2 >= 4 e0 has two real roots: the model then has another Structure than the one given.
+    Raises ModelError for a vector of the wrong length or a value that is not finite.
+    """
+    x = np.asarray(values, dtype=np.float64)
+    if x.shape != (structure.size,):
+        raise ModelError(f"values has the shape {x.shape}: {structure} takes {structure.size} numbers")
+    if not np.all(np.isfinite(x)):
+        i = int(np.flatnonzero(~np.isfinite(x))[0])
+        raise ModelError(f"values[{i}] is {x[i]}: every parameter must be finite")
+    poles_end = 1 + structure.real_poles + 2 * structure.pole_pairs
+    poles = _roots(x[1:poles_end], structure.real_poles)
+    zeros = _roots(x[poles_end:], structure.real_zeros)
+    return Model(float(x[0]), poles, zeros)
+
+
+def gain_unit(p: int) -> str:
+    """Unit of the gain of a model with p poles in excess: (rad/s)^p rad/s per N m."""
+    return "rad/s/(N m)" if p == 0 else f"rad/s^{p + 1}/(N m)"
+
+
+def _roots(x: NDArray[np.float64], reals: int) -> Sequence[complex]:
+    roots = [complex(-a, 0.0) for a in x[:reals]]
+    for e1, e0 in x[reals:].reshape(-1, 2):
+        roots += quadratic_roots(float(e1), float(e0))
+    return roots

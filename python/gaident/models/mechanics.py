@@ -1,0 +1,281 @@
+"""One and two masses: from mechanical parameters to the factored model and back (METHOD.md section 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gaident.errors import ModelError
+from gaident.models import two_mass
+from gaident.models._checks import known_keys, one_of, real_number
+from gaident.models.factors import Structure
+from gaident.models.model import Model
+from gaident.models.roots import polynomial_roots
+from gaident.models.two_mass import Matrix, Vector
+from gaident.models.two_mass_fit import deviations, fit_two_masses
+
+
+@dataclass(frozen=True)
+class OneMass:
+    """A rigid drive: J dw/dt = torque - D w.
+
+    J  moment of inertia [kg m^2], > 0
+    D  viscous damping [N m s/rad], >= 0
+
+    Results of an identification carry `inconsistency` (0: two numbers, two parameters) and, where a
+    covariance was known, the standard deviations `std` by field name. They may be unphysical:
+    see `notes`. Raises ModelError.
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {"J": "kg m^2", "D": "N m s/rad"}
+
+    J: float
+    D: float
+    inconsistency: float | None = None
+    std: Mapping[str, float] = field(default_factory=dict, hash=False)
+
+    def __post_init__(self) -> None:
+        _check(self, positive=("J",), not_negative=("D",))
+
+    def model(self) -> Model:
+        """K = 1/J, A11 = D/J (equation 4)."""
+        return Model(1.0 / self.J, [-self.D / self.J])
+
+    @classmethod
+    def from_model(cls, model: Model) -> OneMass:
+        """The mechanism of a model with p = 1, q = 0; raises ModelError for any other structure."""
+        _require(model, 1, 0, "one-mass")
+        return _one_mass(model, None)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not physical, one sentence each; a damping may be negative by two standard deviations."""
+        return _notes(self, ("J",), ("D",), 0.0)
+
+    @property
+    def physical(self) -> bool:
+        """True if `notes` is empty: such a mechanism can exist."""
+        return not self.notes
+
+    def to_dict(self) -> dict[str, Any]:
+        """The mechanism for JSON; `mechanics_from_dict` is the inverse."""
+        return {"structure": "one mass", **asdict(self)}
+
+
+@dataclass(frozen=True)
+class TwoMass:
+    """Motor and load on a shaft (Fig. 1b of the paper), torque and measured velocity at the motor.
+
+    JM, JL  moments of inertia of motor and load [kg m^2], > 0
+    DM, DL  their viscous damping [N m s/rad], >= 0
+    KG      stiffness of the shaft [N m/rad], > 0
+    DG      damping in the shaft [N m s/rad], >= 0; the paper has 0
+
+    Results of an identification carry `inconsistency` (see `mechanics_from_model`), where a covariance was
+    known the standard deviations `std` (by field name, and "J", "D", "inconsistency"), and
+    `with_shaft_damping`, the mechanism with DG free. They may be unphysical: see `notes`. Raises ModelError.
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "JM": "kg m^2", "DM": "N m s/rad", "JL": "kg m^2", "DL": "N m s/rad", "KG": "N m/rad",
+        "DG": "N m s/rad", "J": "kg m^2", "D": "N m s/rad",
+    }
+
+    JM: float
+    DM: float
+    JL: float
+    DL: float
+    KG: float
+    DG: float = 0.0
+    inconsistency: float | None = None
+    std: Mapping[str, float] = field(default_factory=dict, hash=False)
+    with_shaft_damping: TwoMass | None = None
+
+    def __post_init__(self) -> None:
+        _check(self, positive=("JM", "JL", "KG"), not_negative=("DM", "DL", "DG"))
+
+    def model(self) -> Model:
+        """The factored model (equation 5), p = 1 and q = 2."""
+        if self.JM == 0.0 or self.JL == 0.0:
+            raise ModelError(f"JM is {self.JM:g} and JL is {self.JL:g}: "
+                             "without inertia there is no two-mass model")
+        c = two_mass.coefficients_of_mechanics(self._vector())
+        return Model(c[0], polynomial_roots(c[1:4]), polynomial_roots(c[4:6]))
+
+    @classmethod
+    def from_model(cls, model: Model, free_shaft_damping: bool = False) -> TwoMass:
+        """The mechanism of a model with p = 1, q = 2.
+
+        At DG = 0 (least squares in relative deviations), or with DG free, which meets all six numbers.
+        Raises ModelError for any other structure and where no such mechanism exists.
+        """
+        _require(model, 1, 2, "two-mass")
+        found = _two_masses(model, None)
+        if found is None:
+            raise ModelError("zeros has a root at 0: no stiffness between two masses gives that; "
+                             "use a one-mass model")
+        if not free_shaft_damping:
+            return found
+        if found.with_shaft_damping is None:
+            raise ModelError(f"{model!r} is no two-mass system with any shaft damping: "
+                             "use free_shaft_damping=False and look at its inconsistency")
+        return found.with_shaft_damping
+
+    @property
+    def J(self) -> float:
+        """Total moment of inertia JM + JL [kg m^2]."""
+        return self.JM + self.JL
+
+    @property
+    def D(self) -> float:
+        """Total viscous damping DM + DL [N m s/rad]."""
+        return self.DM + self.DL
+
+    @property
+    def antiresonance(self) -> float:
+        """Undamped natural frequency of the load on the shaft, sqrt(KG/JL) [rad/s]; nan if imaginary."""
+        return _root(self.KG / self.JL) if self.JL else float("nan")
+
+    @property
+    def resonance(self) -> float:
+        """Undamped natural frequency of both masses, sqrt(KG/JL + KG/JM) [rad/s]; nan if imaginary."""
+        return _root(self.KG / self.JL + self.KG / self.JM) if self.JL and self.JM else float("nan")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not physical, one sentence each; a damping may be negative by two standard deviations."""
+        rounding = 1e-9 * abs(self.JM * self.KG) ** 0.5
+        return _notes(self, ("JM", "JL", "KG"), ("DM", "DL", "DG"), rounding)
+
+    @property
+    def physical(self) -> bool:
+        """True if `notes` is empty: such a mechanism can exist."""
+        return not self.notes
+
+    def to_dict(self) -> dict[str, Any]:
+        """The mechanism for JSON; `mechanics_from_dict` is the inverse."""
+        data = {"structure": "two masses", **asdict(self)}
+        if self.with_shaft_damping is not None:
+            data["with_shaft_damping"] = self.with_shaft_damping.to_dict()
+        return data
+
+    def _vector(self) -> Vector:
+        return np.array([self.JM, self.DM, self.JL, self.DL, self.KG, self.DG])
+
+
+Mechanics = OneMass | TwoMass
+
+
+def mechanics_from_model(model: Model, covariance: ArrayLike | None = None) -> Mechanics | None:
+    """The mechanism behind a model: OneMass for p = 1, q = 0; TwoMass for p = 1, q = 2; otherwise None.
+
+    covariance: of the natural parameters x of the model, n x n in the order of `factor_parameters(model)`.
+    With it the result carries standard deviations, to first order. Raises ModelError if it is not such a
+    matrix.
+
+    The six numbers of a two-mass model over-determine its five parameters at DG = 0. The result is their
+    least squares, weighted with the covariance (without one: in relative deviations). Its `inconsistency` is
+    abs(1 - K_G by product / K_G by pairwise): how far the two equations for the stiffness are apart; compare
+    it with std["inconsistency"]. Its `with_shaft_damping` meets all six numbers. What comes out unphysical is
+    data: see `notes`. With a zero at 0 there is no two-mass mechanism: None.
+    """
+    cov = _checked_covariance(model, covariance)
+    if (model.p, model.q) == (1, 0):
+        return _one_mass(model, cov)
+    if (model.p, model.q) == (1, 2):
+        return _two_masses(model, cov)
+    return None
+
+
+def mechanics_from_dict(data: Mapping[str, Any]) -> Mechanics:
+    """The inverse of `OneMass.to_dict` and `TwoMass.to_dict`."""
+    kinds: dict[str, tuple[type[OneMass] | type[TwoMass], tuple[str, ...], tuple[str, ...]]] = {
+        "one mass": (OneMass, ("J", "D"), ("inconsistency", "std")),
+        "two masses": (TwoMass, ("JM", "DM", "JL", "DL", "KG"),
+                       ("DG", "inconsistency", "std", "with_shaft_damping")),
+    }
+    name = one_of(data.get("structure"), "structure", kinds, ModelError)
+    kind, needed, more = kinds[name]
+    values: dict[str, Any] = known_keys(data, name, ("structure", *needed, *more), needed, ModelError)
+    del values["structure"]
+    if values.get("with_shaft_damping") is not None:
+        values["with_shaft_damping"] = mechanics_from_dict(values["with_shaft_damping"])
+    return kind(**values)
+
+
+def _one_mass(model: Model, cov: Matrix | None) -> OneMass:
+    K, a = model.gain, -model.poles[0].real
+    std = {}
+    if cov is not None:
+        std = deviations(np.array([[-1.0 / K**2, 0.0], [-a / K**2, 1.0 / K]]), cov, ("J", "D"))
+    return OneMass(1.0 / K, a / K + 0.0, 0.0, std)
+
+
+def _two_masses(model: Model, cov: Matrix | None) -> TwoMass | None:
+    found = fit_two_masses(model, cov)
+    if found is None:
+        return None
+    damped = None if found.shaft is None else _named(found.shaft, 0.0, found.shaft_std, None)
+    return _named(found.mechanics, found.inconsistency, found.std, damped)
+
+
+def _named(v: Vector, inconsistency: float, std: dict[str, float], damped: TwoMass | None) -> TwoMass:
+    JM, DM, JL, DL, KG, DG = (float(value) for value in v)
+    return TwoMass(JM, DM, JL, DL, KG, DG, inconsistency, std, damped)
+
+
+def _require(model: Model, p: int, q: int, name: str) -> None:
+    if (model.p, model.q) != (p, q):
+        raise ModelError(f"the model has p = {model.p}, q = {model.q}, but a {name} mechanism has p = {p}, "
+                         f"q = {q}: identify that structure, or let mechanics_from_model choose")
+
+
+def _check(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str, ...]) -> None:
+    for name in positive + not_negative:
+        unit = drive.UNITS[name]
+        value = real_number(getattr(drive, name), name, ModelError, f"give one finite number in {unit}")
+        object.__setattr__(drive, name, value)
+        # What an identification found is data, however odd: see `notes`.
+        if drive.inconsistency is None and (value < 0.0 or (value == 0.0 and name in positive)):
+            least = "> 0" if name in positive else ">= 0"
+            raise ModelError(f"{name} is {value:g}: give a number {least} in {unit}")
+    object.__setattr__(drive, "std", dict(drive.std))
+
+
+def _notes(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str, ...],
+           rounding: float) -> tuple[str, ...]:
+    found = []
+    for name in positive + not_negative:
+        value, text = getattr(drive, name), f"{name} = {getattr(drive, name):.4g} {drive.UNITS[name]}"
+        if name in positive and value <= 0.0:
+            found.append(f"{text} is not positive")
+        elif name in not_negative and value < -max(2.0 * drive.std.get(name, 0.0), rounding):
+            found.append(f"{text} is negative")
+    return tuple(found)
+
+
+def _checked_covariance(model: Model, covariance: ArrayLike | None) -> Matrix | None:
+    if covariance is None:
+        return None
+    n = Structure.of(model).size
+    cov = np.array(covariance, dtype=np.float64)
+    if cov.shape != (n, n):
+        raise ModelError(f"covariance has the shape {cov.shape}: this model has {n} natural parameters, "
+                         f"give {n} x {n} numbers in the order of factor_parameters(model)")
+    bad = np.argwhere(~np.isfinite(cov))
+    if len(bad):
+        i, j = (int(k) for k in bad[0])
+        raise ModelError(f"covariance[{i}, {j}] is {cov[i, j]}: every entry must be finite; without a usable "
+                         "covariance give None")
+    if np.any(np.diag(cov) < 0.0) or not np.allclose(cov, cov.T, rtol=1e-6, atol=0.0):
+        raise ModelError("covariance is not symmetric with a diagonal >= 0: give a covariance matrix")
+    symmetric: Matrix = 0.5 * (cov + cov.T)
+    return symmetric
+
+
+def _root(value: float) -> float:
+    return value**0.5 if value >= 0.0 else float("nan")

@@ -1,0 +1,179 @@
+"""The factored transfer function G(s) = K prod 1/(s + A1) prod (s + B2)/(s + A2) (the paper's equation 2)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gaident.errors import ModelError
+from gaident.models._checks import known_keys, real_number
+from gaident.models.controller import PI
+from gaident.models.roots import canonical_roots
+
+Roots = Sequence[complex] | NDArray[np.complex128] | NDArray[np.float64]
+
+
+class Mode(NamedTuple):
+    """One real root or one conjugate pair, as a row of a table."""
+
+    kind: str                 # "pole" or "zero"
+    root: complex             # rad/s; of a pair the member with positive imaginary part
+    natural_frequency: float  # abs(root), rad/s
+    damping: float            # -Re(root)/abs(root); 1 for a stable real root, nan for a root at 0
+
+    @property
+    def frequency_hz(self) -> float:
+        """Natural frequency in Hz."""
+        return self.natural_frequency / (2.0 * math.pi)
+
+
+@dataclass(frozen=True, eq=False)
+class Discrete:
+    """Equation (7): w(n) = sum_{i=0..N} alpha_i r(n-i) + sum_{i=1..N} beta_i w(n-i).
+
+    alpha: N+1 numbers for the command (without a controller: the torque); beta: N numbers, beta[0] is beta_1.
+    """
+
+    alpha: NDArray[np.float64]
+    beta: NDArray[np.float64]
+
+
+@dataclass(frozen=True, init=False, repr=False)
+class Model:
+    """A drive as gain, poles and zeros: torque [N m] to motor velocity [rad/s].
+
+        G(s) = gain * prod(s - zeros) / prod(s - poles)
+
+    gain    real, not 0; for p = 1 it is 1/J_M [1/(kg m^2)]
+    poles   roots of the denominator [rad/s] (the paper's -A: a stable pole has a negative real part)
+    zeros   roots of the numerator [rad/s] (the paper's -B), at most as many as poles
+
+    Complex roots come in conjugate pairs, in any order; asymmetry by rounding (1e-9 relative) is repaired.
+    They are kept in one order: real roots by ascending magnitude, then pairs by ascending magnitude, positive
+    imaginary part first. So equal models compare equal. Raises ModelError.
+    """
+
+    gain: float
+    poles: tuple[complex, ...]
+    zeros: tuple[complex, ...]
+
+    def __init__(self, gain: float, poles: Roots = (), zeros: Roots = ()) -> None:
+        number = real_number(gain, "gain", ModelError, "give one finite real number, not 0")
+        if number == 0.0:
+            raise ModelError("gain is 0: such a model never moves; give one finite real number, not 0")
+        object.__setattr__(self, "gain", number)
+        object.__setattr__(self, "poles", canonical_roots(poles, "poles"))
+        object.__setattr__(self, "zeros", canonical_roots(zeros, "zeros"))
+        if len(self.zeros) > len(self.poles):
+            raise ModelError(f"zeros has {len(self.zeros)} roots and poles {len(self.poles)}: a drive has at "
+                             "least as many poles as zeros; drop zeros or add poles")
+
+    @property
+    def p(self) -> int:
+        """Number of modules 1/(s + A1): poles in excess of zeros."""
+        return len(self.poles) - len(self.zeros)
+
+    @property
+    def q(self) -> int:
+        """Number of modules (s + B2)/(s + A2): zeros."""
+        return len(self.zeros)
+
+    @property
+    def order(self) -> int:
+        """Number of poles, p + q."""
+        return len(self.poles)
+
+    @property
+    def stable(self) -> bool:
+        """True if every pole has a negative real part (an integrating drive, with a pole at 0, is not)."""
+        return all(pole.real < 0.0 for pole in self.poles)
+
+    @property
+    def static_gain(self) -> float:
+        """G(0) [rad/s per N m]: where a constant torque of 1 N m ends; infinite with a pole at 0."""
+        integrators = self.poles.count(0.0) - self.zeros.count(0.0)
+        if integrators < 0:
+            return 0.0
+        numerator = math.prod((-zero for zero in self.zeros if zero != 0.0), start=1.0 + 0.0j)
+        denominator = math.prod((-pole for pole in self.poles if pole != 0.0), start=1.0 + 0.0j)
+        value = self.gain * (numerator / denominator).real
+        return value if integrators == 0 else math.copysign(math.inf, value)
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """Natural frequency and damping, one row per real root and per pair; poles first."""
+        rows = []
+        for kind, roots in (("pole", self.poles), ("zero", self.zeros)):
+            for root in roots:
+                if root.imag >= 0.0:
+                    magnitude = abs(root)
+                    damping = -root.real / magnitude if magnitude else math.nan
+                    rows.append(Mode(kind, root, magnitude, damping))
+        return tuple(rows)
+
+    def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
+        """G(j omega), complex, of the shape of `omega` [rad/s]; not finite where j omega is a pole."""
+        s = 1j * np.asarray(omega, dtype=np.float64)
+        response = np.full(s.shape, complex(self.gain))
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            # Zero over pole in turn, so that no partial product leaves the range of the numbers.
+            for i, pole in enumerate(self.poles):
+                if i < self.q:
+                    response *= s - self.zeros[i]
+                response /= s - pole
+        return response
+
+    def discrete(self, dt: float, controller: PI | None = None) -> Discrete:
+        """The difference equation (7) from command to velocity at sample time `dt` [s].
+
+        Bilinear or held as the controller's loop says, its limits left out (the equation is linear); without
+        a controller from torque to velocity by zero-order hold. Raises ModelError (dt; p = 0 in a sampled
+        loop).
+        """
+        from gaident.models.simulate import discrete
+        return discrete(self, dt, controller)
+
+    def to_scipy(self) -> Any:
+        """The same as scipy.signal.ZerosPolesGain (an lti system)."""
+        from scipy import signal
+        return signal.ZerosPolesGain(list(self.zeros), list(self.poles), self.gain)
+
+    def to_control(self) -> Any:
+        """The same as a control.TransferFunction; raises ImportError with the way to get python-control."""
+        try:
+            import control
+        except ImportError as reason:
+            raise ImportError("to_control needs python-control: pip install gaident[control]") from reason
+        return control.zpk(list(self.zeros), list(self.poles), self.gain)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The model for JSON: {"gain": K, "poles": [[re, im], ...], "zeros": [[re, im], ...]}."""
+        return {"gain": self.gain, "poles": [[r.real, r.imag] for r in self.poles],
+                "zeros": [[r.real, r.imag] for r in self.zeros]}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Model:
+        """The inverse of `to_dict`; a real root may be written as one number."""
+        names = ("gain", "poles", "zeros")
+        values: dict[str, Any] = known_keys(data, "the model", names, ("gain",), ModelError)
+        return cls(values["gain"], _roots_of(values, "poles"), _roots_of(values, "zeros"))
+
+    def __repr__(self) -> str:
+        return f"Model(gain={self.gain!r}, poles={_list(self.poles)}, zeros={_list(self.zeros)})"
+
+
+def _list(roots: tuple[complex, ...]) -> str:
+    return "[" + ", ".join(repr(r.real) if r.imag == 0.0 else repr(r).strip("()") for r in roots) + "]"
+
+
+def _roots_of(values: Mapping[str, Any], name: str) -> list[complex]:
+    entries = values.get(name, ())
+    try:
+        return [complex(*e) if isinstance(e, (list, tuple)) else complex(e) for e in entries]
+    except (TypeError, ValueError):
+        raise ModelError(f"{name} is {entries!r}: give a list of [real, imaginary] pairs in rad/s") from None

@@ -1,0 +1,107 @@
+"""Roots of real polynomials: their one order, their conjugate symmetry, and finding them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.errors import ModelError
+
+# Rounding in text files and root finders stays far below this; a wrong digit in a table stays far above.
+ASYMMETRY = 1e-9
+# An imaginary part this small cannot be told from rounding of the root itself.
+NO_IMAGINARY_PART = 1e-13
+
+
+def canonical_roots(roots: object, name: str) -> tuple[complex, ...]:
+    """Reals by ascending magnitude, then conjugate pairs likewise, positive imaginary part first.
+
+    Raises ModelError, naming the argument and the root, where a root is not finite or has no partner.
+    """
+    if isinstance(roots, (str, bytes)):
+        raise ModelError(f"{name} is {roots!r}: give a list of numbers in rad/s")
+    try:
+        values = np.atleast_1d(np.asarray(roots, dtype=np.complex128))
+    except (TypeError, ValueError):
+        raise ModelError(f"{name} is {roots!r}: give a list of numbers in rad/s") from None
+    if values.ndim != 1:
+        raise ModelError(f"{name} has the shape {values.shape}: give a list of numbers in rad/s")
+    for i, root in enumerate(values):
+        if not np.isfinite(root):
+            raise ModelError(f"{name}[{i}] is {root}: every root must be finite")
+
+    flat = np.abs(values.imag) <= NO_IMAGINARY_PART * np.abs(values)
+    reals = [float(r.real) for r in values[flat]]
+    upper = sorted((complex(r) for r in values[~flat] if r.imag > 0), key=_rank)
+    lower = [complex(r) for r in values[~flat] if r.imag < 0]
+    pairs, alone = [], []
+    for root in upper:
+        distance = [abs(root.conjugate() - other) for other in lower]
+        nearest = int(np.argmin(distance)) if distance else -1
+        if nearest < 0 or distance[nearest] > ASYMMETRY * abs(root):
+            alone.append(root)
+            continue
+        other = lower.pop(nearest)
+        pairs.append(complex(0.5 * root.real + 0.5 * other.real + 0.0, 0.5 * root.imag - 0.5 * other.imag))
+    for root in alone + lower:
+        if abs(root.imag) > ASYMMETRY * abs(root):
+            raise ModelError(f"{name} has {root:g} without its conjugate {root.conjugate():g}: "
+                             "complex roots of a real system come in pairs, so add it")
+        reals.append(root.real)
+    ordered = [complex(r + 0.0, 0.0) for r in sorted(reals, key=lambda r: (abs(r), r))]
+    for root in sorted(pairs, key=_rank):
+        ordered += [root, root.conjugate()]
+    return tuple(ordered)
+
+
+def polynomial_roots(coefficients: Sequence[float] | NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Roots of s^n + c[0] s^(n-1) + ... + c[n-1], in conjugate pairs.
+
+    Companion matrix of the polynomial in s/scale; each root is then polished by Newton steps as long as they
+    help.
+    """
+    c = np.asarray(coefficients, dtype=np.float64)
+    n = len(c)
+    scale = max((abs(c[k]) ** (1.0 / (k + 1)) for k in range(n)), default=0.0)
+    if scale == 0.0:
+        return np.zeros(n, dtype=np.complex128)
+    if n == 2:
+        return np.array(quadratic_roots(float(c[0]), float(c[1])))
+    scaled = np.concatenate([[1.0], c / scale ** np.arange(1, n + 1)])
+    slope = np.polyder(scaled)
+    roots = np.roots(scaled).astype(np.complex128)
+    found: list[complex] = []
+    for root in roots[roots.imag >= 0.0]:
+        value = np.polyval(scaled, root)
+        for _ in range(3):
+            gradient = np.polyval(slope, root)
+            if value == 0.0 or gradient == 0.0:
+                break
+            better = root - value / gradient
+            residual = np.polyval(scaled, better)
+            if abs(residual) >= abs(value):
+                break
+            root, value = better, residual
+        found.append(complex(root))
+        if root.imag != 0.0:
+            found.append(complex(root).conjugate())
+    return scale * np.array(found, dtype=np.complex128)
+
+
+def quadratic_roots(e1: float, e0: float) -> list[complex]:
+    """Both roots of s^2 + e1 s + e0, without cancellation."""
+    half = 0.5 * e1
+    discriminant = half * half - e0
+    if discriminant < 0.0:
+        root = complex(-half, math.sqrt(-discriminant))
+        return [root, root.conjugate()]
+    larger = -half - math.copysign(math.sqrt(discriminant), half)
+    smaller = e0 / larger if larger != 0.0 else 0.0
+    return [complex(smaller, 0.0), complex(larger, 0.0)]
+
+
+def _rank(root: complex) -> tuple[float, float]:
+    return math.hypot(root.real, root.imag), root.real

@@ -1,0 +1,71 @@
+"""The PI controller: what it accepts, what it refuses and how it says so."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+
+from gaident.errors import ControllerError
+from gaident.models.controller import PI
+
+
+def test_defaults_are_a_digital_controller_without_limits() -> None:
+    ctl = PI(0.0232, 1.367)
+    assert (ctl.kp, ctl.ki, ctl.loop) == (0.0232, 1.367, "sampled")
+    assert not ctl.limited
+    assert ctl.limits == (math.inf, math.inf)
+    assert ctl == PI(kp=0.0232, ki=1.367, loop="sampled", torque_limit=None, integrator_limit=None)
+    assert hash(ctl) == hash(PI(0.0232, 1.367))
+
+
+def test_limits_and_integers_become_floats() -> None:
+    ctl = PI(1, 0, "continuous", torque_limit=2, integrator_limit=3)
+    assert ctl.limited
+    assert ctl.limits == (2.0, 3.0)
+    assert all(isinstance(value, float) for value in (ctl.kp, ctl.ki, ctl.torque_limit, ctl.integrator_limit))
+
+
+def test_is_immutable() -> None:
+    with pytest.raises(AttributeError):
+        PI(1.0, 1.0).kp = 2.0  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    ({"kp": -1.0, "ki": 1.0}, ["kp", "-1", "negative gain"]),
+    ({"kp": 1.0, "ki": -0.5}, ["ki", "-0.5"]),
+    ({"kp": math.nan, "ki": 1.0}, ["kp", "nan"]),
+    ({"kp": 1.0, "ki": math.inf}, ["ki", "inf"]),
+    ({"kp": "0.02", "ki": 1.0}, ["kp", "'0.02'"]),
+    ({"kp": None, "ki": 1.0}, ["kp", "None"]),
+    ({"kp": 0.0, "ki": 0.0}, ["kp and ki", "controller=None"]),
+    ({"kp": 1.0, "ki": 1.0, "loop": "continous"}, ["loop", "'continous'", "did you mean 'continuous'?"]),
+    ({"kp": 1.0, "ki": 1.0, "loop": "Sampled"}, ["loop", "did you mean 'sampled'?"]),
+    ({"kp": 1.0, "ki": 1.0, "loop": 3}, ["loop", "3", "sampled, continuous"]),
+    ({"kp": 1.0, "ki": 1.0, "torque_limit": 0.0}, ["torque_limit", "0", "None for no limit"]),
+    ({"kp": 1.0, "ki": 1.0, "torque_limit": -2.0}, ["torque_limit", "-2"]),
+    ({"kp": 1.0, "ki": 1.0, "integrator_limit": math.nan}, ["integrator_limit", "nan"]),
+    ({"kp": 1.0, "ki": 1.0, "integrator_limit": math.inf}, ["integrator_limit", "None for no limit"]),
+])
+def test_refuses_with_name_value_and_remedy(arguments: dict[str, object], words: list[str]) -> None:
+    with pytest.raises(ControllerError) as refusal:
+        PI(**arguments)  # type: ignore[arg-type]
+    for word in words:
+        assert word in str(refusal.value)
+
+
+def test_dictionary_round_trip_through_json() -> None:
+    limited = PI(0.3, 4.0, torque_limit=1.5, integrator_limit=0.5)
+    for ctl in (PI(0.1, 2.0), PI(0.1, 0.0, "continuous"), limited):
+        assert PI.from_dict(json.loads(json.dumps(ctl.to_dict()))) == ctl
+    assert PI.from_dict({"kp": 0.1, "ki": 2}) == PI(0.1, 2.0)
+
+
+def test_from_dict_names_the_wrong_key() -> None:
+    with pytest.raises(ControllerError, match=r"'torque_limt'.*did you mean 'torque_limit'"):
+        PI.from_dict({"kp": 1.0, "ki": 1.0, "torque_limt": 2.0})
+    with pytest.raises(ControllerError, match="lacks ki"):
+        PI.from_dict({"kp": 1.0})
+    with pytest.raises(ControllerError, match="give a dictionary"):
+        PI.from_dict([1.0, 2.0])  # type: ignore[arg-type]
