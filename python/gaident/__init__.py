@@ -1,0 +1,49 @@
+"""gaident: from a drive's log to a model, its structure and parameters, and what they are worth.
+
+    import gaident as ga
+
+    rec = ga.read("run1.csv", columns={"command": "w_ref", "velocity": "w"}, units={"velocity": "rpm"})
+    idn = ga.identify(rec, controller=ga.PI(kp=0.0232, ki=1.367))
+    print(idn.summary())
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gaident.data import Record, differentiate, read, read_columns
+from gaident.errors import GaidentError
+from gaident.identification import Estimate, Identification, SearchSpace, Settings, identify, load
+from gaident.models import (
+    PI,
+    Discrete,
+    Model,
+    OneMass,
+    Run,
+    TwoMass,
+    factor_parameters,
+    initial_state,
+    mechanics_from_model,
+    model_from_factor_parameters,
+    run,
+    simulate,
+)
+
+if TYPE_CHECKING:
+    __version__: str
+
+__all__ = [
+    "PI", "Discrete", "Estimate", "GaidentError", "Identification", "Model", "OneMass", "Record", "Run", "SearchSpace",
+    "Settings", "TwoMass", "differentiate", "factor_parameters", "identify", "initial_state", "load", "mechanics_from_model",
+    "model_from_factor_parameters", "read", "read_columns", "run", "simulate",
+]
+
+
+def __getattr__(name: str) -> str:
+    if name == "__version__":
+        from importlib.metadata import PackageNotFoundError, version
+        try:
+            return version("gaident")
+        except PackageNotFoundError:
+            return "unknown (not installed)"
+    raise AttributeError(f"module 'gaident' has no attribute {name!r}")

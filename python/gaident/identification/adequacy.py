@@ -1,0 +1,116 @@
+"""Does the linear model hold? Tests on the residual that are valid under feedback.
+
+Whiteness says whether anything predictable is left; noise of a colour of its own leaves that too. What falsifies the *model* is a residual
+that still depends on the input or on the motion: whitened, and with what a change of the model's own parameters could explain taken
+out, it is regressed on the input at several lags, a constant, and sign(w), w|w| of the simulated velocity. F-test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.identification.noise import Autoregression, chi2_tail, ljung_box, whiten
+
+__all__ = ["Adequacy", "assess"]
+
+Vector = NDArray[np.float64]
+
+LAGS = (0, 1, 2, 4, 8, 16, 32)
+LEVEL = 1e-4   # p-value below which the linear model counts as falsified
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """What the residual says about the model.
+
+    white_p: Ljung-Box p-value of the residual; ar_order: order of the noise model; noise_std: standard deviation of the whitened
+    residual [rad/s]; predictable: share of the residual's power that its own past predicts (0: white);
+    independence_p: p-value of the test that the residual no longer depends on input and motion; falsified: it does.
+    """
+
+    white_p: float
+    ar_order: int
+    noise_std: float
+    predictable: float
+    independence_p: float
+    falsified: bool
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in words."""
+        if self.falsified:
+            return ("The linear model is falsified: the residual still depends on the input or the motion "
+                    f"(p = {self.independence_p:.1g}), and its own past predicts {100 * self.predictable:.0f} % of its power. "
+                    "Do not trust the mechanical parameters; an effect that is not in the model bends them.")
+        if self.white_p < LEVEL:
+            return ("The residual is not white but does not depend on input or motion: coloured noise. The linear model stands; "
+                    "the standard deviations take the colour into account.")
+        return "The residual is white: nothing left that this linear model could be blamed for."
+
+
+def assess(residuals: Sequence[Vector], J: NDArray[np.float64], inputs: Sequence[Vector], outputs: Sequence[Vector],
+           noise: Autoregression) -> Adequacy:
+    """residuals, inputs and simulated outputs per record; J: sensitivities, parameters x all samples."""
+    lengths = [len(e) for e in residuals]
+    total = sum(lengths)
+    power = sum(float(e @ e) for e in residuals) / total
+    white_p = ljung_box(residuals, lags=min(20, total // 5))
+    predictable = 1.0 - noise.std**2 / power if power > 0.0 else 0.0
+    columns = [_joined([_lagged(u, k) for u in inputs], noise.phi) for k in LAGS]
+    columns.append(_joined([np.ones(n) for n in lengths], noise.phi))
+    threshold = 0.01 * max(float(np.abs(y).max()) for y in outputs)
+    columns.append(_joined([np.where(np.abs(y) > threshold, np.sign(y), 0.0) for y in outputs], noise.phi))
+    columns.append(_joined([y * np.abs(y) for y in outputs], noise.phi))
+    own = [_joined(_split(row, lengths), noise.phi) for row in J]
+    v = _joined(residuals, noise.phi)
+    p = _independence(v, np.array(own), np.array(columns), total - noise.order * len(lengths))
+    return Adequacy(white_p, noise.order, noise.std, float(max(predictable, 0.0)), p, p < LEVEL)
+
+
+def _independence(v: Vector, own: NDArray[np.float64], extra: NDArray[np.float64], samples: int) -> float:
+    """p-value of the F-test that `extra` explains nothing of v beyond `own`."""
+    basis = _orthonormal(own)
+    rest = v - basis.T @ (basis @ v)
+    more = extra - (extra @ basis.T) @ basis
+    sizes = np.linalg.norm(extra, axis=1)
+    keep = np.linalg.norm(more, axis=1) > 1e-6 * np.where(sizes > 0.0, sizes, 1.0)
+    if not np.any(keep):
+        return 1.0
+    directions = _orthonormal(more[keep])
+    m = len(directions)
+    explained = float(np.sum((directions @ rest) ** 2))
+    left = float(rest @ rest) - explained
+    dof = samples - len(basis) - m
+    if dof < 1 or not left > 0.0:
+        return 1.0 if not explained > 0.0 else 0.0
+    # F(m, dof) by its chi2 limit with the finite-sample correction dof ln(1 + m F / dof).
+    return chi2_tail((dof + 0.5 * m) * float(np.log1p(explained / left)), m)
+
+
+def _orthonormal(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """An orthonormal basis of the row space, as rows."""
+    sizes = np.linalg.norm(rows, axis=1)
+    rows = rows[(sizes > 0.0) & np.isfinite(sizes)]
+    if len(rows) == 0:
+        return np.zeros((0, rows.shape[1]))
+    rows = rows / np.linalg.norm(rows, axis=1)[:, None]
+    values, vectors = np.linalg.eigh(rows @ rows.T)
+    known = values > 1e-10 * values[-1]
+    basis: NDArray[np.float64] = (vectors[:, known] / np.sqrt(values[known])).T @ rows
+    return basis
+
+
+def _lagged(x: Vector, k: int) -> Vector:
+    return x if k == 0 else np.concatenate([np.zeros(k), x[:-k]])
+
+
+def _joined(parts: Sequence[Vector], phi: Vector) -> Vector:
+    return np.concatenate([whiten(x, phi) for x in parts])
+
+
+def _split(row: Vector, lengths: Sequence[int]) -> list[Vector]:
+    return np.split(row, np.cumsum(lengths)[:-1])

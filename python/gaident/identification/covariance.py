@@ -1,0 +1,177 @@
+"""Uncertainty of the identified parameters.
+
+The estimate minimises the plain simulation error e; its covariance to first order, for noise of any colour, is
+
+    cov = (J'J)^-1 J' S J (J'J)^-1,    S = s^2 (F'F)^-1
+
+with J = de/dx, F the whitening filter of the residual and s the standard deviation of F e. For white residuals this is s^2 (J'J)^-1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.identification.noise import Autoregression
+from gaident.models.factors import factor_parameters, gain_unit
+from gaident.models.model import Model
+
+__all__ = ["Estimate", "covariance_of_factors", "estimates"]
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter: value and standard deviation in `unit`.
+
+    std is nan for a parameter at a bound of its search range (`at_bound`), inf where the record says nothing about it.
+    identifiable: the record determines it to better than its own size.
+    """
+
+    value: float
+    std: float
+    unit: str
+    at_bound: bool = False
+    identifiable: bool = True
+
+
+def core_layout(model: Model) -> tuple[Matrix, list[int]]:
+    """(T, order): T = d(factor_parameters)/d(core parameters).
+
+    The core's parameters are [ln K | e1, e0 of pole pairs | single pole | zeros likewise], complex pairs first, then real
+    roots paired from the largest down, the smallest left single.
+    """
+    n = len(factor_parameters(model)[1])
+    T = np.zeros((n, n))
+    T[0, 0] = model.gain
+    of_core = [0]
+    row = column = 1
+    for roots in (model.poles, model.zeros):
+        reals = [-r.real for r in roots if r.imag == 0.0]
+        pairs = sum(r.imag > 0.0 for r in roots)
+        for k in range(2 * pairs):
+            T[row + len(reals) + k, column] = 1.0
+            of_core.append(row + len(reals) + k)
+            column += 1
+        left = sorted(range(len(reals)), key=lambda i: -abs(reals[i]))
+        while len(left) >= 2:
+            i, j = left.pop(0), left.pop(0)
+            gap = reals[i] - reals[j] or 1e-9 * max(abs(reals[i]), 1e-9)
+            T[row + i, column:column + 2] = np.array([reals[i], -1.0]) / gap
+            T[row + j, column:column + 2] = np.array([reals[j], -1.0]) / -gap
+            of_core += [row + i, row + j]
+            column += 2
+        if left:
+            T[row + left[0], column] = 1.0
+            of_core.append(row + left[0])
+            column += 1
+        row += len(reals) + 2 * pairs
+    return T, of_core
+
+
+def covariance_of_factors(model: Model, J: Matrix, noise: Autoregression, lengths: Sequence[int],
+                          at_bound: Sequence[bool]) -> Matrix:
+    """Covariance of factor_parameters(model).
+
+    J: sensitivities of the error in the core's order, parameters (start states last) x samples; lengths: samples of each record;
+    at_bound: per parameter of the model, core order. Rows and columns of parameters at a bound are nan; directions that the record
+    does not determine have infinite variance.
+    """
+    count = len(at_bound)
+    free = [i for i in range(J.shape[0]) if i >= count or not at_bound[i]]
+    scale = np.sqrt(np.einsum("ij,ij->i", J, J))
+    seen = [i for i in free if scale[i] > 0.0 and np.isfinite(scale[i])]
+    cov = np.full((count, count), np.nan)
+    for i in free:
+        if i < count:
+            cov[i, i] = np.inf
+    if seen:
+        Js = J[seen] / scale[seen][:, None]
+        A = Js @ Js.T
+        coloured = _correlate(Js, noise.phi, lengths) if noise.order else Js
+        values, vectors = np.linalg.eigh(A)
+        known = values > 1e-13 * values[-1]
+        inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
+        small = noise.std**2 * inverse @ (coloured @ coloured.T) @ inverse
+        lost = np.sum(vectors[:, ~known] ** 2, axis=1) > 1e-6
+        small[lost, :] = small[:, lost] = 0.0
+        small[lost, lost] = np.inf
+        for a, i in enumerate(seen):
+            for b, k in enumerate(seen):
+                if i < count and k < count:
+                    cov[i, k] = small[a, b] / (scale[i] * scale[k])
+    return _transform(core_layout(model)[0], cov)
+
+
+def _transform(T: Matrix, cov: Matrix) -> Matrix:
+    """T cov T', where nan and inf spread only to what depends on them."""
+    usable = np.isfinite(np.diag(cov))
+    inner = np.where(usable[:, None] & usable[None, :], cov, 0.0)
+    result: Matrix = T @ np.nan_to_num(inner) @ T.T
+    for i in np.flatnonzero(~usable):
+        touched = np.flatnonzero(T[:, i])
+        result[touched, :] = result[:, touched] = np.nan
+        result[touched, touched] = cov[i, i]
+    return result
+
+
+def _correlate(J: Matrix, phi: NDArray[np.float64], lengths: Sequence[int]) -> Matrix:
+    """F'^-1 J, record by record: z(n) = J(n) + sum phi_i z(n+i)."""
+    from scipy.signal import lfilter
+    out = np.empty_like(J)
+    start = 0
+    for n in lengths:
+        part = J[:, start:start + n]
+        out[:, start:start + n] = lfilter([1.0], np.concatenate([[1.0], -phi]), part[:, ::-1], axis=1)[:, ::-1]
+        start += n
+    return out
+
+
+def estimates(model: Model, cov: Matrix, at_bound_core: Sequence[bool]) -> dict[str, Estimate]:
+    """The parameters as an engineer reads them: roots by real part, imaginary part, frequency and damping ratio.
+
+    "pole_1" is the real root itself [rad/s]; "pole_pair_1_real", "_imaginary", "_frequency" [rad/s] and "_damping" [1] describe
+    a conjugate pair, "zero..." likewise.
+    """
+    names, values, _ = factor_parameters(model)
+    bound = [False] * len(names)
+    for of, flag in zip(core_layout(model)[1], at_bound_core, strict=True):
+        bound[of] = bound[of] or flag
+    found: dict[str, Estimate] = {}
+
+    def add(name: str, value: float, gradient: dict[int, float], unit: str, flag: bool, size: float) -> None:
+        rows = list(gradient)
+        g = np.array([gradient[r] for r in rows])
+        block = cov[np.ix_(rows, rows)]
+        with np.errstate(invalid="ignore"):
+            variance = float(g @ block @ g) if np.all(np.isfinite(block)) else float(np.max(np.diag(block)))
+        std = float(np.sqrt(variance)) if variance >= 0.0 else float("nan")
+        if flag:
+            std = float("nan")
+        found[name] = Estimate(value, std, unit, flag, bool(std < abs(size)))
+
+    for i, name in enumerate(names):
+        if name == "gain":
+            add(name, float(values[i]), {i: 1.0}, gain_unit(model.p), bound[i], float(values[i]))
+        elif name.endswith("_e1"):
+            stem = name[: -len("_e1")]
+            e1, e0 = float(values[i]), float(values[i + 1])
+            w, im = np.sqrt(e0), np.sqrt(max(e0 - 0.25 * e1**2, 1e-300))
+            add(f"{stem}_real", -0.5 * e1, {i: -0.5}, "rad/s", bound[i], w)
+            add(f"{stem}_imaginary", float(im), {i: -0.25 * e1 / im, i + 1: 0.5 / im}, "rad/s", bound[i + 1], float(w))
+            add(f"{stem}_frequency", float(w), {i + 1: 0.5 / w}, "rad/s", bound[i + 1], float(w))
+            add(f"{stem}_damping", float(0.5 * e1 / w), {i: 0.5 / w, i + 1: -0.25 * e1 / w**3}, "1",
+                bound[i] or bound[i + 1], 1.0)
+        elif not name.endswith("_e0"):
+            add(name, -float(values[i]), {i: -1.0}, "rad/s", bound[i], float(values[i]))
+    return found
+
+
+def usable_covariance(cov: Matrix) -> Any:
+    """The covariance, or None where a parameter is at its bound or not determined."""
+    return cov if np.all(np.isfinite(cov)) else None

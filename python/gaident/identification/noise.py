@@ -1,0 +1,83 @@
+"""Noise model: an autoregressive filter that makes residuals white.
+
+    v(n) = e(n) - sum_i phi_i e(n-i)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Autoregression", "fit_autoregression", "ljung_box", "whiten"]
+
+Vector = NDArray[np.float64]
+
+
+class Autoregression(NamedTuple):
+    """phi (order numbers) and the standard deviation of v [unit of e]."""
+
+    phi: Vector
+    std: float
+
+    @property
+    def order(self) -> int:
+        """Number of coefficients; 0: the residual is white."""
+        return len(self.phi)
+
+
+def fit_autoregression(residuals: Sequence[Vector], max_order: int = 30) -> Autoregression:
+    """Order by BIC, coefficients by Levinson-Durbin on the autocovariance pooled over records.
+
+    residuals: one array per record, not centred (a mean is an error too). The order is at most a twentieth of the samples.
+    """
+    total = sum(len(e) for e in residuals)
+    top = max(0, min(max_order, total // 20, min(len(e) for e in residuals) - 1))
+    cov = np.array([sum(float(e[: len(e) - k] @ e[k:]) for e in residuals) for k in range(top + 1)]) / total
+    if not cov[0] > 0.0:
+        return Autoregression(np.zeros(0), 0.0)
+    phi, variance = np.zeros(0), float(cov[0])
+    best, best_score = Autoregression(phi, float(np.sqrt(variance))), total * np.log(variance)
+    for m in range(1, top + 1):
+        reflection = (cov[m] - phi @ cov[m - 1:0:-1]) / variance if m > 1 else cov[1] / cov[0]
+        phi = np.concatenate([phi - reflection * phi[::-1], [reflection]])
+        variance *= 1.0 - reflection**2
+        if not variance > 1e-14 * cov[0]:
+            break
+        score = total * np.log(variance) + m * np.log(total)
+        if score < best_score:
+            best, best_score = Autoregression(phi.copy(), float(np.sqrt(variance))), score
+    return best
+
+
+def whiten(x: Vector, phi: Vector) -> Vector:
+    """v of x; the first len(phi) samples, whose past is missing, are 0."""
+    v = x.copy()
+    for i, f in enumerate(phi, start=1):
+        v[i:] -= f * x[:-i]
+    v[: len(phi)] = 0.0
+    return v
+
+
+def ljung_box(residuals: Sequence[Vector], lags: int) -> float:
+    """p-value of the Ljung-Box test that residuals are white up to `lags`, pooled over records."""
+    total = sum(len(e) for e in residuals)
+    energy = sum(float(e @ e) for e in residuals)
+    if not energy > 0.0:
+        return 1.0
+    statistic = 0.0
+    for k in range(1, lags + 1):
+        r = sum(float(e[:-k] @ e[k:]) for e in residuals) / energy
+        statistic += r * r / (total - k)
+    return chi2_tail(total * (total + 2) * statistic, lags)
+
+
+def chi2_tail(x: float, dof: int) -> float:
+    """P(chi2 > x), Wilson-Hilferty: good to a few per cent of the tail probability."""
+    if x <= 0.0:
+        return 1.0
+    z = ((x / dof) ** (1.0 / 3.0) - (1.0 - 2.0 / (9.0 * dof))) / np.sqrt(2.0 / (9.0 * dof))
+    from math import erfc
+    return 0.5 * erfc(float(z) / np.sqrt(2.0))

@@ -1,0 +1,246 @@
+"""The result of an identification."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.errors import GaidentError
+from gaident.identification.adequacy import Adequacy
+from gaident.identification.covariance import Estimate
+from gaident.identification.settings import Settings
+from gaident.identification.space import SearchSpace
+from gaident.identification.starts import starts_moving
+from gaident.models.controller import PI
+from gaident.models.mechanics import Mechanics, mechanics_from_dict
+from gaident.models.model import Model
+from gaident.models.simulate import initial_state, simulate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Identification", "Rival", "TrialOutcome", "load"]
+
+SCHEMA = "gaident/identification"
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A structure whose whitened BIC is within 10 units of the winner's (negative delta_bic: it fits better but is larger)."""
+
+    p: int
+    q: int
+    delta_bic: float
+    model: Model
+
+
+@dataclass(frozen=True)
+class TrialOutcome:
+    """One independent genetic run: its best fitness (6), structure, generations and candidates simulated."""
+
+    p: int
+    q: int
+    fitness: float
+    generations: int
+    best_generation: int
+    evaluations: int
+    history: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Structure:
+    """One row of the structure comparison: error sum of the plain fit, whitened BIC relative to the best."""
+
+    p: int
+    q: int
+    error_sum: float
+    delta_bic: float
+
+
+@dataclass(frozen=True)
+class Identification:
+    """Structure, parameters and what they are worth. Made by `identify`; see API for each attribute.
+
+    rmse [rad/s] and fit_percent are of the free-run simulation of all records used; `adequacy` says whether the linear model holds,
+    `warnings` what to keep in mind, in plain sentences. `structures` compares every structure that was fitted.
+    """
+
+    model: Model
+    controller: PI | None
+    parameters: Mapping[str, Estimate]
+    mechanics: Mechanics | None
+    fitness: float
+    rmse: float
+    fit_percent: float
+    rivals: tuple[Rival, ...]
+    structures: tuple[Structure, ...]
+    trials: tuple[TrialOutcome, ...]
+    adequacy: Adequacy
+    warnings: tuple[str, ...]
+    space: SearchSpace
+    settings: Settings
+    seed: int
+    seconds: float
+    samples: int
+    digests: tuple[str, ...]
+    initial_states: Mapping[str, tuple[float, ...]]
+    version: str = ""
+    records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
+
+    @property
+    def p(self) -> int:
+        """Poles in excess of zeros."""
+        return self.model.p
+
+    @property
+    def q(self) -> int:
+        """Zeros."""
+        return self.model.q
+
+    @property
+    def history(self) -> tuple[float, ...]:
+        """Best fitness (6) per generation of the genetic search, of the best trial."""
+        return min(self.trials, key=lambda t: t.fitness).history
+
+    @property
+    def falsified(self) -> bool:
+        """Whether the data contradict the linear model; its mechanics are then not to be trusted."""
+        return self.adequacy.falsified
+
+    def simulate(self, rec: Record) -> NDArray[np.float64]:
+        """Free-run velocity of the model on a record [rad/s].
+
+        A record that does not start at rest gets its initial state estimated (one that was used in the identification, the one found there).
+        """
+        state: Sequence[float] | NDArray[np.float64] | None = self.initial_states.get(rec.digest)
+        limited = self.controller is not None and self.controller.limited
+        if state is None and not limited and starts_moving(rec, self.controller):
+            state = initial_state(self.model, rec, self.controller)
+        return simulate(self.model, rec, self.controller, state)
+
+    def residual(self, rec: Record) -> NDArray[np.float64]:
+        """Measured minus simulated velocity [rad/s]."""
+        return rec.velocity - self.simulate(rec)
+
+    def summary(self) -> str:
+        """The result as text."""
+        from gaident.show.summary import identification_summary
+        return identification_summary(self)
+
+    def plot(self, records: Record | Sequence[Record] | None = None) -> Figure:
+        """Measured against simulated velocity and the residual, as a matplotlib Figure; `records` as used unless given."""
+        from gaident.show.plots import plot_identification
+        chosen = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
+        if not chosen:
+            raise GaidentError("records: a loaded identification holds no data; give plot(records)")
+        return plot_identification(self, chosen)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON, without the records."""
+        return {
+            "schema": SCHEMA, "schema_version": SCHEMA_VERSION, "gaident_version": self.version,
+            "model": self.model.to_dict(),
+            "controller": None if self.controller is None else self.controller.to_dict(),
+            "parameters": {name: asdict(e) for name, e in self.parameters.items()},
+            "mechanics": None if self.mechanics is None else self.mechanics.to_dict(),
+            "fitness": self.fitness, "rmse": self.rmse, "fit_percent": self.fit_percent,
+            "rivals": [{"p": r.p, "q": r.q, "delta_bic": r.delta_bic, "model": r.model.to_dict()} for r in self.rivals],
+            "structures": [asdict(s) for s in self.structures],
+            "trials": [asdict(t) for t in self.trials],
+            "adequacy": asdict(self.adequacy), "warnings": list(self.warnings),
+            "space": self.space.to_dict(), "settings": self.settings.to_dict(),
+            "seed": self.seed, "seconds": self.seconds, "samples": self.samples, "digests": list(self.digests),
+            "initial_states": {d: list(s) for d, s in self.initial_states.items()},
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Identification:
+        """The inverse of to_dict. Raises GaidentError where the data are something else or of a newer schema."""
+        if data.get("schema") != SCHEMA:
+            raise GaidentError(f"schema is {data.get('schema')!r}: this is not a saved identification")
+        if data.get("schema_version") != SCHEMA_VERSION:
+            raise GaidentError(f"schema_version is {data.get('schema_version')!r}: this gaident reads {SCHEMA_VERSION}; "
+                               "use the version that wrote the file")
+        try:
+            return cls(
+                model=Model.from_dict(data["model"]),
+                controller=None if data["controller"] is None else PI.from_dict(data["controller"]),
+                parameters={name: Estimate(**e) for name, e in data["parameters"].items()},
+                mechanics=None if data["mechanics"] is None else mechanics_from_dict(data["mechanics"]),
+                fitness=data["fitness"], rmse=data["rmse"], fit_percent=data["fit_percent"],
+                rivals=tuple(Rival(r["p"], r["q"], r["delta_bic"], Model.from_dict(r["model"])) for r in data["rivals"]),
+                structures=tuple(Structure(**s) for s in data["structures"]),
+                trials=tuple(TrialOutcome(**{**t, "history": tuple(t["history"])}) for t in data["trials"]),
+                adequacy=Adequacy(**data["adequacy"]), warnings=tuple(data["warnings"]),
+                space=SearchSpace.from_dict(data["space"]), settings=Settings.from_dict(data["settings"]),
+                seed=data["seed"], seconds=data["seconds"], samples=data["samples"], digests=tuple(data["digests"]),
+                initial_states={d: tuple(s) for d, s in data["initial_states"].items()},
+                version=data["gaident_version"])
+        except (KeyError, TypeError, AttributeError) as error:
+            raise GaidentError(f"the saved identification is damaged: {error!r}; save it again") from error
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes JSON; the file appears whole or not at all."""
+        target = Path(path)
+        text = json.dumps(_encoded(self.to_dict()), indent=1, allow_nan=False)
+        temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+        try:
+            temporary.write_text(text, encoding="utf-8")
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+def load(path: str | os.PathLike[str]) -> Identification:
+    """Reads what `Identification.save` wrote.
+
+    Raises GaidentError naming the file where it is missing, no JSON, or not a saved identification.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise GaidentError(f"{path}: cannot be read ({error}); give a file that save() wrote") from error
+    try:
+        data = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise GaidentError(f"{path}: line {error.lineno} is not JSON ({error.msg}); give a file that save() wrote") from error
+    if not isinstance(data, dict):
+        raise GaidentError(f"{path}: holds no saved identification; give a file that save() wrote")
+    try:
+        return Identification.from_dict(_decoded(data))
+    except GaidentError as error:
+        raise GaidentError(f"{path}: {error}") from error
+
+
+# JSON knows no nan or inf; they are written as these words.
+_WORDS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
+
+
+def _encoded(x: Any) -> Any:
+    if isinstance(x, dict):
+        return {k: _encoded(v) for k, v in x.items()}
+    if isinstance(x, (list, tuple)):
+        return [_encoded(v) for v in x]
+    if isinstance(x, float) and not math.isfinite(x):
+        return {"number": "nan" if math.isnan(x) else "inf" if x > 0 else "-inf"}
+    return x
+
+
+def _decoded(x: Any) -> Any:
+    if isinstance(x, dict):
+        if set(x) == {"number"} and x["number"] in _WORDS:
+            return _WORDS[x["number"]]
+        return {k: _decoded(v) for k, v in x.items()}
+    if isinstance(x, list):
+        return [_decoded(v) for v in x]
+    return x

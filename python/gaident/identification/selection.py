@@ -1,0 +1,85 @@
+"""Choosing between structures, after every one of them has been fitted: an information criterion on whitened residuals.
+
+    BIC = N ln(RSS_w / N) + k ln N,   k = 1 + p + 2 q and the start states
+
+RSS_w is the least sum of squares of the whitened simulation error. One filter serves all structures, estimated on the residual of
+the one that fits best, so that no structure is whitened with its own mistakes. The *smallest* structure within 10 units of the best wins
+(METHOD.md section 3). A pole and a zero closer than 2 % to each other fit noise and are charged 10 units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.identification.noise import Autoregression, fit_autoregression
+from gaident.models.model import Model
+
+__all__ = ["MARGIN", "Candidate", "choose"]
+
+MARGIN = 10.0
+CANCELLATION = 0.02
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One structure's fit: `cost` is the plain error sum, `bic` the whitened criterion."""
+
+    model: Model
+    starts: NDArray[np.float64]
+    cost: float
+    at_bound: tuple[bool, ...]
+    bic: float = float("nan")
+
+    @property
+    def size(self) -> int:
+        """1 + p + 2 q."""
+        return 1 + self.model.p + 2 * self.model.q
+
+
+def from_core(fit: Any) -> Candidate:
+    """A Candidate of the core's Refined."""
+    return Candidate(Model(fit.gain, fit.poles, fit.zeros), fit.starts, fit.cost, tuple(fit.at_bound))
+
+
+def cancellations(model: Model) -> int:
+    """Zeros with a pole closer than 2 % of their magnitude (each pole counts once)."""
+    free = list(model.poles)
+    count = 0
+    for zero in model.zeros:
+        near = [pole for pole in free if abs(pole - zero) < CANCELLATION * max(abs(zero), 1e-12)]
+        if near:
+            free.remove(min(near, key=lambda pole: abs(pole - zero)))
+            count += 1
+    return count
+
+
+def choose(experiment: Any, candidates: Sequence[Candidate], residuals_of: Any, samples: int, ranges: Any,
+           workers: int) -> tuple[list[Candidate], int, Autoregression]:
+    """(candidates with their BIC, index of the winner, the common noise model).
+
+    residuals_of(candidate) -> one residual array per record.
+    """
+    fitted = min(candidates, key=lambda c: c.cost)
+    noise = fit_autoregression(residuals_of(fitted))
+    costs = [c.cost for c in candidates]
+    count = samples
+    if noise.order > 0:
+        models = [(c.model.gain, np.array(c.model.poles, complex), np.array(c.model.zeros, complex), c.starts)
+                  for c in candidates]
+        whitened = experiment.refine(models=models, ranges=ranges, whitening=list(noise.phi), max_iterations=8,
+                                     workers=workers)
+        costs = [w.cost for w in whitened]
+        count -= noise.order
+    scored = []
+    for c, cost in zip(candidates, costs, strict=True):
+        bic = count * np.log(max(cost, 1e-300) / count) + (c.size + len(c.starts)) * np.log(count)
+        scored.append(replace(c, bic=float(bic + MARGIN * cancellations(c.model))))
+    best = min(c.bic for c in scored)
+    close = [i for i, c in enumerate(scored) if c.bic <= best + MARGIN]
+    winner = min(close, key=lambda i: (scored[i].size, scored[i].bic))
+    return scored, winner, noise

@@ -1,0 +1,108 @@
+"""What a genetic run is told."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+from gaident.errors import SettingsError
+
+if TYPE_CHECKING:
+    from gaident import _core
+
+__all__ = ["Settings"]
+
+ENGINES = {
+    "species": "one species per (p, q), local fits, structures compared afterwards by whitened BIC (the default)",
+    "plain": "one population, every structure in it, fitness (6) alone decides (the paper)",
+}
+CODES = ("gray", "binary")
+SCALES = ("logarithmic", "linear")
+ARITHMETICS = ("double", "float")
+INITIAL_STATES = ("auto", "rest", "free")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of the genetic search; `Settings()` is the best engine, `Settings.paper()` Table II to the letter.
+
+    population: individuals in all; the species engine keeps at least three per structure.
+    tournament: contestants; crossover, mutation: rates, per pair and per bit.
+    generations: of the plain engine; at most so many of the species engine, which works in rounds of `round` generations, fits every
+        species' best locally after each, and stops after `quiet_rounds` rounds without progress.
+    elites: survivors of the plain engine (species always keep one each).
+    code: "gray" or "binary"; scale: "logarithmic" or "linear" coding of real and imaginary parts (K is always logarithmic).
+    error_weight, order_weight: Wf1, Wf2 of fitness (6).
+    arithmetic: "double" or "float", of the genetic search; local fits are always double.
+    initial_state: "rest", "free" (estimated for every record) or "auto": estimated for records that do not start at rest.
+
+    Raises SettingsError naming the field, its value and what it may be.
+    """
+
+    population: int = 50
+    tournament: int = 2
+    crossover: float = 0.9
+    mutation: float = 0.01
+    generations: int = 1000
+    elites: int = 0
+    code: str = "gray"
+    scale: str = "logarithmic"
+    error_weight: float = 1.0
+    order_weight: float = 2.0
+    engine: str = "species"
+    round: int = 40
+    quiet_rounds: int = 1
+    arithmetic: str = "double"
+    initial_state: str = "auto"
+
+    def __post_init__(self) -> None:
+        for name, low, high in (("population", 2, 1_000_000), ("tournament", 1, self.population),
+                                ("generations", 1, 10_000_000), ("elites", 0, self.population - 1),
+                                ("round", 1, 10_000_000), ("quiet_rounds", 1, 10_000_000)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+                raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
+        for name in ("crossover", "mutation"):
+            value = getattr(self, name)
+            if not isinstance(value, (int, float)) or not 0.0 <= value <= 1.0:
+                raise SettingsError(f"{name} is {value!r}: it is a probability, from 0 to 1")
+        for name in ("error_weight", "order_weight"):
+            value = getattr(self, name)
+            if not isinstance(value, (int, float)) or not 0.0 <= value < float("inf"):
+                raise SettingsError(f"{name} is {value!r}: it must be a number, 0 or more")
+        for name, allowed in (("engine", tuple(ENGINES)), ("code", CODES), ("scale", SCALES),
+                              ("arithmetic", ARITHMETICS), ("initial_state", INITIAL_STATES)):
+            if getattr(self, name) not in allowed:
+                raise SettingsError(f"{name} is {getattr(self, name)!r}: it must be one of {', '.join(map(repr, allowed))}")
+
+    @classmethod
+    def paper(cls) -> Settings:
+        """Table II: population 50, tournament, multi-point crossover 0.9, bit mutation 0.01, binary code, 1000 generations,
+        Wf1 = 1, Wf2 = 2, no elitism; the best candidate ever seen is reported, without a local fit."""
+        return cls(code="binary", scale="linear", engine="plain")
+
+    @property
+    def species(self) -> bool:
+        """Whether structures are protected in species of their own."""
+        return self.engine == "species"
+
+    def engine_settings(self) -> _core.EngineSettings:
+        """The same for the core."""
+        from gaident import _core
+        return _core.EngineSettings(
+            population=self.population, tournament=self.tournament, crossover=self.crossover, mutation=self.mutation,
+            generations=self.generations, elites=self.elites, gray=self.code == "gray",
+            logarithmic=self.scale == "logarithmic", error_weight=self.error_weight, order_weight=self.order_weight,
+            species=self.species, round=self.round, quiet_rounds=self.quiet_rounds, in_float=self.arithmetic == "float")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Settings:
+        """The inverse of to_dict. Raises SettingsError for unknown keys."""
+        unknown = set(data) - {f.name for f in fields(cls)}
+        if unknown:
+            raise SettingsError(f"settings hold unknown keys: {', '.join(sorted(unknown))}")
+        return cls(**data)
