@@ -104,6 +104,26 @@ py::tuple sensitivities(PyExperiment& e, double gain, const ComplexArray& poles,
     return py::make_tuple(to_array(error), J, to_array(factors));
 }
 
+// The adjoint of colouring white noise by an autoregression: z(n) = x(n) + sum phi_i z(n+i), backwards, row by row.
+RealArray colour(const RealArray& rows, const std::vector<double>& phi) {
+    if (rows.ndim() != 2) throw std::invalid_argument("rows must be two-dimensional");
+    const auto n = static_cast<std::ptrdiff_t>(rows.shape(1));
+    RealArray out({rows.shape(0), rows.shape(1)});
+    for (py::ssize_t r = 0; r < rows.shape(0); ++r) {
+        const double* const x = rows.data(r, 0);
+        double* const z = out.mutable_data(r, 0);
+        for (std::ptrdiff_t k = n; k-- > 0;) {
+            double sum = x[k];
+            for (std::size_t i = 0; i < phi.size(); ++i) {
+                const std::ptrdiff_t later = k + 1 + static_cast<std::ptrdiff_t>(i);
+                if (later < n) sum += phi[i] * z[later];
+            }
+            z[k] = sum;
+        }
+    }
+    return out;
+}
+
 std::tuple<double, ComplexArray, ComplexArray> decode_bits(const std::vector<Word>& words, const SearchRanges& ranges, bool gray,
                                                            bool logarithmic) {
     const Genome genome(ranges, gray ? Code::gray : Code::binary, logarithmic ? Scale::logarithmic : Scale::linear);
@@ -184,5 +204,6 @@ void bind_identify(py::module_& m) {
         .def("sensitivities", &sensitivities, py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("starts"),
              py::arg("whitening"));
 
+    m.def("colour", &colour, py::arg("rows"), py::arg("phi"));
     m.def("decode", &decode_bits, py::arg("words"), py::arg("ranges"), py::arg("gray"), py::arg("logarithmic"));
 }

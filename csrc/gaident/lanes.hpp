@@ -1,9 +1,9 @@
-// W candidates side by side, one per SIMD lane, by the compiler's vector extension: the same source becomes two
-// AVX-512 registers, four AVX ones or eight SSE ones, and each lane computes what a scalar would (the build forbids contraction
-// to fused multiply-add), so results are equal bit for bit whatever the width of the machine.
+// W candidates side by side, one per SIMD lane, by the compiler's vector extension: as many registers of the machine's own
+// width as it takes, so the same source becomes one AVX-512 register, two of AVX or four of SSE per eight doubles. Each lane computes
+// what a scalar would (the build forbids contraction to fused multiply-add), so results are equal bit for bit whatever the width.
 //
-// `Isa` is an empty tag. Kernels are compiled once per instruction set; the tag keeps their template instantiations
-// apart, so that the linker never takes AVX-512 code for a machine that has none.
+// `Isa` is a tag with the register width in bytes. Kernels are compiled once per instruction set; the tag keeps their template
+// instantiations apart, so that the linker never takes AVX-512 code for a machine that has none.
 #pragma once
 
 #include "arithmetic.hpp"
@@ -12,28 +12,58 @@ namespace gaident {
 
 template <class T, int W, class Isa>
 struct Lanes {
-    typedef T Vector __attribute__((vector_size(W * sizeof(T))));
-    Vector v;
+    static constexpr int per_register = static_cast<int>(Isa::register_bytes / sizeof(T));
+    static constexpr int registers = W / per_register;
+    static_assert(W % per_register == 0);
+    typedef T Register __attribute__((vector_size(Isa::register_bytes)));
+    Register v[registers];
 
     Lanes() = default;
-    [[gnu::always_inline]] inline explicit Lanes(double x) : v(Vector{} + static_cast<T>(x)) {}
-    [[gnu::always_inline]] inline explicit Lanes(Vector x) : v(x) {}
+    [[gnu::always_inline]] inline explicit Lanes(double x) : Lanes(all(static_cast<T>(x))) {}
 
-    [[gnu::always_inline]] static inline Lanes load(const T* p) {
-        Lanes r;
-        __builtin_memcpy(&r.v, p, sizeof(Vector));
-        return r;
+    [[gnu::always_inline]] static inline Lanes all(T x) {
+        return each([x](int) { return Register{} + x; });
     }
-    [[gnu::always_inline]] inline void store(T* p) const { __builtin_memcpy(p, &v, sizeof(Vector)); }
+    [[gnu::always_inline]] static inline Lanes load(const T* p) {
+        return each([p](int i) {
+            Register r;
+            __builtin_memcpy(&r, p + i * per_register, sizeof(Register));
+            return r;
+        });
+    }
+    [[gnu::always_inline]] inline void store(T* p) const {
+        for (int i = 0; i < registers; ++i) __builtin_memcpy(p + i * per_register, &v[i], sizeof(Register));
+    }
 
-    [[gnu::always_inline]] friend inline Lanes operator+(Lanes a, Lanes b) { return Lanes(a.v + b.v); }
-    [[gnu::always_inline]] friend inline Lanes operator-(Lanes a, Lanes b) { return Lanes(a.v - b.v); }
-    [[gnu::always_inline]] friend inline Lanes operator*(Lanes a, Lanes b) { return Lanes(a.v * b.v); }
-    [[gnu::always_inline]] friend inline Lanes operator/(Lanes a, Lanes b) { return Lanes(a.v / b.v); }
-    [[gnu::always_inline]] friend inline Lanes operator-(Lanes a) { return Lanes(-a.v); }
-    [[gnu::always_inline]] friend inline Lanes clamp(Lanes x, Lanes lo, Lanes hi) {
-        const Vector low = x.v < lo.v ? lo.v : x.v;
-        return Lanes(Vector(x.v > hi.v ? hi.v : low));
+    [[gnu::always_inline]] friend inline Lanes operator+(const Lanes& a, const Lanes& b) {
+        return each([&](int i) { return a.v[i] + b.v[i]; });
+    }
+    [[gnu::always_inline]] friend inline Lanes operator-(const Lanes& a, const Lanes& b) {
+        return each([&](int i) { return a.v[i] - b.v[i]; });
+    }
+    [[gnu::always_inline]] friend inline Lanes operator*(const Lanes& a, const Lanes& b) {
+        return each([&](int i) { return a.v[i] * b.v[i]; });
+    }
+    [[gnu::always_inline]] friend inline Lanes operator/(const Lanes& a, const Lanes& b) {
+        return each([&](int i) { return a.v[i] / b.v[i]; });
+    }
+    [[gnu::always_inline]] friend inline Lanes operator-(const Lanes& a) {
+        return each([&](int i) { return -a.v[i]; });
+    }
+    [[gnu::always_inline]] friend inline Lanes clamp(const Lanes& x, const Lanes& lo, const Lanes& hi) {
+        return each([&](int i) {
+            const Register low = x.v[i] < lo.v[i] ? lo.v[i] : x.v[i];
+            return Register(x.v[i] > hi.v[i] ? hi.v[i] : low);
+        });
+    }
+
+private:
+    template <class F>
+    [[gnu::always_inline]] static inline Lanes each(F f) {
+        Lanes r;
+#pragma GCC unroll 8
+        for (int i = 0; i < registers; ++i) r.v[i] = f(i);
+        return r;
     }
 };
 

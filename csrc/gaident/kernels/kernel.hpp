@@ -34,8 +34,8 @@ struct KernelSource {
             Bank<T, W, N> k(g);
             L sum(0.0);
             for (std::size_t i = 0; i < n; ++i) {
-                const L e = splat<T, W>(output[i]) -
-                            recurrence_step<L, N>(k.order, k.a, k.b, k.x, splat<T, W>(input[i]));
+                const L e = L::all(output[i]) -
+                            recurrence_step<L, N>(k.order, k.a, k.b, k.x, L::all(input[i]));
                 sum = sum + e * e;
             }
             k.save(g);
@@ -45,7 +45,7 @@ struct KernelSource {
             using L = Lanes<T, W, Isa>;
             Bank<T, W, N> k(g);
             for (std::size_t i = 0; i < n; ++i)
-                recurrence_step<L, N>(k.order, k.a, k.b, k.x, splat<T, W>(input[i])).store(y + i * W);
+                recurrence_step<L, N>(k.order, k.a, k.b, k.x, L::all(input[i])).store(y + i * W);
             k.save(g);
         }
     };
@@ -55,10 +55,10 @@ struct KernelSource {
         using L = Lanes<T, W, Isa>;
         static SteppedLoop<L, N> loop_of(const Group<T, W>& g, const Controller<T>& c) {
             SteppedLoop<L, N> loop{Controller<L>(Loop{}, 0.0)};
-            loop.pi.kp = splat<T, W>(c.kp);
-            loop.pi.g = splat<T, W>(c.g);
-            loop.pi.torque_limit = splat<T, W>(c.torque_limit);
-            loop.pi.integrator_limit = splat<T, W>(c.integrator_limit);
+            loop.pi.kp = L::all(c.kp);
+            loop.pi.g = L::all(c.g);
+            loop.pi.torque_limit = L::all(c.torque_limit);
+            loop.pi.integrator_limit = L::all(c.integrator_limit);
             loop.pi.s = L::load(g.s);
             return loop;
         }
@@ -67,7 +67,7 @@ struct KernelSource {
             SteppedLoop<L, N> loop = loop_of(g, c);
             L sum(0.0), u(0.0);
             for (std::size_t i = 0; i < n; ++i) {
-                const L e = splat<T, W>(output[i]) - loop.step(k.order, k.a, k.b, k.x, splat<T, W>(input[i]), u);
+                const L e = L::all(output[i]) - loop.step(k.order, k.a, k.b, k.x, L::all(input[i]), u);
                 sum = sum + e * e;
             }
             k.save(g);
@@ -79,17 +79,11 @@ struct KernelSource {
             SteppedLoop<L, N> loop = loop_of(g, c);
             L u(0.0);
             for (std::size_t i = 0; i < n; ++i)
-                loop.step(k.order, k.a, k.b, k.x, splat<T, W>(input[i]), u).store(y + i * W);
+                loop.step(k.order, k.a, k.b, k.x, L::all(input[i]), u).store(y + i * W);
             k.save(g);
             loop.pi.s.store(g.s);
         }
     };
-
-    template <class T, int W>
-    [[gnu::always_inline]] static inline Lanes<T, W, Isa> splat(T x) {
-        typename Lanes<T, W, Isa>::Vector v{};
-        return Lanes<T, W, Isa>(typename Lanes<T, W, Isa>::Vector(v + x));
-    }
 
     // Orders up to 8 have a loop of their own, with the states in registers.
     template <template <class, int, int> class Form, class T, int W, class Call>

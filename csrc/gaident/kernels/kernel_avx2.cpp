@@ -3,7 +3,9 @@
 namespace gaident {
 
 namespace {
-struct Isa_avx2 {};
+struct Isa_avx2 {
+    static constexpr int register_bytes = 32;
+};
 }  // namespace
 
 const Kernels& avx2_kernels() {

@@ -3,7 +3,9 @@
 namespace gaident {
 
 namespace {
-struct Isa_avx512 {};
+struct Isa_avx512 {
+    static constexpr int register_bytes = 64;
+};
 }  // namespace
 
 const Kernels& avx512_kernels() {

@@ -3,7 +3,9 @@
 namespace gaident {
 
 namespace {
-struct Isa_baseline {};
+struct Isa_baseline {
+    static constexpr int register_bytes = 16;
+};
 }  // namespace
 
 const Kernels& baseline_kernels() {

@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident import _core
 from gaident.identification.noise import Autoregression
 from gaident.models.factors import factor_parameters, gain_unit
 from gaident.models.model import Model
@@ -105,7 +104,7 @@ def covariance_of_factors(model: Model, J: Matrix, noise: Autoregression, length
             for b, k in enumerate(seen):
                 if i < count and k < count:
                     cov[i, k] = small[a, b] / (scale[i] * scale[k])
-    return _transform(core_layout(model)[0], cov)
+    return _transform(core_layout(model)[0], 0.5 * (cov + cov.T))
 
 
 def _transform(T: Matrix, cov: Matrix) -> Matrix:
@@ -121,15 +120,9 @@ def _transform(T: Matrix, cov: Matrix) -> Matrix:
 
 
 def _correlate(J: Matrix, phi: NDArray[np.float64], lengths: Sequence[int]) -> Matrix:
-    """F'^-1 J, record by record: z(n) = J(n) + sum phi_i z(n+i)."""
-    from scipy.signal import lfilter
-    out = np.empty_like(J)
-    start = 0
-    for n in lengths:
-        part = J[:, start:start + n]
-        out[:, start:start + n] = lfilter([1.0], np.concatenate([[1.0], -phi]), part[:, ::-1], axis=1)[:, ::-1]
-        start += n
-    return out
+    """F'^-1 J, record by record."""
+    parts = np.split(J, np.cumsum(lengths)[:-1], axis=1)
+    return np.concatenate([_core.colour(rows=part, phi=list(phi)) for part in parts], axis=1)
 
 
 def estimates(model: Model, cov: Matrix, at_bound_core: Sequence[bool]) -> dict[str, Estimate]:
@@ -172,6 +165,10 @@ def estimates(model: Model, cov: Matrix, at_bound_core: Sequence[bool]) -> dict[
     return found
 
 
-def usable_covariance(cov: Matrix) -> Any:
-    """The covariance, or None where a parameter is at its bound or not determined."""
-    return cov if np.all(np.isfinite(cov)) else None
+def usable_covariance(cov: Matrix) -> Matrix | None:
+    """The covariance, or None where a parameter is at its bound or (to working precision) not determined."""
+    if not np.all(np.isfinite(cov)) or np.any(np.diag(cov) <= 0.0):
+        return None
+    size = np.sqrt(np.diag(cov))
+    correlation = cov / np.outer(size, size)
+    return cov if np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0] > -1e-9 else None

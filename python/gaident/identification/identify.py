@@ -115,6 +115,9 @@ class _Work:
                 raise SpaceError("space: every candidate diverged in it; widen the ranges, or leave space=None")
             scored, winner, _ = selection.choose(self.experiment, candidates, self.residuals, self.samples, self.ranges, workers)
             best = self.polished(scored[winner])
+            if self.judged(best).falsified:
+                chain = selection.smallest_mechanism(scored, self.samples)
+                best = best if chain is None or chain == winner else self.polished(scored[chain])
         else:
             trial = min(found, key=lambda t: t.best_fitness)
             gain, poles, zeros = _core.decode(words=trial.best, ranges=self.ranges, gray=self.settings.code == "gray",
@@ -154,14 +157,24 @@ class _Work:
         """Measured minus simulated velocity of each record."""
         return [r.velocity - y for r, y in zip(self.records, self.outputs(c), strict=True)]
 
+    def sensitivities(self, c: Candidate) -> Any:
+        """de/dx of the plain error, parameters (start states last) x samples."""
+        return self.experiment.sensitivities(gain=c.model.gain, poles=np.array(c.model.poles, complex),
+                                             zeros=np.array(c.model.zeros, complex), starts=list(c.starts), whitening=[])[1]
+
+    def judged(self, c: Candidate) -> adequacy.Adequacy:
+        """Whether the data contradict this candidate."""
+        outputs = self.outputs(c)
+        residuals = [r.velocity - y for r, y in zip(self.records, outputs, strict=True)]
+        return adequacy.assess(residuals, self.sensitivities(c), self.inputs, outputs, fit_autoregression(residuals))
+
     def report(self, best: Candidate, scored: list[Candidate], noise: Autoregression, found: list[_core.Trial],
                seed: int) -> Identification:
         """Uncertainty, tests, mechanics, and everything the user sees."""
         model = best.model
         outputs = self.outputs(best)
         residuals = [r.velocity - y for r, y in zip(self.records, outputs, strict=True)]
-        _, J, _ = self.experiment.sensitivities(gain=model.gain, poles=np.array(model.poles, complex),
-                                                zeros=np.array(model.zeros, complex), starts=best.starts, whitening=[])
+        J = self.sensitivities(best)
         lengths = [len(r) for r in self.records]
         cov = covariance.covariance_of_factors(model, J, noise, lengths, best.at_bound)
         parameters = covariance.estimates(model, cov, best.at_bound)
@@ -172,7 +185,9 @@ class _Work:
         spread = sum(float(np.sum((r.velocity - mean) ** 2)) for r in self.records)
         s = self.settings
         lowest = min((c.bic for c in scored), default=0.0)
-        rivals = sorted((Rival(c.model.p, c.model.q, c.bic - best.bic, c.model) for c in scored
+        # Where every structure is contradicted a criterion that supposes one of them true ranks nothing.
+        close = [] if judged.falsified else scored
+        rivals = sorted((Rival(c.model.p, c.model.q, c.bic - best.bic, c.model) for c in close
                          if c.bic <= best.bic + MARGIN and (c.model.p, c.model.q) != (model.p, model.q)),
                         key=lambda r: r.delta_bic)
         states = {r.digest: tuple(float(v) for v in x) for r, x in zip(self.records, self.states(best), strict=True) if len(x)}
@@ -185,7 +200,7 @@ class _Work:
             rivals=tuple(rivals),
             structures=tuple(Structure(c.model.p, c.model.q, c.cost, c.bic - lowest) for c in scored),
             trials=tuple(self.outcome(t) for t in found), adequacy=judged,
-            warnings=_warnings(judged, parameters, mechanics, rivals, model), space=self.space, settings=s, seed=seed,
+            warnings=_warnings(judged, parameters, mechanics, rivals, model, lowest < best.bic - MARGIN), space=self.space, settings=s, seed=seed,
             seconds=0.0, samples=self.samples, digests=tuple(r.digest for r in self.records), initial_states=states,
             version=__version__, records=tuple(self.records))
 
@@ -204,10 +219,13 @@ class _Work:
 
 
 def _warnings(judged: adequacy.Adequacy, parameters: dict[str, covariance.Estimate], mechanics: OneMass | TwoMass | None,
-              rivals: Sequence[Rival], model: Model) -> tuple[str, ...]:
+              rivals: Sequence[Rival], model: Model, larger_fits_better: bool) -> tuple[str, ...]:
     notes = []
     if judged.falsified:
         notes.append(judged.sentence)
+        if larger_fits_better:
+            notes.append("Larger structures come closer, but only by absorbing what no linear structure holds; the smallest mechanism "
+                         f"is reported, ({model.p},{model.q}).")
     bound = [n for n, e in parameters.items() if e.at_bound]
     if bound:
         notes.append(f"At a bound of the search range: {', '.join(bound)}. Widen the space, or doubt the structure.")

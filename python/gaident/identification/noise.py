@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import erfc
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +36,7 @@ def fit_autoregression(residuals: Sequence[Vector], max_order: int = 30) -> Auto
     """
     total = sum(len(e) for e in residuals)
     top = max(0, min(max_order, total // 20, min(len(e) for e in residuals) - 1))
-    cov = np.array([sum(float(e[: len(e) - k] @ e[k:]) for e in residuals) for k in range(top + 1)]) / total
+    cov = sum((_autocorrelation(e, top) for e in residuals), start=np.zeros(top + 1)) / total
     if not cov[0] > 0.0:
         return Autoregression(np.zeros(0), 0.0)
     phi, variance = np.zeros(0), float(cov[0])
@@ -64,14 +65,19 @@ def whiten(x: Vector, phi: Vector) -> Vector:
 def ljung_box(residuals: Sequence[Vector], lags: int) -> float:
     """p-value of the Ljung-Box test that residuals are white up to `lags`, pooled over records."""
     total = sum(len(e) for e in residuals)
-    energy = sum(float(e @ e) for e in residuals)
-    if not energy > 0.0:
+    r = sum((_autocorrelation(e, lags) for e in residuals), start=np.zeros(lags + 1))
+    if not r[0] > 0.0:
         return 1.0
-    statistic = 0.0
-    for k in range(1, lags + 1):
-        r = sum(float(e[:-k] @ e[k:]) for e in residuals) / energy
-        statistic += r * r / (total - k)
+    statistic = float(np.sum((r[1:] / r[0]) ** 2 / (total - np.arange(1, lags + 1))))
     return chi2_tail(total * (total + 2) * statistic, lags)
+
+
+def _autocorrelation(e: Vector, lags: int) -> Vector:
+    """sum_n e(n) e(n+k), k = 0..lags, by FFT (padded, so not circular)."""
+    size = 1 << (len(e) + lags).bit_length()
+    spectrum = np.fft.rfft(e, size)
+    r: Vector = np.fft.irfft(spectrum.real**2 + spectrum.imag**2, size)[: lags + 1]
+    return r
 
 
 def chi2_tail(x: float, dof: int) -> float:
@@ -79,5 +85,4 @@ def chi2_tail(x: float, dof: int) -> float:
     if x <= 0.0:
         return 1.0
     z = ((x / dof) ** (1.0 / 3.0) - (1.0 - 2.0 / (9.0 * dof))) / np.sqrt(2.0 / (9.0 * dof))
-    from math import erfc
     return 0.5 * erfc(float(z) / np.sqrt(2.0))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from gaident.identification.noise import Autoregression, fit_autoregression
 from gaident.models.model import Model
 
-__all__ = ["MARGIN", "Candidate", "choose"]
+__all__ = ["MARGIN", "Candidate", "choose", "smallest_mechanism"]
 
 MARGIN = 10.0
 CANCELLATION = 0.02
@@ -83,3 +83,20 @@ def choose(experiment: Any, candidates: Sequence[Candidate], residuals_of: Any, 
     close = [i for i, c in enumerate(scored) if c.bic <= best + MARGIN]
     winner = min(close, key=lambda i: (scored[i].size, scored[i].bic))
     return scored, winner, noise
+
+
+def smallest_mechanism(scored: Sequence[Candidate], samples: int) -> int | None:
+    """What to report where the data contradict every linear structure: index of the smallest mechanism, None where there is none.
+
+    An information criterion supposes that one of the models is true. Where none is, every module more absorbs a little of what
+    is missing, and the largest structure wins without meaning anything. Then only chains of masses (p = 1, q = 0, 2, 4, ...) are
+    considered, and a mass more has to halve the whitened error sum, which noise-like misfit does not let it do.
+    """
+    chains = {c.model.q: i for i, c in enumerate(scored) if c.model.p == 1 and c.model.q % 2 == 0}
+    if not chains:
+        return None
+    chosen = chains[min(chains)]
+    for q in sorted(chains):
+        if scored[chains[q]].bic < scored[chosen].bic - samples * np.log(2.0):
+            chosen = chains[q]
+    return chosen
