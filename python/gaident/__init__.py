@@ -41,9 +41,7 @@ __all__ = [
 
 def __getattr__(name: str) -> str:
     if name == "__version__":
-        from importlib.metadata import PackageNotFoundError, version
-        try:
-            return version("gaident")
-        except PackageNotFoundError:
-            return "unknown (not installed)"
+        from gaident.version import version
+
+        return version()
     raise AttributeError(f"module 'gaident' has no attribute {name!r}")

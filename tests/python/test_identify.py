@@ -320,3 +320,23 @@ def test_a_record_in_which_nothing_moves_is_refused_with_a_remedy() -> None:
     reversed_sign = record(ONE_MASS, "open")
     with pytest.raises(SpaceError, match="reverse the sign"):
         ga.identify(ga.Record(dt=DT, torque=reversed_sign.torque, velocity=-reversed_sign.velocity))
+
+
+def test_a_constant_command_is_taken_as_a_step_from_rest_and_doubted() -> None:
+    """A step record of another loop: its first velocity is not 0, but an unknown start would leave zeros and gain open."""
+    rec = record(TWO_MASS, "continuous", noise=0.3, samples=250)
+    step = ga.Record(dt=DT, command=np.full(250, 43.6), velocity=np.zeros(250))
+    w = ga.simulate(TWO_MASS, step, controller("continuous"))
+    rec = ga.Record(dt=DT, command=step.command, velocity=w + 0.05 * np.random.default_rng(0).standard_normal(250), name="step")
+    assert abs(rec.velocity[0]) > 1.0
+    idn = ga.identify(rec, controller("sampled"), workers=1)
+    assert not idn.initial_states
+    assert any("step from rest" in w for w in idn.warnings)
+    assert not any("step from rest" in w for w in ga.identify(rec, controller("continuous"), workers=1).warnings)
+
+
+def test_numbers_beyond_reason_are_refused_before_the_core() -> None:
+    rec, ctl = record(ONE_MASS, "continuous"), controller("continuous")
+    for arguments in ({"trials": 10**14}, {"workers": 10**9}, {"seed": 2**70}):
+        with pytest.raises(SettingsError, match=next(iter(arguments))):
+            ga.identify(rec, ctl, **arguments)

@@ -20,10 +20,11 @@ from gaident.identification.result import Identification, Rival, Structure, Tria
 from gaident.identification.selection import MARGIN, Candidate
 from gaident.identification.settings import Settings
 from gaident.identification.space import SearchSpace, derive_space
-from gaident.identification.starts import starts_moving
+from gaident.identification.starts import doubtful_start, starts_moving
 from gaident.models.controller import PI
 from gaident.models.mechanics import OneMass, TwoMass, mechanics_from_model
 from gaident.models.model import Model
+from gaident.version import version
 
 __all__ = ["identify"]
 
@@ -53,11 +54,11 @@ def identify(rec: Record | Sequence[Record], controller: PI | None = None, space
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
-    for name, value, low in (("trials", trials, 1), ("seed", seed, 0), ("workers", workers, 1)):
+    for name, value, low, high in (("trials", trials, 1, 10**6), ("seed", seed, 0, 2**63 - 1), ("workers", workers, 1, 1024)):
         if value is None and name == "workers":
             continue
-        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < low or value >= 2**63:
-            raise SettingsError(f"{name} is {value!r}: it must be a whole number, {low} or more")
+        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
+            raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
     threads = _processors() if workers is None else int(workers)
     records = sorted(given, key=lambda r: (r.digest, r.name))  # sums must not depend on the order given
     space = _checked_space(derive_space(records, controller) if space is None else space, controller)
@@ -98,10 +99,12 @@ class _Work:
     def search(self, trials: int, seed: int, workers: int, progress: ProgressCallback | None) -> list[_core.Trial]:
         """The genetic runs."""
         total = trials * self.settings.generations
+        usual = 4.0 * trials * self.settings.round  # species stop by themselves: the bar approaches its end
 
         def report(done: int, best: float) -> None:
             assert progress is not None
-            progress(min(1.0, done / total), f"generation {done}, best fitness {best:.4g}")
+            fraction = done / (done + usual) if self.settings.species else done / total
+            progress(min(1.0, fraction), f"generation {done}, best fitness {best:.4g}")
 
         return self.experiment.search(ranges=self.ranges, settings=self.settings.engine_settings(), trials=trials,
                                       seed=seed, workers=workers, progress=None if progress is None else report)
@@ -191,7 +194,6 @@ class _Work:
                          if c.bic <= best.bic + MARGIN and (c.model.p, c.model.q) != (model.p, model.q)),
                         key=lambda r: r.delta_bic)
         states = {r.digest: tuple(float(v) for v in x) for r, x in zip(self.records, self.states(best), strict=True) if len(x)}
-        from gaident import __version__
         return Identification(
             model=model, controller=self.controller, parameters=parameters, mechanics=mechanics,
             fitness=s.error_weight**2 * error_sum + s.order_weight * (model.p + model.q),
@@ -200,9 +202,10 @@ class _Work:
             rivals=tuple(rivals),
             structures=tuple(Structure(c.model.p, c.model.q, c.cost, c.bic - lowest) for c in scored),
             trials=tuple(self.outcome(t) for t in found), adequacy=judged,
-            warnings=_warnings(judged, parameters, mechanics, rivals, model, lowest < best.bic - MARGIN), space=self.space, settings=s, seed=seed,
+            warnings=_warnings(judged, parameters, mechanics, rivals, model, lowest < best.bic - MARGIN,
+                               [n for r in self.records if (n := doubtful_start(r, self.controller))] if s.initial_state == "auto" else []), space=self.space, settings=s, seed=seed,
             seconds=0.0, samples=self.samples, digests=tuple(r.digest for r in self.records), initial_states=states,
-            version=__version__, records=tuple(self.records))
+            version=version(), records=tuple(self.records))
 
     def outcome(self, trial: _core.Trial) -> TrialOutcome:
         """One trial for the report."""
@@ -219,8 +222,9 @@ class _Work:
 
 
 def _warnings(judged: adequacy.Adequacy, parameters: dict[str, covariance.Estimate], mechanics: OneMass | TwoMass | None,
-              rivals: Sequence[Rival], model: Model, larger_fits_better: bool) -> tuple[str, ...]:
-    notes = []
+              rivals: Sequence[Rival], model: Model, larger_fits_better: bool,
+              started: Sequence[str]) -> tuple[str, ...]:
+    notes = list(started)
     if judged.falsified:
         notes.append(judged.sentence)
         if larger_fits_better:

@@ -132,23 +132,24 @@ class Identification:
         """Measured minus simulated velocity [rad/s]."""
         return rec.velocity - self.simulate(rec)
 
-    def summary(self) -> str:
-        """The result as text."""
+    def summary(self, axis: str = "rotary") -> str:
+        """The result as text; axis="linear" for units of m and N."""
         from gaident.show.summary import identification_summary
-        return identification_summary(self)
+        return identification_summary(self, axis)
 
-    def plot(self, records: Record | Sequence[Record] | None = None) -> Figure:
+    def plot(self, records: Record | Sequence[Record] | None = None, axis: str = "rotary") -> Figure:
         """Measured against simulated velocity and the residual, as a matplotlib Figure; `records` as used unless given."""
         from gaident.show.plots import plot_identification
         chosen = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
         if not chosen:
             raise GaidentError("records: a loaded identification holds no data; give plot(records)")
-        return plot_identification(self, chosen)
+        return plot_identification(self, chosen, axis=axis)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, without the records."""
         return {
             "schema": SCHEMA, "schema_version": SCHEMA_VERSION, "gaident_version": self.version,
+            "p": self.p, "q": self.q, "falsified": self.falsified,
             "model": self.model.to_dict(),
             "controller": None if self.controller is None else self.controller.to_dict(),
             "parameters": {name: asdict(e) for name, e in self.parameters.items()},
@@ -189,10 +190,14 @@ class Identification:
         except (KeyError, TypeError, AttributeError) as error:
             raise GaidentError(f"the saved identification is damaged: {error!r}; save it again") from error
 
+    def to_json(self) -> str:
+        """What `save` writes, see `json_text`."""
+        return json_text(self.to_dict())
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes JSON; the file appears whole or not at all."""
         target = Path(path)
-        text = json.dumps(_encoded(self.to_dict()), indent=1, allow_nan=False)
+        text = self.to_json()
         temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
         try:
             temporary.write_text(text, encoding="utf-8")
@@ -222,7 +227,11 @@ def load(path: str | os.PathLike[str]) -> Identification:
         raise GaidentError(f"{path}: {error}") from error
 
 
-# JSON knows no nan or inf; they are written as these words.
+def json_text(data: Mapping[str, Any]) -> str:
+    """JSON of plain data; nan and inf, which JSON lacks, become objects {"number": "nan"}."""
+    return json.dumps(_encoded(dict(data)), indent=1, allow_nan=False)
+
+
 _WORDS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 

@@ -172,7 +172,8 @@ def torque_of(rec: Record, controller: PI | None) -> NDArray[np.float64]:
         for n, step in enumerate(increments):
             total = min(max(total + step, -integrator_limit), integrator_limit)
             integral[n] = total
-    return np.clip(controller.kp * e + integral, -torque_limit, torque_limit)
+    torque: NDArray[np.float64] = np.clip(controller.kp * e + integral, -torque_limit, torque_limit)
+    return torque
 
 
 def _integral(x: NDArray[np.float64], dt: float) -> NDArray[np.float64]:

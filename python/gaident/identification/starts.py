@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from gaident.data.record import Record
 from gaident.models.controller import PI
 
-__all__ = ["noise_std", "starts_moving"]
+__all__ = ["doubtful_start", "noise_std", "starts_moving"]
 
 
 def noise_std(velocity: NDArray[np.float64]) -> float:
@@ -24,7 +24,27 @@ def starts_moving(rec: Record, controller: PI | None) -> bool:
 
     At rest the first velocity is noise: within six standard deviations of it, or one step of a quantised signal, of zero. In the
     continuous loop a command at sample 0 passes through at once, so a first velocity between 0 and 0.6 of that command is no motion.
+    A record whose input never changes counts as started at rest by a step at sample 0: with an unknown state before it, it would say
+    nothing about zeros and gain (see `doubtful_start`).
     """
+    return _first_is_motion(rec, controller) and not _constant_input(rec, controller)
+
+
+def doubtful_start(rec: Record, controller: PI | None) -> str | None:
+    """A sentence where a record's input is constant and its first velocity is not that of rest."""
+    if not (_constant_input(rec, controller) and _first_is_motion(rec, controller)):
+        return None
+    name = f"Record {rec.name}" if rec.name else "The record"
+    return (f"{name} starts at {rec.velocity[0]:.4g} rad/s while its input never changes: taken as a step from rest at its first sample. "
+            "If the step came earlier, give the record from before it; if the drive is not a digital one, give loop='continuous'.")
+
+
+def _constant_input(rec: Record, controller: PI | None) -> bool:
+    source = rec.torque if controller is None else rec.command
+    return source is not None and bool(np.all(source == source[0]))
+
+
+def _first_is_motion(rec: Record, controller: PI | None) -> bool:
     w = rec.velocity
     steps = np.abs(np.diff(w))
     smallest = float(steps[steps > 0.0].min()) if np.any(steps > 0.0) else 0.0

@@ -1,0 +1,163 @@
+"""The core of gaident: recurrences, genetic search and local fit (csrc/bindings); SI units."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+class SearchRanges:
+    """Where gain, roots and structural numbers are looked for: pairs (lowest, highest); roots in rad/s."""
+
+    def __init__(
+        self,
+        gain: tuple[float, float],
+        real: tuple[float, float],
+        imaginary: tuple[float, float],
+        p: tuple[int, int],
+        q: tuple[int, int],
+        bits: int,
+        gain_scale: float = 1.0,
+    ) -> None: ...
+
+class EngineSettings:
+    """Settings of the genetic engine; raises ValueError where one is out of its range."""
+
+    def __init__(
+        self,
+        population: int,
+        tournament: int,
+        crossover: float,
+        mutation: float,
+        generations: int,
+        elites: int,
+        gray: bool,
+        logarithmic: bool,
+        error_weight: float,
+        order_weight: float,
+        species: bool,
+        round: int,
+        quiet_rounds: int,
+        in_float: bool,
+    ) -> None: ...
+
+class Refined:
+    """A local fit: model, start states of the records that move, plain or whitened error sum `cost`."""
+
+    @property
+    def gain(self) -> float: ...
+    @property
+    def poles(self) -> NDArray[np.complex128]: ...
+    @property
+    def zeros(self) -> NDArray[np.complex128]: ...
+    @property
+    def p(self) -> int: ...
+    @property
+    def q(self) -> int: ...
+    @property
+    def starts(self) -> NDArray[np.float64]: ...
+    @property
+    def cost(self) -> float: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def converged(self) -> bool: ...
+    @property
+    def at_bound(self) -> list[bool]: ...
+
+class Trial:
+    """One genetic run: best fitness per generation, the best chromosome's words, each species' local fit."""
+
+    @property
+    def history(self) -> NDArray[np.float64]: ...
+    @property
+    def best_fitness(self) -> float: ...
+    @property
+    def best_generation(self) -> int: ...
+    @property
+    def best(self) -> list[int]: ...
+    @property
+    def evaluations(self) -> int: ...
+    @property
+    def species(self) -> list[Refined]: ...
+
+class Experiment:
+    """Records and their loop: what candidates are simulated against.
+
+    records: (input, velocity, dt, start, first velocity) each, start one of "rest", "steady", "free".
+    loop: "continuous", "sampled" or "open". kernels: an instruction set, "" for the machine's best.
+    Ctrl-C ends long work, and so does an exception that `progress` (generations done, best fitness) raises.
+    """
+
+    def __init__(
+        self,
+        records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float, str, float]],
+        loop: str,
+        kp: float,
+        ki: float,
+        torque_limit: float,
+        integrator_limit: float,
+        kernels: str = "",
+    ) -> None: ...
+    @property
+    def kernels(self) -> str: ...
+    def search(
+        self,
+        ranges: SearchRanges,
+        settings: EngineSettings,
+        trials: int,
+        seed: int,
+        workers: int,
+        progress: Callable[[int, float], None] | None = None,
+    ) -> list[Trial]: ...
+    def refine(
+        self,
+        models: Sequence[tuple[float, NDArray[np.complex128], NDArray[np.complex128], NDArray[np.float64]]],
+        ranges: SearchRanges | None,
+        whitening: Sequence[float],
+        max_iterations: int,
+        workers: int,
+    ) -> list[Refined]: ...
+    def sensitivities(
+        self,
+        gain: float,
+        poles: NDArray[np.complex128],
+        zeros: NDArray[np.complex128],
+        starts: Sequence[float] | NDArray[np.float64],
+        whitening: Sequence[float],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """(error, its derivatives: parameters x samples, the factors of the parameters)."""
+
+def simulate(
+    gain: float,
+    poles: NDArray[np.complex128],
+    zeros: NDArray[np.complex128],
+    dt: float,
+    input: NDArray[np.float64],
+    loop: str,
+    kp: float,
+    ki: float,
+    torque_limit: float,
+    integrator_limit: float,
+    initial_state: NDArray[np.float64],
+    arithmetic: str = "double",
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(velocity, torque) of the model in its loop; limits may be inf, an empty initial_state is rest."""
+
+def discrete(
+    gain: float,
+    poles: NDArray[np.complex128],
+    zeros: NDArray[np.complex128],
+    dt: float,
+    loop: str,
+    kp: float,
+    ki: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(alpha, beta) of equation (7), powers of z^-1."""
+
+def colour(rows: NDArray[np.float64], phi: Sequence[float]) -> NDArray[np.float64]:
+    """F'^-1 of each row (parameters x samples): z(n) = rows(n) + sum phi_i z(n+i)."""
+
+def decode(
+    words: Sequence[int], ranges: SearchRanges, gray: bool, logarithmic: bool
+) -> tuple[float, NDArray[np.complex128], NDArray[np.complex128]]:
+    """(gain, poles, zeros) of a chromosome."""

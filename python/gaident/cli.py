@@ -1,0 +1,262 @@
+"""The command line: arguments -> the package's functions, exit codes, and nothing else.
+
+Exit codes: 0 done, 1 the work failed, 2 wrong use, 130 Ctrl-C; except for 0 with exactly one line on stderr.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import os
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gaident import demo as demonstration
+from gaident.cli_options import PICTURES, drive_of, parser_of
+from gaident.cli_output import Progress, csv_targets, csv_text, naming, target_of, write
+from gaident.data.record import Record
+from gaident.drive_file import Drive
+from gaident.errors import GaidentError, SettingsError
+from gaident.identification.identify import identify
+from gaident.identification.result import Identification, json_text, load
+from gaident.identification.settings import Settings
+from gaident.identification.starts import starts_moving
+from gaident.models.controller import PI
+from gaident.models.mechanics import mechanics_from_dict
+from gaident.models.model import Model
+from gaident.models.simulate import AnyModel, Run, initial_state, run
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["main"]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one command; returns its exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")  # a name of a record never stops the output
+    try:
+        args = parser_of(COMMANDS).parse_args(argv)
+        args.run(args)
+        if sys.stdout is not None:  # None where the caller closed it
+            sys.stdout.flush()
+    except SystemExit as exit_:  # --help, --version
+        return int(exit_.code or 0)
+    except GaidentError as error:
+        return _failed(2, str(error))
+    except KeyboardInterrupt:
+        return _failed(130, "interrupted")
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the interpreter flushes once more
+        return _failed(1, "the output was closed before all of it was written")
+    except OSError as error:
+        what = f"{error.filename}: {error.strerror}" if error.filename is not None else error.strerror
+        return _failed(1, what or str(error))
+    except Exception as error:
+        return _failed(1, f"internal error, please report it: {type(error).__name__}: {error}")
+    return 0
+
+
+def _failed(code: int, message: str) -> int:
+    if sys.stderr is not None:
+        print("gaident:", " ".join(message.split()), file=sys.stderr)
+    return code
+
+
+def _identify(args: argparse.Namespace) -> None:
+    drive = drive_of(args)
+    out = target_of(args.out, args.logs)
+    plot = target_of(args.plot, args.logs, PICTURES)
+    controller = drive.controller()
+    records = _read_all(drive, args.logs, controller)
+    settings = Settings.paper() if args.paper else Settings()
+    settings = replace(settings, initial_state=args.initial_state)
+    with Progress(sys.stderr) as progress:
+        idn = identify(
+            records,
+            controller,
+            drive.space(records, controller),
+            settings,
+            trials=args.trials,
+            seed=args.seed,
+            workers=args.workers,
+            progress=progress,
+        )
+    written = []
+    if out is not None:
+        with naming(out):
+            idn.save(out)
+        written.append(out)
+    if plot is not None:
+        _draw(idn, records, drive.axis, plot)
+        written.append(plot)
+    if args.json:
+        _print_json(idn.to_dict())
+        return
+    print(_summary(idn, drive.axis))
+    if written:
+        print(f"\nwritten: {', '.join(map(str, written))}")
+
+
+def _simulate(args: argparse.Namespace) -> None:
+    drive = drive_of(args)
+    model, controller, states = _load_model(args.model)
+    if drive.controller_values and drive.controller() != controller:
+        controller, states = drive.controller(), {}  # the saved states are of the loop they were found in
+    records = _read_all(drive, args.logs, controller)
+    several = len(records) > 1
+    if several and args.out is None and not args.json:
+        raise SettingsError(
+            f"{len(records)} logs are given: name a folder for their CSV files with --out, or use --json"
+        )
+    targets = csv_targets(args.out, args.logs, several)
+    results = []
+    for rec in records:
+        state: Any = states.get(rec.digest) if args.initial_state == "auto" else None
+        limited = controller is not None and controller.limited
+        if state is None and args.initial_state == "auto" and not limited and starts_moving(rec, controller):
+            state = initial_state(model, rec, controller)
+        results.append(run(model, rec, controller, state))
+    texts = [csv_text(rec, result, drive.axis) for rec, result in zip(records, results, strict=True)]
+    for target, text in zip(targets, texts, strict=False):
+        write(target, text.encode())
+    if args.json:
+        plant = model if isinstance(model, Model) else model.model()
+        runs = [_run_dict(rec, result) for rec, result in zip(records, results, strict=True)]
+        _print_json({
+            "schema": "gaident/simulation", "schema_version": 1, "model": plant.to_dict(),
+            "controller": None if controller is None else controller.to_dict(), "runs": runs,
+        })  # fmt: skip
+    elif not targets:
+        sys.stdout.write(texts[0])
+    else:
+        for target, rec, result in zip(targets, records, results, strict=True):
+            rmse, fit = _fit(rec, result)
+            print(f"{rec.name}: fit {fit:.2f} %, rmse {rmse:.4g}; written: {target}")
+
+
+def _demo(args: argparse.Namespace) -> None:
+    from gaident.show.summary import mechanics_comparison
+
+    folder = Path(args.out)
+    folder.mkdir(parents=True, exist_ok=True)
+    say: Callable[[str], None] = (lambda text: None) if args.json else print
+    truth, controller = demonstration.TRUTH, demonstration.CONTROLLER
+    say(demonstration.STORY)
+    with Progress(sys.stderr) as progress:
+        rec, idn = demonstration.identify_two_masses(args.seed, progress, args.workers)
+    say(_summary(idn, "rotary"))
+    if isinstance(idn.mechanics, type(truth)):
+        say(f"\nCompared with the truth\n{mechanics_comparison(idn.mechanics, truth)}")
+    log, picture = folder / "demo_two_mass.csv", folder / "demo_two_mass.png"
+    write(log, csv_text(rec, None, "rotary").encode())
+    _draw(idn, [rec], "rotary", picture)
+    say(f"\nwritten: {picture}, {log}; the same from the log:")
+    say(f"  gaident identify {log} --kp {controller.kp} --ki {controller.ki} --loop {controller.loop}")
+    report: dict[str, Any] = {
+        "schema": "gaident/demo",
+        "schema_version": 1,
+        "two_masses": {"truth": truth.to_dict(), "identification": idn.to_dict()},
+        "emps": None,
+    }
+    path = demonstration.emps_path()
+    if path is None:
+        say("\nThe measured EMPS axis is left out: GAIDENT_DATA names no folder with emps/DATA_EMPS.mat")
+    else:
+        say(f"\n{'-' * 100}\n{demonstration.EMPS_STORY}: {path}\n")
+        with Progress(sys.stderr) as progress:
+            rec, idn = demonstration.identify_emps(path, args.seed, progress, args.workers)
+        say(_summary(idn, "linear"))
+        picture = folder / "demo_emps.png"
+        _draw(idn, [rec], "linear", picture)
+        say(f"\n{demonstration.EMPS_TRUTH}\nwritten: {picture}")
+        report["emps"] = {"identification": idn.to_dict()}
+    if args.json:
+        _print_json(report)
+
+
+def _read_all(drive: Drive, logs: Sequence[str], controller: PI | None) -> list[Record]:
+    records = [drive.read(log) for log in logs]
+    for log, rec in zip(logs, records, strict=True):
+        if controller is not None and rec.command is None:
+            raise SettingsError(
+                f"{log}: there is no command, which drives the loop with a controller: name its column "
+                "(--columns command=...), or use --loop open to work from torque to velocity"
+            )
+        if controller is None and rec.torque is None:
+            raise SettingsError(
+                f"{log}: there is no torque, which drives the model in open loop: name its column "
+                "(--columns torque=...), or give the controller (--kp, --ki)"
+            )
+    return records
+
+
+def _load_model(path: str) -> tuple[AnyModel, PI | None, dict[str, tuple[float, ...]]]:
+    """(model, controller, start state of each record known by its digest)."""
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise SettingsError(
+            f"{path}: there is no such file; give a saved identification or a model"
+        ) from None
+    except (OSError, ValueError) as error:
+        raise SettingsError(
+            f"{path}: cannot be read as JSON ({error}); give what identify --out saved"
+        ) from None
+    if isinstance(data, dict) and "schema" in data:
+        idn = load(path)
+        return idn.model, idn.controller, dict(idn.initial_states)
+    try:
+        known = (
+            mechanics_from_dict(data)
+            if isinstance(data, dict) and "structure" in data
+            else Model.from_dict(data)
+        )
+    except GaidentError as error:
+        raise SettingsError(f"{path}: {error}") from None
+    return known, None, {}
+
+
+def _summary(idn: Identification, axis: str) -> str:
+    from gaident.show.summary import identification_summary
+
+    return identification_summary(idn, axis)
+
+
+def _draw(idn: Identification, records: Sequence[Record], axis: str, path: Path) -> None:
+    from gaident.show.plots import plot_identification
+
+    figure: Figure = plot_identification(idn, records, axis)
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format=path.suffix[1:].lower())
+    write(path, drawn.getvalue())
+
+
+def _fit(rec: Record, result: Run) -> tuple[float, float]:
+    """(rmse, fit_percent) of one simulated run."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = rec.velocity - result.velocity
+        spread = float(np.linalg.norm(rec.velocity - rec.velocity.mean()))
+        fit = 100.0 * (1.0 - float(np.linalg.norm(error)) / spread) if spread > 0.0 else float("nan")
+        return float(np.sqrt(np.mean(error**2))), fit
+
+
+def _run_dict(rec: Record, result: Run) -> dict[str, Any]:
+    rmse, fit = _fit(rec, result)
+    return {"name": rec.name, "dt": rec.dt, "samples": len(rec), "rmse": rmse, "fit_percent": fit,
+            "velocity": result.velocity.tolist(), "torque": result.torque.tolist()}  # fmt: skip
+
+
+def _print_json(data: dict[str, Any]) -> None:
+    print(json_text(data))
+
+
+COMMANDS = {"identify": _identify, "simulate": _simulate, "demo": _demo}

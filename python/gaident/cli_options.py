@@ -1,0 +1,292 @@
+"""The commands' options and their help, and the options that override the drive file."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NoReturn
+
+from gaident.drive_file import AXES, COLUMNS, KEYS, Drive, read_drive_file
+from gaident.errors import ControllerError, SettingsError
+from gaident.identification.settings import INITIAL_STATES
+from gaident.models._checks import one_of
+from gaident.models.controller import LOOPS
+
+__all__ = ["PICTURES", "drive_of", "parser_of"]
+
+PICTURES = (".png", ".pdf", ".svg")
+CONSTANT_HELP = {
+    "counts_per_turn": "encoder counts per turn of the motor, for units of counts",
+    "torque_constant": "[N m/A], for a torque in A",
+    "rated_torque": "what 100 %% means [N m], for a torque in %%",
+    "torque_per_volt": "[N m/V], for a torque in V",
+}
+TEXT_TABLE_HELP = {
+    "delimiter": "what separates columns, a character, tab or space (default: found out)",
+    "decimal": "decimal mark, . or , (default: found out)",
+    "skip": "lines to leave out at the top",
+    "encoding": "as Python calls it (default: found out)",
+}
+
+IDENTIFY_HELP = """\
+Finds structure (p,q), poles, zeros and mechanical parameters of the drive behind one log or several
+(one model for all), with their uncertainty, and says whether a linear model holds at all.
+
+With a controller, the log's velocity command drives the simulated loop; without one, its torque drives
+the model. Formats: CSV and other text tables, MAT of version 5, NPZ.
+"""
+IDENTIFY_EXAMPLES = """\
+examples:
+  a CSV with the columns w_ref and w [rpm], and the controller's gains:
+    gaident identify run1.csv --columns command=w_ref,velocity=w --unit velocity=rpm,command=rpm \\
+        --kp 0.0232 --ki 1.367 --out run1.json --plot run1.png
+  the same, with everything that belongs to the axis in a file:
+    gaident identify run*.csv --drive drive.toml
+  open loop, velocity from a position, force from the drive's voltage:
+    gaident identify DATA_EMPS.mat --columns torque=vir,position=qm,time=t --unit torque=35.15 \\
+        --velocity-cutoff 100 --axis linear
+  as in the paper (Table II), in the paper's ranges:
+    gaident identify step.csv --kp 0.0232 --ki 1.367 --loop continuous --paper \\
+        --gain 1e3 2e4 --real 0 60 --imaginary 0 250 --trials 20
+
+drive.toml, every part optional:
+  axis = "rotary"                 # or "linear"
+  dt = 0.444e-3                   # s; also velocity_cutoff_hz, counts_per_turn, torque_constant, ...
+  [columns]
+  command = "w_ref"
+  velocity = "w"
+  [units]
+  velocity = "rpm"                # or the factor to SI, as a number
+  [controller]
+  kp = 0.0232                     # N m s/rad
+  ki = 1.367                      # N m/rad; also loop, torque_limit, integrator_limit
+  [space]
+  inertia = [1e-4, 5e-3]          # kg m^2; also resonance_hz, damping, or gain, real, imaginary, p, q, bits
+
+exit codes: 0 done, 1 the work failed, 2 wrong use, 130 interrupted
+"""
+SIMULATE_HELP = """\
+Drives a model with each log's command (through the controller) or torque (open loop) and writes the
+velocity and torque that come out. MODEL.json: what `identify --out` saved (its controller is used unless
+another one is given), {"gain": ..., "poles": ..., "zeros": ...}, or {"structure": "two masses", "JM": ...}.
+"""
+SIMULATE_EXAMPLES = """\
+examples:
+  gaident simulate run1.json run2.csv --drive drive.toml > simulated.csv
+  gaident simulate run1.json run*.csv --drive drive.toml --out simulated/     one CSV per log
+  gaident simulate motor.json run2.csv --kp 0.0232 --ki 1.367 --json
+"""
+DEMO_HELP = """\
+The main job: identifies a two-mass drive (the paper's robot arm, Table III) from a noisy velocity step
+through its PI loop, and compares the result with the truth. Where the environment variable GAIDENT_DATA
+names a folder with emps/DATA_EMPS.mat, it then identifies that measured ball-screw axis too.
+"""
+
+
+def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], None]]) -> argparse.ArgumentParser:
+    """The parser; commands: name -> what runs it, set as `run`."""
+    from gaident import __version__
+
+    parser = _Parser(
+        prog="gaident",
+        description="From a servo drive's log to a model of its mechanics, and what it is worth.",
+        epilog="gaident COMMAND --help explains a command, with examples.",
+    )
+    parser.add_argument("--version", action="version", version=f"gaident {__version__}")
+    subparsers = parser.add_subparsers(metavar="COMMAND", required=True)
+
+    def command(name: str, files: str, line: str, text: str, epilog: str = "") -> _Parser:
+        usage = f"gaident {name} {files}[options]"
+        sub: _Parser = subparsers.add_parser(name, usage=usage, help=line, description=text, epilog=epilog)
+        sub.set_defaults(run=commands[name])
+        return sub
+
+    sub = command(
+        "identify", "LOG... ", "log -> structure, parameters, uncertainty", IDENTIFY_HELP, IDENTIFY_EXAMPLES
+    )
+    sub.add_argument("logs", nargs="+", metavar="LOG", help="log file; several give one model for all")
+    _add_log_options(sub)
+    _add_controller_options(sub)
+    _add_space_options(sub)
+    g = sub.add_argument_group("the search")
+    g.add_argument(
+        "--paper", action="store_true", help="the paper's genetic algorithm to the letter (Table II)"
+    )
+    g.add_argument("--trials", type=int, default=1, metavar="N", help="independent genetic runs (default 1)")
+    _add_run_options(g)
+    g.add_argument(
+        "--initial-state",
+        choices=INITIAL_STATES,
+        default="auto",
+        help="auto: estimated for records that do not start at rest (default)",
+    )
+    g = sub.add_argument_group("results")
+    g.add_argument("--out", metavar="FILE", help="save the identification (JSON)")
+    g.add_argument("--plot", metavar="FILE", help=f"draw measured against simulated ({', '.join(PICTURES)})")
+    g.add_argument("--json", action="store_true", help="print what --out saves instead of the summary")
+
+    sub = command(
+        "simulate",
+        "MODEL.json LOG... ",
+        "model + log -> velocity and torque",
+        SIMULATE_HELP,
+        SIMULATE_EXAMPLES,
+    )
+    sub.add_argument("model", metavar="MODEL.json", help="a saved identification, or a model")
+    sub.add_argument("logs", nargs="+", metavar="LOG", help="log file")
+    _add_log_options(sub)
+    _add_controller_options(sub)
+    sub.add_argument(
+        "--initial-state",
+        choices=("auto", "rest"),
+        default="auto",
+        help="auto: estimated for records that do not start at rest (default)",
+    )
+    g = sub.add_argument_group("results")
+    g.add_argument("--out", metavar="PATH", help="CSV file; a folder where several logs are given")
+    g.add_argument("--json", action="store_true", help="print everything as JSON instead of CSV")
+
+    sub = command("demo", "", "the main job, on data of its own", DEMO_HELP)
+    sub.add_argument(
+        "--out", metavar="DIR", default=".", help="where pictures go (default: the current folder)"
+    )
+    _add_run_options(sub)
+    sub.add_argument("--json", action="store_true", help="print JSON instead of text")
+    return parser
+
+
+def _add_run_options(group: Any) -> None:
+    group.add_argument("--seed", type=int, default=0, metavar="N", help="same seed, same result (default 0)")
+    group.add_argument("--workers", type=int, metavar="N", help="threads (default: all processors)")
+
+
+def drive_of(args: argparse.Namespace) -> Drive:
+    """The drive file, if one is named, with the options over it."""
+    sections: dict[str, dict[str, Any]] = {name: {} for name in KEYS}
+    if getattr(args, "drive", None) is not None:
+        sections = read_drive_file(args.drive)
+    for name, keys in KEYS.items():
+        if name in ("columns", "units"):
+            sections[name].update(_assignments(getattr(args, name, None) or [], f"--{name}"))
+            continue
+        for key in keys:
+            value = getattr(args, key, None)
+            if value is not None:
+                sections[name][key] = value
+    if sections["controller"].get("loop") is not None:
+        one_of(sections["controller"]["loop"], "loop", (*LOOPS, "open"), ControllerError)
+    sections["units"] = {k: _as_number(v) for k, v in sections["units"].items()}
+    names = ("", "columns", "units", "controller", "space")
+    return Drive(*(sections[name] for name in names))
+
+
+def _assignments(texts: Sequence[str], option: str) -> dict[str, str]:
+    """{"velocity": "w", "torque": "data[:,4]"} of ["velocity=w,torque=data[:,4]"]."""
+    found = {}
+    for text in texts:
+        for part in re.split(r",(?=\s*\w+\s*=)", text):
+            name, sign, value = part.partition("=")
+            if not sign:
+                raise SettingsError(
+                    f"{option} {text!r}: write channel=value, for example {option} velocity=w"
+                )
+            found[one_of(name.strip(), f"{option}: channel", COLUMNS, SettingsError)] = value.strip()
+    return found
+
+
+def _as_number(text: str | float) -> str | float:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _whole_range(text: str) -> tuple[int, int]:
+    """(1, 1) of "1", (0, 3) of "0..3"."""
+    match = re.fullmatch(r"(\d+)(?:\.\.(\d+))?", text.strip())
+    if match is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither a whole number nor a range like 0..3")
+    return int(match[1]), int(match[2] or match[1])
+
+
+def _add_log_options(parser: argparse.ArgumentParser) -> None:
+    """How logs are read."""
+    g = parser.add_argument_group("the log", "channels: command, velocity, torque, position, time")
+    g.add_argument(
+        "--drive", metavar="FILE", help="drive.toml with what belongs to the axis; options override it"
+    )
+    g.add_argument(
+        "--columns",
+        "--column",
+        action="append",
+        metavar="CH=NAME,...",
+        help="column of each channel: its name, '#3' (number from 0), or data[:,3] of an array; "
+        "CH= alone leaves a channel out. May be repeated",
+    )
+    g.add_argument(
+        "--units",
+        "--unit",
+        action="append",
+        metavar="CH=UNIT,...",
+        help="unit of each channel (rpm, deg, counts, %%, A, V, ms, ...), or the factor to SI as a number",
+    )
+    g.add_argument("--dt", type=float, metavar="S", help="sample time [s], for logs without a time column")
+    g.add_argument(
+        "--velocity-cutoff",
+        type=float,
+        metavar="HZ",
+        dest="velocity_cutoff_hz",
+        help="a log without velocity gets it from position, low-passed at this corner [Hz]",
+    )
+    for name, text in CONSTANT_HELP.items():
+        g.add_argument(f"--{name.replace('_', '-')}", type=float, metavar="X", help=text)
+    for name, text in TEXT_TABLE_HELP.items():
+        kind, meta = (int, "LINES") if name == "skip" else (str, "TEXT")
+        g.add_argument(f"--{name}", type=kind, metavar=meta, help=f"of a text table: {text}")
+    g.add_argument("--axis", choices=AXES, help="linear: print m, m/s, N, kg (default: rotary)")
+
+
+def _add_controller_options(parser: argparse.ArgumentParser) -> None:
+    """The velocity loop."""
+    g = parser.add_argument_group("the velocity controller", "without one: open loop, torque to velocity")
+    g.add_argument("--kp", type=float, metavar="X", help="proportional gain [N m s/rad]")
+    g.add_argument("--ki", type=float, metavar="X", help="integral gain [N m/rad]")
+    g.add_argument(
+        "--loop",
+        choices=(*LOOPS, "open"),
+        help="sampled: a digital drive (default); continuous: everything bilinear, as in the paper; open: "
+        "leave the controller out",
+    )
+    g.add_argument("--torque-limit", type=float, metavar="X", help="the controller's torque limit [N m]")
+    g.add_argument("--integrator-limit", type=float, metavar="X", help="limit of its integral part [N m]")
+
+
+def _add_space_options(parser: argparse.ArgumentParser) -> None:
+    """Where parameters are looked for."""
+    g = parser.add_argument_group("where to look", "what is not given is derived from the data")
+    for name, text in (
+        ("--inertia", "total inertia [kg m^2] or mass [kg]"),
+        ("--resonance-hz", "where the mechanism may resonate [Hz]"),
+        ("--damping", "total viscous damping [N m s/rad], with --inertia"),
+        ("--gain", "K at p = 1, that is 1/J_M [1/(kg m^2)]"),
+        ("--real", "negated real parts of poles and zeros [rad/s]"),
+        ("--imaginary", "imaginary parts [rad/s]"),
+    ):
+        g.add_argument(name, nargs=2, type=float, metavar=("LOW", "HIGH"), help=text)
+    for name, text in (("--p", "poles in excess of zeros"), ("--q", "zeros")):
+        g.add_argument(name, type=_whole_range, metavar="N|A..B", help=f"{text}: 1, or 0..3")
+    g.add_argument("--bits", type=int, metavar="N", help="bits per number of the genetic code (default 10)")
+
+
+class _Parser(argparse.ArgumentParser):
+    """argparse that raises for wrong use; no abbreviations, as they change when options are added."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        more = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
+        super().__init__(**{**more, **kwargs})
+
+    def error(self, message: str) -> NoReturn:
+        if message.startswith("unrecognized arguments: ") and not message.split()[2].startswith("-"):
+            message += " (name all files in one place, without options between them)"
+        raise SettingsError(f"{message}; see {self.prog} --help")

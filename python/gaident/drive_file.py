@@ -1,0 +1,199 @@
+"""drive.toml: what belongs to the axis, checked key by key, and what follows from it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gaident.data.readers import read
+from gaident.data.record import CHANNELS, Record
+from gaident.errors import ControllerError, ReadError, SpaceError
+from gaident.identification.space import SearchSpace, derive_space
+from gaident.models._checks import known_keys, one_of, real_number
+from gaident.models.controller import PI
+
+__all__ = ["AXES", "COLUMNS", "KEYS", "Drive", "read_drive_file"]
+
+
+COLUMNS = (*CHANNELS, "time")
+CONSTANTS = ("counts_per_turn", "torque_constant", "rated_torque", "torque_per_volt")
+RANGES = ("inertia", "resonance_hz", "damping", "gain", "real", "imaginary", "p", "q")
+AXES = ("rotary", "linear")
+
+Check = Callable[[object, str], object]
+
+
+def _number(value: object, name: str) -> float:
+    if isinstance(value, bool):
+        raise ReadError(f"{name} is {value!r}: give one number")
+    return real_number(value, name, ReadError, "give one number, without quotes")
+
+
+def _whole(value: object, name: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise ReadError(f"{name} is {value!r}: give a whole number")
+    return value
+
+
+def _text(value: object, name: str) -> str:
+    if not isinstance(value, str):
+        raise ReadError(f'{name} is {value!r}: give text in quotes, {name} = "..."')
+    return value
+
+
+def _column(value: object, name: str) -> str | int:
+    return value if isinstance(value, int) and not isinstance(value, bool) else _text(value, name)
+
+
+def _unit(value: object, name: str) -> str | float:
+    return value if isinstance(value, str) else _number(value, name)
+
+
+def _pair(value: object, name: str) -> tuple[float, float]:
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
+        raise ReadError(f"{name} is {value!r}: give a pair, {name} = [lowest, highest]")
+    low, high = (_number(v, name) for v in value)
+    return low, high
+
+
+def _pair_or_one(value: object, name: str) -> tuple[int, int]:
+    if isinstance(value, int) and not isinstance(value, bool):
+        return value, value
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
+        raise ReadError(f"{name} is {value!r}: give one whole number or a pair, {name} = [lowest, highest]")
+    return _whole(value[0], name), _whole(value[1], name)
+
+
+def _axis(value: object, name: str) -> str:
+    return one_of(value, name, AXES, ReadError)
+
+
+# Sections of drive.toml ("" is its top), their keys and what a value must be.
+KEYS: dict[str, dict[str, Check]] = {
+    "": {
+        "axis": _axis,
+        "dt": _number,
+        "velocity_cutoff_hz": _number,
+        **dict.fromkeys(CONSTANTS, _number),
+        "delimiter": _text,
+        "decimal": _text,
+        "skip": _whole,
+        "encoding": _text,
+    },
+    "columns": dict.fromkeys(COLUMNS, _column),
+    "units": dict.fromkeys(COLUMNS, _unit),
+    "controller": {
+        "kp": _number,
+        "ki": _number,
+        "loop": _text,
+        "torque_limit": _number,
+        "integrator_limit": _number,
+    },
+    "space": {
+        **dict.fromkeys(RANGES, _pair),
+        "p": _pair_or_one,
+        "q": _pair_or_one,
+        "bits": _whole,
+    },
+}
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What belongs to the axis: how its logs are read, its controller, where to look for its parameters."""
+
+    general: Mapping[str, Any]
+    columns: Mapping[str, Any]
+    units: Mapping[str, Any]
+    controller_values: Mapping[str, Any]
+    space_values: Mapping[str, Any]
+
+    @property
+    def axis(self) -> str:
+        """ "rotary" or "linear": which units are printed."""
+        return str(self.general.get("axis", "rotary"))
+
+    def read(self, path: str) -> Record:
+        """The log as a Record. Raises ReadError or RecordError."""
+        more = {k: v for k, v in self.general.items() if k not in ("axis", "dt")}
+        columns = {k: None if v == "" else v for k, v in self.columns.items()}
+        return read(path, columns or None, self.units or None, self.general.get("dt"), **more)
+
+    def controller(self) -> PI | None:
+        """The PI controller; None: open loop. Raises ControllerError where half of it is missing."""
+        values = self.controller_values
+        if values.get("loop") == "open" or not values:
+            return None
+        missing = [name for name in ("kp", "ki") if name not in values]
+        if missing:
+            raise ControllerError(
+                f"the controller lacks {' and '.join(missing)}: give --kp and --ki (or [controller] in "
+                "the drive file), or --loop open to work from torque to velocity"
+            )
+        return PI(**values)
+
+    def space(self, records: Sequence[Record], controller: PI | None) -> SearchSpace | None:
+        """The search space: what is given, the rest derived from the data; None where nothing is given."""
+        given = dict(self.space_values)
+        if not given:
+            return None
+        source = ", ".join(given)
+        for name, other in (("inertia", "gain"), ("resonance_hz", "imaginary")):
+            if name in given and other in given:
+                raise SpaceError(
+                    f"{name} and {other} both say where to look for the same thing: leave one out"
+                )
+        if "damping" in given and "inertia" not in given:
+            raise SpaceError("damping is given without inertia: give both, their ratio bounds the real parts")
+        derived = derive_space(records, controller)
+        mechanics = {k: given.pop(k) for k in ("inertia", "resonance_hz", "damping") if k in given}
+        if mechanics:
+            # What is not given stands in with any value; the ranges that come from it are not used.
+            top = derived.imaginary[1] / math.tau
+            whole = SearchSpace.from_mechanics(
+                mechanics.get("inertia", (1.0, 2.0)),
+                mechanics.get("resonance_hz", (0.5 * top, top)),
+                mechanics.get("damping"),
+            )
+            if "inertia" in mechanics:
+                given.setdefault("gain", whole.gain)
+            if "resonance_hz" in mechanics:
+                given.setdefault("imaginary", whole.imaginary)
+            if "resonance_hz" in mechanics or "damping" in mechanics:
+                given.setdefault("real", whole.real)
+        return dataclasses.replace(derived, **given, source=f"given: {source}; what is not, {derived.source}")
+
+
+def read_drive_file(path: str) -> dict[str, dict[str, Any]]:
+    """drive.toml as {section: {key: value}}, checked; raises ReadError with file, key, value and remedy."""
+    if sys.version_info >= (3, 11):
+        import tomllib
+    else:
+        import tomli as tomllib
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ReadError(f"{path}: there is no such drive file; check --drive") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ReadError(f"{path}: cannot be read ({error}); give a TOML file in UTF-8") from None
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ReadError(f"{path}: this is not TOML ({error}); see gaident identify --help") from None
+    top = known_keys(data, path, [*KEYS[""], *(s for s in KEYS if s)], (), ReadError)
+    sections: dict[str, dict[str, Any]] = {"": {k: v for k, v in top.items() if k not in KEYS or not k}}
+    for name in (s for s in KEYS if s):
+        sections[name] = known_keys(top.get(name, {}), f"{path}: [{name}]", KEYS[name], (), ReadError)
+    for name, values in sections.items():
+        where = f"{path}: [{name}] " if name else f"{path}: "
+        for key, value in values.items():
+            try:
+                values[key] = KEYS[name][key](value, key)
+            except ReadError as error:
+                raise ReadError(f"{where}{error}") from None
+    return sections

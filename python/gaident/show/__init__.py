@@ -1,0 +1,20 @@
+"""Results as text and pictures: pure functions of what a result says about itself."""
+
+from gaident.show.plots import (
+    plot_bode,
+    plot_convergence,
+    plot_identification,
+    plot_poles_zeros,
+    plot_structures,
+)
+from gaident.show.summary import identification_summary, mechanics_comparison
+
+__all__ = [
+    "identification_summary",
+    "mechanics_comparison",
+    "plot_bode",
+    "plot_convergence",
+    "plot_identification",
+    "plot_poles_zeros",
+    "plot_structures",
+]

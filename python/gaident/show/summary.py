@@ -1,0 +1,205 @@
+"""The result of an identification as text."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from typing import Any
+
+from gaident.show.wording import number, structure_words, table, unit, velocity_unit, with_std
+
+__all__ = ["identification_summary", "mechanics_comparison"]
+
+WIDTH = 100
+SHOWN_STRUCTURES = 5
+
+
+def identification_summary(idn: Any, axis: str = "rotary") -> str:
+    """What was found and what it is worth; plain text, verdict first, no line break at the end.
+
+    idn: an Identification, or anything with its attributes. axis: "rotary", or "linear" for units of m and N.
+    """
+    sections = [
+        _verdict(idn, axis),
+        _model(idn, axis),
+        _mechanics(idn, axis),
+        _structures(idn),
+        _search(idn, axis),
+        _warnings(idn),
+    ]
+    return "\n\n".join("\n".join(lines) for lines in sections if lines)
+
+
+def mechanics_comparison(found: Any, truth: Any, axis: str = "rotary") -> str:
+    """A table of identified against true mechanics; both OneMass or both TwoMass."""
+    rows = [("", "true", "identified", "deviation", "")]
+    for name in (n for n in found.UNITS if hasattr(truth, n)):
+        true, value, std = getattr(truth, name), getattr(found, name), found.std.get(name, math.nan)
+        if true == value == 0.0:
+            continue
+        relative = f"{round(100.0 * (value / true - 1.0), 1) + 0.0:+.1f} %" if true else ""
+        in_stds = f" ({abs(value - true) / std:.1f} std)" if std > 0.0 else ""
+        rows.append(
+            (name, number(true), with_std(value, std), relative + in_stds, unit(found.UNITS[name], axis))
+        )
+    return "\n".join(table(rows))
+
+
+def _verdict(idn: Any, axis: str) -> list[str]:
+    stands = "the linear model is FALSIFIED" if idn.falsified else "the linear model stands"
+    records = len(idn.digests)
+    figures = (
+        f"fit {number(idn.fit_percent)} %",
+        f"rmse {number(idn.rmse)} {velocity_unit(axis)}",
+        f"noise {number(idn.adequacy.noise_std)} {velocity_unit(axis)}",
+        f"{idn.samples} samples of {records} record{'s' if records != 1 else ''}",
+        f"found in {idn.seconds:.2f} s",
+    )
+    return [
+        f"(p,q) = ({idn.p},{idn.q}), {structure_words(idn.p, idn.q)}; {stands}",
+        *textwrap.wrap(idn.adequacy.sentence, WIDTH),
+        ", ".join(figures),
+        _loop(idn.controller, axis),
+    ]
+
+
+def _loop(controller: Any, axis: str) -> str:
+    torque = unit("N m", axis)
+    if controller is None:
+        driven = "torque" if axis == "rotary" else "force"
+        return f"open loop, {driven} [{torque}] to velocity [{velocity_unit(axis)}]"
+    parts = [
+        f"{controller.loop} loop, PI with kp {number(controller.kp)} {unit('N m s/rad', axis)}",
+        f"ki {number(controller.ki)} {unit('N m/rad', axis)}",
+    ]
+    for name in ("torque_limit", "integrator_limit"):
+        limit = getattr(controller, name)
+        if limit is not None:
+            parts.append(f"{name.replace('_', ' ')} {number(limit)} {torque}")
+    return ", ".join(parts)
+
+
+def _model(idn: Any, axis: str) -> list[str]:
+    gain = idn.parameters["gain"]
+    rows: list[tuple[str, ...]] = [
+        ("", "real part [rad/s]", "imaginary part [rad/s]", "frequency [Hz]", "damping", "")
+    ]
+    stems = dict.fromkeys(_stem(name) for name in idn.parameters if name != "gain")
+    rows += [_root(idn.parameters, stem) for stem in stems]
+    head = f"Model: gain K = {_estimate(gain)} {unit(gain.unit, axis)} {_flags([gain])}".rstrip()
+    return [head, *(table(rows) if len(rows) > 1 else [])]
+
+
+def _stem(name: str) -> str:
+    """ "pole_pair_1" of "pole_pair_1_frequency", "pole_1" of itself."""
+    return name.rsplit("_", 1)[0] if "_pair_" in name else name
+
+
+def _root(parameters: Any, stem: str) -> tuple[str, ...]:
+    """One real root or one pair as a row."""
+    name = stem.replace("_", " ")
+    if stem in parameters:
+        e = parameters[stem]
+        frequency = with_std(abs(e.value) / math.tau, e.std / math.tau) if e.value else ""
+        return (name, _estimate(e), "", frequency, "", _flags([e], e.value))
+    parts = [parameters[f"{stem}_{what}"] for what in ("real", "imaginary", "frequency", "damping")]
+    real, imaginary, frequency, damping = parts
+    in_hz = with_std(frequency.value / math.tau, frequency.std / math.tau)
+    return name, _estimate(real), _estimate(imaginary), in_hz, _estimate(damping), _flags(parts, real.value)
+
+
+def _estimate(e: Any) -> str:
+    return with_std(e.value, e.std)
+
+
+def _flags(estimates: list[Any], real_part: float = -1.0) -> str:
+    flags = []
+    if any(e.at_bound for e in estimates):
+        flags.append("at bound")
+    elif any(not e.identifiable for e in estimates):
+        flags.append("not identifiable")
+    if real_part > 0.0:
+        flags.append("unstable")
+    return ", ".join(flags)
+
+
+def _mechanics(idn: Any, axis: str) -> list[str]:
+    m = idn.mechanics
+    if m is None:
+        if (idn.p, idn.q) in ((1, 0), (1, 2)):
+            return ["Mechanics: no such mechanism has these poles and zeros"]
+        return [f"Mechanics: none, ({idn.p},{idn.q}) is {structure_words(idn.p, idn.q)}"]
+    head = "Mechanics, NOT TO BE TRUSTED (the linear model is falsified)" if idn.falsified else "Mechanics"
+    damped = getattr(m, "with_shaft_damping", None)
+    rows = [("", "no shaft damping", "with shaft damping", "")] if damped is not None else []
+    for name, rotary in m.UNITS.items():
+        value = getattr(m, name)
+        cell = "0 (set)" if name == "DG" and value == 0.0 else with_std(value, m.std.get(name))
+        beside = "" if damped is None else with_std(getattr(damped, name), damped.std.get(name))
+        rows.append((name, cell, beside, unit(rotary, axis)))
+    lines = [head, *table(rows)]
+    if hasattr(m, "resonance"):
+        lines.append(
+            f"  resonance {number(m.resonance / math.tau)} Hz, antiresonance "
+            f"{number(m.antiresonance / math.tau)} Hz (undamped)"
+        )
+        lines += [f"  {line}" for line in textwrap.wrap(_inconsistency(m), WIDTH - 2)]
+    if damped is not None:
+        lines += [f"  with shaft damping: {note}" for note in damped.notes]
+    return lines
+
+
+def _inconsistency(m: Any) -> str:
+    if m.inconsistency is None:
+        return ""
+    std = m.std.get("inconsistency", math.nan)
+    text = f"inconsistency without shaft damping {with_std(100.0 * m.inconsistency, 100.0 * std)} %"
+    if not std > 0.0:
+        return text
+    if m.inconsistency <= 3.0 * std:
+        return f"{text}: within three standard deviations, no shaft damping needed"
+    return f"{text}: significant; a hint at shaft damping, or at an effect that the model lacks"
+
+
+def _structures(idn: Any) -> list[str]:
+    if not idn.structures:
+        return []
+    rivals = {(r.p, r.q) for r in idn.rivals}
+    ordered = sorted(idn.structures, key=lambda s: (s.delta_bic, s.p + 2 * s.q))
+    shown = [s for i, s in enumerate(ordered) if i < SHOWN_STRUCTURES or (s.p, s.q) == (idn.p, idn.q)]
+    rows = [("(p,q)", "delta BIC", "error sum", "")]
+    for s in shown:
+        mark = "reported" if (s.p, s.q) == (idn.p, idn.q) else "rival" if (s.p, s.q) in rivals else ""
+        rows.append((f"({s.p},{s.q})", f"{s.delta_bic:.1f}", number(s.error_sum), mark))
+    return [f"Structures, the best {len(shown)} of {len(ordered)}", *table(rows)]
+
+
+def _search(idn: Any, axis: str) -> list[str]:
+    space, s = idn.space, idn.settings
+    generations = sum(t.generations for t in idn.trials)
+    evaluations = sum(t.evaluations for t in idn.trials)
+    gain_unit = unit("rad/s^2/(N m)", axis)
+    trials = len(idn.trials)
+    return [
+        f"Searched ({space.source})",
+        f"  K {_span(*space.gain)} {gain_unit}, real parts {_span(-space.real[1], -space.real[0])} rad/s, "
+        f"imaginary parts {_span(*space.imaginary)} rad/s,",
+        f"  p {space.p[0]}..{space.p[1]}, q {space.q[0]}..{space.q[1]}, {space.bits} bits a number",
+        f"  engine {s.engine}, population {s.population}, {s.code} code, {s.scale} scale; seed {idn.seed}, "
+        f"{trials} trial{'s' if trials != 1 else ''},",
+        f"  {generations} generations, {evaluations} candidates; fitness (6) of the result "
+        f"{number(idn.fitness)}; gaident {idn.version or 'of unknown version'}",
+    ]
+
+
+def _span(low: float, high: float) -> str:
+    return f"{number(low)}..{number(high)}"
+
+
+def _warnings(idn: Any) -> list[str]:
+    # What falsifies the model stands at the top already.
+    notes = [w for w in idn.warnings if w != idn.adequacy.sentence]
+    lines = []
+    for note in notes:
+        lines += textwrap.wrap(note, WIDTH, initial_indent="  - ", subsequent_indent="    ")
+    return ["Keep in mind", *lines] if lines else []
