@@ -54,8 +54,63 @@ Prepared prepare(const Factors<double>& g, const Record& record, const Loop& loo
     return c;
 }
 
+namespace {
+
+void place(FactorGroup& group, std::size_t lane, const Factors<double>& g) {
+    const Structure s = g.structure;
+    const Counts& most = group.counts;
+    group.gain[lane] = g.gain;
+    for (int i = 0; i < most.pole_pairs; ++i) {
+        const Pair<double> f = i < s.pole_pairs() ? g.pole_pair[i] : Pair<double>{0.0, 0.0};
+        group.pole_e1[i][lane] = f.e1;
+        group.pole_e0[i][lane] = f.e0;
+    }
+    for (int i = 0; i < most.zero_pairs; ++i) {
+        const Pair<double> f = i < s.zero_pairs() ? g.zero_pair[i] : Pair<double>{0.0, 0.0};
+        group.zero_e1[i][lane] = f.e1;
+        group.zero_e0[i][lane] = f.e0;
+    }
+    group.pole[lane] = s.single_pole() ? g.pole : 0.0;
+    group.zero[lane] = s.single_zero() ? g.zero : 0.0;
+    for (int i = 0; i < most.p; ++i) group.excess[i][lane] = i < s.p ? 1.0 : 0.0;
+}
+
+}  // namespace
+
+void load_group(const Experiment& experiment, const Record& record, std::span<const Factors<double>* const> candidates,
+                std::span<const double* const> starts, DoubleGroup& group) {
+    const Loop& loop = experiment.loop;
+    const bool closed = loop.kind != LoopKind::open && !loop.limited();
+    FactorGroup factors;
+    factors.structure = candidates[0]->structure;
+    double fastest = 0.0;
+    for (const Factors<double>* g : candidates) {
+        const Counts c = g->counts();
+        Counts& most = factors.counts;
+        most = {std::max(most.order, c.order),           std::max(most.p, c.p),
+                std::max(most.pole_pairs, c.pole_pairs), std::max(most.zero_pairs, c.zero_pairs),
+                most.single_pole || c.single_pole,       most.single_zero || c.single_zero};
+        if (loop.kind != LoopKind::continuous) fastest = std::max(fastest, largest_root(*g));
+    }
+    if (loop.kind != LoopKind::continuous) factors.doublings = held_doublings(fastest, record.sample_time);
+    for (std::size_t lane = 0; lane < FactorGroup::width; ++lane)
+        place(factors, lane, *candidates[std::min(lane, candidates.size() - 1)]);
+    experiment.kernels->coefficients(factors, loop, record.sample_time, closed, group);
+
+    for (std::size_t lane = 0; lane < FactorGroup::width; ++lane) {
+        const std::size_t i = std::min(lane, candidates.size() - 1);
+        const double* const start = starts.empty() ? nullptr : starts[i];
+        for (int k = 0; k < group.order; ++k) group.x[k][lane] = 0.0;
+        group.s[lane] = 0.0;
+        if (start == nullptr && record.start == Start::rest) continue;
+        const Prepared c = prepare(*candidates[i], record, loop, start);
+        for (int k = 0; k < c.response.order; ++k) group.x[k][lane] = c.x[k];
+        group.s[lane] = c.s;
+    }
+}
+
 Batch::Batch(const Experiment& experiment, std::size_t capacity, bool in_float)
-    : experiment_(experiment), in_float_(in_float), order_(capacity), prepared_(capacity) {
+    : experiment_(experiment), in_float_(in_float), order_(capacity), sorted_(capacity) {
     if (!in_float) return;
     inputs_.reserve(experiment.samples());
     outputs_.reserve(experiment.samples());
@@ -65,49 +120,91 @@ Batch::Batch(const Experiment& experiment, std::size_t capacity, bool in_float)
     }
 }
 
+// Behind a hold a group ends where the structure changes.
+std::size_t Batch::group_end(std::size_t first, std::size_t count) const {
+    std::size_t end = std::min<std::size_t>(first + DoubleGroup::width, count);
+    if (experiment_.loop.kind == LoopKind::continuous) return end;
+    for (std::size_t i = first + 1; i < end; ++i)
+        if (!(sorted_[i]->structure == sorted_[first]->structure)) end = i;
+    return end;
+}
+
+namespace {
+
+void narrow(const DoubleGroup& from, int offset, FloatGroup& to) {
+    for (int k = 0; k <= to.order; ++k)
+        for (int lane = 0; lane < DoubleGroup::width; ++lane) {
+            if (k < to.order) to.a[k][offset + lane] = k < from.order ? static_cast<float>(from.a[k][lane]) : 0.0F;
+            if (k < to.order) to.x[k][offset + lane] = k < from.order ? static_cast<float>(from.x[k][lane]) : 0.0F;
+            to.b[k][offset + lane] = k <= from.order ? static_cast<float>(from.b[k][lane]) : 0.0F;
+        }
+    for (int lane = 0; lane < DoubleGroup::width; ++lane) to.s[offset + lane] = static_cast<float>(from.s[lane]);
+}
+
+}  // namespace
+
 template <class G, class T>
 void Batch::run(const KernelSet<G, T>& kernels, G& group, std::span<const T> in, std::span<const T> out, const Record& record,
-                std::size_t count, double* sums) {
+                std::span<const Factors<double>> candidates, double* sums) {
+    constexpr bool halves = G::width == 2 * DoubleGroup::width;
+    const std::size_t count = candidates.size();
     const Controller<T> controller(experiment_.loop, record.sample_time);
     const bool stepped = experiment_.loop.limited();
-    for (std::size_t first = 0; first < count; first += G::width) {
-        const std::size_t used = std::min<std::size_t>(G::width, count - first);
-        group.order = 0;
-        for (std::size_t i = 0; i < used; ++i)
-            group.order = std::max(group.order, prepared_[order_[first + i]].response.order);
-        // Unused lanes repeat the last candidate.
-        for (int lane = 0; lane < G::width; ++lane)
-            place(group, lane, prepared_[order_[first + std::min<std::size_t>(static_cast<std::size_t>(lane), used - 1)]]);
+    const auto load = [&](std::size_t first, std::size_t end, DoubleGroup& into) {
+        load_group(experiment_, record, std::span(sorted_).subspan(first, end - first), {}, into);
+    };
+    for (std::size_t first = 0; first < count;) {
+        const std::size_t middle = group_end(first, count);
+        std::size_t end = middle;
+        load(first, middle, double_group_);
+        if constexpr (halves) {
+            if (middle < count) {
+                end = group_end(middle, count);
+                load(middle, end, other_half_);
+            } else {
+                other_half_ = double_group_;
+            }
+            group.order = std::max(double_group_.order, other_half_.order);
+            narrow(double_group_, 0, group);
+            narrow(other_half_, DoubleGroup::width, group);
+        }
+        const auto lane = [&](std::size_t i) { return i < middle ? i - first : DoubleGroup::width + (i - middle); };
         for (std::size_t i = 0; i < in.size(); i += chunk_samples) {
             const std::size_t n = std::min(chunk_samples, in.size() - i);
             T part[G::width];
             if (stepped) kernels.stepped_errors(group, controller, in.data() + i, out.data() + i, n, part);
             else kernels.errors(group, in.data() + i, out.data() + i, n, part);
-            for (std::size_t k = 0; k < used; ++k) sums[order_[first + k]] += static_cast<double>(part[k]);
+            for (std::size_t k = first; k < end; ++k) sums[order_[k]] += static_cast<double>(part[lane(k)]);
             experiment_.stop_if_asked();
         }
+        first = end;
     }
 }
 
 void Batch::errors(std::span<const Factors<double>> candidates, std::span<double> sums) {
     const std::size_t count = candidates.size();
-    // Candidates of one order share their lanes: a counting sort by order keeps the sum of group orders small.
-    std::size_t at[max_plant_order + 2] = {};
-    for (const auto& g : candidates) ++at[g.structure.poles() + 1];
-    for (int i = 1; i < max_plant_order + 2; ++i) at[i] += at[i - 1];
-    for (std::size_t i = 0; i < count; ++i) order_[at[candidates[i].structure.poles()]++] = i;
+    // Candidates of one order share their lanes: sorting by order keeps the sum of group orders small; within an order by q, so that
+    // structures stay together.
+    constexpr std::size_t keys = (max_plant_order + 1) * (max_plant_order / 2 + 1);
+    std::size_t at[keys + 1] = {};
+    const auto key = [](Structure s) { return static_cast<std::size_t>(s.poles() * (max_plant_order / 2 + 1) + s.q); };
+    for (const auto& g : candidates) ++at[key(g.structure) + 1];
+    for (std::size_t i = 1; i <= keys; ++i) at[i] += at[i - 1];
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t place = at[key(candidates[i].structure)]++;
+        order_[place] = i;
+        sorted_[place] = &candidates[i];
+    }
 
     std::fill(sums.begin(), sums.begin() + static_cast<std::ptrdiff_t>(count), 0.0);
     std::size_t offset = 0;
     for (const Record& record : experiment_.records) {
-        for (std::size_t i = 0; i < count; ++i)
-            prepared_[i] = prepare(candidates[i], record, experiment_.loop, nullptr);
         if (in_float_) {
             const std::span<const float> in(inputs_.data() + offset, record.size());
             const std::span<const float> out(outputs_.data() + offset, record.size());
-            run(experiment_.kernels->in_float, float_group_, in, out, record, count, sums.data());
+            run(experiment_.kernels->in_float, float_group_, in, out, record, candidates, sums.data());
         } else {
-            run(experiment_.kernels->in_double, double_group_, record.input, record.output, record, count, sums.data());
+            run(experiment_.kernels->in_double, double_group_, record.input, record.output, record, candidates, sums.data());
         }
         offset += record.size();
     }

@@ -50,16 +50,11 @@ struct Prepared {
 // `start` holds start_states() numbers, or is null: then the record's own start (rest, or steady motion) is used.
 Prepared prepare(const Factors<double>& g, const Record& record, const Loop& loop, const double* start);
 
-template <class T, int W>
-void place(Group<T, W>& group, int lane, const Prepared& c) {
-    const int n = c.response.order;
-    for (int i = 0; i < group.order; ++i) {
-        group.a[i][lane] = static_cast<T>(i < n ? c.response.a[i] : 0.0);
-        group.x[i][lane] = static_cast<T>(i < n ? c.x[i] : 0.0);
-    }
-    for (int i = 0; i <= group.order; ++i) group.b[i][lane] = static_cast<T>(i <= n ? c.response.b[i] : 0.0);
-    group.s[lane] = static_cast<T>(c.s);
-}
+// Responses and initial states of up to eight candidates on one record, eight at a time: as prepare(), bit for bit. Behind a hold all
+// must have the same structure. starts[i], where not null, is candidate i's `start`; an empty span means none has one. Lanes
+// beyond the candidates repeat the last.
+void load_group(const Experiment& experiment, const Record& record, std::span<const Factors<double>* const> candidates,
+                std::span<const double* const> starts, DoubleGroup& group);
 
 // Error sums of candidates of any mixture of structures. All memory is taken in the constructor.
 class Batch {
@@ -70,16 +65,17 @@ public:
     void errors(std::span<const Factors<double>> candidates, std::span<double> sums);
 
 private:
+    std::size_t group_end(std::size_t first, std::size_t count) const;
     template <class G, class T>
     void run(const KernelSet<G, T>& kernels, G& group, std::span<const T> in, std::span<const T> out, const Record& record,
-             std::size_t count, double* sums);
+             std::span<const Factors<double>> candidates, double* sums);
 
     const Experiment& experiment_;
     bool in_float_;
-    std::vector<std::size_t> order_;      // candidates sorted by order, stable
-    std::vector<Prepared> prepared_;
+    std::vector<std::size_t> order_;       // candidates sorted by order, stable
+    std::vector<const Factors<double>*> sorted_;
     std::vector<float> inputs_, outputs_;  // the records in float, one after the other
-    DoubleGroup double_group_;
+    DoubleGroup double_group_, other_half_;
     FloatGroup float_group_;
 };
 

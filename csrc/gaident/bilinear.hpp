@@ -11,37 +11,52 @@
 
 namespace gaident {
 
+// What the i-th of the p poles in excess of zeros brings to a product. Lanes of mixed structures overload it.
 template <class R>
-Delta<R> bilinear_plant(const Factors<R>& g, double sample_time) {
-    const Structure s = g.structure;
+R excess(const Factors<R>&, int, R factor, R) {
+    return factor;
+}
+
+template <class R, class Plant>
+Delta<R> bilinear_plant(const Plant& g, double sample_time) {
+    const Counts s = g.counts();
     const R h = R(0.5 * sample_time), one = R(1.0), two = R(2.0), four = R(4.0);
 
     R gain = g.gain;
-    for (int i = 0; i < s.p; ++i) gain = gain * h;
+    for (int i = 0; i < s.p; ++i) gain = gain * excess(g, i, h, one);
 
     Polynomial<R> denominator(one), numerator(one);
-    for (int i = 0; i < s.pole_pairs(); ++i) {
+    for (int i = 0; i < s.pole_pairs; ++i) {
         const R e1 = g.pole_pair[i].e1 * h, e0 = (g.pole_pair[i].e0 * h) * h;
         const R lead = (one + e1) + e0;
         denominator.times(one, (two * e1 + four * e0) / lead, (four * e0) / lead);
         gain = gain / lead;
     }
-    if (s.single_pole()) {
+    if (s.single_pole) {
         const R a = g.pole * h, lead = one + a;
         denominator.times(one, (two * a) / lead);
         gain = gain / lead;
     }
-    for (int i = 0; i < s.zero_pairs(); ++i) {
+    for (int i = 0; i < s.zero_pairs; ++i) {
         const R e1 = g.zero_pair[i].e1 * h, e0 = (g.zero_pair[i].e0 * h) * h;
         numerator.times((one + e1) + e0, two * e1 + four * e0, four * e0);
     }
-    if (s.single_zero()) {
+    if (s.single_zero) {
         const R b = g.zero * h;
         numerator.times(one + b, two * b);
     }
-    for (int i = 0; i < s.p; ++i) numerator.times(one, two);
-    for (int i = 0; i <= numerator.degree; ++i) numerator.c[i] = numerator.c[i] * gain;
-    return make_delta(numerator, denominator);
+    for (int i = 0; i < s.p; ++i) numerator.times(one, excess(g, i, two, R(0.0)));
+    // Both have the plant's order, and are aligned at their leading coefficients.
+    Delta<R> plant;
+    plant.order = s.order;
+    for (int i = 0; i < s.order; ++i) plant.a[i] = denominator.c[i + 1];
+    for (int i = 0; i <= s.order; ++i) plant.b[i] = numerator.c[i] * gain;
+    return plant;
+}
+
+template <class R>
+Delta<R> bilinear_plant(const Factors<R>& g, double sample_time) {
+    return bilinear_plant<R, Factors<R>>(g, sample_time);
 }
 
 }  // namespace gaident

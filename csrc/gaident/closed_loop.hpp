@@ -31,15 +31,16 @@ Delta<R> close_loop(const Delta<R>& plant, double kp, double ki, double sample_t
 // The recurrence, in observer form; every arithmetic runs these lines:
 //
 //     y(n)       = x[0](n) + b[0] r(n)
-//     x[i](n+1)  = x[i](n) + (x[i+1](n) - a[i] y(n) + b[i+1] r(n)),   x[N] = 0
+//     x[i](n+1)  = x[i](n) + x[i+1](n) + b[i+1] r(n) - a[i] y(n),   x[N] = 0
 //
+// y enters last: what does not depend on it is ready before it is, which shortens the chain from one sample to the next.
 // `N` is the order when known at compile time, so that the state lives in registers; -1 otherwise.
 template <class R, int N>
 [[gnu::always_inline]] inline R recurrence_step(int order, const R* a, const R* b, R* x, R r) {
     const int n = N >= 0 ? N : order;
     const R y = x[0] + b[0] * r;
-    for (int i = 0; i + 1 < n; ++i) x[i] = x[i] + ((x[i + 1] - a[i] * y) + b[i + 1] * r);
-    if (n > 0) x[n - 1] = x[n - 1] + (b[n] * r - a[n - 1] * y);
+    for (int i = 0; i + 1 < n; ++i) x[i] = ((x[i] + x[i + 1]) + b[i + 1] * r) - a[i] * y;
+    if (n > 0) x[n - 1] = (x[n - 1] + b[n] * r) - a[n - 1] * y;
     return y;
 }
 

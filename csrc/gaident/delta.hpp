@@ -53,15 +53,4 @@ struct Polynomial {
     }
 };
 
-// The leading coefficient of `denominator` is taken to be 1 and not stored; a shorter numerator is shifted into place.
-template <class R>
-Delta<R> make_delta(const Polynomial<R>& numerator, const Polynomial<R>& denominator) {
-    Delta<R> h;
-    h.order = denominator.degree;
-    for (int i = 0; i < h.order; ++i) h.a[i] = denominator.c[i + 1];
-    for (int i = 0; i <= h.order; ++i) h.b[i] = R(0.0);
-    for (int i = 0; i <= numerator.degree; ++i) h.b[h.order - numerator.degree + i] = numerator.c[i];
-    return h;
-}
-
 }  // namespace gaident

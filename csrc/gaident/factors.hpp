@@ -36,6 +36,12 @@ struct Pair {
     R e1, e0;  // s^2 + e1 s + e0
 };
 
+// How many factors of each kind a product takes in.
+struct Counts {
+    int order, p, pole_pairs, zero_pairs;
+    bool single_pole, single_zero;
+};
+
 template <class R>
 struct Factors {
     Structure structure;
@@ -44,6 +50,11 @@ struct Factors {
     R pole{};  // s + pole, used when the number of poles is odd
     Pair<R> zero_pair[max_pairs]{};
     R zero{};
+
+    Counts counts() const {
+        const Structure& s = structure;
+        return {s.poles(), s.p, s.pole_pairs(), s.zero_pairs(), s.single_pole(), s.single_zero()};
+    }
 };
 
 // A conjugate pair -re +- i im, or two real roots -a1, -a2, as s^2 + e1 s + e0.

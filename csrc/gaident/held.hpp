@@ -91,10 +91,10 @@ inline double largest_root(const Factors<double>& g) {
 }
 
 // Needs p >= 1: a plant that passes its torque straight through has no held form.
-template <class R>
-Delta<R> held_plant(const Factors<R>& g, double sample_time, int doublings) {
-    const Structure s = g.structure;
-    const int n = s.poles();
+template <class R, class Plant>
+Delta<R> held_plant(const Plant& g, double sample_time, int doublings) {
+    const Counts s = g.counts();
+    const int n = s.order;
     const R Ts = R(sample_time), zero = R(0.0), one = R(1.0);
 
     // Output of the cascade so far, as a row over [torque, states].
@@ -105,9 +105,9 @@ Delta<R> held_plant(const Factors<R>& g, double sample_time, int doublings) {
     detail::Hessenberg<R> M;
     M.n = n + 1;
     int state = 1;
-    int zeros_left = s.zero_pairs();
-    bool single_zero_left = s.single_zero();
-    const int pairs = s.pole_pairs();
+    int zeros_left = s.zero_pairs;
+    bool single_zero_left = s.single_zero;
+    const int pairs = s.pole_pairs;
     for (int i = 0; i < pairs; ++i) {
         // x1' = x2, x2' = -e0 x1 - e1 x2 + v;   y = n2 v + (n0 - n2 e0) x1 + (n1 - n2 e1) x2
         const R e1 = g.pole_pair[i].e1 * Ts, e0 = (g.pole_pair[i].e0 * Ts) * Ts;
@@ -120,7 +120,7 @@ Delta<R> held_plant(const Factors<R>& g, double sample_time, int doublings) {
             row[state] = (g.zero_pair[zeros_left].e0 * Ts) * Ts - e0;
             row[state + 1] = g.zero_pair[zeros_left].e1 * Ts - e1;
         } else {
-            const bool with_zero = single_zero_left && !s.single_pole();
+            const bool with_zero = single_zero_left && !s.single_pole;
             for (int j = 0; j < state; ++j) row[j] = zero;
             row[state] = with_zero ? g.zero * Ts : one;
             row[state + 1] = with_zero ? one : zero;
@@ -128,7 +128,7 @@ Delta<R> held_plant(const Factors<R>& g, double sample_time, int doublings) {
         }
         state += 2;
     }
-    if (s.single_pole()) {
+    if (s.single_pole) {
         const R a = g.pole * Ts;
         for (int j = 0; j < state; ++j) M.m[state][j] = row[j];
         M.m[state][state] = -a;
@@ -148,7 +148,7 @@ Delta<R> held_plant(const Factors<R>& g, double sample_time, int doublings) {
         const R f11 = F.m[k][k], f12 = F.m[k][k + 1], f21 = F.m[k + 1][k], f22 = F.m[k + 1][k + 1];
         denominator.times(one, -(f11 + f22), f11 * f22 - f12 * f21);
     }
-    if (s.single_pole()) denominator.times(one, -F.m[n][n]);
+    if (s.single_pole) denominator.times(one, -F.m[n][n]);
 
     R gain = g.gain;
     for (int i = 0; i < s.p; ++i) gain = gain * Ts;
@@ -178,6 +178,11 @@ Delta<R> held_plant(const Factors<R>& g, double sample_time, int doublings) {
         d.b[k + 1] = sum;
     }
     return d;
+}
+
+template <class R>
+Delta<R> held_plant(const Factors<R>& g, double sample_time, int doublings) {
+    return held_plant<R, Factors<R>>(g, sample_time, doublings);
 }
 
 }  // namespace gaident

@@ -57,6 +57,11 @@ struct Lanes {
         });
     }
 
+    // a where on > 0, else b
+    [[gnu::always_inline]] friend inline Lanes where(const Lanes& on, const Lanes& a, const Lanes& b) {
+        return each([&](int i) { return Register(on.v[i] > Register{} ? a.v[i] : b.v[i]); });
+    }
+
 private:
     template <class F>
     [[gnu::always_inline]] static inline Lanes each(F f) {

@@ -28,8 +28,8 @@ struct SteppedLoop {
         pi.s = clamp(pi.s + pi.g * e, -pi.integrator_limit, pi.integrator_limit) + pi.g * e;
         const int n = N >= 0 ? N : order;
         const R y = x[0] + b[0] * u;
-        for (int i = 0; i + 1 < n; ++i) x[i] = x[i] + ((x[i + 1] - a[i] * y) + b[i + 1] * u);
-        if (n > 0) x[n - 1] = x[n - 1] + (b[n] * u - a[n - 1] * y);
+        for (int i = 0; i + 1 < n; ++i) x[i] = ((x[i] + x[i + 1]) + b[i + 1] * u) - a[i] * y;
+        if (n > 0) x[n - 1] = (x[n - 1] + b[n] * u) - a[n - 1] * y;
         return y;
     }
 };

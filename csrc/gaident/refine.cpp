@@ -55,11 +55,18 @@ void Refiner::load(const std::vector<Vector>& points, Structure s, std::size_t r
     std::size_t offset = static_cast<std::size_t>(s.parameters());
     for (std::size_t k = 0; k < r; ++k)
         if (experiment_.records[k].start == Start::free) offset += static_cast<std::size_t>(start_states(s, experiment_.loop));
-    for (std::size_t i = 0; i < scratch.bank.size() * W; ++i) {
-        const Vector& x = points[std::min(i, points.size() - 1)];  // unused lanes repeat the last point
-        const Prepared c = prepare(unpack(x, s), record, experiment_.loop, record.start == Start::free ? x.data() + offset : nullptr);
-        scratch.bank[i / W].order = c.response.order;
-        place(scratch.bank[i / W], static_cast<int>(i % W), c);
+    const bool free = record.start == Start::free;
+    for (std::size_t g = 0; g < scratch.bank.size(); ++g) {
+        const std::size_t used = std::min(W, points.size() - g * W);
+        Factors<double> models[W];
+        const Factors<double>* lanes[W];
+        const double* starts[W];
+        for (std::size_t i = 0; i < used; ++i) {
+            models[i] = unpack(points[g * W + i], s);
+            lanes[i] = &models[i];
+            starts[i] = points[g * W + i].data() + offset;
+        }
+        load_group(experiment_, record, {lanes, used}, {starts, free ? used : 0}, scratch.bank[g]);
     }
 }
 

@@ -37,12 +37,12 @@ inline bool add(const char* name, void (*body)()) {
 }
 
 inline void fail(const char* file, int line, const std::string& what) {
-    constexpr int shown = 50; // a failing loop shall not bury the first message
+    constexpr int shown = 50;  // a failing loop shall not bury the first message
     if (const int count = ++failures; count <= shown) std::printf("%s:%d: %s\n", file, line, what.c_str());
 }
 
 inline void near(const char* file, int line, const char* text, double value, double expected, double tolerance) {
-    if (std::abs(value - expected) <= tolerance || value == expected) return; // ==: equal infinities
+    if (std::abs(value - expected) <= tolerance || value == expected) return;  // ==: equal infinities
     char numbers[160];
     std::snprintf(numbers, sizeof numbers, "%.17g is not within %.3g of %.17g", value, tolerance, expected);
     fail(file, line, std::string(text) + ": " + numbers);
@@ -53,7 +53,8 @@ inline int run(const std::vector<std::string>& arguments) {
     int ran = 0;
     for (const Case& c : cases()) {
         bool wanted = list || arguments.empty();
-        for (const std::string& part : arguments) wanted = wanted || std::string(c.name).find(part) != std::string::npos;
+        for (const std::string& part : arguments)
+            wanted = wanted || std::string(c.name).find(part) != std::string::npos;
         if (!wanted) continue;
         ++ran;
         std::printf(list ? "%s\n" : "[ %s ]\n", c.name);
@@ -70,29 +71,29 @@ inline int run(const std::vector<std::string>& arguments) {
     return ran == 0 ? 2 : failures > 0 ? 1 : 0;
 }
 
-} // namespace check
+}  // namespace check
 
 #define CHECK_JOIN_(a, b) a##b
 #define CHECK_JOIN(a, b) CHECK_JOIN_(a, b)
-#define TEST_CASE(name)                                                                                               \
-    static void CHECK_JOIN(test_case_, __LINE__)();                                                                   \
-    [[maybe_unused]] static const bool CHECK_JOIN(added_, __LINE__) =                                                 \
-        check::add(name, &CHECK_JOIN(test_case_, __LINE__));                                                          \
+#define TEST_CASE(name)                                               \
+    static void CHECK_JOIN(test_case_, __LINE__)();                   \
+    [[maybe_unused]] static const bool CHECK_JOIN(added_, __LINE__) = \
+        check::add(name, &CHECK_JOIN(test_case_, __LINE__));          \
     static void CHECK_JOIN(test_case_, __LINE__)()
-#define CHECK(...)                                                                                                    \
-    do {                                                                                                              \
-        if (!(__VA_ARGS__)) check::fail(__FILE__, __LINE__, "CHECK(" #__VA_ARGS__ ")");                               \
+#define CHECK(...)                                                                      \
+    do {                                                                                \
+        if (!(__VA_ARGS__)) check::fail(__FILE__, __LINE__, "CHECK(" #__VA_ARGS__ ")"); \
     } while (false)
-#define CHECK_NEAR(value, expected, tolerance)                                                                        \
-    check::near(__FILE__, __LINE__, "CHECK_NEAR(" #value ", " #expected ")", static_cast<double>(value),              \
+#define CHECK_NEAR(value, expected, tolerance)                                                           \
+    check::near(__FILE__, __LINE__, "CHECK_NEAR(" #value ", " #expected ")", static_cast<double>(value), \
                 static_cast<double>(expected), static_cast<double>(tolerance))
-#define CHECK_THROWS(expression, exception_type)                                                                      \
-    do {                                                                                                              \
-        bool thrown_ = false;                                                                                         \
-        try {                                                                                                         \
-            static_cast<void>(expression);                                                                            \
-        } catch (const exception_type&) {                                                                             \
-            thrown_ = true;                                                                                           \
-        }                                                                                                             \
-        if (!thrown_) check::fail(__FILE__, __LINE__, "CHECK_THROWS(" #expression ", " #exception_type ")");          \
+#define CHECK_THROWS(expression, exception_type)                                                             \
+    do {                                                                                                     \
+        bool thrown_ = false;                                                                                \
+        try {                                                                                                \
+            static_cast<void>(expression);                                                                   \
+        } catch (const exception_type&) {                                                                    \
+            thrown_ = true;                                                                                  \
+        }                                                                                                    \
+        if (!thrown_) check::fail(__FILE__, __LINE__, "CHECK_THROWS(" #expression ", " #exception_type ")"); \
     } while (false)

@@ -7,8 +7,42 @@
 
 namespace gaident {
 
+// The factors of a group in registers.
+template <class L>
+struct LaneFactors : Factors<L> {
+    Counts sizes{};
+    L has_excess[max_plant_order / 2];
+
+    Counts counts() const { return sizes; }
+};
+
+template <class L>
+[[gnu::always_inline]] inline L excess(const LaneFactors<L>& g, int i, L factor, L neutral) {
+    return where(g.has_excess[i], factor, neutral);
+}
+
 template <class Isa>
 struct KernelSource {
+    static void coefficients(const FactorGroup& f, const Loop& loop, double sample_time, bool closed, DoubleGroup& out) {
+        using L = Lanes<double, double_lanes, Isa>;
+        LaneFactors<L> g;
+        g.structure = f.structure;
+        g.sizes = f.counts;
+        g.gain = L::load(f.gain);
+        for (int i = 0; i < f.counts.pole_pairs; ++i) g.pole_pair[i] = {L::load(f.pole_e1[i]), L::load(f.pole_e0[i])};
+        for (int i = 0; i < f.counts.zero_pairs; ++i) g.zero_pair[i] = {L::load(f.zero_e1[i]), L::load(f.zero_e0[i])};
+        if (f.counts.single_pole) g.pole = L::load(f.pole);
+        if (f.counts.single_zero) g.zero = L::load(f.zero);
+        for (int i = 0; i < f.counts.p; ++i) g.has_excess[i] = L::load(f.excess[i]);
+        Delta<L> h = loop.kind == LoopKind::continuous
+                         ? bilinear_plant<L>(g, sample_time)
+                         : held_plant<L>(g, sample_time, f.doublings);
+        if (closed) h = close_loop(h, loop.kp, loop.ki, sample_time);
+        out.order = h.order;
+        for (int i = 0; i < h.order; ++i) h.a[i].store(out.a[i]);
+        for (int i = 0; i <= h.order; ++i) h.b[i].store(out.b[i]);
+    }
+
     template <class T, int W, int N>
     struct Bank {  // a group in registers
         using L = Lanes<T, W, Isa>;
@@ -124,7 +158,7 @@ struct KernelSource {
         return {errors<T, W>, outputs<T, W>, stepped_errors<T, W>, stepped_outputs<T, W>};
     }
     static Kernels all(const char* name) {
-        return {name, set<double, double_lanes>(), set<float, float_lanes>()};
+        return {name, coefficients, set<double, double_lanes>(), set<float, float_lanes>()};
     }
 };
 

@@ -23,6 +23,19 @@ inline constexpr int float_lanes = 16;
 using DoubleGroup = Group<double, double_lanes>;
 using FloatGroup = Group<float, float_lanes>;
 
+// W plants as factors, lane by lane. Lanes of a smaller structure leave at zero the factors they lack: bilinear, s^2 and s over their
+// powers of (delta + 2) are the identity, so that mixed structures share a group. Behind a hold they are not, and a group has one structure.
+struct FactorGroup {
+    static constexpr int width = double_lanes;
+    Structure structure;  // of all lanes, behind a hold
+    Counts counts{};      // of the product: the largest of the lanes
+    alignas(64) double gain[width];
+    alignas(64) double pole_e1[max_pairs][width], pole_e0[max_pairs][width], pole[width];
+    alignas(64) double zero_e1[max_pairs][width], zero_e0[max_pairs][width], zero[width];
+    alignas(64) double excess[max_plant_order / 2][width];  // 1 where the lane has more than i poles in excess of zeros, else 0
+    int doublings = 0;  // of the hold's matrix exponential, enough for the fastest lane
+};
+
 template <class G, class T>
 struct KernelSet {
     // sums[lane] = sum over n samples of (output - y)^2
@@ -36,6 +49,8 @@ struct KernelSet {
 
 struct Kernels {
     const char* name;
+    // Coefficients of the plants (`closed` false) or of the closed loops into the group's a, b and order; its states are left alone.
+    void (*coefficients)(const FactorGroup&, const Loop&, double sample_time, bool closed, DoubleGroup&);
     KernelSet<DoubleGroup, double> in_double;
     KernelSet<FloatGroup, float> in_float;
 };

@@ -2,8 +2,9 @@
 //
 //     u -> G0 = K -> G11 -> G12 ... -> G21 -> G22 ... -> w
 //
-// every module a difference equation of its own in powers of z, with its own past. Conjugate pairs make one module of order two.
-// Slow and obvious; it shares no line with the fast path. Run in long double or wider where its own rounding matters.
+// every module a difference equation of its own in powers of z, with its own past. Conjugate pairs make one module of
+// order two. Slow and obvious; it shares no line with the fast path. Run in long double or wider where its own
+// rounding matters.
 #pragma once
 
 #include "../controller.hpp"
@@ -66,7 +67,8 @@ System<R> factor_modules(const Plant& g) {
 }
 
 // One module under s = c (z-1)/(z+1), c = 2/Ts:
-//     a0 y(n) = b0 u(n) + b1 u(n-1) + b2 u(n-2) - a1 y(n-1) - a2 y(n-2),   or  y(n) = g u(n) + h  with h the past's share.
+//     a0 y(n) = b0 u(n) + b1 u(n-1) + b2 u(n-2) - a1 y(n-1) - a2 y(n-2),   or  y(n) = g u(n) + h  with h the past's
+// share.
 template <class R>
 class DifferenceEquation {
 public:
@@ -113,12 +115,13 @@ struct Regulator {
     R I = R(0), e = R(0);
 
     Regulator(const Loop& loop, double Ts)
-        : kp(loop.kp), ki(loop.ki), sample_time(Ts), torque_limit(loop.torque_limit),
+        : kp(loop.kp),
+          ki(loop.ki),
+          sample_time(Ts),
+          torque_limit(loop.torque_limit),
           integrator_limit(loop.integrator_limit) {}
 
-    R integral(R error) const {
-        return limited<R>(I + R(ki) * R(sample_time) / R(2) * (error + e), integrator_limit);
-    }
+    R integral(R error) const { return limited<R>(I + R(ki) * R(sample_time) / R(2) * (error + e), integrator_limit); }
     R torque(R error) const { return limited<R>(R(kp) * error + integral(error), torque_limit); }
     void advance(R error) {
         I = integral(error);
@@ -150,8 +153,8 @@ private:
     static R distance(R a, R b) { return a < b ? b - a : a - b; }
 };
 
-// loop="continuous": command -> velocity, everything bilinear, the algebraic loop solved within the sample: with every module
-// y = g u + h the whole chain is w = G u + H.
+// loop="continuous": command -> velocity, everything bilinear, the algebraic loop solved within the sample: with
+// every module y = g u + h the whole chain is w = G u + H.
 template <class R>
 Response<R> run_continuous(const System<R>& system, std::span<const double> command, double Ts, const Loop& loop) {
     std::vector<DifferenceEquation<R>> chain;
@@ -224,12 +227,12 @@ Matrix<R> exponential(Matrix<R> M) {
 template <class R>
 class HeldPlant {
 public:
-    HeldPlant(const System<R>& system, double sample_time) {
+    HeldPlant(const System<R>& system, double sample_time) : K_(system.K) {
         std::size_t n = 0;
         for (const Module<R>& m : system.modules) n += static_cast<std::size_t>(m.order);
         Matrix<R> M(n + 1, std::vector<R>(n + 1, R(0)));  // [A B; 0 0]
-        std::vector<R> y(n + 1, R(0));                    // the chain's signal as a row over [x, u]
-        y[n] = system.K;
+        std::vector<R> y(n + 1, R(0));                    // the chain's signal as a row over [x, K u]
+        y[n] = R(1);
         std::size_t at = 0;
         const R Ts = R(sample_time);
         for (const Module<R>& m : system.modules) {
@@ -263,7 +266,7 @@ public:
         return w;
     }
     void hold(R torque) {
-        x_.back() = torque;
+        x_.back() = K_ * torque;
         std::vector<R> next(x_.size(), R(0));
         for (std::size_t i = 0; i < x_.size(); ++i)
             for (std::size_t j = 0; j < x_.size(); ++j) next[i] = next[i] + transition_[i][j] * x_[j];
@@ -271,6 +274,7 @@ public:
     }
 
 private:
+    R K_;  // held outside: it can be large, and a large matrix loses digits
     Matrix<R> transition_;
     std::vector<R> output_, x_;
 };

@@ -1,0 +1,223 @@
+#include "check.hpp"
+#include "gaident/batch.hpp"
+#include "gaident/reference/drives.hpp"
+
+using namespace gaident;
+
+namespace {
+
+std::vector<const Kernels*> available() {
+    std::vector<const Kernels*> all;
+    for (const char* name : {"baseline", "avx2", "avx512"})
+        if (const Kernels* k = kernels_named(name)) all.push_back(k);
+    return all;
+}
+
+// Candidates of every structure around the paper's two-mass drive, in no order.
+std::vector<reference::Plant> candidates(Random& random, std::size_t count, std::size_t p_min) {
+    std::vector<reference::Plant> all;
+    while (all.size() < count) {
+        reference::Plant g =
+            reference::random_plant(random, p_min + random.below(static_cast<std::uint32_t>(4 - p_min)),
+                                    random.below(4), reference::Family::ordinary, 2e-3, 250);
+        g.K = reference::log_uniform(random, 1e3, 2e4);
+        for (std::size_t i = 1; i < g.A1.size(); ++i) g.K *= 100.0;
+        all.push_back(g);
+    }
+    return all;
+}
+
+struct Setup {
+    std::vector<std::vector<double>> inputs, outputs;
+    Experiment experiment;
+
+    Setup(Random& random, const Loop& loop, const std::vector<std::size_t>& lengths, double Ts) {
+        experiment.loop = loop;
+        for (const std::size_t n : lengths) {
+            inputs.push_back(reference::random_signal(random, n));
+            outputs.emplace_back();
+            for (const double r : inputs.back()) outputs.back().push_back(0.8 * r + reference::normal(random));
+        }
+        for (std::size_t i = 0; i < lengths.size(); ++i) {
+            Record r;
+            r.input = inputs[i];
+            r.output = outputs[i];
+            r.sample_time = Ts;
+            experiment.records.push_back(r);
+        }
+    }
+    // By the referee. Also the sum of squares of the outputs, for scale.
+    double sum(const reference::Plant& g, double* scale) const {
+        long double total = 0.0, size = 0.0;
+        for (std::size_t i = 0; i < inputs.size(); ++i) {
+            const auto w = reference::run(reference::factor_modules<long double>(g), inputs[i],
+                                          experiment.records[i].sample_time, experiment.loop)
+                               .velocity;
+            for (std::size_t k = 0; k < w.size(); ++k) {
+                const long double y = static_cast<long double>(outputs[i][k]);
+                total += (y - w[k]) * (y - w[k]);
+                size += y * y + w[k] * w[k];
+            }
+        }
+        *scale = static_cast<double>(size);
+        return static_cast<double>(total);
+    }
+};
+
+Loop paper_loop(LoopKind kind) {
+    Loop loop = reference::paper_drive(true).loop;
+    loop.kind = kind;
+    return loop;
+}
+
+}  // namespace
+
+TEST_CASE("batch: error sums of a mixture of structures equal the referee's; several records, longer than a chunk") {
+    for (const LoopKind kind : {LoopKind::continuous, LoopKind::sampled, LoopKind::open})
+        for (const bool limited : {false, true}) {
+            Random random(91);
+            Loop loop = paper_loop(kind);
+            if (limited) loop.torque_limit = 2.0;
+            const Setup setup(random, loop, {130, 1100, 1, 512}, 0.444e-3);
+            const auto plants = candidates(random, 43, kind == LoopKind::continuous ? 0 : 1);
+            std::vector<Factors<double>> factors;
+            for (const auto& g : plants) factors.push_back(reference::factors_of(g));
+            std::vector<double> sums(factors.size()), in_float(factors.size());
+            Batch(setup.experiment, 50, false).errors(factors, sums);
+            Batch(setup.experiment, 50, true).errors(factors, in_float);
+            double worst = 0.0, worst_float = 0.0;
+            int compared = 0, compared_float = 0;
+            for (std::size_t i = 0; i < plants.size(); ++i) {
+                double scale;
+                const double exact = setup.sum(plants[i], &scale);
+                CHECK(!std::isnan(sums[i]) && !std::isnan(in_float[i]));
+                if (!(exact < 1e30)) continue;  // diverging
+                ++compared;
+                worst = std::max(worst, std::abs(sums[i] - exact) / scale);
+                if (exact > 1e8 * static_cast<double>(plants.size())) continue;
+                ++compared_float;
+                worst_float = std::max(worst_float, std::abs(in_float[i] - exact) / scale);
+            }
+            std::printf("loop %d, limited %d: double %.2g (%d), float %.2g (%d)\n", static_cast<int>(kind),
+                        limited ? 1 : 0, worst, compared, worst_float, compared_float);
+            CHECK(compared > 20 && compared_float > 10);
+            CHECK(worst < 1e-9);
+            // Random controllers with a limit end in limit cycles, which carry the last digit's rounding on.
+            CHECK(worst_float < (limited ? 0.05 : 1e-4));
+        }
+}
+
+TEST_CASE("batch: every kernel set gives the same sums, and neighbours do not matter") {
+    Random random(92);
+    for (const bool limited : {false, true})
+        for (const bool in_float : {false, true}) {
+            Loop loop = paper_loop(LoopKind::continuous);
+            if (limited) loop.torque_limit = 2.0;
+            Setup setup(random, loop, {250, 600}, 0.444e-3);
+            std::vector<Factors<double>> factors;
+            for (const auto& g : candidates(random, 50, 0)) factors.push_back(reference::factors_of(g));
+            std::vector<double> first(50);
+            setup.experiment.kernels = &baseline_kernels();
+            Batch(setup.experiment, 50, in_float).errors(factors, first);
+            for (const Kernels* k : available()) {
+                setup.experiment.kernels = k;
+                std::vector<double> sums(50), reversed(50), alone(1);
+                Batch batch(setup.experiment, 50, in_float);
+                batch.errors(factors, sums);
+                CHECK(sums == first);
+                std::vector<Factors<double>> backwards(factors.rbegin(), factors.rend());
+                batch.errors(backwards, reversed);
+                batch.errors(std::span(factors).first(1), alone);
+                for (std::size_t i = 0; i < 50; ++i) CHECK(reversed[49 - i] == first[i]);
+                CHECK(alone[0] == first[0]);
+            }
+        }
+}
+
+TEST_CASE("batch: a candidate that diverges is the worst, never NaN") {
+    Random random(93);
+    Setup setup(random, paper_loop(LoopKind::continuous), {4000}, 0.444e-3);
+    using Roots = std::vector<std::complex<double>>;
+    std::vector<Factors<double>> factors;
+    const Factors<double> calm = reference::paper_drive(true).factors();
+    for (int i = 0; i < 40; ++i)
+        factors.push_back(
+            i % 3 == 0 ? calm : factors_from_roots(1e4, Roots{1500.0 + i, {800.0, 900.0}, {800.0, -900.0}}, Roots{}));
+    for (const bool in_float : {false, true}) {
+        std::vector<double> sums(40);
+        Batch(setup.experiment, 40, in_float).errors(factors, sums);
+        for (std::size_t i = 0; i < 40; ++i) {
+            CHECK(i % 3 == 0 ? sums[i] < 1e12 : sums[i] == worst_fitness);
+            CHECK(i % 3 != 0 || sums[i] == sums[0]);
+        }
+    }
+}
+
+TEST_CASE("batch: a record in steady motion is the record from rest, shifted") {
+    Random random(94);
+    for (const LoopKind kind : {LoopKind::continuous, LoopKind::sampled, LoopKind::open})
+        for (const bool limited : {false, true}) {
+            if (limited && kind == LoopKind::open) continue;
+            reference::Drive d = reference::paper_drive(true);
+            d.loop.kind = kind;
+            if (limited) d.loop.torque_limit = 1e6;  // never reached, but the loop is run step by step
+            d.input = reference::random_signal(random, 400);
+            const auto rest = d.respond<long double>().velocity;
+            const double y0 = 25.0;
+            double dc = d.plant.K;
+            std::complex<double> ratio = 1.0 / d.plant.A1[0];
+            for (std::size_t j = 0; j < 2; ++j) ratio *= d.plant.B2[j] / d.plant.A2[j];
+            dc *= ratio.real();
+            // In a closed loop steady motion at y0 needs the command y0, in open loop the torque y0/G(0).
+            std::vector<double> input, output;
+            for (std::size_t i = 0; i < 400; ++i) {
+                input.push_back(d.input[i] + (kind == LoopKind::open ? y0 / dc : y0));
+                output.push_back(static_cast<double>(rest[i]) + y0);
+            }
+            Experiment experiment;
+            experiment.loop = d.loop;
+            Record r;
+            r.input = input;
+            r.output = output;
+            r.sample_time = d.sample_time;
+            r.start = Start::steady;
+            r.velocity0 = y0;
+            experiment.records.push_back(r);
+            double scale = 0.0;
+            for (const double w : output) scale += w * w;
+            double sum;
+            const Factors<double> g = d.factors();
+            Batch(experiment, 1, false).errors({&g, 1}, {&sum, 1});
+            CHECK(sum < 1e-18 * scale);
+            experiment.records[0].start = Start::free;  // the genetic search takes such a record as steady
+            Batch(experiment, 1, false).errors({&g, 1}, {&sum, 1});
+            CHECK(sum < 1e-18 * scale);
+            experiment.records[0].start = Start::rest;
+            Batch(experiment, 1, false).errors({&g, 1}, {&sum, 1});
+            CHECK(sum > 1e-9 * scale);
+        }
+}
+
+TEST_CASE("batch: an experiment that makes no sense is refused, and the stop flag ends a long one") {
+    Random random(95);
+    const Setup good(random, paper_loop(LoopKind::continuous), {100}, 1e-3);
+    good.experiment.check();
+    CHECK(good.experiment.samples() == 100);
+    const auto refused = [&](auto&& change) {
+        Experiment e = good.experiment;
+        change(e);
+        CHECK_THROWS(e.check(), std::invalid_argument);
+    };
+    refused([](Experiment& e) { e.records.clear(); });
+    refused([](Experiment& e) { e.records[0].input = e.records[0].input.first(99); });
+    refused([](Experiment& e) { e.records[0].input = e.records[0].output = {}; });
+    refused([](Experiment& e) { e.records[0].sample_time = 0.0; });
+    refused([](Experiment& e) { e.records[0].sample_time = std::nan(""); });
+
+    Experiment e = good.experiment;
+    const std::atomic<bool> stop{true};
+    e.stop = &stop;
+    const Factors<double> g = reference::paper_drive(true).factors();
+    double sum;
+    CHECK_THROWS(Batch(e, 1, false).errors({&g, 1}, {&sum, 1}), Stopped);
+}

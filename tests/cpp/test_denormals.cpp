@@ -1,0 +1,81 @@
+#include "check.hpp"
+#include "gaident/engine.hpp"
+#include "gaident/simulate.hpp"
+
+#include <stdexcept>
+
+using namespace gaident;
+
+namespace {
+
+// Half of the smallest ordinary number: zero where denormals are flushed.
+double half_of_smallest() {
+    volatile double smallest = std::numeric_limits<double>::min();
+    volatile double half = smallest * 0.5;
+    return half;
+}
+
+#if defined(__SSE2__)
+unsigned control_word() { return _mm_getcsr() & ~0x3FU; }  // without the sticky exception flags
+#else
+unsigned control_word() { return 0; }
+#endif
+
+void throws_inside() {
+    const FlushDenormals flush;
+    throw std::runtime_error("inside");
+}
+
+}  // namespace
+
+TEST_CASE("denormals: flushed while the guard lives, and restored after") {
+    const unsigned before = control_word();
+    CHECK(half_of_smallest() > 0.0);
+    {
+        const FlushDenormals flush;
+#if defined(__SSE2__) || defined(__aarch64__)
+        CHECK(half_of_smallest() == 0.0);
+#endif
+        {
+            const FlushDenormals inner;
+        }
+#if defined(__SSE2__) || defined(__aarch64__)
+        CHECK(half_of_smallest() == 0.0);
+#endif
+    }
+    CHECK(half_of_smallest() > 0.0);
+    CHECK(control_word() == before);
+}
+
+TEST_CASE("denormals: restored also after a throw") {
+    const unsigned before = control_word();
+    CHECK_THROWS(throws_inside(), std::runtime_error);
+    CHECK(half_of_smallest() > 0.0);
+    CHECK(control_word() == before);
+    CHECK_THROWS(parallel(3, 2, [](std::size_t) { throw std::runtime_error("inside"); }), std::runtime_error);
+    CHECK(half_of_smallest() > 0.0);
+    CHECK(control_word() == before);
+}
+
+TEST_CASE("denormals: a caller who flushes already still does so afterwards") {
+    const FlushDenormals own;
+    const unsigned before = control_word();
+    parallel(2, 2, [](std::size_t) {});
+    CHECK(control_word() == before);
+}
+
+TEST_CASE("denormals: simulating leaves the control word alone, and a long decay meets no denormal") {
+    const unsigned before = control_word();
+    std::vector<double> input(20000, 0.0), velocity(input.size()), torque(input.size());
+    input[0] = 1.0;
+    Loop loop;
+    loop.kind = LoopKind::open;
+    const Factors<double> g = factors_from_roots(100.0, std::vector<std::complex<double>>{-500.0}, {});
+    simulate<double>(g, input, 1e-3, loop, nullptr, velocity, torque);
+    CHECK(control_word() == before);
+    CHECK(velocity[1] > 0.0);
+    CHECK(std::abs(velocity.back()) < 1e-300);
+#if defined(__SSE2__) || defined(__aarch64__)
+    for (const double w : velocity) CHECK(std::fpclassify(w) != FP_SUBNORMAL);
+#endif
+}

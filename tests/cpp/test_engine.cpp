@@ -1,0 +1,378 @@
+#include "check.hpp"
+#include "gaident/decode.hpp"
+#include "gaident/denormals.hpp"
+#include "gaident/engine.hpp"
+#include "gaident/parameters.hpp"
+#include "gaident/reference/drives.hpp"
+
+#include <chrono>
+#include <cstdlib>
+#include <new>
+#include <thread>
+
+// ------------------------------------------------------------- every allocation of this program is counted
+
+namespace {
+
+std::atomic<long> allocations{0};
+
+void* allocate(std::size_t n, std::size_t alignment) {
+    ++allocations;
+    const std::size_t size = (n + alignment - 1) / alignment * alignment;
+    if (void* p = std::aligned_alloc(alignment, size > 0 ? size : alignment)) return p;
+    throw std::bad_alloc();
+}
+
+// Not inlined: the compiler would see a free() of what operator new returned, and warn.
+[[gnu::noinline]] void release(void* p) { std::free(p); }
+
+}  // namespace
+
+void* operator new(std::size_t n) { return allocate(n, alignof(std::max_align_t)); }
+void* operator new[](std::size_t n) { return allocate(n, alignof(std::max_align_t)); }
+void* operator new(std::size_t n, std::align_val_t a) { return allocate(n, static_cast<std::size_t>(a)); }
+void* operator new[](std::size_t n, std::align_val_t a) { return allocate(n, static_cast<std::size_t>(a)); }
+void operator delete(void* p) noexcept { release(p); }
+void operator delete[](void* p) noexcept { release(p); }
+void operator delete(void* p, std::size_t) noexcept { release(p); }
+void operator delete[](void* p, std::size_t) noexcept { release(p); }
+void operator delete(void* p, std::align_val_t) noexcept { release(p); }
+void operator delete[](void* p, std::align_val_t) noexcept { release(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { release(p); }
+void operator delete[](void* p, std::size_t, std::align_val_t) noexcept { release(p); }
+
+using namespace gaident;
+
+namespace {
+
+// The paper's two-mass record, or one like it.
+struct Bench {
+    reference::Drive drive;
+    reference::Measurement measured;
+    Experiment experiment;
+
+    explicit Bench(reference::Drive d, double noise = 0.3) : drive(std::move(d)), measured(drive, noise, 17) {
+        experiment.records.push_back(measured.record());
+        experiment.loop = drive.loop;
+    }
+    Bench(const Bench&) = delete;
+};
+
+reference::Drive two_mass(LoopKind kind = LoopKind::continuous, std::size_t samples = 250) {
+    reference::Drive d = reference::paper_drive(true);
+    d.loop.kind = kind;
+    d.input.assign(samples, kind == LoopKind::open ? 0.2 : 43.6);
+    return d;
+}
+
+Settings paper(int generations) {
+    Settings s;
+    s.generations = generations;
+    return s;
+}
+
+Settings species(int generations) {
+    Settings s;
+    s.species = true;
+    s.code = Code::gray;
+    s.generations = generations;
+    s.round = generations;
+    return s;
+}
+
+SearchRanges few() {
+    SearchRanges r;
+    r.p_min = 1;
+    r.p_max = 1;
+    r.q_max = 2;
+    return r;
+}
+
+bool same(const Refined& a, const Refined& b) {
+    return pack(a.factors, a.starts) == pack(b.factors, b.starts) && a.cost == b.cost && a.iterations == b.iterations &&
+           a.converged == b.converged && a.at_bound == b.at_bound && a.factors.structure == b.factors.structure;
+}
+
+bool same(const Trial& a, const Trial& b) {
+    bool equal = a.history == b.history && a.best_fitness == b.best_fitness && a.best_generation == b.best_generation &&
+                 a.best == b.best && a.evaluations == b.evaluations && a.species.size() == b.species.size();
+    for (std::size_t i = 0; equal && i < a.species.size(); ++i) equal = same(a.species[i], b.species[i]);
+    return equal;
+}
+
+std::vector<const Kernels*> available() {
+    std::vector<const Kernels*> all;
+    for (const char* name : {"baseline", "avx2", "avx512"})
+        if (const Kernels* k = kernels_named(name)) all.push_back(k);
+    return all;
+}
+
+}  // namespace
+
+TEST_CASE("engine: generations equal the referee's bit for bit; odd groups, elites, fixed structures, no crossover") {
+    const Bench bench(two_mass());
+    struct Plan {
+        int population, elites, tournament;
+        double crossover, mutation;
+        std::vector<Breeder::Group> groups;
+    };
+    const std::vector<Plan> plans = {
+        {50, 0, 2, 0.9, 0.01, {{0, 50, 0, false}}},
+        {51, 1, 3, 0.9, 0.02, {{0, 51, 1, false}}},
+        {51, 0, 2, 0.9, 0.05, {{0, 51, 0, false}}},
+        {20, 0, 2, 0.0, 0.0, {{0, 20, 0, false}}},
+        {20, 0, 1, 1.0, 1.0, {{0, 20, 0, false}}},
+        {31, 1, 2, 0.9, 0.05, {{0, 7, 1, true}, {7, 4, 1, true}, {11, 1, 1, true}, {12, 19, 2, false}}}};
+    for (const Plan& plan : plans)
+        for (const int bits : {10, 16}) {
+            SearchRanges ranges;
+            ranges.bits = bits;
+            const Genome genome(ranges, Code::gray, Scale::linear);
+            Settings s;
+            s.population = plan.population;
+            s.tournament = plan.tournament;
+            s.crossover = plan.crossover;
+            s.mutation = plan.mutation;
+            Breeder breeder(bench.experiment, genome, s, Random(77));
+            const auto n = static_cast<std::size_t>(plan.population);
+            breeder.randomise(0, n);
+            breeder.evaluate();
+
+            Random random(77);
+            reference::Mutation mutation(plan.mutation, random);
+            std::vector<reference::Bits> now(n);
+            for (auto& c : now) {
+                std::vector<Word> words(static_cast<std::size_t>(genome.words()));
+                random.words(words.data(), words.size());
+                c = reference::unpack(words.data(), genome.bits());
+            }
+            for (int g = 0; g < 8; ++g) {
+                for (std::size_t i = 0; i < n; ++i) CHECK(reference::unpack(breeder[i], genome.bits()) == now[i]);
+                std::vector<double> cost(n);
+                for (std::size_t i = 0; i < n; ++i) cost[i] = breeder.cost(i);
+                breeder.generation(plan.groups);
+
+                // The paper's generation: select, cross, mutate; the best of a group go on unchanged where asked for.
+                std::vector<reference::Bits> next(n);
+                for (const auto& group : plan.groups) {
+                    const std::size_t last = group.first + group.count;
+                    std::vector<bool> taken(n, false);
+                    std::size_t child = group.first;
+                    for (int k = 0; k < group.elites && child < last; ++k, ++child) {
+                        std::size_t best = n;
+                        for (std::size_t i = group.first; i < last; ++i)
+                            if (!taken[i] && (best == n || cost[i] < cost[best])) best = i;
+                        taken[best] = true;
+                        next[child] = now[best];
+                    }
+                    while (child < last) {
+                        const auto mother =
+                            now[reference::tournament(random, cost, group.first, group.count, plan.tournament)];
+                        const auto father =
+                            now[reference::tournament(random, cost, group.first, group.count, plan.tournament)];
+                        reference::Bits first = mother, second = father;
+                        if (random.word() < threshold(plan.crossover))
+                            reference::crossover(random, genome.fields(), mother, father, first, second);
+                        const std::size_t from = group.fixed_structure ? 4 : 0;
+                        mutation.apply(random, first, from, first.size());
+                        next[child++] = first;
+                        if (child == last) break;
+                        mutation.apply(random, second, from, second.size());
+                        next[child++] = second;
+                    }
+                }
+                now = next;
+            }
+        }
+}
+
+TEST_CASE("engine: the best fitness of a plain run never rises with an elite, and its log is right") {
+    const Bench bench(two_mass());
+    for (const int elites : {0, 1, 3}) {
+        Settings s = paper(80);
+        s.elites = elites;
+        Progress progress;
+        const auto trials = search(bench.experiment, SearchRanges{}, s, 2, 3, 1, progress);
+        for (const Trial& t : trials) {
+            CHECK(t.history.size() == 80);
+            CHECK(t.evaluations == 50 * 80);
+            CHECK(t.species.empty());
+            double least = worst_fitness;
+            for (std::size_t i = 0; i < t.history.size(); ++i) {
+                CHECK(!std::isnan(t.history[i]));
+                if (elites > 0 && i > 0) CHECK(t.history[i] <= t.history[i - 1]);
+                least = std::min(least, t.history[i]);
+            }
+            CHECK(t.best_fitness == least);
+            CHECK(t.history[static_cast<std::size_t>(t.best_generation)] == least);
+            const Genome genome(SearchRanges{}, s.code, s.roots);
+            const Factors<double> g = decode(t.best.data(), genome);
+            double sum;
+            Batch(bench.experiment, 1, false).errors({&g, 1}, {&sum, 1});
+            CHECK(fitness(sum, g.structure, s.weights) == t.best_fitness);
+        }
+        CHECK(progress.done == 160);
+        CHECK(progress.best == std::min(trials[0].best_fitness, trials[1].best_fitness));
+        CHECK(!same(trials[0], trials[1]));
+    }
+}
+
+TEST_CASE("engine: same seed, same result, for any number of workers; another seed, another result") {
+    const Bench bench(two_mass());
+    for (const bool with_species : {false, true}) {
+        const Settings s = with_species ? species(15) : paper(40);
+        const int trials = with_species ? 2 : 5;
+        std::vector<Trial> first;
+        for (const int workers : {1, 2, 3, 7}) {
+            Progress progress;
+            const auto result = search(bench.experiment, few(), s, trials, 11, workers, progress);
+            if (first.empty()) first = result;
+            for (std::size_t i = 0; i < result.size(); ++i) CHECK(same(result[i], first[i]));
+        }
+        // A trial does not depend on how many others there are.
+        Progress progress;
+        CHECK(same(search(bench.experiment, few(), s, 1, 11, 4, progress)[0], first[0]));
+        CHECK(search(bench.experiment, few(), s, 1, 12, 1, progress)[0].history != first[0].history);
+    }
+}
+
+TEST_CASE("engine: every kernel set gives the identical trial, in double and in float") {
+    Bench bench(two_mass());
+    for (const bool limited : {false, true})
+        for (const bool in_float : {false, true})
+            for (const bool with_species : {false, true}) {
+                if (with_species && limited) continue;
+                bench.experiment.loop.torque_limit = limited ? 3.0 : std::numeric_limits<double>::infinity();
+                Settings s = with_species ? species(10) : paper(30);
+                s.in_float = in_float;
+                std::vector<Trial> first;
+                for (const Kernels* k : available()) {
+                    bench.experiment.kernels = k;
+                    Progress progress;
+                    const auto result =
+                        search(bench.experiment, with_species ? few() : SearchRanges{}, s, 1, 21, 1, progress);
+                    if (first.empty()) first = result;
+                    CHECK(same(result[0], first[0]));
+                }
+            }
+}
+
+TEST_CASE("engine: a generation allocates nothing, in any loop and arithmetic") {
+    for (const LoopKind kind : {LoopKind::continuous, LoopKind::sampled, LoopKind::open})
+        for (const bool limited : {false, true})
+            for (const bool in_float : {false, true}) {
+                reference::Drive d = two_mass(kind, 600);
+                if (limited) d.loop.torque_limit = 3.0;
+                Bench bench(d);
+                bench.experiment.records.push_back(bench.experiment.records[0]);
+                bench.experiment.records[1].start = Start::steady;
+                SearchRanges ranges;
+                ranges.p_min = 1;
+                const Genome genome(ranges, Code::gray, Scale::logarithmic);
+                Settings s;
+                s.population = 49;
+                s.in_float = in_float;
+                Breeder breeder(bench.experiment, genome, s, Random(5));
+                const Breeder::Group groups[] = {{0, 7, 1, true}, {7, 42, 2, false}};
+                const long before = allocations;
+                breeder.randomise(0, 49);
+                breeder.set_structure(0, 7, {1, 2});
+                breeder.evaluate();
+                for (int g = 0; g < 10; ++g) breeder.generation(groups);
+                CHECK(allocations == before);
+            }
+    const long before = allocations;
+    delete new int(3);
+    CHECK(allocations == before + 1);  // the counter counts
+}
+
+TEST_CASE("engine: a candidate that diverges gets the worst fitness, never NaN, and does not spoil a run") {
+    const Bench bench(two_mass(LoopKind::continuous, 3000));
+    SearchRanges wild;
+    wild.real = {-3000.0, 3000.0};
+    wild.imaginary = {0.0, 3000.0};
+    const Genome genome(wild, Code::gray, Scale::linear);
+    for (const bool in_float : {false, true}) {
+        Settings s;
+        s.in_float = in_float;
+        s.elites = 1;
+        Breeder breeder(bench.experiment, genome, s, Random(6));
+        breeder.randomise(0, 50);
+        breeder.evaluate();
+        const Breeder::Group all[] = {{0, 50, 1, false}};
+        int diverged = 0;
+        for (int g = 0; g < 20; ++g) {
+            for (std::size_t i = 0; i < 50; ++i) {
+                CHECK(breeder.cost(i) >= 0.0 && breeder.cost(i) <= worst_fitness);  // false for NaN
+                diverged += breeder.cost(i) == worst_fitness ? 1 : 0;
+            }
+            breeder.generation(all);
+        }
+        CHECK(diverged > 20);
+        Progress progress;
+        s.generations = 60;
+        const Trial t = search(bench.experiment, wild, s, 1, 1, 1, progress)[0];
+        CHECK(t.best_fitness < worst_fitness);
+        for (std::size_t i = 1; i < t.history.size(); ++i) CHECK(t.history[i] <= t.history[i - 1]);
+    }
+}
+
+TEST_CASE("engine: the stop flag ends a long run quickly") {
+    using Clock = std::chrono::steady_clock;
+    struct Long {
+        Settings settings;
+        std::size_t samples;
+        int workers;
+    };
+    Settings large = paper(1000000);
+    large.population = 2000;
+    Settings refining = species(1000000);
+    refining.round = 20;
+    refining.quiet_rounds = 1000000;
+    for (const Long& run : {Long{paper(1000000), 250, 1}, Long{paper(1000000), 250, 2}, Long{large, 50000, 1},
+                            Long{refining, 20000, 2}}) {
+        Bench bench(two_mass(LoopKind::continuous, run.samples));
+        std::atomic<bool> stop{false};
+        bench.experiment.stop = &stop;
+        Clock::time_point asked;
+        std::thread user([&] {
+            std::this_thread::sleep_for(std::chrono::milliseconds(60));
+            asked = Clock::now();
+            stop = true;
+        });
+        Progress progress;
+        bool stopped = false;
+        try {
+            search(bench.experiment, SearchRanges{}, run.settings, 3, 1, run.workers, progress);
+        } catch (const Stopped&) {
+            stopped = true;
+        }
+        const double seconds = std::chrono::duration<double>(Clock::now() - asked).count();
+        user.join();
+        CHECK(stopped);
+        std::printf("stopped within %.1f ms\n", 1e3 * seconds);
+        CHECK(seconds < 0.2);
+    }
+}
+
+TEST_CASE("engine: parallel does everything once, and throws the first exception again") {
+    for (const int workers : {-1, 0, 1, 2, 5, 40}) {
+        std::vector<std::atomic<int>> done(17);
+        parallel(done.size(), workers, [&](std::size_t i) { ++done[i]; });
+        for (const auto& d : done) CHECK(d == 1);
+        std::atomic<int> begun{0};
+        bool caught = false;
+        try {
+            parallel(1000, workers, [&](std::size_t i) {
+                ++begun;
+                if (i == 3) throw std::range_error("three");
+            });
+        } catch (const std::range_error& e) {
+            caught = std::string(e.what()) == "three";
+        }
+        CHECK(caught);
+        CHECK(workers > 1 || begun == 4);
+        CHECK_THROWS(parallel(5, workers, [](std::size_t) { throw Stopped{}; }), Stopped);
+    }
+    parallel(0, 4, [](std::size_t) { CHECK(false); });
+}

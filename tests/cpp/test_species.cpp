@@ -1,0 +1,165 @@
+#include "check.hpp"
+#include "gaident/decode.hpp"
+#include "gaident/parameters.hpp"
+#include "gaident/reference/drives.hpp"
+#include "gaident/species.hpp"
+
+using namespace gaident;
+
+namespace {
+
+SearchRanges small_ranges() {
+    SearchRanges r;
+    r.p_min = 1;
+    r.p_max = 2;
+    r.q_max = 2;
+    return r;
+}
+
+Settings quick() {
+    Settings s;
+    s.species = true;
+    s.code = Code::gray;
+    s.generations = 60;
+    s.round = 30;
+    return s;
+}
+
+// G(0)-like limits of a plant relative to another one's: how the low and the high frequencies changed.
+double low(const Factors<double>& f) {
+    double x = f.gain;
+    for (int i = 0; i < f.structure.pole_pairs(); ++i) x /= f.pole_pair[i].e0;
+    if (f.structure.single_pole()) x /= f.pole;
+    for (int i = 0; i < f.structure.zero_pairs(); ++i) x *= f.zero_pair[i].e0;
+    if (f.structure.single_zero()) x *= f.zero;
+    return x;
+}
+
+}  // namespace
+
+TEST_CASE("species: structures by p + q, then by q, every allowed one once") {
+    SearchRanges r;
+    const std::vector<Structure> all = structures(r);
+    CHECK(all.size() == 16);
+    for (std::size_t i = 1; i < all.size(); ++i)
+        CHECK(all[i - 1].poles() < all[i].poles() || (all[i - 1].poles() == all[i].poles() && all[i - 1].q < all[i].q));
+    r.p_min = 1;
+    r.p_max = 7;
+    r.q_min = 2;
+    r.q_max = 4;
+    CHECK(structures(r).size() == 21);
+    for (const Structure s : structures(r)) CHECK(s.p >= 1 && s.p <= 7 && s.q >= 2 && s.q <= 4);
+    r.p_min = r.p_max = 1;
+    r.q_min = r.q_max = 2;
+    CHECK((structures(r) == std::vector<Structure>{{1, 2}}));
+}
+
+TEST_CASE(
+    "species: a grown structure is the smaller one and a module that changes one end of the frequencies at most") {
+    Random random(141);
+    const SearchRanges ranges;
+    for (int p = 0; p <= 3; ++p)
+        for (int q = 0; q <= 3; ++q) {
+            reference::Plant g =
+                reference::random_plant(random, static_cast<std::size_t>(p), static_cast<std::size_t>(q),
+                                        reference::Family::ordinary, 2e-3, 250);
+            g.K = 5000.0;
+            const Factors<double> from = reference::factors_of(g);
+            for (int dp = -1; dp <= 3; ++dp)
+                for (int dq = -1; dq <= 3; ++dq) {
+                    const Structure to{p + dp, q + dq};
+                    if (to.p < 0 || to.q < 0) continue;
+                    const auto made = grow(from, to, ranges, 4.0, 5000.0);
+                    const bool one_module = (dp == 0 && (dq == 1 || dq == 2)) || (dq == 0 && (dp == 1 || dp == 2));
+                    CHECK(made.empty() != one_module);
+                    for (const Factors<double>& f : made) {
+                        CHECK(f.structure == to);
+                        CHECK(f.gain > 0.0 && std::isfinite(f.gain));
+                        const bool low_kept = std::abs(low(f) / low(from) - 1.0) < 1e-9;
+                        const bool high_kept = dp == 0 && std::abs(f.gain / from.gain - 1.0) < 1e-9;
+                        CHECK(low_kept || high_kept);
+                    }
+                }
+        }
+    // Nothing to see between the slowest and the fastest: nothing is made.
+    CHECK(grow(reference::paper_drive(false).factors(), {1, 2}, ranges, 300.0, 200.0).empty());
+}
+
+TEST_CASE("species: finds the true structure's optimum, and no smaller structure reaches it") {
+    for (const bool two_mass : {false, true}) {
+        const auto d = reference::paper_drive(two_mass);
+        const reference::Measurement measured(d, 0.3, 7);
+        Experiment experiment;
+        experiment.records.push_back(measured.record());
+        experiment.loop = d.loop;
+        Progress progress;
+        const auto trial = search(experiment, small_ranges(), quick(), 1, 5, 1, progress)[0];
+        const std::vector<Structure> all = structures(small_ranges());
+        CHECK(trial.species.size() == all.size());
+        RefineOptions o;
+        o.ranges = small_ranges();
+        const Refined truth = Refiner(experiment, o).fit(d.factors(), {}, 60);
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            const Refined& found = trial.species[i];
+            CHECK(found.factors.structure == all[i]);
+            CHECK(found.cost < worst_fitness);
+            CHECK(found.at_bound.size() == static_cast<std::size_t>(all[i].parameters()));
+            if (all[i] == d.factors().structure) CHECK(found.cost <= truth.cost * (1 + 1e-6));
+            if (all[i].poles() < d.factors().structure.poles()) CHECK(found.cost > 2.0 * truth.cost);
+        }
+    }
+}
+
+TEST_CASE("species: the log of a run") {
+    const auto d = reference::paper_drive(true);
+    const reference::Measurement measured(d, 0.3, 8);
+    Experiment experiment;
+    experiment.records.push_back(measured.record());
+    experiment.loop = d.loop;
+    Progress progress;
+    Settings s = quick();
+    s.population = 10;  // too few for six species: three each are taken
+    s.quiet_rounds = 100;
+    const auto trial = search(experiment, small_ranges(), s, 1, 6, 1, progress)[0];
+    CHECK(trial.history.size() == 60);
+    CHECK(progress.done == 60);
+    CHECK(trial.evaluations == 18 * 60);
+    for (std::size_t i = 1; i < trial.history.size(); ++i) CHECK(trial.history[i] <= trial.history[i - 1]);
+    CHECK(trial.best_fitness == trial.history.back());
+    CHECK(progress.best == trial.best_fitness);
+    CHECK(trial.history[static_cast<std::size_t>(trial.best_generation)] == trial.best_fitness);
+    // The best chromosome is the best fitness.
+    const Genome genome(small_ranges(), s.code, s.roots);
+    const Factors<double> g = decode(trial.best.data(), genome);
+    double sum;
+    Batch(experiment, 1, false).errors({&g, 1}, {&sum, 1});
+    CHECK(fitness(sum, g.structure, s.weights) == trial.best_fitness);
+}
+
+TEST_CASE("species: mutation and crossover leave the structure of a species alone") {
+    const auto d = reference::paper_drive(true);
+    const reference::Measurement measured(d, 0.3, 9);
+    Experiment experiment;
+    experiment.records.push_back(measured.record());
+    experiment.loop = d.loop;
+    const Genome genome(SearchRanges{}, Code::gray, Scale::linear);
+    Settings s;
+    s.population = 48;
+    s.mutation = 0.2;
+    Breeder breeder(experiment, genome, s, Random(3));
+    breeder.randomise(0, 48);
+    std::vector<Breeder::Group> groups;
+    const auto all = structures(SearchRanges{});
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        groups.push_back({3 * i, 3, 1, true});
+        breeder.set_structure(3 * i, 3, all[i]);
+    }
+    breeder.evaluate();
+    for (int g = 0; g < 20; ++g) {
+        std::vector<double> best;
+        for (const auto& group : groups) best.push_back(breeder.cost(breeder.best_of(group.first, group.count)));
+        breeder.generation(groups);
+        for (std::size_t i = 0; i < 48; ++i) CHECK(breeder.candidate(i).structure == all[i / 3]);
+        for (std::size_t i = 0; i < all.size(); ++i) CHECK(breeder.cost(breeder.best_of(3 * i, 3)) <= best[i]);
+    }
+}
