@@ -2,6 +2,10 @@
 
     python bench/success.py [--cases 100] [--only NAME ...] [--paper]
 
+""
+""
+""
+""
 "Right" means the true (p, q) *and* rms(fitted response - noise-free truth) below `limit` times the noise. Every case has its own noise and its
 own seed of the genetic search. Records: loop "continuous", dt 0.444 ms, white noise on the simulated output.
 """
@@ -83,8 +87,9 @@ def random_drive(rng: np.random.Generator, resonances: int) -> Case:
         lowest = 1.2 * wp
     bandwidth = log_uniform(rng, 80.0, 400.0)
     kp = bandwidth / rigid
-    return Case(ga.Model(1.0 / inertia, poles, zeros), ga.PI(kp, kp * bandwidth / 5.0, loop="continuous"),
-                staircase(rng), 0.05, 0.2)
+    return Case(
+        ga.Model(1.0 / inertia, poles, zeros), ga.PI(kp, kp * bandwidth / 5.0, loop="continuous"), staircase(rng), 0.05, 0.2
+    )
 
 
 CASES: dict[str, tuple[Callable[[np.random.Generator], Case], dict[str, tuple[int, int]]]] = {
@@ -114,8 +119,10 @@ def noise_free(case: Case) -> np.ndarray:
 def local_fit_from_truth(case: Case, rec: ga.Record) -> float:
     """Error sum that scipy's least squares reaches from the true parameters."""
     from scipy.optimize import least_squares
+
     _, values, _ = ga.factor_parameters(case.model)
     from gaident.models import Structure
+
     structure = Structure.of(case.model)
 
     def residual(scaled: np.ndarray) -> np.ndarray:
@@ -137,8 +144,10 @@ def run(name: str, cases: int, settings: ga.Settings, first: int, verbose: bool)
         if settings.engine == "plain":
             space = ga.SearchSpace(gain=(1e3, 2e4), real=(0.0, 60.0), imaginary=(0.0, 250.0))
         elif space_options:
-            from gaident.identification.space import derive_space
             from dataclasses import replace
+
+            from gaident.identification.space import derive_space
+
             space = replace(derive_space([rec], case.controller), **space_options)
         began = time.perf_counter()
         idn = ga.identify(rec, case.controller, space=space, settings=settings, seed=1000 + k, workers=1)
@@ -154,8 +163,14 @@ def run(name: str, cases: int, settings: ga.Settings, first: int, verbose: bool)
             rows = ", ".join(f"({s.p},{s.q}) {s.delta_bic:.1f}" for s in sorted(idn.structures, key=lambda s: s.delta_bic)[:6])
             print(f"  case {k}: found ({idn.p},{idn.q}), true ({case.model.p},{case.model.q}), deviation {deviation:.3f}; {rows}")
             print(f"    true {case.model}")
-    result = {"right": right, "structure": structure_right, "median ms": 1e3 * float(np.median(seconds)),
-              "max ms": 1e3 * max(seconds), "median deviation": float(np.median(deviations)), "max deviation": max(deviations)}
+    result = {
+        "right": right,
+        "structure": structure_right,
+        "median ms": 1e3 * float(np.median(seconds)),
+        "max ms": 1e3 * max(seconds),
+        "median deviation": float(np.median(deviations)),
+        "max deviation": max(deviations),
+    }
     if excess:
         result["largest excess over the fit from the truth"] = max(excess)
     return result
@@ -172,8 +187,11 @@ def main() -> None:
     settings = ga.Settings.paper() if options.paper else ga.Settings()
     for name in options.only or list(CASES):
         figures = run(name, options.cases, settings, options.first, options.verbose)
-        print(f"{name}: {figures.pop('right'):.0f} of {options.cases} right; "
-              + ", ".join(f"{k} {v:.4g}" for k, v in figures.items()), flush=True)
+        print(
+            f"{name}: {figures.pop('right'):.0f} of {options.cases} right; "
+            + ", ".join(f"{k} {v:.4g}" for k, v in figures.items()),
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
 """gaident: from a drive's log to a model, its structure and parameters, and what they are worth.
 
-    import gaident as ga
+import gaident as ga
 
-    rec = ga.read("run1.csv", columns={"command": "w_ref", "velocity": "w"}, units={"velocity": "rpm"})
-    idn = ga.identify(rec, controller=ga.PI(kp=0.0232, ki=1.367))
-    print(idn.summary())
+rec = ga.read("run1.csv", columns={"command": "w_ref", "velocity": "w"}, units={"velocity": "rpm"})
+idn = ga.identify(rec, controller=ga.PI(kp=0.0232, ki=1.367))
+print(idn.summary())
 """
 
 from __future__ import annotations
@@ -33,9 +33,29 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
-    "PI", "Discrete", "Estimate", "GaidentError", "Identification", "Model", "OneMass", "Record", "Run", "SearchSpace",
-    "Settings", "TwoMass", "differentiate", "factor_parameters", "identify", "initial_state", "load", "mechanics_from_model",
-    "model_from_factor_parameters", "read", "read_columns", "run", "simulate",
+    "PI",
+    "Discrete",
+    "Estimate",
+    "GaidentError",
+    "Identification",
+    "Model",
+    "OneMass",
+    "Record",
+    "Run",
+    "SearchSpace",
+    "Settings",
+    "TwoMass",
+    "differentiate",
+    "factor_parameters",
+    "identify",
+    "initial_state",
+    "load",
+    "mechanics_from_model",
+    "model_from_factor_parameters",
+    "read",
+    "read_columns",
+    "run",
+    "simulate",
 ]
 
 

@@ -114,9 +114,7 @@ def _simulate(args: argparse.Namespace) -> None:
     records = _read_all(drive, args.logs, controller)
     several = len(records) > 1
     if several and args.out is None and not args.json:
-        raise SettingsError(
-            f"{len(records)} logs are given: name a folder for their CSV files with --out, or use --json"
-        )
+        raise SettingsError(f"{len(records)} logs are given: name a folder for their CSV files with --out, or use --json")
     targets = csv_targets(args.out, args.logs, several)
     results = []
     for rec in records:
@@ -204,22 +202,14 @@ def _load_model(path: str) -> tuple[AnyModel, PI | None, dict[str, tuple[float, 
     try:
         data = json.loads(Path(path).read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise SettingsError(
-            f"{path}: there is no such file; give a saved identification or a model"
-        ) from None
+        raise SettingsError(f"{path}: there is no such file; give a saved identification or a model") from None
     except (OSError, ValueError) as error:
-        raise SettingsError(
-            f"{path}: cannot be read as JSON ({error}); give what identify --out saved"
-        ) from None
+        raise SettingsError(f"{path}: cannot be read as JSON ({error}); give what identify --out saved") from None
     if isinstance(data, dict) and "schema" in data:
         idn = load(path)
         return idn.model, idn.controller, dict(idn.initial_states)
     try:
-        known = (
-            mechanics_from_dict(data)
-            if isinstance(data, dict) and "structure" in data
-            else Model.from_dict(data)
-        )
+        known = mechanics_from_dict(data) if isinstance(data, dict) and "structure" in data else Model.from_dict(data)
     except GaidentError as error:
         raise SettingsError(f"{path}: {error}") from None
     return known, None, {}

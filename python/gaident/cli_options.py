@@ -102,17 +102,13 @@ def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], None]]) -> a
         sub.set_defaults(run=commands[name])
         return sub
 
-    sub = command(
-        "identify", "LOG... ", "log -> structure, parameters, uncertainty", IDENTIFY_HELP, IDENTIFY_EXAMPLES
-    )
+    sub = command("identify", "LOG... ", "log -> structure, parameters, uncertainty", IDENTIFY_HELP, IDENTIFY_EXAMPLES)
     sub.add_argument("logs", nargs="+", metavar="LOG", help="log file; several give one model for all")
     _add_log_options(sub)
     _add_controller_options(sub)
     _add_space_options(sub)
     g = sub.add_argument_group("the search")
-    g.add_argument(
-        "--paper", action="store_true", help="the paper's genetic algorithm to the letter (Table II)"
-    )
+    g.add_argument("--paper", action="store_true", help="the paper's genetic algorithm to the letter (Table II)")
     g.add_argument("--trials", type=int, default=1, metavar="N", help="independent genetic runs (default 1)")
     _add_run_options(g)
     g.add_argument(
@@ -148,9 +144,7 @@ def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], None]]) -> a
     g.add_argument("--json", action="store_true", help="print everything as JSON instead of CSV")
 
     sub = command("demo", "", "the main job, on data of its own", DEMO_HELP)
-    sub.add_argument(
-        "--out", metavar="DIR", default=".", help="where pictures go (default: the current folder)"
-    )
+    sub.add_argument("--out", metavar="DIR", default=".", help="where pictures go (default: the current folder)")
     _add_run_options(sub)
     sub.add_argument("--json", action="store_true", help="print JSON instead of text")
     return parser
@@ -188,9 +182,7 @@ def _assignments(texts: Sequence[str], option: str) -> dict[str, str]:
         for part in re.split(r",(?=\s*\w+\s*=)", text):
             name, sign, value = part.partition("=")
             if not sign:
-                raise SettingsError(
-                    f"{option} {text!r}: write channel=value, for example {option} velocity=w"
-                )
+                raise SettingsError(f"{option} {text!r}: write channel=value, for example {option} velocity=w")
             found[one_of(name.strip(), f"{option}: channel", COLUMNS, SettingsError)] = value.strip()
     return found
 
@@ -213,9 +205,7 @@ def _whole_range(text: str) -> tuple[int, int]:
 def _add_log_options(parser: argparse.ArgumentParser) -> None:
     """How logs are read."""
     g = parser.add_argument_group("the log", "channels: command, velocity, torque, position, time")
-    g.add_argument(
-        "--drive", metavar="FILE", help="drive.toml with what belongs to the axis; options override it"
-    )
+    g.add_argument("--drive", metavar="FILE", help="drive.toml with what belongs to the axis; options override it")
     g.add_argument(
         "--columns",
         "--column",

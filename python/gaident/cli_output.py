@@ -95,9 +95,7 @@ def csv_targets(path: str | None, logs: Sequence[str], several: bool) -> list[Pa
     folder.mkdir(parents=True, exist_ok=True)
     names = [Path(log).stem for log in logs]
     if len(set(names)) < len(names):
-        raise SettingsError(
-            "two logs bear the same name, so would their CSV files: rename one, or use --json"
-        )
+        raise SettingsError("two logs bear the same name, so would their CSV files: rename one, or use --json")
     found = [target_of(str(folder / f"{name}_simulated.csv"), logs) for name in names]
     return [target for target in found if target is not None]
 

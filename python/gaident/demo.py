@@ -44,9 +44,7 @@ EMPS_CUTOFF = 100.0  # Hz, theirs too
 
 def two_mass_record(seed: int) -> Record:
     """A velocity step through the PI loop, with white noise on the measured velocity."""
-    still = Record(
-        SAMPLE_TIME, command=np.full(SAMPLES, STEP), velocity=np.zeros(SAMPLES), name="velocity step"
-    )
+    still = Record(SAMPLE_TIME, command=np.full(SAMPLES, STEP), velocity=np.zeros(SAMPLES), name="velocity step")
     noise = NOISE * np.random.default_rng(seed).standard_normal(SAMPLES)
     velocity = simulate(TRUTH, still, CONTROLLER) + noise
     return Record(SAMPLE_TIME, command=still.command, velocity=velocity, name=still.name)
@@ -65,9 +63,7 @@ def emps_path() -> Path | None:
     return path if path is not None and path.is_file() else None
 
 
-def identify_emps(
-    path: Path, seed: int, progress: Progress, workers: int | None
-) -> tuple[Record, Identification]:
+def identify_emps(path: Path, seed: int, progress: Progress, workers: int | None) -> tuple[Record, Identification]:
     """The measured ball-screw axis, from force to velocity (linear: m, m/s, N, kg)."""
     columns: dict[str, Any] = {"torque": "vir", "position": "qm", "time": "t"}
     rec = read(path, columns, {"torque": EMPS_FORCE}, velocity_cutoff_hz=EMPS_CUTOFF, name="EMPS")

@@ -145,9 +145,7 @@ class Drive:
         source = ", ".join(given)
         for name, other in (("inertia", "gain"), ("resonance_hz", "imaginary")):
             if name in given and other in given:
-                raise SpaceError(
-                    f"{name} and {other} both say where to look for the same thing: leave one out"
-                )
+                raise SpaceError(f"{name} and {other} both say where to look for the same thing: leave one out")
         if "damping" in given and "inertia" not in given:
             raise SpaceError("damping is given without inertia: give both, their ratio bounds the real parts")
         derived = derive_space(records, controller)

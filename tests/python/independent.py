@@ -344,9 +344,7 @@ def _random_roots(rng: np.random.Generator, count: int, low: float, high: float)
     return np.array(roots, dtype=complex)
 
 
-def random_case(
-    rng: np.random.Generator, loop: str, p: int, q: int, family: str, samples: int, growth: float = 1e6
-) -> Case:
+def random_case(rng: np.random.Generator, loop: str, p: int, q: int, family: str, samples: int, growth: float = 1e6) -> Case:
     """A plant of the family and a PI around it; neither grows by more than `growth` within `samples`.
 
     slow: every root within 2 % of one slow one, or exactly on it; fast: sizes up to 0.98 of Nyquist;

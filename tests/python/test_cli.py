@@ -159,9 +159,7 @@ def test_simulate_writes_csv_that_can_be_read(here: Path, capsys: pytest.Capture
     assert capsys.readouterr().out == Path("sim.csv").read_text()
 
 
-def test_simulate_takes_the_saved_controller_and_start(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_simulate_takes_the_saved_controller_and_start(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["identify", "step.csv", *NAMES, *LOOP, "--initial-state", "free", "--out", "idn.json"]) == 0
     idn = ga.load("idn.json")
     capsys.readouterr()
@@ -221,9 +219,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("args", "part"), WRONG, ids=lambda x: x if isinstance(x, str) else "")
-def test_wrong_use_is_one_line_and_2(
-    args: list[str], part: str, here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_use_is_one_line_and_2(args: list[str], part: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert part in refusal(args, capsys)
 
 
@@ -281,17 +277,13 @@ def test_failure_of_writing_bears_the_users_name(
     assert [p.name for p in here.iterdir()] == ["step.csv"]
 
 
-def test_a_bug_is_1_and_no_traceback(
-    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_bug_is_1_and_no_traceback(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("one\nover zero")
 
     monkeypatch.setattr("gaident.cli.identify", broken)
     assert main(["identify", "step.csv", *NAMES, *LOOP]) == 1
-    assert capsys.readouterr().err == (
-        "gaident: internal error, please report it: ZeroDivisionError: one over zero\n"
-    )
+    assert capsys.readouterr().err == ("gaident: internal error, please report it: ZeroDivisionError: one over zero\n")
 
 
 def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -440,9 +432,7 @@ def test_hsm150_runs_together_falsify_the_linear_model(here: Path, data_dir: Pat
 
 @pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda p: p.stem)
 def test_examples_run(path: Path, tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(path)], capture_output=True, text=True, cwd=tmp_path, timeout=60
-    )
+    done = subprocess.run([sys.executable, "-W", "error", str(path)], capture_output=True, text=True, cwd=tmp_path, timeout=60)
     assert done.returncode == 0, done.stderr
     assert done.stdout and done.stderr == ""
     assert not list(tmp_path.iterdir())

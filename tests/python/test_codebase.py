@@ -46,9 +46,7 @@ ROOMS: dict[str, tuple[set[str], set[str]]] = {
 def repository_files() -> list[Path]:
     """Return every file of the repository that is not ignored (every file, where there is no git)."""
     command = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"]
-    listed = (
-        subprocess.run(command, cwd=ROOT, capture_output=True, text=True) if shutil.which("git") else None
-    )
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True) if shutil.which("git") else None
     if listed is not None and listed.returncode == 0:
         return [f for f in (ROOT / name for name in listed.stdout.split("\0") if name) if f.is_file()]
     folders = ("csrc", "python", "tests", "bench", ".ci", "docs", "examples")
@@ -64,9 +62,7 @@ def place(file: Path) -> int:
     """Return the place of a core file in CORE_ORDER."""
     relative = file.relative_to(CORE)
     name = f"{relative.parts[0]}/" if len(relative.parts) > 1 else relative.stem
-    assert name in CORE_ORDER, (
-        f"{file.relative_to(ROOT)}: give it a place in CORE_ORDER ({Path(__file__).name})"
-    )
+    assert name in CORE_ORDER, f"{file.relative_to(ROOT)}: give it a place in CORE_ORDER ({Path(__file__).name})"
     return CORE_ORDER.index(name)
 
 
@@ -113,9 +109,7 @@ def test_headers_compile_when_included_first() -> None:
     compiler = shutil.which("g++") or shutil.which("c++")
     if compiler is None:
         pytest.skip("no C++ compiler on the path")
-    flags = (
-        "-std=c++20 -fsyntax-only -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wno-psabi -Werror -x c++ -"
-    )
+    flags = "-std=c++20 -fsyntax-only -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wno-psabi -Werror -x c++ -"
 
     def compile_alone(header: Path) -> str:
         name = header.relative_to(ROOT / "csrc").as_posix()
@@ -180,9 +174,7 @@ def imports(tree: ast.Module, package: str) -> list[tuple[str, bool, int]]:
             found += [(alias.name, node in inside, node.lineno) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             up = package.split(".")[: len(package.split(".")) - node.level + 1]
-            base = (
-                ".".join([*up, *([node.module] if node.module else [])]) if node.level else str(node.module)
-            )
+            base = ".".join([*up, *([node.module] if node.module else [])]) if node.level else str(node.module)
             # `from gaident import x` reaches the module x
             names = [f"{base}.{a.name}" for a in node.names] if base == "gaident" else [base]
             found += [(name, node in inside, node.lineno) for name in names]
@@ -199,9 +191,7 @@ def test_python_imports_follow_the_rooms() -> None:
     for file in sources(PACKAGE, ".py"):
         relative = file.relative_to(PACKAGE)
         room = room_of(relative.parts[0].removesuffix(".py"))
-        assert room in ROOMS, (
-            f"{file.relative_to(ROOT)}: give the room {room!r} its line in ROOMS ({Path(__file__).name})"
-        )
+        assert room in ROOMS, f"{file.relative_to(ROOT)}: give the room {room!r} its line in ROOMS ({Path(__file__).name})"
         always, later = ROOMS[room]
         package = ".".join(["gaident", *relative.parts[:-1]])
         for module, in_function, line in imports(ast.parse(file.read_text()), package):
@@ -215,9 +205,7 @@ def test_python_imports_follow_the_rooms() -> None:
 
 
 def test_importing_gaident_is_light() -> None:
-    code = (
-        "import time, numpy, sys; t = time.perf_counter(); import gaident; print(time.perf_counter() - t); "
-    )
+    code = "import time, numpy, sys; t = time.perf_counter(); import gaident; print(time.perf_counter() - t); "
     code += "print([m for m in ('scipy', 'matplotlib', 'control', 'argparse') if m in sys.modules])"
     runs = []
     for _ in range(3):

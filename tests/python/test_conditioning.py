@@ -24,9 +24,7 @@ DT = 1e-3
     st.sampled_from([None, 5.0, 50.0, 400.0]),
     st.integers(20, 300),
 )
-def test_constant_speed_comes_back_up_to_the_ends(
-    offset: float, speed: float, cutoff: float | None, n: int
-) -> None:
+def test_constant_speed_comes_back_up_to_the_ends(offset: float, speed: float, cutoff: float | None, n: int) -> None:
     position = offset + speed * DT * np.arange(n)
     np.testing.assert_allclose(differentiate(position, DT, cutoff), speed, atol=1e-6 * max(1.0, abs(speed)))
 
@@ -35,9 +33,7 @@ def test_central_differences_without_a_cutoff() -> None:
     position = np.random.default_rng(1).normal(size=50)
     velocity = differentiate(position, DT)
     np.testing.assert_allclose(velocity[1:-1], (position[2:] - position[:-2]) / (2 * DT), rtol=1e-12)
-    np.testing.assert_allclose(
-        velocity[[0, -1]], [(position[1] - position[0]) / DT, (position[-1] - position[-2]) / DT]
-    )
+    np.testing.assert_allclose(velocity[[0, -1]], [(position[1] - position[0]) / DT, (position[-1] - position[-2]) / DT])
 
 
 @pytest.mark.parametrize("frequency", [5.0, 20.0, 50.0, 100.0])
@@ -56,13 +52,9 @@ def test_is_linear_and_symmetric_in_time() -> None:
     rng = np.random.default_rng(2)
     a, b = rng.normal(size=(2, 400))
     both = differentiate(2 * a - 3 * b, DT, 80.0)
-    np.testing.assert_allclose(
-        both, 2 * differentiate(a, DT, 80.0) - 3 * differentiate(b, DT, 80.0), atol=1e-8
-    )
+    np.testing.assert_allclose(both, 2 * differentiate(a, DT, 80.0) - 3 * differentiate(b, DT, 80.0), atol=1e-8)
     # forward-backward filtering forgets its direction but near the ends
-    np.testing.assert_allclose(
-        -differentiate(a[::-1], DT, 80.0)[::-1][100:-100], differentiate(a, DT, 80.0)[100:-100], atol=1e-6
-    )
+    np.testing.assert_allclose(-differentiate(a[::-1], DT, 80.0)[::-1][100:-100], differentiate(a, DT, 80.0)[100:-100], atol=1e-6)
 
 
 def test_leaves_the_input_alone() -> None:

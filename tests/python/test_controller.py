@@ -32,22 +32,25 @@ def test_is_immutable() -> None:
         PI(1.0, 1.0).kp = 2.0  # type: ignore[misc]
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    ({"kp": -1.0, "ki": 1.0}, ["kp", "-1", "negative gain"]),
-    ({"kp": 1.0, "ki": -0.5}, ["ki", "-0.5"]),
-    ({"kp": math.nan, "ki": 1.0}, ["kp", "nan"]),
-    ({"kp": 1.0, "ki": math.inf}, ["ki", "inf"]),
-    ({"kp": "0.02", "ki": 1.0}, ["kp", "'0.02'"]),
-    ({"kp": None, "ki": 1.0}, ["kp", "None"]),
-    ({"kp": 0.0, "ki": 0.0}, ["kp and ki", "controller=None"]),
-    ({"kp": 1.0, "ki": 1.0, "loop": "continous"}, ["loop", "'continous'", "did you mean 'continuous'?"]),
-    ({"kp": 1.0, "ki": 1.0, "loop": "Sampled"}, ["loop", "did you mean 'sampled'?"]),
-    ({"kp": 1.0, "ki": 1.0, "loop": 3}, ["loop", "3", "sampled, continuous"]),
-    ({"kp": 1.0, "ki": 1.0, "torque_limit": 0.0}, ["torque_limit", "0", "None for no limit"]),
-    ({"kp": 1.0, "ki": 1.0, "torque_limit": -2.0}, ["torque_limit", "-2"]),
-    ({"kp": 1.0, "ki": 1.0, "integrator_limit": math.nan}, ["integrator_limit", "nan"]),
-    ({"kp": 1.0, "ki": 1.0, "integrator_limit": math.inf}, ["integrator_limit", "None for no limit"]),
-])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"kp": -1.0, "ki": 1.0}, ["kp", "-1", "negative gain"]),
+        ({"kp": 1.0, "ki": -0.5}, ["ki", "-0.5"]),
+        ({"kp": math.nan, "ki": 1.0}, ["kp", "nan"]),
+        ({"kp": 1.0, "ki": math.inf}, ["ki", "inf"]),
+        ({"kp": "0.02", "ki": 1.0}, ["kp", "'0.02'"]),
+        ({"kp": None, "ki": 1.0}, ["kp", "None"]),
+        ({"kp": 0.0, "ki": 0.0}, ["kp and ki", "controller=None"]),
+        ({"kp": 1.0, "ki": 1.0, "loop": "continous"}, ["loop", "'continous'", "did you mean 'continuous'?"]),
+        ({"kp": 1.0, "ki": 1.0, "loop": "Sampled"}, ["loop", "did you mean 'sampled'?"]),
+        ({"kp": 1.0, "ki": 1.0, "loop": 3}, ["loop", "3", "sampled, continuous"]),
+        ({"kp": 1.0, "ki": 1.0, "torque_limit": 0.0}, ["torque_limit", "0", "None for no limit"]),
+        ({"kp": 1.0, "ki": 1.0, "torque_limit": -2.0}, ["torque_limit", "-2"]),
+        ({"kp": 1.0, "ki": 1.0, "integrator_limit": math.nan}, ["integrator_limit", "nan"]),
+        ({"kp": 1.0, "ki": 1.0, "integrator_limit": math.inf}, ["integrator_limit", "None for no limit"]),
+    ],
+)
 def test_refuses_with_name_value_and_remedy(arguments: dict[str, object], words: list[str]) -> None:
     with pytest.raises(ControllerError) as refusal:
         PI(**arguments)  # type: ignore[arg-type]

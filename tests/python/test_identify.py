@@ -258,7 +258,7 @@ def test_save_and_load(tmp_path: object) -> None:
     assert np.array_equal(again.simulate(rec), idn.simulate(rec))
     assert [p.name for p in path.parent.iterdir()] == ["result.json"]
     path.write_text(path.read_text()[:300])
-    with pytest.raises(ga.GaidentError, match="result.json: line"):
+    with pytest.raises(ga.GaidentError, match=r"result\.json: line"):
         ga.load(path)
     path.write_text('{"schema": "something else"}')
     with pytest.raises(ga.GaidentError, match="not a saved identification"):

@@ -17,8 +17,7 @@ from gaident.models.model import Model
 
 TABLE_3 = TwoMass(JM=1.02e-4, DM=0.003, JL=5.815e-4, DL=0.008, KG=2.59)
 TABLE_4_NOMINAL = Model(9813.54, [-16.11, -13.54 + 172.2j, -13.54 - 172.2j], [-6.88 + 66.35j, -6.88 - 66.35j])
-TABLE_4_IDENTIFIED = Model(6545.29, [-15.41, -10.30 + 150.9j, -10.30 - 150.9j],
-                           [-4.26 + 93.98j, -4.26 - 93.98j])
+TABLE_4_IDENTIFIED = Model(6545.29, [-15.41, -10.30 + 150.9j, -10.30 - 150.9j], [-4.26 + 93.98j, -4.26 - 93.98j])
 FIELDS = ("JM", "DM", "JL", "DL", "KG", "DG")
 
 
@@ -31,6 +30,7 @@ def values(mechanics: TwoMass) -> np.ndarray:
 
 
 # --- the paper's figures
+
 
 def test_table_3_gives_the_nominal_poles_and_zeros() -> None:
     model = TABLE_3.model()
@@ -85,12 +85,14 @@ def test_table_4_one_mass() -> None:
 
 # --- round trips
 
+
 def log_floats(low: float, high: float) -> st.SearchStrategy[float]:
     return st.floats(np.log(low), np.log(high)).map(lambda v: float(np.exp(v)))
 
 
 def drives(shaft_damping: bool) -> st.SearchStrategy[TwoMass]:
     """Random drives by antiresonance w [rad/s] and damping relative to it: all are two-mass in earnest."""
+
     def make(JM: float, R: float, w: float, dm: float, dl: float, dg: float) -> TwoMass:
         return TwoMass(JM, dm * JM * w, R * JM, dl * R * JM * w, R * JM * w * w, dg * JM * w)
 
@@ -137,8 +139,12 @@ def test_a_lossless_drive_keeps_its_dampings_at_zero() -> None:
 
 def test_dictionary_round_trip_through_json() -> None:
     x = factor_parameters(TABLE_4_IDENTIFIED)[1]
-    for mechanics in (TABLE_3, OneMass(1e-4, 0.0), mechanics_from_model(Model(6278.26, [-34.13]), np.eye(2)),
-                      mechanics_from_model(TABLE_4_IDENTIFIED, np.diag((0.01 * x) ** 2))):
+    for mechanics in (
+        TABLE_3,
+        OneMass(1e-4, 0.0),
+        mechanics_from_model(Model(6278.26, [-34.13]), np.eye(2)),
+        mechanics_from_model(TABLE_4_IDENTIFIED, np.diag((0.01 * x) ** 2)),
+    ):
         assert mechanics is not None
         assert mechanics_from_dict(json.loads(json.dumps(mechanics.to_dict()))) == mechanics
         hash(mechanics)
@@ -149,6 +155,7 @@ def test_dictionary_round_trip_through_json() -> None:
 
 
 # --- standard deviations
+
 
 def test_one_mass_deviations() -> None:
     found = mechanics_from_model(Model(5000.0, [-20.0]), [[2500.0, 10.0], [10.0, 0.25]])
@@ -170,8 +177,7 @@ def test_two_mass_deviations_agree_with_repeated_draws() -> None:
     assert found.with_shaft_damping is not None
     np.testing.assert_allclose(values(found), values(TABLE_3), rtol=1e-9)
 
-    models = [model_from_factor_parameters(x + root @ rng.standard_normal(6), Structure.of(model))
-              for _ in range(600)]
+    models = [model_from_factor_parameters(x + root @ rng.standard_normal(6), Structure.of(model)) for _ in range(600)]
     draws = [mechanics_from_model(m, cov) for m in models]
     for name in ("JM", "DM", "JL", "DL", "KG", "J", "D"):
         assert np.std([getattr(d, name) for d in draws]) == pytest.approx(found.std[name], rel=0.15), name
@@ -212,12 +218,15 @@ def test_a_singular_covariance_is_taken() -> None:
     assert nothing is not None and nothing.std == {}
 
 
-@pytest.mark.parametrize(("covariance", "words"), [
-    (np.eye(5), ["(5, 5)", "6 x 6", "factor_parameters"]),
-    (np.full((6, 6), np.nan), ["covariance[0, 0]", "nan", "None"]),
-    (-np.eye(6), ["symmetric"]),
-    (np.triu(np.ones((6, 6))), ["symmetric"]),
-])
+@pytest.mark.parametrize(
+    ("covariance", "words"),
+    [
+        (np.eye(5), ["(5, 5)", "6 x 6", "factor_parameters"]),
+        (np.full((6, 6), np.nan), ["covariance[0, 0]", "nan", "None"]),
+        (-np.eye(6), ["symmetric"]),
+        (np.triu(np.ones((6, 6))), ["symmetric"]),
+    ],
+)
 def test_refuses_what_is_no_covariance(covariance: np.ndarray, words: list[str]) -> None:
     with pytest.raises(ModelError) as refusal:
         mechanics_from_model(TABLE_4_NOMINAL, covariance)
@@ -227,15 +236,19 @@ def test_refuses_what_is_no_covariance(covariance: np.ndarray, words: list[str])
 
 # --- refusals and what is not physical
 
-@pytest.mark.parametrize(("name", "value", "words"), [
-    ("JM", 0.0, ["JM is 0", "> 0", "kg m^2"]),
-    ("JL", -1e-4, ["JL is -0.0001", "> 0"]),
-    ("KG", 0.0, ["KG is 0", "N m/rad"]),
-    ("DM", -1e-9, ["DM is -1e-09", ">= 0"]),
-    ("DG", -1.0, ["DG is -1"]),
-    ("DL", float("nan"), ["DL is nan", "N m s/rad"]),
-    ("KG", "2.59", ["KG is '2.59'"]),
-])
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("JM", 0.0, ["JM is 0", "> 0", "kg m^2"]),
+        ("JL", -1e-4, ["JL is -0.0001", "> 0"]),
+        ("KG", 0.0, ["KG is 0", "N m/rad"]),
+        ("DM", -1e-9, ["DM is -1e-09", ">= 0"]),
+        ("DG", -1.0, ["DG is -1"]),
+        ("DL", float("nan"), ["DL is nan", "N m s/rad"]),
+        ("KG", "2.59", ["KG is '2.59'"]),
+    ],
+)
 def test_entered_mechanics_must_be_physical(name: str, value: object, words: list[str]) -> None:
     arguments: dict[str, object] = {"JM": 1e-4, "DM": 0.0, "JL": 1e-4, "DL": 0.0, "KG": 1.0, name: value}
     with pytest.raises(ModelError) as refusal:

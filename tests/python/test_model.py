@@ -18,8 +18,7 @@ from gaident.models.factors import Structure, factor_parameters, model_from_fact
 from gaident.models.model import Model
 from gaident.models.roots import polynomial_roots
 
-TWO_MASS = Model(gain=6545.29, poles=[-15.41, -10.30 + 150.9j, -10.30 - 150.9j],
-                 zeros=[-4.26 + 93.98j, -4.26 - 93.98j])
+TWO_MASS = Model(gain=6545.29, poles=[-15.41, -10.30 + 150.9j, -10.30 - 150.9j], zeros=[-4.26 + 93.98j, -4.26 - 93.98j])
 
 PART = st.floats(0.1, 1e3)
 REAL = st.builds(lambda a, s: complex(s * a, 0.0), PART, st.sampled_from([-1.0, 1.0]))
@@ -66,7 +65,7 @@ def test_order_of_the_roots_does_not_matter(model: Model, random: object) -> Non
     assert hash(again) == hash(model)
     for roots in (model.poles, model.zeros):
         reals = [r for r in roots if r.imag == 0.0]
-        pairs = list(roots[len(reals):])
+        pairs = list(roots[len(reals) :])
         assert [abs(r) for r in reals] == sorted(abs(r) for r in reals)
         assert all(a.imag > 0.0 and b == a.conjugate() for a, b in zip(pairs[::2], pairs[1::2], strict=True))
         assert [abs(r) for r in pairs[::2]] == sorted(abs(r) for r in pairs[::2])
@@ -87,22 +86,24 @@ def test_equal_pairs_are_matched_each_with_its_own() -> None:
         Model(1.0, [-1 + 2j, -1 + 2j, -1 - 2j])
 
 
-@pytest.mark.parametrize(("gain", "poles", "zeros", "words"), [
-    (0.0, [], [], ["gain is 0"]),
-    (math.nan, [], [], ["gain", "nan"]),
-    (1j, [], [], ["gain", "1j"]),
-    ("5", [], [], ["gain", "'5'"]),
-    (1.0, [-1.0, math.inf], [], ["poles[1]", "inf"]),
-    (1.0, [-1.0], [complex(math.nan, 0)], ["zeros[0]", "nan"]),
-    (1.0, [-1.0], [-2.0, -3.0], ["zeros has 2", "poles 1", "drop zeros or add poles"]),
-    (1.0, [-1 + 1j], [], ["poles", "-1+1j", "conjugate", "-1-1j"]),
-    (1.0, [-5.0, -6.0], [-1 - 1j, -3.0], ["zeros", "-1-1j", "conjugate"]),
-    (1.0, "abc", [], ["poles", "'abc'"]),
-    (1.0, ["a"], [], ["poles", "rad/s"]),
-    (1.0, [[-1.0, -2.0]], [], ["poles", "(1, 2)"]),
-])
-def test_refuses_with_name_value_and_remedy(gain: float, poles: list[complex], zeros: list[complex],
-                                            words: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("gain", "poles", "zeros", "words"),
+    [
+        (0.0, [], [], ["gain is 0"]),
+        (math.nan, [], [], ["gain", "nan"]),
+        (1j, [], [], ["gain", "1j"]),
+        ("5", [], [], ["gain", "'5'"]),
+        (1.0, [-1.0, math.inf], [], ["poles[1]", "inf"]),
+        (1.0, [-1.0], [complex(math.nan, 0)], ["zeros[0]", "nan"]),
+        (1.0, [-1.0], [-2.0, -3.0], ["zeros has 2", "poles 1", "drop zeros or add poles"]),
+        (1.0, [-1 + 1j], [], ["poles", "-1+1j", "conjugate", "-1-1j"]),
+        (1.0, [-5.0, -6.0], [-1 - 1j, -3.0], ["zeros", "-1-1j", "conjugate"]),
+        (1.0, "abc", [], ["poles", "'abc'"]),
+        (1.0, ["a"], [], ["poles", "rad/s"]),
+        (1.0, [[-1.0, -2.0]], [], ["poles", "(1, 2)"]),
+    ],
+)
+def test_refuses_with_name_value_and_remedy(gain: float, poles: list[complex], zeros: list[complex], words: list[str]) -> None:
     with pytest.raises(ModelError) as refusal:
         Model(gain, poles, zeros)
     for word in words:

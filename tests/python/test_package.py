@@ -56,9 +56,7 @@ def wheel(sdist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the wheel, with the objects that `make` has already compiled or else from the unpacked sdist."""
     compiled = ROOT / "build" / "python"
     if (compiled / "CMakeCache.txt").is_file():
-        return call_backend(
-            "build_wheel", ROOT, tmp_path_factory.mktemp("wheel"), {"build-dir": str(compiled)}
-        )
+        return call_backend("build_wheel", ROOT, tmp_path_factory.mktemp("wheel"), {"build-dir": str(compiled)})
     # Only the contents are looked at: unoptimised is quicker.
     quick = {"cmake.build-type": "Debug", "cmake.define.CMAKE_CXX_FLAGS_DEBUG": "-O0 -g0"}
     return call_backend("build_wheel", sdist, tmp_path_factory.mktemp("wheel"), quick)
@@ -90,9 +88,7 @@ def test_wheel_holds_the_package_and_nothing_else(wheel: Path) -> None:
     sources = [f for f in (python / "gaident").rglob("*") if f.suffix == ".py"]
     expected = {f.relative_to(python).as_posix() for f in sources} | {"gaident/_core.pyi", "gaident/py.typed"}
     info = f"gaident-{pyproject_version()}.dist-info"
-    expected |= {
-        f"{info}/{n}" for n in ("METADATA", "WHEEL", "RECORD", "entry_points.txt", "licenses/LICENSE")
-    }
+    expected |= {f"{info}/{n}" for n in ("METADATA", "WHEEL", "RECORD", "entry_points.txt", "licenses/LICENSE")}
 
     names = {n for n in zipfile.ZipFile(wheel).namelist() if not n.endswith("/")}
     extensions = {n for n in names if re.fullmatch(r"gaident/_core\.[\w.-]+\.(so|pyd)", n)}
@@ -136,9 +132,7 @@ def signature(function: ast.FunctionDef) -> Signature:
         listed.insert(len(a.posonlyargs), "/")
     if a.vararg or a.kwonlyargs:
         listed.append(f"*{a.vararg.arg}" if a.vararg else "*")
-    listed += [
-        shown(argument, default) for argument, default in zip(a.kwonlyargs, a.kw_defaults, strict=True)
-    ]
+    listed += [shown(argument, default) for argument, default in zip(a.kwonlyargs, a.kw_defaults, strict=True)]
     return [*listed, f"**{a.kwarg.arg}"] if a.kwarg else listed
 
 
@@ -183,9 +177,7 @@ def exported(scope: object) -> dict[str, list[Signature] | None]:
 
 def test_stub_equals_module() -> None:
     tree = ast.parse((ROOT / "python" / "gaident" / "_core.pyi").read_text())
-    private = [
-        n.name for n in tree.body if isinstance(n, ast.FunctionDef | ast.ClassDef) and n.name[0] == "_"
-    ]
+    private = [n.name for n in tree.body if isinstance(n, ast.FunctionDef | ast.ClassDef) and n.name[0] == "_"]
     assert not private, f"the stub declares private names: {private}"
     assert declared(tree.body) == exported(_core)
     for node in tree.body:

@@ -24,9 +24,7 @@ SAMPLES = Path(__file__).parent / "samples"
 FILES = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
-@pytest.mark.parametrize(
-    ("file", "call"), SAMPLE_CALLS, ids=[f"{k}-{c[0]}" for k, c in enumerate(SAMPLE_CALLS)]
-)
+@pytest.mark.parametrize(("file", "call"), SAMPLE_CALLS, ids=[f"{k}-{c[0]}" for k, c in enumerate(SAMPLE_CALLS)])
 def test_the_same_run_in_every_loggers_manner(file: str, call: dict[str, Any]) -> None:
     rec, expected = read(SAMPLES / file, **call), sample_log()
     assert rec.dt == pytest.approx(expected.dt, rel=1e-9)
@@ -70,9 +68,7 @@ def test_round_trip_of_random_tables(tmp_path: Path, table: tuple[Record, bytes,
     seed=st.integers(0, 10_000),
     flips=st.integers(0, 20),
 )
-def test_damaged_files_never_end_in_a_foreign_error(
-    tmp_path: Path, kind: str, cut: int | None, seed: int, flips: int
-) -> None:
+def test_damaged_files_never_end_in_a_foreign_error(tmp_path: Path, kind: str, cut: int | None, seed: int, flips: int) -> None:
     raw = bytearray(log_bytes(kind))
     rng = np.random.default_rng(seed)
     for _ in range(flips):
@@ -190,9 +186,7 @@ def test_arrays_of_every_shape(tmp_path: Path, kind: str) -> None:
         "gain",
     }
     assert all(values.dtype == np.float64 and values.ndim == 1 for values in held.values())
-    with pytest.raises(
-        ReadError, match=r"a\.\w+: velocity='data' is an array of 30 x 3.*'data\[:,0\]'.*zero based"
-    ):
+    with pytest.raises(ReadError, match=r"a\.\w+: velocity='data' is an array of 30 x 3.*'data\[:,0\]'.*zero based"):
         read(path, columns={"velocity": "data", "torque": "flat"}, dt=1.0)
     with pytest.raises(ReadError, match=r"velocity='data\[:,3\]'.*from 0 to 2"):
         read(path, columns={"velocity": "data[:,3]", "torque": "flat"}, dt=1.0)
@@ -241,12 +235,8 @@ def test_mat_version_4(tmp_path: Path) -> None:
     assert len(read(tmp_path / "a.mat", dt=1e-3)) == 30
 
 
-@pytest.mark.parametrize(
-    ("file", "raw", "call", "words"), GARBAGE, ids=[f"{k}-{g[0]}" for k, g in enumerate(GARBAGE)]
-)
-def test_one_clear_error(
-    tmp_path: Path, file: str, raw: bytes, call: dict[str, Any], words: list[str]
-) -> None:
+@pytest.mark.parametrize(("file", "raw", "call", "words"), GARBAGE, ids=[f"{k}-{g[0]}" for k, g in enumerate(GARBAGE)])
+def test_one_clear_error(tmp_path: Path, file: str, raw: bytes, call: dict[str, Any], words: list[str]) -> None:
     path = tmp_path / file
     path.write_bytes(raw)
     with pytest.raises(GaidentError) as caught:
@@ -258,9 +248,7 @@ def test_one_clear_error(
     for word in words:
         assert word in message
     # what is judged before the file is opened names its argument, all else the file
-    assert str(path) in message or re.match(
-        r"(units|columns|dt|name|\w+_\w+|delimiter|decimal|skip|encoding|\w+=)", message
-    )
+    assert str(path) in message or re.match(r"(units|columns|dt|name|\w+_\w+|delimiter|decimal|skip|encoding|\w+=)", message)
 
 
 def test_paths_that_are_no_file(tmp_path: Path) -> None:

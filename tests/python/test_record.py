@@ -35,9 +35,7 @@ def arrays(length: int) -> st.SearchStrategy[Any]:
 def records(draw: st.DrawFn) -> Record:
     n = draw(LENGTHS)
     command, torque = draw(
-        st.one_of(
-            st.tuples(arrays(n), st.none()), st.tuples(st.none(), arrays(n)), st.tuples(arrays(n), arrays(n))
-        )
+        st.one_of(st.tuples(arrays(n), st.none()), st.tuples(st.none(), arrays(n)), st.tuples(arrays(n), arrays(n)))
     )
     return Record(
         draw(st.floats(1e-6, 1.0)),
@@ -114,9 +112,7 @@ def test_one_changed_value_changes_digest_and_equality(rec: Record, where: int, 
     assert other.digest != rec.digest
 
 
-@given(
-    LENGTHS, st.integers(0, 100), st.sampled_from([np.nan, np.inf, -np.inf]), st.sampled_from([0, 1, 2, 3])
-)
+@given(LENGTHS, st.integers(0, 100), st.sampled_from([np.nan, np.inf, -np.inf]), st.sampled_from([0, 1, 2, 3]))
 def test_the_first_value_that_is_not_finite_is_named(n: int, where: int, value: float, which: int) -> None:
     keys = ("command", "velocity", "torque", "position")
     channels: dict[str, Any] = {key: np.zeros(n) for key in keys}

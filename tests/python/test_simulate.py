@@ -37,8 +37,13 @@ from independent import (
 LOOPS = ("continuous", "sampled", "open")
 STRUCTURES = [(p, q) for p in range(4) for q in range(4)]
 DOUBLE, FLOAT = 1e-9, 1e-4
-EVERY = [(loop, family, p, q) for loop in LOOPS for family in FAMILIES for p, q in STRUCTURES
-         if (p > 0 or loop == "continuous") and (p + q > 0 or family == "mixed")]
+EVERY = [
+    (loop, family, p, q)
+    for loop in LOOPS
+    for family in FAMILIES
+    for p, q in STRUCTURES
+    if (p > 0 or loop == "continuous") and (p + q > 0 or family == "mixed")
+]
 
 
 def generator(*key: object) -> np.random.Generator:
@@ -53,8 +58,18 @@ Clamped = tuple[Case, Array, Array, Result]
 def core(case: Case, signal: Array, state: Array | None = None, arithmetic: str = "double") -> Result:
     """(velocity, torque) of gaident._core.simulate."""
     return _core.simulate(
-        case.gain, case.poles, case.zeros, case.dt, signal, case.loop, case.kp, case.ki,
-        case.torque_limit, case.integrator_limit, np.zeros(0) if state is None else state, arithmetic,
+        case.gain,
+        case.poles,
+        case.zeros,
+        case.dt,
+        signal,
+        case.loop,
+        case.kp,
+        case.ki,
+        case.torque_limit,
+        case.integrator_limit,
+        np.zeros(0) if state is None else state,
+        arithmetic,
     )
 
 
@@ -342,8 +357,11 @@ def test_limits_that_are_never_reached_change_nothing(loop: str, family: str) ->
         signal = random_signal(rng, 250)
         free = core(case, signal)
         integral = free[1] - case.kp * (signal - free[0])
-        wide = replace(case, torque_limit=1.01 * float(np.max(np.abs(free[1]))),
-                       integrator_limit=1.01 * float(np.max(np.abs(integral))) + 1e-9)
+        wide = replace(
+            case,
+            torque_limit=1.01 * float(np.max(np.abs(free[1]))),
+            integrator_limit=1.01 * float(np.max(np.abs(integral))) + 1e-9,
+        )
         assert_agrees(core(wide, signal), free, 1e-10, case)
 
 

@@ -34,9 +34,7 @@ class Fake:
     version: str = "0.1.0"
     digests: tuple[str, ...] = ("c0ffee",)
     controller: Any = field(default_factory=lambda: ga.PI(0.0232, 1.367, torque_limit=2.4))
-    adequacy: Any = field(
-        default_factory=lambda: SimpleNamespace(noise_std=0.3011, sentence="The residual is white.")
-    )
+    adequacy: Any = field(default_factory=lambda: SimpleNamespace(noise_std=0.3011, sentence="The residual is white."))
     parameters: dict[str, Estimate] = field(
         default_factory=lambda: {
             "gain": Estimate(9790.12, 64.3, "rad/s^2/(N m)"),
@@ -74,8 +72,7 @@ class Fake:
     trials: tuple[Any, ...] = (SimpleNamespace(generations=80, evaluations=4000),)
     warnings: tuple[str, ...] = (
         "Structures within 10 BIC units of (1,2): (1,3); the smallest is reported.",
-        "At a bound of the search range: zero_pair_1_real, zero_pair_1_damping. Widen the space, or doubt "
-        "the structure.",
+        "At a bound of the search range: zero_pair_1_real, zero_pair_1_damping. Widen the space, or doubt the structure.",
     )
     space: Any = field(
         default_factory=lambda: ga.SearchSpace(
@@ -131,9 +128,7 @@ def test_comparison_with_the_truth() -> None:
     truth = ga.TwoMass(JM=1.02e-4, DM=0.003, JL=5.815e-4, DL=0.008, KG=2.59)
     lines = mechanics_comparison(Fake().mechanics, truth).splitlines()
     assert lines[0].split() == ["true", "identified", "deviation"]
-    assert lines[3].split() == [
-        *("JL", "0.0005815", "(5.773", "+-", "0.020)e-04", "-0.7", "%", "(2.1", "std)", "kg", "m^2")
-    ]
+    assert lines[3].split() == [*("JL", "0.0005815", "(5.773", "+-", "0.020)e-04", "-0.7", "%", "(2.1", "std)", "kg", "m^2")]
     assert not any(line.split()[0] == "DG" for line in lines[1:])
 
 

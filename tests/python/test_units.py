@@ -152,9 +152,7 @@ def test_names_and_units_in_headers(tmp_path: Path, header: str, size: float) ->
 
 
 def test_units_and_constants_of_the_drive(tmp_path: Path) -> None:
-    path = write(
-        tmp_path / "a.csv", "t [ms],n [counts/s],theta [counts],i [A]", rows(form="{k},{k},{k},{w:.4f}")
-    )
+    path = write(tmp_path / "a.csv", "t [ms],n [counts/s],theta [counts],i [A]", rows(form="{k},{k},{k},{w:.4f}"))
     rec = read(
         path,
         columns={"time": "t", "velocity": "n", "position": "theta", "torque": "i"},

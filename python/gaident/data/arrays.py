@@ -43,14 +43,9 @@ def channel(values: ArrayLike, argument: str) -> NDArray[np.float64]:
         )
     if array.dtype.kind in _REFUSED_KINDS:
         kind, remedy = _REFUSED_KINDS[array.dtype.kind]
-        raise RecordError(
-            f"{argument} is {kind} (dtype {array.dtype}), but real numbers are needed; {remedy}"
-        )
+        raise RecordError(f"{argument} is {kind} (dtype {array.dtype}), but real numbers are needed; {remedy}")
     if array.size < MINIMUM_SAMPLES:
-        raise RecordError(
-            f"{argument} has {array.size} samples, but at least {MINIMUM_SAMPLES} are needed; give a "
-            "longer record"
-        )
+        raise RecordError(f"{argument} has {array.size} samples, but at least {MINIMUM_SAMPLES} are needed; give a longer record")
     own = isinstance(values, list | tuple) and array.dtype == np.float64
     with np.errstate(over="ignore"):
         copy = array if own else np.array(array, dtype=np.float64, order="C")
@@ -70,15 +65,12 @@ def _as_array(values: ArrayLike, argument: str) -> NDArray[Any]:
     """numpy.asarray with our errors; a list of whole numbers too large for int64 still is one of numbers."""
     if isinstance(values, np.ma.MaskedArray) and np.ma.getmaskarray(values).any():
         bad = int(np.argmax(np.ma.getmaskarray(values).ravel()))
-        raise RecordError(
-            f"{argument}[{bad}] is masked, but every value must be there; cut or repair the record"
-        )
+        raise RecordError(f"{argument}[{bad}] is masked, but every value must be there; cut or repair the record")
     try:
         array = np.asarray(values)
     except (ValueError, TypeError, OverflowError) as error:
         raise RecordError(
-            f"{argument} is no array ({error}); give one number per sample, for example numpy.asarray(x, "
-            "dtype=float)"
+            f"{argument} is no array ({error}); give one number per sample, for example numpy.asarray(x, dtype=float)"
         ) from None
     if array.dtype.kind == "O" and array.ndim == 1 and isinstance(values, list | tuple):
         return _from_objects(values, array, argument)
@@ -92,9 +84,7 @@ def _from_objects(values: Sequence[Any], array: NDArray[Any], argument: str) -> 
     try:
         return array.astype(np.float64)
     except OverflowError:
-        raise RecordError(
-            f"{argument} holds a whole number too large for a float64; scale it first"
-        ) from None
+        raise RecordError(f"{argument} holds a whole number too large for a float64; scale it first") from None
 
 
 def first_not_finite(array: NDArray[np.float64]) -> int | None:

@@ -37,9 +37,7 @@ class Wanted:
         """Itself, once what can be judged without the file is right; else ReadError or RecordError."""
         for argument, value in (("columns", self.columns), ("units", self.units)):
             if value is not None and not isinstance(value, Mapping):
-                raise ReadError(
-                    f"{argument}={value!r} is no mapping; give for example {argument}={{'velocity': ...}}"
-                )
+                raise ReadError(f"{argument}={value!r} is no mapping; give for example {argument}={{'velocity': ...}}")
             _known(argument, value or ())
         self.constants.check()
         for quantity, unit in self.units.items():
@@ -70,13 +68,10 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
     count = next(iter(lengths.values()))
     if count < MINIMUM_SAMPLES:
         raise RecordError(
-            f"{table.path}: the log has {count} samples, but at least {MINIMUM_SAMPLES} are needed; give a "
-            "longer log"
+            f"{table.path}: the log has {count} samples, but at least {MINIMUM_SAMPLES} are needed; give a longer log"
         )
     dt = _sample_time(table, wanted, time)
-    scaled = {
-        channel: _scale(table, wanted, channel, named[channel], array) for channel, array in values.items()
-    }
+    scaled = {channel: _scale(table, wanted, channel, named[channel], array) for channel, array in values.items()}
     try:
         if "velocity" not in scaled:
             scaled["velocity"] = differentiate(scaled["position"], dt, wanted.velocity_cutoff_hz)
@@ -143,9 +138,7 @@ def _time_column(table: Table, wanted: Wanted) -> Column | None:
 def _sample_time(table: Table, wanted: Wanted, time: Column | None) -> float:
     if time is None:
         if wanted.dt is None:
-            raise ReadError(
-                f"{table.path}: columns={{'time': None}} ignores the time column; give dt= [s] then"
-            )
+            raise ReadError(f"{table.path}: columns={{'time': None}} ignores the time column; give dt= [s] then")
         return float(wanted.dt)
     explicit = wanted.columns is not None and "time" in wanted.columns
     if wanted.dt is None:
@@ -159,9 +152,7 @@ def _sample_time(table: Table, wanted: Wanted, time: Column | None) -> float:
     return float(wanted.dt)
 
 
-def _scale(
-    table: Table, wanted: Wanted, channel: str, column: Column, values: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _scale(table: Table, wanted: Wanted, channel: str, column: Column, values: NDArray[np.float64]) -> NDArray[np.float64]:
     size = _factor(table, wanted, channel, column)
     return values if size == 1.0 else values * size
 

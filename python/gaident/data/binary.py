@@ -37,9 +37,7 @@ def read_mat(path: str, raw: bytes) -> Table:
     others: list[str] = []
     for name, value in content:
         if name in arrays:
-            raise ReadError(
-                f"{path}: two variables are called {name!r}; save the log again with one name for each"
-            )
+            raise ReadError(f"{path}: two variables are called {name!r}; save the log again with one name for each")
         # MATLAB keeps what its objects need in a variable without a name.
         if name:
             _sort(name, value, arrays, others)
@@ -54,9 +52,7 @@ def read_npz(path: str, raw: bytes) -> Table:
     try:
         with np.load(io.BytesIO(raw), allow_pickle=False) as archive:
             if len(set(archive.files)) != len(archive.files):
-                raise ReadError(
-                    f"{path}: two arrays of one name in it; save the log again with one name for each"
-                )
+                raise ReadError(f"{path}: two arrays of one name in it; save the log again with one name for each")
             for name in archive.files:
                 _sort(name, np.asarray(archive[name]), arrays, others)
     except ReadError:
@@ -94,9 +90,7 @@ def _sort(name: str, value: NDArray[Any] | str, arrays: dict[str, NDArray[Any]],
 def _table(path: str, arrays: Mapping[str, NDArray[Any]], others: list[str]) -> Table:
     if not arrays:
         rest = f" (only {', '.join(others)})" if others else ""
-        raise ReadError(
-            f"{path}: the file holds no arrays of numbers{rest}; save the log's columns as plain vectors"
-        )
+        raise ReadError(f"{path}: the file holds no arrays of numbers{rest}; save the log's columns as plain vectors")
     columns: list[Column] = []
     matrices = {}
     for name, array in arrays.items():

@@ -42,9 +42,7 @@ def differentiate(position: ArrayLike, dt: float, cutoff_hz: float | None = None
 
 def _low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float) -> NDArray[np.float64]:
     nyquist = 0.5 / dt
-    cutoff_hz = positive_number(
-        cutoff_hz, "cutoff_hz", "Hz", f"give a corner between 0 and {nyquist:g} Hz, or None"
-    )
+    cutoff_hz = positive_number(cutoff_hz, "cutoff_hz", "Hz", f"give a corner between 0 and {nyquist:g} Hz, or None")
     if cutoff_hz >= nyquist:
         raise RecordError(
             f"cutoff_hz={cutoff_hz:g} Hz, but it must be below the Nyquist frequency {nyquist:g} Hz "

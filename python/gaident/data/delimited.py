@@ -43,14 +43,11 @@ class TextOptions:
             delimiter = _WORDS.get(delimiter, delimiter) if isinstance(delimiter, str) else ""
             if len(delimiter) != 1 or delimiter in '\n\r".+-' or delimiter.isalnum():
                 raise ReadError(
-                    f"delimiter={self.delimiter!r} cannot stand between columns; give ',', ';', 'tab', "
-                    "'space' or '|'"
+                    f"delimiter={self.delimiter!r} cannot stand between columns; give ',', ';', 'tab', 'space' or '|'"
                 )
         if self.decimal not in (None, ".", ","):
             raise ReadError(f"decimal={self.decimal!r} is no decimal mark; give '.' or ','")
-        if self.skip is not None and (
-            isinstance(self.skip, bool) or not isinstance(self.skip, int) or self.skip < 0
-        ):
+        if self.skip is not None and (isinstance(self.skip, bool) or not isinstance(self.skip, int) or self.skip < 0):
             raise ReadError(f"skip={self.skip!r} is no number of lines; give a whole number from 0")
         if self.encoding is not None and not isinstance(self.encoding, str):
             raise ReadError(f"encoding={self.encoding!r} is no text; give for example 'utf-8' or 'latin-1'")
@@ -62,17 +59,12 @@ def read_text(path: str, raw: bytes, options: TextOptions) -> Table:
     options = options.check()
     everything = lines_of(path, raw, options.encoding)
     skip = options.skip or 0
-    lines: list[Line] = [
-        (n, text) for n, text in enumerate(everything[skip:], skip + 1) if text and not text.isspace()
-    ]
+    lines: list[Line] = [(n, text) for n, text in enumerate(everything[skip:], skip + 1) if text and not text.isspace()]
     comments = [line for line in lines if COMMENT.match(line[1])]
     if comments:
         lines = [line for line in lines if not COMMENT.match(line[1])]
     if not lines:
-        raise ReadError(
-            f"{path}: no line is left after skip={skip} and comments; give a smaller skip=, or a log with "
-            "data"
-        )
+        raise ReadError(f"{path}: no line is left after skip={skip} and comments; give a smaller skip=, or a log with data")
     dialect = detect(path, lines, options.delimiter, options.decimal)
     header = find_header(lines, comments, dialect)
     numbers, body = zip(*lines[header.start :], strict=True)
@@ -138,9 +130,7 @@ def _clean(block: Sequence[str], dialect: Dialect, out: NDArray[np.float64]) -> 
     delimiter = None if dialect.delimiter == " " else dialect.delimiter
     usecols = wanted if len(wanted) < dialect.width else None
     try:
-        values = np.loadtxt(
-            block, delimiter=delimiter, comments=None, ndmin=2, dtype=np.float64, usecols=usecols
-        )
+        values = np.loadtxt(block, delimiter=delimiter, comments=None, ndmin=2, dtype=np.float64, usecols=usecols)
     except ValueError:
         return False
     if values.shape != (len(block), len(wanted)):

@@ -127,9 +127,7 @@ def _look_further(lines: Sequence[Line], found: Dialect) -> Dialect:
     if sampled_point:
         return found
     pattern = re.compile(r"(?<![\d,])\d+,\d+(?![\d,])")
-    if any(pattern.search(text) for _, text in lines[1:]) and not any(
-        re.search(r"\d\.\d", text) for _, text in lines[1:]
-    ):
+    if any(pattern.search(text) for _, text in lines[1:]) and not any(re.search(r"\d\.\d", text) for _, text in lines[1:]):
         return replace(found, decimal=",")
     return found
 
@@ -140,9 +138,7 @@ def _refuse_two_meanings(path: str, lines: Sequence[Line], half: Sequence[Line],
     whole = [(number, row) for number, row in rows if all(cell.lstrip("+-").isdigit() for cell in row)]
     if 10 * len(whole) < 9 * len(rows):
         return
-    names = next(
-        (split(text, ",") for _, text in reversed(lines[: len(lines) // 2]) if not _digits_only(text)), []
-    )
+    names = next((split(text, ",") for _, text in reversed(lines[: len(lines) // 2]) if not _digits_only(text)), [])
     suspicious = [number for number, row in whole if any(_LEADING_ZERO.fullmatch(cell) for cell in row[1:])]
     other_widths = [number for number, row in whole if len(row) != found.width]
     half_named = len([name for name in names if name]) * 2 == found.width

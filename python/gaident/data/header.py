@@ -46,22 +46,14 @@ def find_header(lines: Sequence[Line], comments: Sequence[Line], dialect: Dialec
     units.
     """
     start = _first_data(lines, dialect)
-    rows = [
-        (index, cells) for index, (_, text) in enumerate(lines[:start]) if (cells := _cells(text, dialect))
-    ]
+    rows = [(index, cells) for index, (_, text) in enumerate(lines[:start]) if (cells := _cells(text, dialect))]
     below = None
     if len(rows) >= 2 and _is_unit_row(rows[-1][1], rows[-2][1]):
         below = rows.pop()[1]
     names_at = next((k for k in reversed(range(len(rows))) if not _has_number(rows[k][1], dialect)), None)
     if names_at is None:
-        in_comments = [
-            cells for _, text in comments if (cells := _cells(COMMENT.sub("", text, count=1), dialect))
-        ]
-        units = (
-            in_comments.pop()
-            if len(in_comments) >= 2 and _is_unit_row(in_comments[-1], in_comments[-2])
-            else below
-        )
+        in_comments = [cells for _, text in comments if (cells := _cells(COMMENT.sub("", text, count=1), dialect))]
+        units = in_comments.pop() if len(in_comments) >= 2 and _is_unit_row(in_comments[-1], in_comments[-2]) else below
         named = in_comments[-1] if in_comments and not _has_number(in_comments[-1], dialect) else None
         return Header(_headings(named or [""] * dialect.width, None, units), start)
     index, names = rows[names_at]
@@ -163,9 +155,7 @@ def _unique(headings: list[Heading]) -> tuple[Heading, ...]:
     return tuple(
         heading
         if heading.key and counts[heading.key] == 1
-        else Heading(
-            f"{heading.key} #{k}".strip(), (*filter(None, [heading.key]), *heading.names), heading.unit
-        )
+        else Heading(f"{heading.key} #{k}".strip(), (*filter(None, [heading.key]), *heading.names), heading.unit)
         for k, heading in enumerate(headings)
     )
 

@@ -170,12 +170,7 @@ def _version_4(raw: bytes) -> list[Variable]:
         order = "<" if struct.unpack_from("<i", raw, at)[0] in range(100) else ">"
         kind, rows, cols, imaginary, length = struct.unpack_from(order + "5i", raw, at)
         stored, content = divmod(kind % 1000, 10)
-        if (
-            kind // 1000 != (order == ">")
-            or stored >= len(_STORED_4)
-            or content > 2
-            or imaginary not in (0, 1)
-        ):
+        if kind // 1000 != (order == ">") or stored >= len(_STORED_4) or content > 2 or imaginary not in (0, 1):
             raise DamagedError(f"a variable of type {kind}")
         dtype = np.dtype(order + _STORED_4[stored])
         size = rows * cols * dtype.itemsize

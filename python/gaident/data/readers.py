@@ -118,11 +118,7 @@ def read_columns(
     """
     table = _read_table(path, TextOptions(delimiter, decimal, skip, encoding))
     # A copy each: a column must not keep the whole table alive, nor change another when it is written to.
-    return {
-        column.key: np.array(column.values, dtype=np.float64)
-        for column in table.columns
-        if column.values.dtype.kind != "c"
-    }
+    return {column.key: np.array(column.values, dtype=np.float64) for column in table.columns if column.values.dtype.kind != "c"}
 
 
 def _read_table(path: str | os.PathLike[str], options: TextOptions) -> Table:
@@ -131,9 +127,7 @@ def _read_table(path: str | os.PathLike[str], options: TextOptions) -> Table:
     if reader.read is not read_text:
         given = [key for key, value in vars(options).items() if value is not None]
         if given:
-            raise ReadError(
-                f"{given[0]}= is for text tables, but {shown} is {reader.name}; leave {given[0]} out"
-            )
+            raise ReadError(f"{given[0]}= is for text tables, but {shown} is {reader.name}; leave {given[0]} out")
     return reader.read(shown, raw, options)
 
 
@@ -147,9 +141,7 @@ def _content(path: str | os.PathLike[str]) -> tuple[bytes, str]:
         if file.is_dir():
             raise ReadError(f"{shown}: this is a folder; name one log file in it")
         if not file.exists():
-            raise ReadError(
-                f"{shown}: there is no such file{_near(file)}; check the path (now in {Path.cwd()})"
-            )
+            raise ReadError(f"{shown}: there is no such file{_near(file)}; check the path (now in {Path.cwd()})")
         if not file.is_file():
             raise ReadError(f"{shown}: this is no regular file; save the log to a file first")
         raw = file.read_bytes()

@@ -65,9 +65,7 @@ class Record:
                 "or derive it with differentiate(position, dt, cutoff_hz)"
             )
         if command is None and torque is None:
-            raise RecordError(
-                "command=None and torque=None, but a record needs what drove the motor; give one of them"
-            )
+            raise RecordError("command=None and torque=None, but a record needs what drove the motor; give one of them")
         if not isinstance(name, str):
             raise RecordError(f"name={name!r} is no text; give a str")
         given = {"command": command, "velocity": velocity, "torque": torque, "position": position}
@@ -75,9 +73,7 @@ class Record:
         lengths = {key: len(values) for key, values in channels.items() if values is not None}
         if len(set(lengths.values())) > 1:
             listed = ", ".join(f"{key} {length}" for key, length in lengths.items())
-            raise RecordError(
-                f"the channels have unequal lengths ({listed} samples); cut them to the same samples"
-            )
+            raise RecordError(f"the channels have unequal lengths ({listed} samples); cut them to the same samples")
         sample_time = positive_number(dt, "dt", "s", "give the sample time in seconds, for example dt=1e-3")
         self._fill(sample_time, channels, str(name))
 
@@ -128,9 +124,7 @@ class Record:
     def __getitem__(self, samples: slice) -> Record:
         """`rec[a:b]`: samples a to b-1, numpy's rules for negative and missing bounds; at least 20 remain."""
         if not isinstance(samples, slice):
-            raise RecordError(
-                f"rec[{samples!r}]: a record is cut by a slice, rec[a:b]; one value is rec.velocity[n]"
-            )
+            raise RecordError(f"rec[{samples!r}]: a record is cut by a slice, rec[a:b]; one value is rec.velocity[n]")
         text = f"rec[{_bound(samples.start)}:{_bound(samples.stop)}]"
         if samples.step is not None and samples.step != 1:
             raise RecordError(
@@ -140,9 +134,7 @@ class Record:
         try:
             start, stop, _ = samples.indices(len(self))
         except TypeError:
-            raise RecordError(
-                f"{text}: bounds are sample numbers, whole; cut by seconds with rec.between(t0, t1)"
-            ) from None
+            raise RecordError(f"{text}: bounds are sample numbers, whole; cut by seconds with rec.between(t0, t1)") from None
         return self._cut(start, stop, text)
 
     def between(self, t0: float, t1: float) -> Record:
@@ -187,9 +179,7 @@ class Record:
 
     def __repr__(self) -> str:
         label = f"{self.name!r}, " if self.name else ""
-        held = ", ".join(
-            f"{key} {values.min() + 0.0:.4g}..{values.max() + 0.0:.4g}" for key, values in self.channels()
-        )
+        held = ", ".join(f"{key} {values.min() + 0.0:.4g}..{values.max() + 0.0:.4g}" for key, values in self.channels())
         return f"Record({label}{len(self)} samples, dt={self.dt:.6g} s, {self.duration:.4g} s; {held})"
 
     def __reduce__(self) -> tuple[type[Record], tuple[Any, ...]]:

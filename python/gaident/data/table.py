@@ -66,9 +66,7 @@ class Table:
         Raises ReadError, naming what there is, when none or more than one answers.
         """
         if isinstance(address, bool) or not isinstance(address, str | int | np.integer):
-            raise ReadError(
-                f"columns: {channel}={address!r} is no column; give its name, or its number as '#0'"
-            )
+            raise ReadError(f"columns: {channel}={address!r} is no column; give its name, or its number as '#0'")
         wanted = address.strip() if isinstance(address, str) else f"#{address}"
         # The number comes before loose spellings, but a column may really be called '#1'.
         for matches in (
@@ -96,8 +94,7 @@ class Table:
         values = column.values
         if values.dtype.kind not in "iufb":
             raise ReadError(
-                f"{self.path}: {where} holds no real numbers (dtype {values.dtype}); name another column, "
-                f"or save its real part"
+                f"{self.path}: {where} holds no real numbers (dtype {values.dtype}); name another column, or save its real part"
             )
         bad = first_not_finite(values.astype(np.float64, copy=False))
         if column.bad is not None and (bad is None or column.bad[0] <= bad):
@@ -109,17 +106,14 @@ class Table:
             )
         if bad is not None:
             raise ReadError(
-                f"{self.path}, {self.place(bad)}: {where} holds {values[bad]}; "
-                f"cut the log before it, or correct the value"
+                f"{self.path}, {self.place(bad)}: {where} holds {values[bad]}; cut the log before it, or correct the value"
             )
         return values.astype(np.float64, copy=False)
 
     def listing(self) -> str:
         """The columns, for messages."""
         keys = [repr(column.key) for column in self.columns]
-        shown = ", ".join(keys[:_LISTED]) + (
-            f" and {len(keys) - _LISTED} more" if len(keys) > _LISTED else ""
-        )
+        shown = ", ".join(keys[:_LISTED]) + (f" and {len(keys) - _LISTED} more" if len(keys) > _LISTED else "")
         rest = f"; besides {', '.join(self.others)}, which are no columns of numbers" if self.others else ""
         return (shown or "no columns") + rest
 
@@ -133,11 +127,7 @@ class Table:
 
     def _loosely(self, wanted: str) -> list[Column]:
         plain = wanted.casefold()
-        return [
-            column
-            for column in self.columns
-            if plain in {name.casefold() for name in (column.key, *column.names)}
-        ]
+        return [column for column in self.columns if plain in {name.casefold() for name in (column.key, *column.names)}]
 
     def _pick(self, wanted: str, channel: str) -> list[Column]:
         """`data[:,3]` or `data[2,:]` out of a matrix."""
@@ -184,9 +174,7 @@ def _comma_hint(text: str) -> str:
     if re.fullmatch(r"[+-]?\d+,\d+([eE][+-]?\d+)?", text):
         return " (a decimal comma? then give decimal=',')"
     if re.fullmatch(r"[+-]?\d+\.\d+", text):
-        return (
-            " (a point in a log with decimal commas? export it with one decimal mark and none for thousands)"
-        )
+        return " (a point in a log with decimal commas? export it with one decimal mark and none for thousands)"
     if re.fullmatch(r"[+-]?\d{1,3}([.,' ]\d{3})+([.,]\d+)?", text):
         return " (a mark between thousands? export the log without it)"
     return ""

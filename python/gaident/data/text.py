@@ -62,9 +62,7 @@ def _decode(path: str, raw: bytes, encoding: str | None) -> str:
             "'latin-1'"
         ) from None
     except LookupError:
-        raise ReadError(
-            f"encoding={encoding!r} is not known to Python; give for example 'utf-8' or 'latin-1'"
-        ) from None
+        raise ReadError(f"encoding={encoding!r} is not known to Python; give for example 'utf-8' or 'latin-1'") from None
 
 
 def _guess(raw: bytes) -> str | None:

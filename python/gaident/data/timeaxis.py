@@ -70,11 +70,7 @@ def check_given(table: Table, column: Column, second: float, dt: float) -> None:
     if abs(found - dt) <= _CONTRADICTION * dt:
         return
     unit = next(
-        (
-            name
-            for name, size in (("ms", 1e-3), ("us", 1e-6), ("min", 60.0))
-            if abs(found * size / dt - 1) < 0.01
-        ),
+        (name for name, size in (("ms", 1e-3), ("us", 1e-6), ("min", 60.0)) if abs(found * size / dt - 1) < 0.01),
         None,
     )
     hint = f"; if it is in {unit}, give units={{'time': {unit!r}}}" if unit and second == 1.0 else ""

@@ -32,9 +32,7 @@ class _Unit:
 # First spelling of each row is what messages list.
 _VELOCITY: dict[tuple[str, ...], _Unit] = {
     ("rad/s", "rad/sec", "rad s-1", "rad s^-1"): _Unit(1.0),
-    ("rpm", "1/min", "r/min", "rev/min", "u/min", "min-1", "min^-1", "min⁻¹", "turns/min"): _Unit(
-        _TURN / 60.0
-    ),
+    ("rpm", "1/min", "r/min", "rev/min", "u/min", "min-1", "min^-1", "min⁻¹", "turns/min"): _Unit(_TURN / 60.0),
     ("rps", "rev/s", "turn/s", "turns/s"): _Unit(_TURN),
     ("deg/s", "°/s", "deg/sec", "degree/s", "degrees/s"): _Unit(_TURN / 360.0),
     ("counts/s", "count/s", "cnt/s", "inc/s", "pulses/s", "ticks/s"): _Unit(_TURN, _COUNTS, divide=True),
@@ -128,9 +126,7 @@ class Constants:
                 continue
             number = _number(value)
             if number is None or not math.isfinite(number) or number <= 0:
-                raise ReadError(
-                    f"{name}={value!r}, but it must be a positive finite number; correct it or leave it out"
-                )
+                raise ReadError(f"{name}={value!r}, but it must be a positive finite number; correct it or leave it out")
 
 
 def known_units(quantity: str) -> tuple[str, ...]:
@@ -169,9 +165,7 @@ def factor(quantity: str, unit: str | float, constants: Constants | None = None)
         return number
     listed = ", ".join(known_units(quantity))
     if not isinstance(unit, str):
-        raise ReadError(
-            f"units: {quantity}={unit!r} is neither text nor a number; give one of {listed}, or a factor"
-        )
+        raise ReadError(f"units: {quantity}={unit!r} is neither text nor a number; give one of {listed}, or a factor")
     row = _UNITS[quantity].get(_spelling(unit))
     if row is None:
         raise ReadError(
@@ -183,9 +177,7 @@ def factor(quantity: str, unit: str | float, constants: Constants | None = None)
     name, meaning = row.constant
     value: float | None = getattr(constants, name)
     if value is None:
-        raise ReadError(
-            f"units: {quantity} in {unit!r} needs a constant of the drive; give {name}=... {meaning}"
-        )
+        raise ReadError(f"units: {quantity} in {unit!r} needs a constant of the drive; give {name}=... {meaning}")
     return row.factor / value if row.divide else row.factor * value
 
 

@@ -1,7 +1,9 @@
 """Does the linear model hold? Tests on the residual that are valid under feedback.
 
-Whiteness says whether anything predictable is left; noise of a colour of its own leaves that too. What falsifies the *model* is a residual
-that still depends on the input or on the motion: whitened, and with what a change of the model's own parameters could explain taken
+Whiteness says whether anything predictable is left; noise of a colour of its own leaves that too. What falsifies the *model*
+is a residual
+that still depends on the input or on the motion: whitened, and with what a change of the model's own parameters could explain
+taken
 out, it is regressed on the input at several lags, a constant, and sign(w), w|w| of the simulated velocity. F-test.
 """
 
@@ -20,7 +22,7 @@ __all__ = ["Adequacy", "assess"]
 Vector = NDArray[np.float64]
 
 LAGS = (0, 1, 2, 4, 8, 16, 32)
-LEVEL = 1e-4   # p-value below which the linear model counts as falsified
+LEVEL = 1e-4  # p-value below which the linear model counts as falsified
 
 
 @dataclass(frozen=True)
@@ -43,17 +45,26 @@ class Adequacy:
     def sentence(self) -> str:
         """The verdict in words."""
         if self.falsified:
-            return ("The linear model is falsified: the residual still depends on the input or the motion "
-                    f"(p = {self.independence_p:.1g}), and its own past predicts {100 * self.predictable:.0f} % of its power. "
-                    "Do not trust the mechanical parameters; an effect that is not in the model bends them.")
+            return (
+                "The linear model is falsified: the residual still depends on the input or the motion "
+                f"(p = {self.independence_p:.1g}), and its own past predicts {100 * self.predictable:.0f} % of its power. "
+                "Do not trust the mechanical parameters; an effect that is not in the model bends them."
+            )
         if self.white_p < LEVEL:
-            return ("The residual is not white but does not depend on input or motion: coloured noise. The linear model stands; "
-                    "the standard deviations take the colour into account.")
+            return (
+                "The residual is not white but does not depend on input or motion: coloured noise. The linear model stands; "
+                "the standard deviations take the colour into account."
+            )
         return "The residual is white: nothing left that this linear model could be blamed for."
 
 
-def assess(residuals: Sequence[Vector], J: NDArray[np.float64], inputs: Sequence[Vector], outputs: Sequence[Vector],
-           noise: Autoregression) -> Adequacy:
+def assess(
+    residuals: Sequence[Vector],
+    J: NDArray[np.float64],
+    inputs: Sequence[Vector],
+    outputs: Sequence[Vector],
+    noise: Autoregression,
+) -> Adequacy:
     """residuals, inputs and simulated outputs per record; J: sensitivities, parameters x all samples."""
     lengths = [len(e) for e in residuals]
     total = sum(lengths)

@@ -4,13 +4,15 @@ The estimate minimises the plain simulation error e; its covariance to first ord
 
     cov = (J'J)^-1 J' S J (J'J)^-1,    S = s^2 (F'F)^-1
 
-with J = de/dx, F the whitening filter of the residual and s the standard deviation of F e. For white residuals this is s^2 (J'J)^-1.
+with J = de/dx, F the whitening filter of the residual and s the standard deviation of F e. For white residuals this is s^2
+(J'J)^-1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -61,8 +63,8 @@ def core_layout(model: Model) -> tuple[Matrix, list[int]]:
         while len(left) >= 2:
             i, j = left.pop(0), left.pop(0)
             gap = reals[i] - reals[j] or 1e-9 * max(abs(reals[i]), 1e-9)
-            T[row + i, column:column + 2] = np.array([reals[i], -1.0]) / gap
-            T[row + j, column:column + 2] = np.array([reals[j], -1.0]) / -gap
+            T[row + i, column : column + 2] = np.array([reals[i], -1.0]) / gap
+            T[row + j, column : column + 2] = np.array([reals[j], -1.0]) / -gap
             of_core += [row + i, row + j]
             column += 2
         if left:
@@ -73,12 +75,14 @@ def core_layout(model: Model) -> tuple[Matrix, list[int]]:
     return T, of_core
 
 
-def covariance_of_factors(model: Model, J: Matrix, noise: Autoregression, lengths: Sequence[int],
-                          at_bound: Sequence[bool]) -> Matrix:
+def covariance_of_factors(
+    model: Model, J: Matrix, noise: Autoregression, lengths: Sequence[int], at_bound: Sequence[bool]
+) -> Matrix:
     """Covariance of factor_parameters(model).
 
     J: sensitivities of the error in the core's order, parameters (start states last) x samples; lengths: samples of each record;
-    at_bound: per parameter of the model, core order. Rows and columns of parameters at a bound are nan; directions that the record
+    at_bound: per parameter of the model, core order. Rows and columns of parameters at a bound are nan; directions that the
+    record
     does not determine have infinite variance.
     """
     count = len(at_bound)
@@ -158,8 +162,9 @@ def estimates(model: Model, cov: Matrix, at_bound_core: Sequence[bool]) -> dict[
             add(f"{stem}_real", -0.5 * e1, {i: -0.5}, "rad/s", bound[i], w)
             add(f"{stem}_imaginary", float(im), {i: -0.25 * e1 / im, i + 1: 0.5 / im}, "rad/s", bound[i + 1], float(w))
             add(f"{stem}_frequency", float(w), {i + 1: 0.5 / w}, "rad/s", bound[i + 1], float(w))
-            add(f"{stem}_damping", float(0.5 * e1 / w), {i: 0.5 / w, i + 1: -0.25 * e1 / w**3}, "1",
-                bound[i] or bound[i + 1], 1.0)
+            add(
+                f"{stem}_damping", float(0.5 * e1 / w), {i: 0.5 / w, i + 1: -0.25 * e1 / w**3}, "1", bound[i] or bound[i + 1], 1.0
+            )
         elif not name.endswith("_e0"):
             add(name, -float(values[i]), {i: -1.0}, "rad/s", bound[i], float(values[i]))
     return found

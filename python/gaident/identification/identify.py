@@ -34,12 +34,20 @@ ProgressCallback = Callable[[float, str], None]
 FINAL_ITERATIONS = 60
 
 
-def identify(rec: Record | Sequence[Record], controller: PI | None = None, space: SearchSpace | None = None,
-             settings: Settings | None = None, trials: int = 1, seed: int = 0, workers: int | None = None,
-             progress: ProgressCallback | None = None) -> Identification:
+def identify(
+    rec: Record | Sequence[Record],
+    controller: PI | None = None,
+    space: SearchSpace | None = None,
+    settings: Settings | None = None,
+    trials: int = 1,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: ProgressCallback | None = None,
+) -> Identification:
     """Finds structure (p, q) and parameters of the model behind one or several records.
 
-    rec: a Record or a list (one model for all, each with its own initial state). controller: the velocity loop's PI, driven by the
+    rec: a Record or a list (one model for all, each with its own initial state). controller: the velocity loop's PI, driven by
+    the
         record's command; None: open loop, the record's torque drives the model.
     space: search ranges; None: derived from the data, see `Identification.space`. settings: Settings() unless given.
     trials: independent genetic runs, the best of each structure is kept. workers: threads, None: as many as the machine has;
@@ -63,8 +71,9 @@ def identify(rec: Record | Sequence[Record], controller: PI | None = None, space
     records = sorted(given, key=lambda r: (r.digest, r.name))  # sums must not depend on the order given
     space = _checked_space(derive_space(records, controller) if space is None else space, controller)
 
-    moving = [settings.initial_state == "free" or (settings.initial_state == "auto" and starts_moving(r, controller))
-              for r in records]
+    moving = [
+        settings.initial_state == "free" or (settings.initial_state == "auto" and starts_moving(r, controller)) for r in records
+    ]
     work = _Work(records, controller, space, settings, moving)
     found = work.search(int(trials), int(seed), threads, progress)
     best, scored, noise = work.select(found, threads)
@@ -88,10 +97,13 @@ class _Work:
         loop, kp, ki = ("open", 0.0, 0.0) if c is None else (c.loop, c.kp, c.ki)
         limits = (np.inf, np.inf) if c is None else c.limits
         self.inputs = [_input(r, c) for r in self.records]
-        rows = [(u, r.velocity, r.dt, "free" if m else "rest", float(r.velocity[:3].mean()))
-                for u, r, m in zip(self.inputs, self.records, self.moving, strict=True)]
-        self.experiment = _core.Experiment(records=rows, loop=loop, kp=kp, ki=ki, torque_limit=limits[0],
-                                           integrator_limit=limits[1])
+        rows = [
+            (u, r.velocity, r.dt, "free" if m else "rest", float(r.velocity[:3].mean()))
+            for u, r, m in zip(self.inputs, self.records, self.moving, strict=True)
+        ]
+        self.experiment = _core.Experiment(
+            records=rows, loop=loop, kp=kp, ki=ki, torque_limit=limits[0], integrator_limit=limits[1]
+        )
         self.loop = (loop, kp, ki, *limits)
         self.samples = sum(len(r) for r in self.records)
         self.ranges = self.space.ranges(paper=not self.settings.species and self.settings.scale == "linear")
@@ -106,8 +118,14 @@ class _Work:
             fraction = done / (done + usual) if self.settings.species else done / total
             progress(min(1.0, fraction), f"generation {done}, best fitness {best:.4g}")
 
-        return self.experiment.search(ranges=self.ranges, settings=self.settings.engine_settings(), trials=trials,
-                                      seed=seed, workers=workers, progress=None if progress is None else report)
+        return self.experiment.search(
+            ranges=self.ranges,
+            settings=self.settings.engine_settings(),
+            trials=trials,
+            seed=seed,
+            workers=workers,
+            progress=None if progress is None else report,
+        )
 
     def select(self, found: list[_core.Trial], workers: int) -> tuple[Candidate, list[Candidate], Autoregression]:
         """The winner, all structures with their BIC (the plain engine compares none), and the noise model of the winner."""
@@ -123,8 +141,12 @@ class _Work:
                 best = best if chain is None or chain == winner else self.polished(scored[chain])
         else:
             trial = min(found, key=lambda t: t.best_fitness)
-            gain, poles, zeros = _core.decode(words=trial.best, ranges=self.ranges, gray=self.settings.code == "gray",
-                                              logarithmic=self.settings.scale == "logarithmic")
+            gain, poles, zeros = _core.decode(
+                words=trial.best,
+                ranges=self.ranges,
+                gray=self.settings.code == "gray",
+                logarithmic=self.settings.scale == "logarithmic",
+            )
             model = Model(gain, poles, zeros)
             size = 1 + model.p + 2 * model.q
             best = Candidate(model, np.zeros(0), 0.0, (False,) * size)
@@ -133,9 +155,13 @@ class _Work:
 
     def polished(self, c: Candidate) -> Candidate:
         """The local fit taken to the end."""
-        fit = self.experiment.refine(models=[(c.model.gain, np.array(c.model.poles, complex), np.array(c.model.zeros, complex),
-                                              c.starts)],
-                                     ranges=self.ranges, whitening=[], max_iterations=FINAL_ITERATIONS, workers=1)[0]
+        fit = self.experiment.refine(
+            models=[(c.model.gain, np.array(c.model.poles, complex), np.array(c.model.zeros, complex), c.starts)],
+            ranges=self.ranges,
+            whitening=[],
+            max_iterations=FINAL_ITERATIONS,
+            workers=1,
+        )[0]
         done = selection.from_core(fit)
         return Candidate(done.model, done.starts, done.cost, done.at_bound, c.bic) if done.cost <= c.cost else c
 
@@ -145,7 +171,7 @@ class _Work:
         states, at = [], 0
         for m in self.moving:
             n = size if m and len(c.starts) else 0
-            states.append(c.starts[at:at + n])
+            states.append(c.starts[at : at + n])
             at += n
         return states
 
@@ -153,8 +179,10 @@ class _Work:
         """Simulated velocity of each record."""
         loop, kp, ki, torque_limit, integrator_limit = self.loop
         poles, zeros = np.array(c.model.poles, complex), np.array(c.model.zeros, complex)
-        return [_core.simulate(c.model.gain, poles, zeros, r.dt, u, loop, kp, ki, torque_limit, integrator_limit, s)[0]
-                for r, u, s in zip(self.records, self.inputs, self.states(c), strict=True)]
+        return [
+            _core.simulate(c.model.gain, poles, zeros, r.dt, u, loop, kp, ki, torque_limit, integrator_limit, s)[0]
+            for r, u, s in zip(self.records, self.inputs, self.states(c), strict=True)
+        ]
 
     def residuals(self, c: Candidate) -> list[Vector]:
         """Measured minus simulated velocity of each record."""
@@ -162,8 +190,13 @@ class _Work:
 
     def sensitivities(self, c: Candidate) -> Any:
         """de/dx of the plain error, parameters (start states last) x samples."""
-        return self.experiment.sensitivities(gain=c.model.gain, poles=np.array(c.model.poles, complex),
-                                             zeros=np.array(c.model.zeros, complex), starts=list(c.starts), whitening=[])[1]
+        return self.experiment.sensitivities(
+            gain=c.model.gain,
+            poles=np.array(c.model.poles, complex),
+            zeros=np.array(c.model.zeros, complex),
+            starts=list(c.starts),
+            whitening=[],
+        )[1]
 
     def judged(self, c: Candidate) -> adequacy.Adequacy:
         """Whether the data contradict this candidate."""
@@ -171,8 +204,9 @@ class _Work:
         residuals = [r.velocity - y for r, y in zip(self.records, outputs, strict=True)]
         return adequacy.assess(residuals, self.sensitivities(c), self.inputs, outputs, fit_autoregression(residuals))
 
-    def report(self, best: Candidate, scored: list[Candidate], noise: Autoregression, found: list[_core.Trial],
-               seed: int) -> Identification:
+    def report(
+        self, best: Candidate, scored: list[Candidate], noise: Autoregression, found: list[_core.Trial], seed: int
+    ) -> Identification:
         """Uncertainty, tests, mechanics, and everything the user sees."""
         model = best.model
         outputs = self.outputs(best)
@@ -190,22 +224,46 @@ class _Work:
         lowest = min((c.bic for c in scored), default=0.0)
         # Where every structure is contradicted a criterion that supposes one of them true ranks nothing.
         close = [] if judged.falsified else scored
-        rivals = sorted((Rival(c.model.p, c.model.q, c.bic - best.bic, c.model) for c in close
-                         if c.bic <= best.bic + MARGIN and (c.model.p, c.model.q) != (model.p, model.q)),
-                        key=lambda r: r.delta_bic)
+        rivals = sorted(
+            (
+                Rival(c.model.p, c.model.q, c.bic - best.bic, c.model)
+                for c in close
+                if c.bic <= best.bic + MARGIN and (c.model.p, c.model.q) != (model.p, model.q)
+            ),
+            key=lambda r: r.delta_bic,
+        )
         states = {r.digest: tuple(float(v) for v in x) for r, x in zip(self.records, self.states(best), strict=True) if len(x)}
         return Identification(
-            model=model, controller=self.controller, parameters=parameters, mechanics=mechanics,
+            model=model,
+            controller=self.controller,
+            parameters=parameters,
+            mechanics=mechanics,
             fitness=s.error_weight**2 * error_sum + s.order_weight * (model.p + model.q),
             rmse=float(np.sqrt(error_sum / self.samples)),
             fit_percent=float(100.0 * (1.0 - np.sqrt(error_sum / spread))) if spread > 0.0 else float("nan"),
             rivals=tuple(rivals),
             structures=tuple(Structure(c.model.p, c.model.q, c.cost, c.bic - lowest) for c in scored),
-            trials=tuple(self.outcome(t) for t in found), adequacy=judged,
-            warnings=_warnings(judged, parameters, mechanics, rivals, model, lowest < best.bic - MARGIN,
-                               [n for r in self.records if (n := doubtful_start(r, self.controller))] if s.initial_state == "auto" else []), space=self.space, settings=s, seed=seed,
-            seconds=0.0, samples=self.samples, digests=tuple(r.digest for r in self.records), initial_states=states,
-            version=version(), records=tuple(self.records))
+            trials=tuple(self.outcome(t) for t in found),
+            adequacy=judged,
+            warnings=_warnings(
+                judged,
+                parameters,
+                mechanics,
+                rivals,
+                model,
+                lowest < best.bic - MARGIN,
+                [n for r in self.records if (n := doubtful_start(r, self.controller))] if s.initial_state == "auto" else [],
+            ),
+            space=self.space,
+            settings=s,
+            seed=seed,
+            seconds=0.0,
+            samples=self.samples,
+            digests=tuple(r.digest for r in self.records),
+            initial_states=states,
+            version=version(),
+            records=tuple(self.records),
+        )
 
     def outcome(self, trial: _core.Trial) -> TrialOutcome:
         """One trial for the report."""
@@ -214,22 +272,32 @@ class _Work:
             top = min(trial.species, key=lambda f: s.error_weight**2 * f.cost + s.order_weight * (f.p + f.q))
             p, q = top.p, top.q
         else:
-            model = _core.decode(words=trial.best, ranges=self.ranges, gray=s.code == "gray",
-                                 logarithmic=s.scale == "logarithmic")
+            model = _core.decode(
+                words=trial.best, ranges=self.ranges, gray=s.code == "gray", logarithmic=s.scale == "logarithmic"
+            )
             p, q = len(model[1]) - len(model[2]), len(model[2])
-        return TrialOutcome(p, q, trial.best_fitness, len(trial.history), trial.best_generation, trial.evaluations,
-                            tuple(trial.history.tolist()))
+        return TrialOutcome(
+            p, q, trial.best_fitness, len(trial.history), trial.best_generation, trial.evaluations, tuple(trial.history.tolist())
+        )
 
 
-def _warnings(judged: adequacy.Adequacy, parameters: dict[str, covariance.Estimate], mechanics: OneMass | TwoMass | None,
-              rivals: Sequence[Rival], model: Model, larger_fits_better: bool,
-              started: Sequence[str]) -> tuple[str, ...]:
+def _warnings(
+    judged: adequacy.Adequacy,
+    parameters: dict[str, covariance.Estimate],
+    mechanics: OneMass | TwoMass | None,
+    rivals: Sequence[Rival],
+    model: Model,
+    larger_fits_better: bool,
+    started: Sequence[str],
+) -> tuple[str, ...]:
     notes = list(started)
     if judged.falsified:
         notes.append(judged.sentence)
         if larger_fits_better:
-            notes.append("Larger structures come closer, but only by absorbing what no linear structure holds; the smallest mechanism "
-                         f"is reported, ({model.p},{model.q}).")
+            notes.append(
+                "Larger structures come closer, but only by absorbing what no linear structure holds; the smallest mechanism "
+                f"is reported, ({model.p},{model.q})."
+            )
     bound = [n for n, e in parameters.items() if e.at_bound]
     if bound:
         notes.append(f"At a bound of the search range: {', '.join(bound)}. Widen the space, or doubt the structure.")
@@ -253,11 +321,15 @@ def _checked_records(rec: Record | Sequence[Record], controller: PI | None) -> l
     for i, r in enumerate(records):
         where = f"record {i} ({r.name})" if r.name else f"record {i}"
         if controller is not None and r.command is None:
-            raise RecordError(f"{where} has no command, which drives the loop with a controller: give Record(command=...), or "
-                              "controller=None to identify from torque to velocity")
+            raise RecordError(
+                f"{where} has no command, which drives the loop with a controller: give Record(command=...), or "
+                "controller=None to identify from torque to velocity"
+            )
         if controller is None and r.torque is None:
-            raise RecordError(f"{where} has no torque, which drives the model in open loop: give Record(torque=...), or "
-                              "controller=PI(...) to identify in closed loop")
+            raise RecordError(
+                f"{where} has no torque, which drives the model in open loop: give Record(torque=...), or "
+                "controller=PI(...) to identify in closed loop"
+            )
     return records
 
 
@@ -266,9 +338,12 @@ def _checked_space(space: SearchSpace, controller: PI | None) -> SearchSpace:
         raise SpaceError(f"space is {space!r}: give a gaident.SearchSpace, or None to derive it from the data")
     if (controller is None or controller.loop == "sampled") and space.p[0] < 1:
         if space.p[1] < 1:
-            raise SpaceError(f"p is {space.p!r}: with a held torque the plant needs at least one pole more than zeros; "
-                             "use p=(1, 3), or PI(..., loop='continuous')")
+            raise SpaceError(
+                f"p is {space.p!r}: with a held torque the plant needs at least one pole more than zeros; "
+                "use p=(1, 3), or PI(..., loop='continuous')"
+            )
         from dataclasses import replace
+
         return replace(space, p=(1, space.p[1]))
     return space
 

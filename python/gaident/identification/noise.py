@@ -1,6 +1,6 @@
 """Noise model: an autoregressive filter that makes residuals white.
 
-    v(n) = e(n) - sum_i phi_i e(n-i)
+v(n) = e(n) - sum_i phi_i e(n-i)
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def fit_autoregression(residuals: Sequence[Vector], max_order: int = 30) -> Auto
     phi, variance = np.zeros(0), float(cov[0])
     best, best_score = Autoregression(phi, float(np.sqrt(variance))), total * np.log(variance)
     for m in range(1, top + 1):
-        reflection = (cov[m] - phi @ cov[m - 1:0:-1]) / variance if m > 1 else cov[1] / cov[0]
+        reflection = (cov[m] - phi @ cov[m - 1 : 0 : -1]) / variance if m > 1 else cov[1] / cov[0]
         phi = np.concatenate([phi - reflection * phi[::-1], [reflection]])
         variance *= 1.0 - reflection**2
         if not variance > 1e-14 * cov[0]:

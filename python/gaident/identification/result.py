@@ -71,7 +71,8 @@ class Structure:
 class Identification:
     """Structure, parameters and what they are worth. Made by `identify`; see API for each attribute.
 
-    rmse [rad/s] and fit_percent are of the free-run simulation of all records used; `adequacy` says whether the linear model holds,
+    rmse [rad/s] and fit_percent are of the free-run simulation of all records used; `adequacy` says whether the linear model
+    holds,
     `warnings` what to keep in mind, in plain sentences. `structures` compares every structure that was fitted.
     """
 
@@ -120,7 +121,8 @@ class Identification:
     def simulate(self, rec: Record) -> NDArray[np.float64]:
         """Free-run velocity of the model on a record [rad/s].
 
-        A record that does not start at rest gets its initial state estimated (one that was used in the identification, the one found there).
+        A record that does not start at rest gets its initial state estimated (one that was used in the identification, the one
+        found there).
         """
         state: Sequence[float] | NDArray[np.float64] | None = self.initial_states.get(rec.digest)
         limited = self.controller is not None and self.controller.limited
@@ -135,11 +137,13 @@ class Identification:
     def summary(self, axis: str = "rotary") -> str:
         """The result as text; axis="linear" for units of m and N."""
         from gaident.show.summary import identification_summary
+
         return identification_summary(self, axis)
 
     def plot(self, records: Record | Sequence[Record] | None = None, axis: str = "rotary") -> Figure:
         """Measured against simulated velocity and the residual, as a matplotlib Figure; `records` as used unless given."""
         from gaident.show.plots import plot_identification
+
         chosen = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
         if not chosen:
             raise GaidentError("records: a loaded identification holds no data; give plot(records)")
@@ -148,19 +152,30 @@ class Identification:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, without the records."""
         return {
-            "schema": SCHEMA, "schema_version": SCHEMA_VERSION, "gaident_version": self.version,
-            "p": self.p, "q": self.q, "falsified": self.falsified,
+            "schema": SCHEMA,
+            "schema_version": SCHEMA_VERSION,
+            "gaident_version": self.version,
+            "p": self.p,
+            "q": self.q,
+            "falsified": self.falsified,
             "model": self.model.to_dict(),
             "controller": None if self.controller is None else self.controller.to_dict(),
             "parameters": {name: asdict(e) for name, e in self.parameters.items()},
             "mechanics": None if self.mechanics is None else self.mechanics.to_dict(),
-            "fitness": self.fitness, "rmse": self.rmse, "fit_percent": self.fit_percent,
+            "fitness": self.fitness,
+            "rmse": self.rmse,
+            "fit_percent": self.fit_percent,
             "rivals": [{"p": r.p, "q": r.q, "delta_bic": r.delta_bic, "model": r.model.to_dict()} for r in self.rivals],
             "structures": [asdict(s) for s in self.structures],
             "trials": [asdict(t) for t in self.trials],
-            "adequacy": asdict(self.adequacy), "warnings": list(self.warnings),
-            "space": self.space.to_dict(), "settings": self.settings.to_dict(),
-            "seed": self.seed, "seconds": self.seconds, "samples": self.samples, "digests": list(self.digests),
+            "adequacy": asdict(self.adequacy),
+            "warnings": list(self.warnings),
+            "space": self.space.to_dict(),
+            "settings": self.settings.to_dict(),
+            "seed": self.seed,
+            "seconds": self.seconds,
+            "samples": self.samples,
+            "digests": list(self.digests),
             "initial_states": {d: list(s) for d, s in self.initial_states.items()},
         }
 
@@ -170,23 +185,33 @@ class Identification:
         if data.get("schema") != SCHEMA:
             raise GaidentError(f"schema is {data.get('schema')!r}: this is not a saved identification")
         if data.get("schema_version") != SCHEMA_VERSION:
-            raise GaidentError(f"schema_version is {data.get('schema_version')!r}: this gaident reads {SCHEMA_VERSION}; "
-                               "use the version that wrote the file")
+            raise GaidentError(
+                f"schema_version is {data.get('schema_version')!r}: this gaident reads {SCHEMA_VERSION}; "
+                "use the version that wrote the file"
+            )
         try:
             return cls(
                 model=Model.from_dict(data["model"]),
                 controller=None if data["controller"] is None else PI.from_dict(data["controller"]),
                 parameters={name: Estimate(**e) for name, e in data["parameters"].items()},
                 mechanics=None if data["mechanics"] is None else mechanics_from_dict(data["mechanics"]),
-                fitness=data["fitness"], rmse=data["rmse"], fit_percent=data["fit_percent"],
+                fitness=data["fitness"],
+                rmse=data["rmse"],
+                fit_percent=data["fit_percent"],
                 rivals=tuple(Rival(r["p"], r["q"], r["delta_bic"], Model.from_dict(r["model"])) for r in data["rivals"]),
                 structures=tuple(Structure(**s) for s in data["structures"]),
                 trials=tuple(TrialOutcome(**{**t, "history": tuple(t["history"])}) for t in data["trials"]),
-                adequacy=Adequacy(**data["adequacy"]), warnings=tuple(data["warnings"]),
-                space=SearchSpace.from_dict(data["space"]), settings=Settings.from_dict(data["settings"]),
-                seed=data["seed"], seconds=data["seconds"], samples=data["samples"], digests=tuple(data["digests"]),
+                adequacy=Adequacy(**data["adequacy"]),
+                warnings=tuple(data["warnings"]),
+                space=SearchSpace.from_dict(data["space"]),
+                settings=Settings.from_dict(data["settings"]),
+                seed=data["seed"],
+                seconds=data["seconds"],
+                samples=data["samples"],
+                digests=tuple(data["digests"]),
                 initial_states={d: tuple(s) for d, s in data["initial_states"].items()},
-                version=data["gaident_version"])
+                version=data["gaident_version"],
+            )
         except (KeyError, TypeError, AttributeError) as error:
             raise GaidentError(f"the saved identification is damaged: {error!r}; save it again") from error
 

@@ -3,7 +3,8 @@
     BIC = N ln(RSS_w / N) + k ln N,   k = 1 + p + 2 q and the start states
 
 RSS_w is the least sum of squares of the whitened simulation error. One filter serves all structures, estimated on the residual of
-the one that fits best, so that no structure is whitened with its own mistakes. The *smallest* structure within 10 units of the best wins
+the one that fits best, so that no structure is whitened with its own mistakes. The *smallest* structure within 10 units of the
+best wins
 (METHOD.md section 3). A pole and a zero closer than 2 % to each other fit noise and are charged 10 units.
 """
 
@@ -58,8 +59,9 @@ def cancellations(model: Model) -> int:
     return count
 
 
-def choose(experiment: Any, candidates: Sequence[Candidate], residuals_of: Any, samples: int, ranges: Any,
-           workers: int) -> tuple[list[Candidate], int, Autoregression]:
+def choose(
+    experiment: Any, candidates: Sequence[Candidate], residuals_of: Any, samples: int, ranges: Any, workers: int
+) -> tuple[list[Candidate], int, Autoregression]:
     """(candidates with their BIC, index of the winner, the common noise model).
 
     residuals_of(candidate) -> one residual array per record.
@@ -69,10 +71,10 @@ def choose(experiment: Any, candidates: Sequence[Candidate], residuals_of: Any, 
     costs = [c.cost for c in candidates]
     count = samples
     if noise.order > 0:
-        models = [(c.model.gain, np.array(c.model.poles, complex), np.array(c.model.zeros, complex), c.starts)
-                  for c in candidates]
-        whitened = experiment.refine(models=models, ranges=ranges, whitening=list(noise.phi), max_iterations=8,
-                                     workers=workers)
+        models = [
+            (c.model.gain, np.array(c.model.poles, complex), np.array(c.model.zeros, complex), c.starts) for c in candidates
+        ]
+        whitened = experiment.refine(models=models, ranges=ranges, whitening=list(noise.phi), max_iterations=8, workers=workers)
         costs = [w.cost for w in whitened]
         count -= noise.order
     scored = []

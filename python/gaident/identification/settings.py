@@ -28,7 +28,8 @@ class Settings:
 
     population: individuals in all; the species engine keeps at least three per structure.
     tournament: contestants; crossover, mutation: rates, per pair and per bit.
-    generations: of the plain engine; at most so many of the species engine, which works in rounds of `round` generations, fits every
+    generations: of the plain engine; at most so many of the species engine, which works in rounds of `round` generations, fits
+    every
         species' best locally after each, and stops after `quiet_rounds` rounds without progress.
     elites: survivors of the plain engine (species always keep one each).
     code: "gray" or "binary"; scale: "logarithmic" or "linear" coding of real and imaginary parts (K is always logarithmic).
@@ -56,9 +57,14 @@ class Settings:
     initial_state: str = "auto"
 
     def __post_init__(self) -> None:
-        for name, low, high in (("population", 2, 1_000_000), ("tournament", 1, self.population),
-                                ("generations", 1, 10_000_000), ("elites", 0, self.population - 1),
-                                ("round", 1, 10_000_000), ("quiet_rounds", 1, 10_000_000)):
+        for name, low, high in (
+            ("population", 2, 1_000_000),
+            ("tournament", 1, self.population),
+            ("generations", 1, 10_000_000),
+            ("elites", 0, self.population - 1),
+            ("round", 1, 10_000_000),
+            ("quiet_rounds", 1, 10_000_000),
+        ):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
                 raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
@@ -70,8 +76,13 @@ class Settings:
             value = getattr(self, name)
             if not isinstance(value, (int, float)) or not 0.0 <= value < float("inf"):
                 raise SettingsError(f"{name} is {value!r}: it must be a number, 0 or more")
-        for name, allowed in (("engine", tuple(ENGINES)), ("code", CODES), ("scale", SCALES),
-                              ("arithmetic", ARITHMETICS), ("initial_state", INITIAL_STATES)):
+        for name, allowed in (
+            ("engine", tuple(ENGINES)),
+            ("code", CODES),
+            ("scale", SCALES),
+            ("arithmetic", ARITHMETICS),
+            ("initial_state", INITIAL_STATES),
+        ):
             if getattr(self, name) not in allowed:
                 raise SettingsError(f"{name} is {getattr(self, name)!r}: it must be one of {', '.join(map(repr, allowed))}")
 
@@ -89,11 +100,23 @@ class Settings:
     def engine_settings(self) -> _core.EngineSettings:
         """The same for the core."""
         from gaident import _core
+
         return _core.EngineSettings(
-            population=self.population, tournament=self.tournament, crossover=self.crossover, mutation=self.mutation,
-            generations=self.generations, elites=self.elites, gray=self.code == "gray",
-            logarithmic=self.scale == "logarithmic", error_weight=self.error_weight, order_weight=self.order_weight,
-            species=self.species, round=self.round, quiet_rounds=self.quiet_rounds, in_float=self.arithmetic == "float")
+            population=self.population,
+            tournament=self.tournament,
+            crossover=self.crossover,
+            mutation=self.mutation,
+            generations=self.generations,
+            elites=self.elites,
+            gray=self.code == "gray",
+            logarithmic=self.scale == "logarithmic",
+            error_weight=self.error_weight,
+            order_weight=self.order_weight,
+            species=self.species,
+            round=self.round,
+            quiet_rounds=self.quiet_rounds,
+            in_float=self.arithmetic == "float",
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""

@@ -29,7 +29,8 @@ class SearchSpace:
     gain: range of K at p = 1, 1/J [rad/s^2 per N m], both ends positive.
     real: negated real parts, rad/s (negative lower end: unstable roots are allowed). imaginary: rad/s.
     p, q: ranges of the structural numbers, 0..7. bits: per number, 2..16.
-    gain_scale: K counts in units of gain_scale^(p-1) at other p, rad/s; None: sqrt(real[1]*imaginary[1])/10, and 1 (the same range
+    gain_scale: K counts in units of gain_scale^(p-1) at other p, rad/s; None: sqrt(real[1]*imaginary[1])/10, and 1 (the same
+    range
     for every p, as in the paper) with Settings.paper().
     source: where the ranges come from, shown in the summary.
 
@@ -65,8 +66,10 @@ class SearchSpace:
                 raise SpaceError(f"{name} is {value!r}: the lowest must be below the highest")
             object.__setattr__(self, name, (lo, hi))
         if self.gain[0] <= 0.0:
-            raise SpaceError(f"gain is {self.gain!r}: both ends must be positive, the gain is searched on a logarithmic scale; "
-                             "if velocity falls when torque rises, reverse the sign of one of them")
+            raise SpaceError(
+                f"gain is {self.gain!r}: both ends must be positive, the gain is searched on a logarithmic scale; "
+                "if velocity falls when torque rises, reverse the sign of one of them"
+            )
         if self.imaginary[0] < 0.0:
             raise SpaceError(f"imaginary is {self.imaginary!r}: give the positive half, pairs are conjugate by themselves")
         if isinstance(self.bits, bool) or not isinstance(self.bits, int) or not 2 <= self.bits <= 16:
@@ -75,8 +78,16 @@ class SearchSpace:
             raise SpaceError(f"gain_scale is {self.gain_scale!r}: give a frequency in rad/s, above 0, or None")
 
     @classmethod
-    def from_mechanics(cls, inertia: Range, resonance_hz: Range, damping: Range | None = None, *,
-                       p: tuple[int, int] = (0, 3), q: tuple[int, int] = (0, 3), bits: int = 10) -> SearchSpace:
+    def from_mechanics(
+        cls,
+        inertia: Range,
+        resonance_hz: Range,
+        damping: Range | None = None,
+        *,
+        p: tuple[int, int] = (0, 3),
+        q: tuple[int, int] = (0, 3),
+        bits: int = 10,
+    ) -> SearchSpace:
         """Ranges as an engineer knows them.
 
         inertia: total inertia at the motor shaft [kg m^2] (or mass [kg]); the motor's own may be down to a tenth of it.
@@ -91,17 +102,26 @@ class SearchSpace:
             raise SpaceError(f"damping is {damping!r}: give (lowest, highest) with 0 <= lowest < highest, or None")
         top = 2.0 * math.pi * resonance_hz[1]
         real = top if damping is None else max(damping[1] / inertia[0], 0.3 * top)
-        return cls(gain=(1.0 / inertia[1], 10.0 / inertia[0]), real=(0.0, real),
-                   imaginary=(math.pi * resonance_hz[0], top), p=p, q=q, bits=bits, source="from mechanics")
+        return cls(
+            gain=(1.0 / inertia[1], 10.0 / inertia[0]),
+            real=(0.0, real),
+            imaginary=(math.pi * resonance_hz[0], top),
+            p=p,
+            q=q,
+            bits=bits,
+            source="from mechanics",
+        )
 
     def ranges(self, paper: bool = False) -> _core.SearchRanges:
         """The same for the core."""
         from gaident import _core
+
         scale = self.gain_scale
         if scale is None:
             scale = 1.0 if paper else 0.1 * math.sqrt(max(self.real[1], 1e-9) * self.imaginary[1])
-        return _core.SearchRanges(gain=self.gain, real=self.real, imaginary=self.imaginary, p=self.p, q=self.q,
-                                  bits=self.bits, gain_scale=scale)
+        return _core.SearchRanges(
+            gain=self.gain, real=self.real, imaginary=self.imaginary, p=self.p, q=self.q, bits=self.bits, gain_scale=scale
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -124,9 +144,11 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
 
         w(t) = K int u dt - A int w dt + w(0),
 
-    and of the motor alone, from the steps of the velocity, w(n+1) - w(n) = K u(n) Ts, which weighs the moments of high torque. u is the record's
+    and of the motor alone, from the steps of the velocity, w(n+1) - w(n) = K u(n) Ts, which weighs the moments of high torque.
+    u is the record's
     torque or, without one, what the controller makes of command and velocity. Searched is from thirty times less to a thousand
-    times more: behind resonances the motor alone may be far lighter than the whole drive. Roots go up to where the sampling still shows them: real parts to 1/dt, imaginary parts to 0.8 of the Nyquist frequency. Raises SpaceError
+    times more: behind resonances the motor alone may be far lighter than the whole drive. Roots go up to where the sampling
+    still shows them: real parts to 1/dt, imaginary parts to 0.8 of the Nyquist frequency. Raises SpaceError
     where nothing moves.
     """
     gram, right = np.zeros((2, 2)), np.zeros(2)
@@ -141,20 +163,27 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
         energy += float(u @ u) * rec.dt**2
     for what, still in (("torque", not energy > 0.0), ("velocity", all(np.ptp(r.velocity) == 0.0 for r in records))):
         if still:
-            raise SpaceError(f"the {what} of the record is constant: nothing can be identified from it; use a record in which the "
-                             "drive moves, or give space=SearchSpace(...)")
+            raise SpaceError(
+                f"the {what} of the record is constant: nothing can be identified from it; use a record in which the "
+                "drive moves, or give space=SearchSpace(...)"
+            )
     rigid = float(np.linalg.solve(gram, right)[0]) if np.linalg.cond(gram) < 1e14 else 0.0
     found = [k for k in (rigid, steps / energy) if np.isfinite(k) and k > 0.0]
     if not found:
-        raise SpaceError("the velocity falls when the torque rises: reverse the sign of one of them (for example by a unit of -1), "
-                         "or give space=SearchSpace(gain=...)")
+        raise SpaceError(
+            "the velocity falls when the torque rises: reverse the sign of one of them (for example by a unit of -1), "
+            "or give space=SearchSpace(gain=...)"
+        )
     dt = min(rec.dt for rec in records)
     longest = max(rec.duration for rec in records)
     shown = " and ".join(f"{k:.4g}" for k in found)
-    return SearchSpace(gain=(min(found) / 30.0, max(found) * 1000.0), real=(0.0, 1.0 / dt),
-                       imaginary=(min(0.5 / longest, 0.1 / dt), 0.8 * math.pi / dt),
-                       p=(0, 3) if controller is not None and controller.loop == "continuous" else (1, 3),
-                       source=f"derived from the data: K about {shown}, sample time {1e3 * dt:.4g} ms")
+    return SearchSpace(
+        gain=(min(found) / 30.0, max(found) * 1000.0),
+        real=(0.0, 1.0 / dt),
+        imaginary=(min(0.5 / longest, 0.1 / dt), 0.8 * math.pi / dt),
+        p=(0, 3) if controller is not None and controller.loop == "continuous" else (1, 3),
+        source=f"derived from the data: K about {shown}, sample time {1e3 * dt:.4g} ms",
+    )
 
 
 def torque_of(rec: Record, controller: PI | None) -> NDArray[np.float64]:

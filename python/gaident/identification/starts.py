@@ -23,8 +23,10 @@ def starts_moving(rec: Record, controller: PI | None) -> bool:
     """Whether the record does not start at rest.
 
     At rest the first velocity is noise: within six standard deviations of it, or one step of a quantised signal, of zero. In the
-    continuous loop a command at sample 0 passes through at once, so a first velocity between 0 and 0.6 of that command is no motion.
-    A record whose input never changes counts as started at rest by a step at sample 0: with an unknown state before it, it would say
+    continuous loop a command at sample 0 passes through at once, so a first velocity between 0 and 0.6 of that command is no
+    motion.
+    A record whose input never changes counts as started at rest by a step at sample 0: with an unknown state before it, it
+    would say
     nothing about zeros and gain (see `doubtful_start`).
     """
     return _first_is_motion(rec, controller) and not _constant_input(rec, controller)
@@ -35,8 +37,11 @@ def doubtful_start(rec: Record, controller: PI | None) -> str | None:
     if not (_constant_input(rec, controller) and _first_is_motion(rec, controller)):
         return None
     name = f"Record {rec.name}" if rec.name else "The record"
-    return (f"{name} starts at {rec.velocity[0]:.4g} rad/s while its input never changes: taken as a step from rest at its first sample. "
-            "If the step came earlier, give the record from before it; if the drive is not a digital one, give loop='continuous'.")
+    return (
+        f"{name} starts at {rec.velocity[0]:.4g} rad/s while its input never changes: taken as a step from rest at its "
+        "first sample. "
+        "If the step came earlier, give the record from before it; if the drive is not a digital one, give loop='continuous'."
+    )
 
 
 def _constant_input(rec: Record, controller: PI | None) -> bool:

@@ -9,7 +9,21 @@ from gaident.models.model import Discrete, Mode, Model
 from gaident.models.simulate import AnyModel, Run, initial_state, run, simulate
 
 __all__ = [
-    "AnyModel", "Discrete", "Mechanics", "Mode", "Model", "OneMass", "PI", "Run", "Structure", "TwoMass",
-    "factor_parameters", "initial_state", "mechanics_from_dict", "mechanics_from_model",
-    "model_from_factor_parameters", "run", "simulate",
+    "AnyModel",
+    "Discrete",
+    "Mechanics",
+    "Mode",
+    "Model",
+    "OneMass",
+    "PI",
+    "Run",
+    "Structure",
+    "TwoMass",
+    "factor_parameters",
+    "initial_state",
+    "mechanics_from_dict",
+    "mechanics_from_model",
+    "model_from_factor_parameters",
+    "run",
+    "simulate",
 ]

@@ -9,8 +9,7 @@ from collections.abc import Iterable, Mapping
 from gaident.errors import GaidentError
 
 
-def real_number(value: object, name: str, error: type[GaidentError],
-                remedy: str = "give one finite number") -> float:
+def real_number(value: object, name: str, error: type[GaidentError], remedy: str = "give one finite number") -> float:
     """`value` as a finite float; raises `error` naming `name`, the value and the remedy."""
     # A string is no number here even where float() could read it: it is mostly a forgotten conversion.
     if isinstance(value, (str, bytes)):
@@ -32,8 +31,9 @@ def one_of(value: object, name: str, allowed: Iterable[str], error: type[Gaident
     raise error(f"{name} is {value!r}: it must be one of {', '.join(names)}{_nearest(value, names)}")
 
 
-def known_keys(data: object, what: str, allowed: Iterable[str], needed: Iterable[str],
-               error: type[GaidentError]) -> dict[str, object]:
+def known_keys(
+    data: object, what: str, allowed: Iterable[str], needed: Iterable[str], error: type[GaidentError]
+) -> dict[str, object]:
     """`data` as a dictionary with all `needed` and only `allowed` keys; raises `error` otherwise."""
     names = list(allowed)
     if not isinstance(data, Mapping):

@@ -42,11 +42,13 @@ class PI:
             if gain < 0.0:
                 raise ControllerError(
                     f"{name} is {gain:g}: give a gain >= 0; if positive torque turns the axis backwards, "
-                    "give the model a negative gain or change the sign of the record's signals")
+                    "give the model a negative gain or change the sign of the record's signals"
+                )
             object.__setattr__(self, name, gain)
         if self.kp == 0.0 and self.ki == 0.0:
-            raise ControllerError("kp and ki are both 0: such a controller never gives a torque; "
-                                  "for an open loop use controller=None")
+            raise ControllerError(
+                "kp and ki are both 0: such a controller never gives a torque; for an open loop use controller=None"
+            )
         object.__setattr__(self, "loop", one_of(self.loop, "loop", LOOPS, ControllerError))
         for name in ("torque_limit", "integrator_limit"):
             value = getattr(self, name)

@@ -31,8 +31,7 @@ class Structure(NamedTuple):
         """The structure of `model`."""
         pole_pairs = sum(r.imag > 0.0 for r in model.poles)
         zero_pairs = sum(r.imag > 0.0 for r in model.zeros)
-        return cls(len(model.poles) - 2 * pole_pairs, pole_pairs,
-                   len(model.zeros) - 2 * zero_pairs, zero_pairs)
+        return cls(len(model.poles) - 2 * pole_pairs, pole_pairs, len(model.zeros) - 2 * zero_pairs, zero_pairs)
 
     @property
     def size(self) -> int:

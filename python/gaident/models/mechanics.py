@@ -81,8 +81,14 @@ class TwoMass:
     """
 
     UNITS: ClassVar[Mapping[str, str]] = {
-        "JM": "kg m^2", "DM": "N m s/rad", "JL": "kg m^2", "DL": "N m s/rad", "KG": "N m/rad",
-        "DG": "N m s/rad", "J": "kg m^2", "D": "N m s/rad",
+        "JM": "kg m^2",
+        "DM": "N m s/rad",
+        "JL": "kg m^2",
+        "DL": "N m s/rad",
+        "KG": "N m/rad",
+        "DG": "N m s/rad",
+        "J": "kg m^2",
+        "D": "N m s/rad",
     }
 
     JM: float
@@ -101,8 +107,7 @@ class TwoMass:
     def model(self) -> Model:
         """The factored model (equation 5), p = 1 and q = 2."""
         if self.JM == 0.0 or self.JL == 0.0:
-            raise ModelError(f"JM is {self.JM:g} and JL is {self.JL:g}: "
-                             "without inertia there is no two-mass model")
+            raise ModelError(f"JM is {self.JM:g} and JL is {self.JL:g}: without inertia there is no two-mass model")
         c = two_mass.coefficients_of_mechanics(self._vector())
         return Model(c[0], polynomial_roots(c[1:4]), polynomial_roots(c[4:6]))
 
@@ -116,13 +121,14 @@ class TwoMass:
         _require(model, 1, 2, "two-mass")
         found = _two_masses(model, None)
         if found is None:
-            raise ModelError("zeros has a root at 0: no stiffness between two masses gives that; "
-                             "use a one-mass model")
+            raise ModelError("zeros has a root at 0: no stiffness between two masses gives that; use a one-mass model")
         if not free_shaft_damping:
             return found
         if found.with_shaft_damping is None:
-            raise ModelError(f"{model!r} is no two-mass system with any shaft damping: "
-                             "use free_shaft_damping=False and look at its inconsistency")
+            raise ModelError(
+                f"{model!r} is no two-mass system with any shaft damping: "
+                "use free_shaft_damping=False and look at its inconsistency"
+            )
         return found.with_shaft_damping
 
     @property
@@ -195,8 +201,7 @@ def mechanics_from_dict(data: Mapping[str, Any]) -> Mechanics:
     """The inverse of `OneMass.to_dict` and `TwoMass.to_dict`."""
     kinds: dict[str, tuple[type[OneMass] | type[TwoMass], tuple[str, ...], tuple[str, ...]]] = {
         "one mass": (OneMass, ("J", "D"), ("inconsistency", "std")),
-        "two masses": (TwoMass, ("JM", "DM", "JL", "DL", "KG"),
-                       ("DG", "inconsistency", "std", "with_shaft_damping")),
+        "two masses": (TwoMass, ("JM", "DM", "JL", "DL", "KG"), ("DG", "inconsistency", "std", "with_shaft_damping")),
     }
     name = one_of(data.get("structure"), "structure", kinds, ModelError)
     kind, needed, more = kinds[name]
@@ -230,8 +235,10 @@ def _named(v: Vector, inconsistency: float, std: dict[str, float], damped: TwoMa
 
 def _require(model: Model, p: int, q: int, name: str) -> None:
     if (model.p, model.q) != (p, q):
-        raise ModelError(f"the model has p = {model.p}, q = {model.q}, but a {name} mechanism has p = {p}, "
-                         f"q = {q}: identify that structure, or let mechanics_from_model choose")
+        raise ModelError(
+            f"the model has p = {model.p}, q = {model.q}, but a {name} mechanism has p = {p}, "
+            f"q = {q}: identify that structure, or let mechanics_from_model choose"
+        )
 
 
 def _check(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str, ...]) -> None:
@@ -246,8 +253,7 @@ def _check(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str,
     object.__setattr__(drive, "std", dict(drive.std))
 
 
-def _notes(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str, ...],
-           rounding: float) -> tuple[str, ...]:
+def _notes(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str, ...], rounding: float) -> tuple[str, ...]:
     found = []
     for name in positive + not_negative:
         value, text = getattr(drive, name), f"{name} = {getattr(drive, name):.4g} {drive.UNITS[name]}"
@@ -264,13 +270,16 @@ def _checked_covariance(model: Model, covariance: ArrayLike | None) -> Matrix | 
     n = Structure.of(model).size
     cov = np.array(covariance, dtype=np.float64)
     if cov.shape != (n, n):
-        raise ModelError(f"covariance has the shape {cov.shape}: this model has {n} natural parameters, "
-                         f"give {n} x {n} numbers in the order of factor_parameters(model)")
+        raise ModelError(
+            f"covariance has the shape {cov.shape}: this model has {n} natural parameters, "
+            f"give {n} x {n} numbers in the order of factor_parameters(model)"
+        )
     bad = np.argwhere(~np.isfinite(cov))
     if len(bad):
         i, j = (int(k) for k in bad[0])
-        raise ModelError(f"covariance[{i}, {j}] is {cov[i, j]}: every entry must be finite; without a usable "
-                         "covariance give None")
+        raise ModelError(
+            f"covariance[{i}, {j}] is {cov[i, j]}: every entry must be finite; without a usable covariance give None"
+        )
     if np.any(np.diag(cov) < 0.0) or not np.allclose(cov, cov.T, rtol=1e-6, atol=0.0):
         raise ModelError("covariance is not symmetric with a diagonal >= 0: give a covariance matrix")
     symmetric: Matrix = 0.5 * (cov + cov.T)

@@ -21,10 +21,10 @@ Roots = Sequence[complex] | NDArray[np.complex128] | NDArray[np.float64]
 class Mode(NamedTuple):
     """One real root or one conjugate pair, as a row of a table."""
 
-    kind: str                 # "pole" or "zero"
-    root: complex             # rad/s; of a pair the member with positive imaginary part
+    kind: str  # "pole" or "zero"
+    root: complex  # rad/s; of a pair the member with positive imaginary part
     natural_frequency: float  # abs(root), rad/s
-    damping: float            # -Re(root)/abs(root); 1 for a stable real root, nan for a root at 0
+    damping: float  # -Re(root)/abs(root); 1 for a stable real root, nan for a root at 0
 
     @property
     def frequency_hz(self) -> float:
@@ -70,8 +70,10 @@ class Model:
         object.__setattr__(self, "poles", canonical_roots(poles, "poles"))
         object.__setattr__(self, "zeros", canonical_roots(zeros, "zeros"))
         if len(self.zeros) > len(self.poles):
-            raise ModelError(f"zeros has {len(self.zeros)} roots and poles {len(self.poles)}: a drive has at "
-                             "least as many poles as zeros; drop zeros or add poles")
+            raise ModelError(
+                f"zeros has {len(self.zeros)} roots and poles {len(self.poles)}: a drive has at "
+                "least as many poles as zeros; drop zeros or add poles"
+            )
 
     @property
     def p(self) -> int:
@@ -136,11 +138,13 @@ class Model:
         loop).
         """
         from gaident.models.simulate import discrete
+
         return discrete(self, dt, controller)
 
     def to_scipy(self) -> Any:
         """The same as scipy.signal.ZerosPolesGain (an lti system)."""
         from scipy import signal
+
         return signal.ZerosPolesGain(list(self.zeros), list(self.poles), self.gain)
 
     def to_control(self) -> Any:
@@ -153,8 +157,11 @@ class Model:
 
     def to_dict(self) -> dict[str, Any]:
         """The model for JSON: {"gain": K, "poles": [[re, im], ...], "zeros": [[re, im], ...]}."""
-        return {"gain": self.gain, "poles": [[r.real, r.imag] for r in self.poles],
-                "zeros": [[r.real, r.imag] for r in self.zeros]}
+        return {
+            "gain": self.gain,
+            "poles": [[r.real, r.imag] for r in self.poles],
+            "zeros": [[r.real, r.imag] for r in self.zeros],
+        }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Model:

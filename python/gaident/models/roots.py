@@ -48,8 +48,10 @@ def canonical_roots(roots: object, name: str) -> tuple[complex, ...]:
         pairs.append(complex(0.5 * root.real + 0.5 * other.real + 0.0, 0.5 * root.imag - 0.5 * other.imag))
     for root in alone + lower:
         if abs(root.imag) > ASYMMETRY * abs(root):
-            raise ModelError(f"{name} has {root:g} without its conjugate {root.conjugate():g}: "
-                             "complex roots of a real system come in pairs, so add it")
+            raise ModelError(
+                f"{name} has {root:g} without its conjugate {root.conjugate():g}: "
+                "complex roots of a real system come in pairs, so add it"
+            )
         reals.append(root.real)
     ordered = [complex(r + 0.0, 0.0) for r in sorted(reals, key=lambda r: (abs(r), r))]
     for root in sorted(pairs, key=_rank):

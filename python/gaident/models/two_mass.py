@@ -29,14 +29,16 @@ def coefficients_of_mechanics(mechanics: Vector) -> Vector:
     """c (6) of the mechanics (6); exact."""
     JM, DM, JL, DL, KG, DG = mechanics
     m, load = (DM + DG) / JM, (DL + DG) / JL
-    return np.array([
-        1.0 / JM,
-        m + load,
-        KG * (1.0 / JM + 1.0 / JL) + (DM * DL + (DM + DL) * DG) / (JM * JL),
-        (DM + DL) * KG / (JM * JL),
-        load,
-        KG / JL,
-    ])
+    return np.array(
+        [
+            1.0 / JM,
+            m + load,
+            KG * (1.0 / JM + 1.0 / JL) + (DM * DL + (DM + DL) * DG) / (JM * JL),
+            (DM + DL) * KG / (JM * JL),
+            load,
+            KG / JL,
+        ]
+    )
 
 
 def coefficients_of_parameters(x: Vector, structure: Structure) -> Vector:
@@ -88,14 +90,16 @@ def coefficients_of_phi(phi: Vector) -> Vector:
 def jacobian_of_phi(phi: Vector) -> Matrix:
     """d coefficients_of_phi / d phi, 6 x 5."""
     _, m, load, b0, R = phi
-    return np.array([
-        [1.0, 0.0, 0.0, 0.0, 0.0],
-        [0.0, 1.0, 1.0, 0.0, 0.0],
-        [0.0, load, m, R + 1.0, b0],
-        [0.0, b0, b0 * R, m + load * R, b0 * load],
-        [0.0, 0.0, 1.0, 0.0, 0.0],
-        [0.0, 0.0, 0.0, 1.0, 0.0],
-    ])
+    return np.array(
+        [
+            [1.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 1.0, 0.0, 0.0],
+            [0.0, load, m, R + 1.0, b0],
+            [0.0, b0, b0 * R, m + load * R, b0 * load],
+            [0.0, 0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0, 0.0],
+        ]
+    )
 
 
 def mechanics_with_shaft_damping(c: Vector) -> Vector | None:
@@ -106,7 +110,7 @@ def mechanics_with_shaft_damping(c: Vector) -> Vector | None:
     """
     K, sum_a, pair_a, prod_a, load, b0 = c
     m = sum_a - load
-    d0, d1 = 0.5 * (m - prod_a / b0), 0.5 * load          # d = d0 + d1 R
+    d0, d1 = 0.5 * (m - prod_a / b0), 0.5 * load  # d = d0 + d1 R
     a, b, e = b0 - d1 * d1, -(pair_a - b0 - m * load + 2.0 * d0 * d1), -d0 * d0
     discriminant = b * b - 4.0 * a * e
     if discriminant < 0.0:

@@ -28,10 +28,10 @@ NAMES = ("JM", "DM", "JL", "DL", "KG", "DG", "J", "D")
 class TwoMassFit(NamedTuple):
     """Mechanics as vectors (J_M, D_M, J_L, D_L, K_G, D_G), SI; deviations by name, {} if unknown."""
 
-    mechanics: Vector         # least squares at D_G = 0
-    inconsistency: float      # abs(two_mass.stiffness_gap)
+    mechanics: Vector  # least squares at D_G = 0
+    inconsistency: float  # abs(two_mass.stiffness_gap)
     std: dict[str, float]
-    shaft: Vector | None      # exact, D_G free
+    shaft: Vector | None  # exact, D_G free
     shaft_std: dict[str, float]
 
 

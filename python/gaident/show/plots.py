@@ -50,9 +50,7 @@ def plot_identification(idn: Any, records: Sequence[Any], axis: str = "rotary") 
         band = 2.0 * idn.adequacy.noise_std
         low.axhspan(-band, band, color=ORANGE, alpha=0.35, linewidth=0, label="+-2 std of the noise")
         low.axhline(0.0, color=BLACK, linewidth=0.5)
-        _line(
-            low, rec.time, rec.velocity - simulated, color=BLUE, linewidth=0.7, label="measured - simulated"
-        )
+        _line(low, rec.time, rec.velocity - simulated, color=BLUE, linewidth=0.7, label="measured - simulated")
         top.set_title(rec.name or f"record {column + 1}", fontsize="medium", loc="right")
         if open_loop:
             _line(grid[2, column], rec.time, rec.torque, color=GREEN, linewidth=0.8)
@@ -91,13 +89,7 @@ def plot_convergence(idn: Any) -> Figure:
     others = [t for i, t in enumerate(idn.trials) if i != best]
     for i, trial in enumerate([*others, idn.trials[best]]):
         front = i == len(others)
-        label = (
-            f"best of {len(idn.trials)} trials"
-            if front and others
-            else "other trials"
-            if i == 0 and others
-            else None
-        )
+        label = f"best of {len(idn.trials)} trials" if front and others else "other trials" if i == 0 and others else None
         ax.step(
             np.arange(1, len(trial.history) + 1),
             trial.history,

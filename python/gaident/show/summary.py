@@ -39,9 +39,7 @@ def mechanics_comparison(found: Any, truth: Any, axis: str = "rotary") -> str:
             continue
         relative = f"{round(100.0 * (value / true - 1.0), 1) + 0.0:+.1f} %" if true else ""
         in_stds = f" ({abs(value - true) / std:.1f} std)" if std > 0.0 else ""
-        rows.append(
-            (name, number(true), with_std(value, std), relative + in_stds, unit(found.UNITS[name], axis))
-        )
+        rows.append((name, number(true), with_std(value, std), relative + in_stds, unit(found.UNITS[name], axis)))
     return "\n".join(table(rows))
 
 
@@ -81,9 +79,7 @@ def _loop(controller: Any, axis: str) -> str:
 
 def _model(idn: Any, axis: str) -> list[str]:
     gain = idn.parameters["gain"]
-    rows: list[tuple[str, ...]] = [
-        ("", "real part [rad/s]", "imaginary part [rad/s]", "frequency [Hz]", "damping", "")
-    ]
+    rows: list[tuple[str, ...]] = [("", "real part [rad/s]", "imaginary part [rad/s]", "frequency [Hz]", "damping", "")]
     stems = dict.fromkeys(_stem(name) for name in idn.parameters if name != "gain")
     rows += [_root(idn.parameters, stem) for stem in stems]
     head = f"Model: gain K = {_estimate(gain)} {unit(gain.unit, axis)} {_flags([gain])}".rstrip()
@@ -140,8 +136,7 @@ def _mechanics(idn: Any, axis: str) -> list[str]:
     lines = [head, *table(rows)]
     if hasattr(m, "resonance"):
         lines.append(
-            f"  resonance {number(m.resonance / math.tau)} Hz, antiresonance "
-            f"{number(m.antiresonance / math.tau)} Hz (undamped)"
+            f"  resonance {number(m.resonance / math.tau)} Hz, antiresonance {number(m.antiresonance / math.tau)} Hz (undamped)"
         )
         lines += [f"  {line}" for line in textwrap.wrap(_inconsistency(m), WIDTH - 2)]
     if damped is not None:

@@ -77,6 +77,4 @@ def table(rows: Sequence[Sequence[str]], indent: str = "  ") -> list[str]:
     kept = [column for column in columns if any(column)]
     widths = [max(map(len, column)) for column in kept]
     lines = zip(*kept, strict=True)
-    return [
-        (indent + "  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True))).rstrip() for line in lines
-    ]
+    return [(indent + "  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True))).rstrip() for line in lines]

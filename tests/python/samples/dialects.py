@@ -79,13 +79,9 @@ def tables(draw: st.DrawFn) -> tuple[Record, bytes, dict[str, Any]]:
     if draw(st.booleans()):
         channels.append("position")
     rng.shuffle(channels)
-    values = {
-        key: np.round(rng.normal(size=n) * draw(st.sampled_from([1e-2, 1.0, 1e3])), 5) for key in channels
-    }
+    values = {key: np.round(rng.normal(size=n) * draw(st.sampled_from([1e-2, 1.0, 1e3])), 5) for key in channels}
     delimiter, decimal = draw(
-        st.sampled_from(
-            [*((mark, ".") for mark in ",;\t| "), (";", ","), ("\t", ","), ("|", ","), (" ", ",")]
-        )
+        st.sampled_from([*((mark, ".") for mark in ",;\t| "), (";", ","), ("\t", ","), ("|", ","), (" ", ",")])
     )
     with_time = draw(st.booleans())
     in_ms = with_time and draw(st.booleans())
