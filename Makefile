@@ -33,9 +33,8 @@ help: ## list the commands
 
 install: .venv/.installed ## set up .venv and install the package into it
 
-demo: .venv/.installed ## identify a two-mass drive; table on the screen, picture in build/demo
-	@mkdir -p "$(DEMO_DIR)"
-	@gaident="$(abspath $(BIN)/gaident)" && cd "$(DEMO_DIR)" && "$$gaident" demo
+demo: .venv/.installed ## identify a two-mass drive; table on the screen, pictures in build/demo
+	@$(BIN)/gaident demo --out "$(DEMO_DIR)"
 
 test: lint test-cpp test-python ## every check: ruff, mypy, C++ tests (plain and sanitized), Python tests
 
@@ -61,7 +60,7 @@ bench: .venv/.tools ## build and run the C++ benchmark
 	build/release/bench/gaident_bench $(BENCH_FLAGS)
 
 tidy: .venv/.tidied ## repair and format the Python and C++ sources
-	$(BIN)/ruff check --fix .
+	$(BIN)/ruff check --fix-only .
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i $$(find csrc bench tests/cpp -name '*.?pp')
 

@@ -2,7 +2,7 @@
 // population, record length and loop. Every row first checks its answer against the referee. `--quick` runs fewer repetitions.
 #include "../csrc/gaident/decode.hpp"
 #include "../csrc/gaident/denormals.hpp"
-#include "../csrc/gaident/engine.hpp"
+#include "../csrc/gaident/breeder.hpp"
 #include "../csrc/gaident/reference/cascade.hpp"
 #include "../csrc/gaident/simulate.hpp"
 

@@ -1,5 +1,5 @@
 #include "../gaident/decode.hpp"
-#include "../gaident/species.hpp"
+#include "../gaident/parallel.hpp"
 #include "bindings.hpp"
 
 using namespace gaident;

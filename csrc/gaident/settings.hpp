@@ -46,6 +46,13 @@ struct Trial {
 struct Progress {
     std::atomic<std::size_t> done{0};  // generations, of all trials together
     std::atomic<double> best{worst_fitness};
+
+    void note(std::size_t generations, double fitness_now) {
+        done += generations;
+        double seen = best.load();
+        while (fitness_now < seen && !best.compare_exchange_weak(seen, fitness_now)) {
+        }
+    }
 };
 
 }  // namespace gaident

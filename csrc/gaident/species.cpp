@@ -1,19 +1,12 @@
 #include "species.hpp"
 
-#include "decode.hpp"
+#include "parallel.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 namespace gaident {
-
-void note(Progress& progress, std::size_t generations, double best) {
-    progress.done += generations;
-    double seen = progress.best.load();
-    while (best < seen && !progress.best.compare_exchange_weak(seen, best)) {
-    }
-}
 
 std::vector<Structure> structures(const SearchRanges& r) {
     std::vector<Structure> all;
@@ -167,7 +160,7 @@ private:
                 trial_.best_generation = done + g;
                 std::copy(breeder_[best], breeder_[best] + genome_.words(), trial_.best.begin());
             }
-            note(progress_, 1, trial_.best_fitness);
+            progress_.note(1, trial_.best_fitness);
             if (g + 1 == generations) break;
             breeder_.generation(groups_);
         }

@@ -5,7 +5,7 @@
 // on a grid of frequencies where it helps most, and the local fit goes on from there. Structures are not compared here.
 #pragma once
 
-#include "engine.hpp"
+#include "breeder.hpp"
 
 namespace gaident {
 
@@ -19,7 +19,5 @@ std::vector<Structure> structures(const SearchRanges& ranges);
 // `to` is not one module (or one conjugate pair of modules) larger.
 std::vector<Factors<double>> grow(const Factors<double>& from, Structure to, const SearchRanges& ranges, double slowest,
                                   double fastest);
-
-void note(Progress& progress, std::size_t generations, double best);
 
 }  // namespace gaident

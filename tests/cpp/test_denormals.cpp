@@ -1,5 +1,6 @@
 #include "check.hpp"
 #include "gaident/engine.hpp"
+#include "gaident/parallel.hpp"
 #include "gaident/simulate.hpp"
 
 #include <stdexcept>

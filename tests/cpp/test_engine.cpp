@@ -2,6 +2,7 @@
 #include "gaident/decode.hpp"
 #include "gaident/denormals.hpp"
 #include "gaident/engine.hpp"
+#include "gaident/parallel.hpp"
 #include "gaident/parameters.hpp"
 #include "gaident/reference/drives.hpp"
 

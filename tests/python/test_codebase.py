@@ -23,7 +23,7 @@ PACKAGE = ROOT / "python" / "gaident"
 CORE_ORDER = [
     *("rng", "arithmetic", "lanes", "denormals", "chromosome", "genome", "factors", "decode", "parameters"),
     *("delta", "bilinear", "held", "controller", "closed_loop", "loop", "record", "fitness", "kernels/"),
-    *("batch", "simulate", "linear", "refine", "settings", "operators", "engine", "species", "reference/"),
+    *("batch", "simulate", "linear", "refine", "settings", "operators", "breeder", "parallel", "species", "engine", "reference/"),
 ]
 
 # Python: what each room may import of gaident, beside itself, and what inside a function only. A room is a
@@ -31,15 +31,16 @@ CORE_ORDER = [
 DESK = {"errors", "data", "models", "identification"}
 ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "errors": (set(), set()),
+    "version": (set(), set()),
     "data": ({"errors"}, set()),
     "models": ({"errors", "data", "_core"}, set()),
-    "identification": ({"errors", "data", "models", "_core"}, {"show"}),
+    "identification": ({"errors", "version", "data", "models", "_core"}, {"show"}),
     "show": ({"errors"}, set()),
     "drive_file": (DESK, set()),
     "demo": (DESK, {"show"}),
     "cli": (DESK | {"drive_file", "demo"}, {"show", "_core"}),
     "__main__": ({"cli"}, set()),
-    "__init__": (DESK, {"show"}),
+    "__init__": (DESK, {"show", "version"}),
 }
 
 

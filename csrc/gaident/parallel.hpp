@@ -1,0 +1,12 @@
+// Threads: for independent pieces of work only (trials, species, models to be fitted), never inside one small generation.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+namespace gaident {
+
+// Calls work(0) ... work(n-1) on up to `workers` threads, denormals flushed; the first exception is thrown again here.
+void parallel(std::size_t n, int workers, const std::function<void(std::size_t)>& work);
+
+}  // namespace gaident
