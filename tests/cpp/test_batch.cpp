@@ -107,6 +107,63 @@ TEST_CASE("batch: error sums of a mixture of structures equal the referee's; sev
         }
 }
 
+TEST_CASE("batch: eight candidates prepared side by side are the eight prepared alone, p and q up to 7") {
+    Random random(96);
+    for (const Kernels* kernels : available())
+        for (const LoopKind kind : {LoopKind::continuous, LoopKind::sampled, LoopKind::open})
+            for (int repeat = 0; repeat < 100; ++repeat) {
+                Loop loop = paper_loop(kind);
+                if (repeat % 3 == 0) loop.torque_limit = 2.0;
+                Setup setup(random, loop, {10}, 0.444e-3);
+                setup.experiment.kernels = kernels;
+                Record& record = setup.experiment.records[0];
+                record.start = repeat % 2 == 0 ? Start::rest : Start::steady;
+                record.velocity0 = 11.0;
+                // Any mixture of structures in the continuous loop, one structure behind a hold; all lanes used or not.
+                std::vector<Factors<double>> models;
+                const bool mixed = kind == LoopKind::continuous;
+                const std::size_t used = 1 + random.below(8), p0 = 1 + random.below(7), q0 = random.below(8);
+                for (std::size_t i = 0; i < used; ++i) {
+                    auto g = reference::random_plant(random, mixed ? random.below(8) : p0, mixed ? random.below(8) : q0,
+                                                     reference::families[random.below(4)], 0.444e-3, 250);
+                    g.K = 100.0;
+                    models.push_back(reference::factors_of(g));
+                }
+                std::vector<const Factors<double>*> lanes;
+                std::vector<std::vector<double>> states;
+                std::vector<const double*> starts;
+                for (const auto& m : models) {
+                    lanes.push_back(&m);
+                    states.emplace_back();
+                    for (int k = 0; k < start_states(m.structure, loop); ++k) states.back().push_back(random.uniform());
+                }
+                const bool with_starts = repeat % 5 == 0;
+                for (const auto& x : states)
+                    if (with_starts) starts.push_back(x.data());
+                DoubleGroup group;
+                load_group(setup.experiment, record, lanes, starts, group);
+                int order = 0;
+                for (std::size_t lane = 0; lane < DoubleGroup::width; ++lane) {
+                    const std::size_t i = std::min(lane, used - 1);
+                    const Prepared one = prepare(models[i], record, loop, with_starts ? starts[i] : nullptr);
+                    const int n = one.response.order;
+                    order = std::max(order, n);
+                    // Behind a hold the group doubles as often as its fastest lane needs, which moves the last digits.
+                    double size = 0.0;
+                    for (int k = 0; k <= n; ++k) size = std::max(size, std::abs(one.response.b[k]));
+                    for (int k = 0; k < group.order; ++k) {
+                        const double a = k < n ? one.response.a[k] : 0.0;
+                        CHECK_NEAR(group.a[k][lane], a, mixed ? 0.0 : 1e-11 * std::abs(a));
+                        CHECK(group.x[k][lane] == (k < n ? one.x[k] : 0.0));
+                    }
+                    for (int k = 0; k <= group.order; ++k)
+                        CHECK_NEAR(group.b[k][lane], k <= n ? one.response.b[k] : 0.0, mixed ? 0.0 : 1e-11 * size);
+                    CHECK(group.s[lane] == one.s);
+                }
+                CHECK(group.order == order);
+            }
+}
+
 TEST_CASE("batch: every kernel set gives the same sums, and neighbours do not matter") {
     Random random(92);
     for (const bool limited : {false, true})

@@ -1,5 +1,6 @@
 #include "check.hpp"
 #include "gaident/decode.hpp"
+#include "gaident/engine.hpp"
 #include "gaident/parameters.hpp"
 #include "gaident/reference/drives.hpp"
 #include "gaident/species.hpp"
