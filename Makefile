@@ -15,9 +15,13 @@ endif
 
 BIN := .venv/bin
 PIP_INSTALL := $(BIN)/python -m pip install --quiet
-# Built in a folder that stays, so that a small change is a small build.
+# Built in folders that stay, so that a small change is a small build. The checks take warnings for errors and add tests
+# and benchmark to the same objects.
 PACKAGE := --no-build-isolation --config-settings=build-dir=build/python
+CHECKED := --no-build-isolation --config-settings=build-dir=build/checked --config-settings=build.targets=_core \
+	$(patsubst %,--config-settings=cmake.define.GAIDENT_%=ON,WERROR TESTS BENCH)
 CMAKE := $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja)
+CTEST := $(BIN)/ctest --output-on-failure --no-tests=error -j $(JOBS) --test-dir
 export CMAKE_BUILD_PARALLEL_LEVEL := $(JOBS)
 
 # Folders stand in the list for files that were added or deleted.
@@ -44,20 +48,21 @@ lint: .venv/.tested
 	$(BIN)/mypy
 
 test-cpp: .venv/.tested
-	$(CMAKE) -B build/release -DGAIDENT_PYTHON=OFF > build/release.log || { cat build/release.log; exit 1; }
-	$(BIN)/cmake --build build/release
-	$(BIN)/ctest --test-dir build/release --output-on-failure --no-tests=error -j $(JOBS)
-	$(CMAKE) -B build/sanitize -DGAIDENT_PYTHON=OFF -DGAIDENT_SANITIZE=ON -DGAIDENT_BENCH=OFF > build/sanitize.log || { cat build/sanitize.log; exit 1; }
-	$(BIN)/cmake --build build/sanitize
-	$(BIN)/ctest --test-dir build/sanitize --output-on-failure --no-tests=error -j $(JOBS)
+	$(BIN)/cmake --build build/checked
+	$(CTEST) build/checked
+	@mkdir -p build/sanitized
+	$(CMAKE) -B build/sanitized -DGAIDENT_SANITIZE=ON -DGAIDENT_BENCH=OFF > build/sanitized/configure.log || { cat build/sanitized/configure.log; exit 1; }
+	$(BIN)/cmake --build build/sanitized
+	$(CTEST) build/sanitized
 
 test-python: .venv/.tested
 	$(BIN)/python -m pytest
 
-bench: .venv/.tools ## build and run the C++ benchmark
-	$(CMAKE) -B build/release -DGAIDENT_PYTHON=OFF > build/release.log || { cat build/release.log; exit 1; }
-	$(BIN)/cmake --build build/release --target gaident_bench
-	build/release/bench/gaident_bench $(BENCH_FLAGS)
+bench: .venv/.tools ## build (plainly, without Python) and run the C++ benchmark; BENCH_FLAGS=... goes to it
+	@mkdir -p build/plain
+	$(CMAKE) -B build/plain > build/plain/configure.log || { cat build/plain/configure.log; exit 1; }
+	$(BIN)/cmake --build build/plain --target gaident_bench
+	build/plain/bench/gaident_bench $(BENCH_FLAGS)
 
 tidy: .venv/.tidied ## repair and format the Python and C++ sources
 	$(BIN)/ruff check --fix-only .
@@ -75,7 +80,6 @@ clean: ## remove everything that these commands made
 	@$(PYTHON) -c 'import os, sysconfig; open(os.path.join(sysconfig.get_path("include"), "Python.h")).close()' 2>/dev/null || { echo "Python.h is missing; on Debian: apt install python3-dev" >&2; exit 1; }
 	@command -v $(firstword $(CXX)) >/dev/null || { echo "no C++ compiler '$(CXX)'; on Debian: apt install g++" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
-	mkdir -p build
 	@$(BIN)/python -c 'import ast, re; text = open("pyproject.toml").read(); print(*ast.literal_eval(re.search(r"(?ms)^requires = (\[.*?\])", text)[1]), sep="\n")' > .venv/build-requires.txt
 	$(PIP_INSTALL) -r .venv/build-requires.txt cmake ninja
 	@touch $@
@@ -85,7 +89,7 @@ clean: ## remove everything that these commands made
 	@touch $@
 
 .venv/.tested: .venv/.tools $(SOURCES)
-	$(PIP_INSTALL) $(PACKAGE) ".[test]"
+	$(PIP_INSTALL) $(CHECKED) ".[test]"
 	@touch .venv/.installed $@
 
 .venv/.tidied: .venv/.tools

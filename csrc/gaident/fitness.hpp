@@ -18,6 +18,7 @@ struct FitnessWeights {
 };
 
 inline double fitness(double error_sum, Structure s, const FitnessWeights& w) {
+    if (!(error_sum < worst_fitness)) return worst_fitness;
     return sane(w.error * w.error * error_sum + w.order * static_cast<double>(s.p + s.q));
 }
 

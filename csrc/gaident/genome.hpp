@@ -135,6 +135,8 @@ public:
 
 private:
     static void check(const SearchRanges& s) {
+        for (const Range r : {s.gain, s.real, s.imaginary})
+            if (!std::isfinite(r.lo) || !std::isfinite(r.hi)) throw std::invalid_argument("SearchRanges: the ends of all ranges must be finite");
         const auto bad = [](const std::string& what) { throw std::invalid_argument("SearchRanges: " + what); };
         if (!(s.gain.lo > 0.0 && s.gain.hi > s.gain.lo)) bad("gain needs 0 < lo < hi (it is coded logarithmically)");
         if (!(s.gain_scale > 0.0)) bad("gain_scale must be positive");

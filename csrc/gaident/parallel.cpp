@@ -28,10 +28,10 @@ void parallel(std::size_t n, int workers, const std::function<void(std::size_t)>
             }
         }
     };
-    std::vector<std::thread> pool;
+    std::vector<std::jthread> pool;
     for (std::size_t t = 1; t < threads; ++t) pool.emplace_back(loop);
     loop();
-    for (std::thread& t : pool) t.join();
+    pool.clear();
     if (error) std::rethrow_exception(error);
 }
 

@@ -27,8 +27,8 @@ struct Settings {
         if (population < 2 || population > 1000000) bad("population must be 2..1000000");
         if (tournament < 1 || tournament > population) bad("tournament must be 1..population");
         if (!(crossover >= 0.0 && crossover <= 1.0)) bad("crossover must be 0..1");
-        if (!(mutation >= 0.0 && mutation <= 1.0)) bad("mutation must be 0..1");
-        if (generations < 1) bad("generations must be at least 1");
+        if (!(mutation == 0.0 || (mutation >= 1e-6 && mutation <= 1.0))) bad("mutation must be 0 or 1e-6..1");
+        if (generations < 1 || generations > 10000000) bad("generations must be 1..10000000");
         if (elites < 0 || elites >= population) bad("elites must be 0..population-1");
         if (round < 1 || quiet_rounds < 1) bad("round and quiet_rounds must be at least 1");
     }

@@ -11,7 +11,7 @@ namespace gaident {
 template <class L>
 struct LaneFactors : Factors<L> {
     Counts sizes{};
-    L has_excess[max_plant_order / 2];
+    L has_excess[max_plant_order];
 
     Counts counts() const { return sizes; }
 };

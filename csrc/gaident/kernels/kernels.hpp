@@ -32,7 +32,7 @@ struct FactorGroup {
     alignas(64) double gain[width];
     alignas(64) double pole_e1[max_pairs][width], pole_e0[max_pairs][width], pole[width];
     alignas(64) double zero_e1[max_pairs][width], zero_e0[max_pairs][width], zero[width];
-    alignas(64) double excess[max_plant_order / 2][width];  // 1 where the lane has more than i poles in excess of zeros, else 0
+    alignas(64) double excess[max_plant_order][width];  // 1 where the lane has more than i poles in excess of zeros, else 0
     int doublings = 0;  // of the hold's matrix exponential, enough for the fastest lane
 };
 
