@@ -62,8 +62,9 @@ def canonical_roots(roots: object, name: str) -> tuple[complex, ...]:
 def polynomial_roots(coefficients: Sequence[float] | NDArray[np.float64]) -> NDArray[np.complex128]:
     """Roots of s^n + c[0] s^(n-1) + ... + c[n-1], in conjugate pairs.
 
-    Companion matrix of the polynomial in s/scale; each root is then polished by Newton steps as long as they
-    help.
+    Companion matrix of the polynomial in s/scale; each root is then polished by Newton steps as long as they help. Of a
+    cubic only the best separated real root is found so; the other two are those of the quadratic that is left, so that together
+    they give back the coefficients even where two nearly coincide.
     """
     c = np.asarray(coefficients, dtype=np.float64)
     n = len(c)
@@ -75,6 +76,10 @@ def polynomial_roots(coefficients: Sequence[float] | NDArray[np.float64]) -> NDA
     scaled = np.concatenate([[1.0], c / scale ** np.arange(1, n + 1)])
     slope = np.polyder(scaled)
     roots = np.roots(scaled).astype(np.complex128)
+    if n == 3:
+        real = roots[np.abs(roots.imag) == np.min(np.abs(roots.imag))].real
+        best = real[np.argmax(np.abs(np.polyval(slope, real)))]
+        roots = np.array([best], dtype=np.complex128)
     found: list[complex] = []
     for root in roots[roots.imag >= 0.0]:
         value = np.polyval(scaled, root)
@@ -90,6 +95,13 @@ def polynomial_roots(coefficients: Sequence[float] | NDArray[np.float64]) -> NDA
         found.append(complex(root))
         if root.imag != 0.0:
             found.append(complex(root).conjugate())
+    if n == 3:
+        r = found[0].real
+        # s^3 + c0 s^2 + c1 s + c2 = (s - r)(s^2 + q1 s + q0), each of q1, q0 by the equation that does not cancel
+        _, c0, c1, c2 = (float(v) for v in scaled)
+        q0 = -c2 / r if r != 0.0 else c1
+        q1 = (q0 - c1) / r if abs(r) ** 3 > abs(c2) else c0 + r
+        found += quadratic_roots(q1, q0)
     return scale * np.array(found, dtype=np.complex128)
 
 
