@@ -109,9 +109,12 @@ RealArray colour(const RealArray& rows, const std::vector<double>& phi) {
     if (rows.ndim() != 2) throw std::invalid_argument("rows must be two-dimensional");
     const auto n = static_cast<std::ptrdiff_t>(rows.shape(1));
     RealArray out({rows.shape(0), rows.shape(1)});
+    const double* const first_x = rows.data();
+    double* const first_z = out.mutable_data();
+    const py::gil_scoped_release release;
     for (py::ssize_t r = 0; r < rows.shape(0); ++r) {
-        const double* const x = rows.data(r, 0);
-        double* const z = out.mutable_data(r, 0);
+        const double* const x = first_x + r * n;
+        double* const z = first_z + r * n;
         for (std::ptrdiff_t k = n; k-- > 0;) {
             double sum = x[k];
             for (std::size_t i = 0; i < phi.size(); ++i) {

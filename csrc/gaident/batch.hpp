@@ -50,8 +50,8 @@ struct Prepared {
 // `start` holds start_states() numbers, or is null: then the record's own start (rest, or steady motion) is used.
 Prepared prepare(const Factors<double>& g, const Record& record, const Loop& loop, const double* start);
 
-// Responses and initial states of up to eight candidates on one record, eight at a time: as prepare(), bit for bit. Behind a hold all
-// must have the same structure. starts[i], where not null, is candidate i's `start`; an empty span means none has one. Lanes
+// Responses and initial states of up to eight candidates on one record: as prepare(), bit for bit in the continuous loop. Behind a hold
+// all must have the same structure, and the last digits differ, since the fastest lane decides how often the exponential is doubled. starts[i], where not null, is candidate i's `start`; an empty span means none has one. Lanes
 // beyond the candidates repeat the last.
 void load_group(const Experiment& experiment, const Record& record, std::span<const Factors<double>* const> candidates,
                 std::span<const double* const> starts, DoubleGroup& group);

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -29,7 +30,11 @@ void parallel(std::size_t n, int workers, const std::function<void(std::size_t)>
         }
     };
     std::vector<std::jthread> pool;
-    for (std::size_t t = 1; t < threads; ++t) pool.emplace_back(loop);
+    try {
+        for (std::size_t t = 1; t < threads; ++t) pool.emplace_back(loop);
+    } catch (const std::system_error&) {
+        // The machine gives no more threads: those there are do the work, to the same result.
+    }
     loop();
     pool.clear();
     if (error) std::rethrow_exception(error);

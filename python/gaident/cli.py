@@ -75,6 +75,8 @@ def _identify(args: argparse.Namespace) -> None:
     drive = drive_of(args)
     out = target_of(args.out, args.logs)
     plot = target_of(args.plot, args.logs, PICTURES)
+    if out is not None and plot is not None and out.resolve() == plot.resolve():
+        raise SettingsError(f"--out and --plot both name {out}: the second would overwrite the first; give two files")
     controller = drive.controller()
     records = _read_all(drive, args.logs, controller)
     settings = Settings.paper() if args.paper else Settings()

@@ -34,7 +34,9 @@ class Fake:
     version: str = "0.1.0"
     digests: tuple[str, ...] = ("c0ffee",)
     controller: Any = field(default_factory=lambda: ga.PI(0.0232, 1.367, torque_limit=2.4))
-    adequacy: Any = field(default_factory=lambda: SimpleNamespace(noise_std=0.3011, sentence="The residual is white."))
+    adequacy: Any = field(
+        default_factory=lambda: SimpleNamespace(noise_std=0.3011, undecided=False, sentence="The residual is white.")
+    )
     parameters: dict[str, Estimate] = field(
         default_factory=lambda: {
             "gain": Estimate(9790.12, 64.3, "rad/s^2/(N m)"),
@@ -97,7 +99,7 @@ def test_summary_of_a_falsified_linear_axis() -> None:
         falsified=True,
         controller=None,
         parameters=one_mass,
-        adequacy=SimpleNamespace(noise_std=2.2e-4, sentence=sentence),
+        adequacy=SimpleNamespace(undecided=False, noise_std=2.2e-4, sentence=sentence),
         mechanics=ga.OneMass(105.7, 429.0, std={"J": 8.3, "D": 17.0}),
         warnings=(sentence,),
         rivals=(),

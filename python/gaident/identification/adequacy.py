@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.identification.noise import Autoregression, chi2_tail, ljung_box, whiten
+from gaident.identification.starts import noise_std
 
 __all__ = ["Adequacy", "assess"]
 
@@ -30,16 +31,21 @@ class Adequacy:
     """What the residual says about the model.
 
     white_p: Ljung-Box p-value of the residual; ar_order: order of the noise model; noise_std: standard deviation of the whitened
-    residual [rad/s]; predictable: share of the residual's power that its own past predicts (0: white);
-    independence_p: p-value of the test that the residual no longer depends on input and motion; falsified: it does.
+    residual [rad/s]; predictable: share of the residual's power that its own past predicts (0: white); excess: rms of the
+    residual over
+    the noise as the measured velocity's own third differences show it;
+    independence_p: p-value of the test that the residual no longer depends on input and motion; falsified: it does;
+    undecided: it does not, but the residual is coloured and more than twice the noise, so that dynamics may be missing.
     """
 
     white_p: float
     ar_order: int
     noise_std: float
     predictable: float
+    excess: float
     independence_p: float
     falsified: bool
+    undecided: bool
 
     @property
     def sentence(self) -> str:
@@ -49,6 +55,13 @@ class Adequacy:
                 "The linear model is falsified: the residual still depends on the input or the motion "
                 f"(p = {self.independence_p:.1g}), and its own past predicts {100 * self.predictable:.0f} % of its power. "
                 "Do not trust the mechanical parameters; an effect that is not in the model bends them."
+            )
+        if self.undecided:
+            return (
+                f"Undecided: the residual is coloured and {self.excess:.1f} times the noise on the measured velocity. "
+                "Coloured noise "
+                "or missing dynamics; this record cannot tell which, and parameters and standard deviations hold only "
+                "if it is noise."
             )
         if self.white_p < LEVEL:
             return (
@@ -64,14 +77,21 @@ def assess(
     inputs: Sequence[Vector],
     outputs: Sequence[Vector],
     noise: Autoregression,
+    open_loop: bool,
 ) -> Adequacy:
-    """residuals, inputs and simulated outputs per record; J: sensitivities, parameters x all samples."""
+    """residuals, inputs and simulated outputs per record; J: sensitivities, parameters x all samples.
+
+    open_loop: the input is a torque. It acts from the next sample on, and if a controller made it, it carries the noise of its
+    own
+    sample: lag 0 would then be correlated with the residual by construction and is left out.
+    """
     lengths = [len(e) for e in residuals]
     total = sum(lengths)
     power = sum(float(e @ e) for e in residuals) / total
     white_p = ljung_box(residuals, lags=min(20, total // 5))
     predictable = 1.0 - noise.std**2 / power if power > 0.0 else 0.0
-    columns = [_joined([_lagged(u, k) for u in inputs], noise.phi) for k in LAGS]
+    lags = [k for k in LAGS if k < min(lengths) // 4 and not (open_loop and k == 0)]
+    columns = [_joined([_lagged(u, k) for u in inputs], noise.phi) for k in lags]
     columns.append(_joined([np.ones(n) for n in lengths], noise.phi))
     threshold = 0.01 * max(float(np.abs(y).max()) for y in outputs)
     columns.append(_joined([np.where(np.abs(y) > threshold, np.sign(y), 0.0) for y in outputs], noise.phi))
@@ -79,7 +99,12 @@ def assess(
     own = [_joined(_split(row, lengths), noise.phi) for row in J]
     v = _joined(residuals, noise.phi)
     p = _independence(v, np.array(own), np.array(columns), total - noise.order * len(lengths))
-    return Adequacy(white_p, noise.order, noise.std, float(max(predictable, 0.0)), p, p < LEVEL)
+    measured = [y + e for y, e in zip(outputs, residuals, strict=True)]
+    quiet = float(np.sqrt(sum(len(w) * noise_std(w) ** 2 for w in measured) / total))
+    excess = float(np.sqrt(power)) / quiet if quiet > 0.0 else (0.0 if power == 0.0 else float("inf"))
+    falsified = p < LEVEL
+    undecided = not falsified and white_p < LEVEL and excess > 2.0
+    return Adequacy(white_p, noise.order, noise.std, float(max(predictable, 0.0)), excess, p, falsified, undecided)
 
 
 def _independence(v: Vector, own: NDArray[np.float64], extra: NDArray[np.float64], samples: int) -> float:
@@ -116,7 +141,9 @@ def _orthonormal(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _lagged(x: Vector, k: int) -> Vector:
-    return x if k == 0 else np.concatenate([np.zeros(k), x[:-k]])
+    out = np.zeros_like(x)
+    out[k:] = x[: len(x) - k]
+    return out
 
 
 def _joined(parts: Sequence[Vector], phi: Vector) -> Vector:

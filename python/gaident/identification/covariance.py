@@ -170,10 +170,21 @@ def estimates(model: Model, cov: Matrix, at_bound_core: Sequence[bool]) -> dict[
     return found
 
 
-def usable_covariance(cov: Matrix) -> Matrix | None:
-    """The covariance, or None where a parameter is at its bound or (to working precision) not determined."""
-    if not np.all(np.isfinite(cov)) or np.any(np.diag(cov) <= 0.0):
+def usable_covariance(model: Model, cov: Matrix) -> Matrix | None:
+    """The covariance with parameters at a bound taken as known, or None where the record does not determine one.
+
+    As known means: a standard deviation of 1e-9 of their size, since a covariance of mechanics cannot use an exact 0.
+    """
+    variance = np.diag(cov)
+    bound = np.isnan(variance)
+    if np.any(np.isinf(variance)):
         return None
-    size = np.sqrt(np.diag(cov))
-    correlation = cov / np.outer(size, size)
-    return cov if np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0] > -1e-9 else None
+    _, values, _ = factor_parameters(model)
+    fixed = np.where(bound[:, None] | bound[None, :], 0.0, cov)
+    scale = np.maximum(np.abs(values), 1e-9 * max(1.0, float(np.max(np.abs(values[1:]), initial=0.0))))
+    fixed[bound, bound] = (1e-9 * scale[bound]) ** 2
+    if not np.all(np.isfinite(fixed)) or np.any(np.diag(fixed) <= 0.0):
+        return None
+    size = np.sqrt(np.diag(fixed))
+    correlation = fixed / np.outer(size, size)
+    return fixed if np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0] > -1e-9 else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -69,6 +69,7 @@ def identify(
             raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
     threads = _processors() if workers is None else int(workers)
     records = sorted(given, key=lambda r: (r.digest, r.name))  # sums must not depend on the order given
+    derived = space is None
     space = _checked_space(derive_space(records, controller) if space is None else space, controller)
 
     moving = [
@@ -78,6 +79,9 @@ def identify(
     found = work.search(int(trials), int(seed), threads, progress)
     best, scored, noise = work.select(found, threads)
     result = work.report(best, scored, noise, found, int(seed))
+    if derived and not settings.species:
+        warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give space=SearchSpace(...)."
+        object.__setattr__(result, "warnings", (*result.warnings, warning))
     object.__setattr__(result, "seconds", time.perf_counter() - began)
     return result
 
@@ -134,7 +138,9 @@ class _Work:
             candidates = [selection.from_core(s) for s in merged if s.cost < 1e300]
             if not candidates:
                 raise SpaceError("space: every candidate diverged in it; widen the ranges, or leave space=None")
-            scored, winner, _ = selection.choose(self.experiment, candidates, self.residuals, self.samples, self.ranges, workers)
+            scored, winner, _ = selection.choose(
+                self.experiment, candidates, self.residuals, [len(r) for r in self.records], self.ranges, workers
+            )
             best = self.polished(scored[winner])
             if self.judged(best).falsified:
                 chain = selection.smallest_mechanism(scored, self.samples)
@@ -148,22 +154,29 @@ class _Work:
                 logarithmic=self.settings.scale == "logarithmic",
             )
             model = Model(gain, poles, zeros)
-            size = 1 + model.p + 2 * model.q
-            best = Candidate(model, np.zeros(0), 0.0, (False,) * size)
+            # No local fit: only the start states the search assumed (steady motion) and what stands at a bound.
+            best = self.refined(Candidate(model, np.zeros(0), np.inf, ()), 0)
             scored = []
         return best, scored, fit_autoregression(self.residuals(best))
 
     def polished(self, c: Candidate) -> Candidate:
         """The local fit taken to the end."""
+        done = self.refined(c, FINAL_ITERATIONS)
+        # Once more without a step: the core reports bounds in the order of the factors it was given, and Model may have put
+        # the roots into another.
+        return self.refined(done if done.cost <= c.cost else c, 0)
+
+    def refined(self, c: Candidate, iterations: int) -> Candidate:
+        """The local fit from c; with no iterations, c with its start states, cost and what stands at a bound."""
         fit = self.experiment.refine(
             models=[(c.model.gain, np.array(c.model.poles, complex), np.array(c.model.zeros, complex), c.starts)],
             ranges=self.ranges,
             whitening=[],
-            max_iterations=FINAL_ITERATIONS,
+            max_iterations=iterations,
             workers=1,
         )[0]
         done = selection.from_core(fit)
-        return Candidate(done.model, done.starts, done.cost, done.at_bound, c.bic) if done.cost <= c.cost else c
+        return replace(done, model=done.model if iterations else c.model, bic=c.bic)
 
     def states(self, c: Candidate) -> list[Vector]:
         """Start state of each record; empty: at rest."""
@@ -202,7 +215,9 @@ class _Work:
         """Whether the data contradict this candidate."""
         outputs = self.outputs(c)
         residuals = [r.velocity - y for r, y in zip(self.records, outputs, strict=True)]
-        return adequacy.assess(residuals, self.sensitivities(c), self.inputs, outputs, fit_autoregression(residuals))
+        return adequacy.assess(
+            residuals, self.sensitivities(c), self.inputs, outputs, fit_autoregression(residuals), self.controller is None
+        )
 
     def report(
         self, best: Candidate, scored: list[Candidate], noise: Autoregression, found: list[_core.Trial], seed: int
@@ -215,8 +230,8 @@ class _Work:
         lengths = [len(r) for r in self.records]
         cov = covariance.covariance_of_factors(model, J, noise, lengths, best.at_bound)
         parameters = covariance.estimates(model, cov, best.at_bound)
-        judged = adequacy.assess(residuals, J, self.inputs, outputs, noise)
-        mechanics = mechanics_from_model(model, covariance.usable_covariance(cov))
+        judged = adequacy.assess(residuals, J, self.inputs, outputs, noise, self.controller is None)
+        mechanics = mechanics_from_model(model, covariance.usable_covariance(model, cov))
         error_sum = sum(float(e @ e) for e in residuals)
         mean = sum(float(r.velocity.sum()) for r in self.records) / self.samples
         spread = sum(float(np.sum((r.velocity - mean) ** 2)) for r in self.records)
@@ -291,13 +306,13 @@ def _warnings(
     started: Sequence[str],
 ) -> tuple[str, ...]:
     notes = list(started)
-    if judged.falsified:
+    if judged.falsified or judged.undecided:
         notes.append(judged.sentence)
-        if larger_fits_better:
-            notes.append(
-                "Larger structures come closer, but only by absorbing what no linear structure holds; the smallest mechanism "
-                f"is reported, ({model.p},{model.q})."
-            )
+    if judged.falsified and larger_fits_better:
+        notes.append(
+            "Larger structures come closer, but only by absorbing what no linear structure holds; the smallest mechanism "
+            f"is reported, ({model.p},{model.q})."
+        )
     bound = [n for n, e in parameters.items() if e.at_bound]
     if bound:
         notes.append(f"At a bound of the search range: {', '.join(bound)}. Widen the space, or doubt the structure.")
@@ -330,6 +345,14 @@ def _checked_records(rec: Record | Sequence[Record], controller: PI | None) -> l
                 f"{where} has no torque, which drives the model in open loop: give Record(torque=...), or "
                 "controller=PI(...) to identify in closed loop"
             )
+    seen: dict[str, str] = {}
+    for i, r in enumerate(records):
+        where = f"record {i} ({r.name})" if r.name else f"record {i}"
+        if r.digest in seen:
+            raise RecordError(
+                f"{where} holds the same data as {seen[r.digest]}: counted twice it would halve every variance; leave one out"
+            )
+        seen[r.digest] = where
     return records
 
 
@@ -342,8 +365,6 @@ def _checked_space(space: SearchSpace, controller: PI | None) -> SearchSpace:
                 f"p is {space.p!r}: with a held torque the plant needs at least one pole more than zeros; "
                 "use p=(1, 3), or PI(..., loop='continuous')"
             )
-        from dataclasses import replace
-
         return replace(space, p=(1, space.p[1]))
     return space
 

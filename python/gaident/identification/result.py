@@ -78,7 +78,7 @@ class Identification:
 
     model: Model
     controller: PI | None
-    parameters: Mapping[str, Estimate]
+    parameters: Mapping[str, Estimate] = field(hash=False)
     mechanics: Mechanics | None
     fitness: float
     rmse: float
@@ -91,10 +91,10 @@ class Identification:
     space: SearchSpace
     settings: Settings
     seed: int
-    seconds: float
+    seconds: float = field(compare=False)
     samples: int
     digests: tuple[str, ...]
-    initial_states: Mapping[str, tuple[float, ...]]
+    initial_states: Mapping[str, tuple[float, ...]] = field(hash=False)
     version: str = ""
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
@@ -124,9 +124,16 @@ class Identification:
         A record that does not start at rest gets its initial state estimated (one that was used in the identification, the one
         found there).
         """
+        if not isinstance(rec, Record):
+            raise GaidentError(f"rec is {type(rec).__name__}: give a gaident.Record")
         state: Sequence[float] | NDArray[np.float64] | None = self.initial_states.get(rec.digest)
-        limited = self.controller is not None and self.controller.limited
-        if state is None and not limited and starts_moving(rec, self.controller):
+        unseen = rec.digest not in self.digests and self.settings.initial_state != "rest"
+        if state is None and unseen and starts_moving(rec, self.controller):
+            if self.controller is not None and self.controller.limited:
+                raise GaidentError(
+                    "rec starts in motion and the controller has limits: its initial state cannot be estimated; use a record "
+                    "from rest, or gaident.simulate(idn.model, rec, controller, initial_state=...)"
+                )
             state = initial_state(self.model, rec, self.controller)
         return simulate(self.model, rec, self.controller, state)
 
@@ -144,7 +151,10 @@ class Identification:
         """Measured against simulated velocity and the residual, as a matplotlib Figure; `records` as used unless given."""
         from gaident.show.plots import plot_identification
 
-        chosen = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
+        given = self.records if records is None else (records,) if isinstance(records, Record) else records
+        if not isinstance(given, Sequence) or not all(isinstance(r, Record) for r in given):
+            raise GaidentError(f"records is {type(records).__name__}: give a gaident.Record or a list of them")
+        chosen = tuple(given)
         if not chosen:
             raise GaidentError("records: a loaded identification holds no data; give plot(records)")
         return plot_identification(self, chosen, axis=axis)
@@ -238,7 +248,7 @@ def load(path: str | os.PathLike[str]) -> Identification:
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, UnicodeDecodeError, TypeError) as error:
         raise GaidentError(f"{path}: cannot be read ({error}); give a file that save() wrote") from error
     try:
         data = json.loads(text)

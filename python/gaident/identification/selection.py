@@ -60,7 +60,7 @@ def cancellations(model: Model) -> int:
 
 
 def choose(
-    experiment: Any, candidates: Sequence[Candidate], residuals_of: Any, samples: int, ranges: Any, workers: int
+    experiment: Any, candidates: Sequence[Candidate], residuals_of: Any, lengths: Sequence[int], ranges: Any, workers: int
 ) -> tuple[list[Candidate], int, Autoregression]:
     """(candidates with their BIC, index of the winner, the common noise model).
 
@@ -69,14 +69,14 @@ def choose(
     fitted = min(candidates, key=lambda c: c.cost)
     noise = fit_autoregression(residuals_of(fitted))
     costs = [c.cost for c in candidates]
-    count = samples
+    count = sum(lengths)
     if noise.order > 0:
         models = [
             (c.model.gain, np.array(c.model.poles, complex), np.array(c.model.zeros, complex), c.starts) for c in candidates
         ]
         whitened = experiment.refine(models=models, ranges=ranges, whitening=list(noise.phi), max_iterations=8, workers=workers)
         costs = [w.cost for w in whitened]
-        count -= noise.order
+        count -= noise.order * len(lengths)  # the first samples of each record, whose past is missing
     scored = []
     for c, cost in zip(candidates, costs, strict=True):
         bic = count * np.log(max(cost, 1e-300) / count) + (c.size + len(c.starts)) * np.log(count)

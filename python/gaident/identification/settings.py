@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields
+from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 from gaident.errors import SettingsError
@@ -57,17 +58,21 @@ class Settings:
     initial_state: str = "auto"
 
     def __post_init__(self) -> None:
-        for name, low, high in (
+        for name, low, top in (
             ("population", 2, 1_000_000),
-            ("tournament", 1, self.population),
+            ("tournament", 1, "population"),
             ("generations", 1, 10_000_000),
-            ("elites", 0, self.population - 1),
+            ("elites", 0, "population - 1"),
             ("round", 1, 10_000_000),
             ("quiet_rounds", 1, 10_000_000),
         ):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            if isinstance(value, bool) or not isinstance(value, Integral):
+                raise SettingsError(f"{name} is {value!r}: it must be a whole number, {low} or more")
+            high = top if isinstance(top, int) else self.population - (name == "elites")
+            if not low <= int(value) <= high:
                 raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
+            object.__setattr__(self, name, int(value))
         for name in ("crossover", "mutation"):
             value = getattr(self, name)
             if not isinstance(value, (int, float)) or not 0.0 <= value <= 1.0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,7 +50,7 @@ class SearchSpace:
     def __post_init__(self) -> None:
         for name in ("gain", "real", "imaginary", "p", "q"):
             value = getattr(self, name)
-            if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != 2:
+            if isinstance(value, str) or not isinstance(value, (Sequence, np.ndarray)) or len(value) != 2:
                 raise SpaceError(f"{name} is {value!r}: give a pair (lowest, highest)")
             try:
                 lo, hi = (float(v) for v in value)
@@ -74,7 +75,7 @@ class SearchSpace:
             raise SpaceError(f"imaginary is {self.imaginary!r}: give the positive half, pairs are conjugate by themselves")
         if isinstance(self.bits, bool) or not isinstance(self.bits, int) or not 2 <= self.bits <= 16:
             raise SpaceError(f"bits is {self.bits!r}: it must be a whole number from 2 to 16")
-        if self.gain_scale is not None and not (0.0 < self.gain_scale < math.inf):
+        if self.gain_scale is not None and not (isinstance(self.gain_scale, Real) and 0.0 < self.gain_scale < math.inf):
             raise SpaceError(f"gain_scale is {self.gain_scale!r}: give a frequency in rad/s, above 0, or None")
 
     @classmethod
@@ -95,11 +96,9 @@ class SearchSpace:
             from half the lowest on.
         damping: total viscous damping [N m s/rad]; None: up to where a pole is as fast as the highest resonance.
         """
-        for name, value in (("inertia", inertia), ("resonance_hz", resonance_hz)):
-            if len(value) != 2 or not 0.0 < value[0] < value[1] < math.inf:
-                raise SpaceError(f"{name} is {value!r}: give (lowest, highest) with 0 < lowest < highest")
-        if damping is not None and (len(damping) != 2 or not 0.0 <= damping[0] < damping[1] < math.inf):
-            raise SpaceError(f"damping is {damping!r}: give (lowest, highest) with 0 <= lowest < highest, or None")
+        inertia = _pair("inertia", inertia, above_zero=True)
+        resonance_hz = _pair("resonance_hz", resonance_hz, above_zero=True)
+        damping = None if damping is None else _pair("damping", damping, above_zero=False)
         top = 2.0 * math.pi * resonance_hz[1]
         real = top if damping is None else max(damping[1] / inertia[0], 0.3 * top)
         return cls(
@@ -134,6 +133,18 @@ class SearchSpace:
         if unknown:
             raise SpaceError(f"space holds unknown keys: {', '.join(sorted(unknown))}")
         return cls(**data)
+
+
+def _pair(name: str, value: object, above_zero: bool) -> Range:
+    """(lowest, highest) as floats, or SpaceError."""
+    try:
+        lo, hi = (float(v) for v in value)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        raise SpaceError(f"{name} is {value!r}: give a pair of numbers (lowest, highest)") from None
+    if not ((lo > 0.0 or (lo == 0.0 and not above_zero)) and lo < hi < math.inf):
+        least = "0 <" if above_zero else "0 <="
+        raise SpaceError(f"{name} is {value!r}: give (lowest, highest) with {least} lowest < highest")
+    return lo, hi
 
 
 def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpace:
@@ -179,7 +190,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
     shown = " and ".join(f"{k:.4g}" for k in found)
     return SearchSpace(
         gain=(min(found) / 30.0, max(found) * 1000.0),
-        real=(0.0, 1.0 / dt),
+        real=(-10.0 / longest, 1.0 / dt),
         imaginary=(min(0.5 / longest, 0.1 / dt), 0.8 * math.pi / dt),
         p=(0, 3) if controller is not None and controller.loop == "continuous" else (1, 3),
         source=f"derived from the data: K about {shown}, sample time {1e3 * dt:.4g} ms",

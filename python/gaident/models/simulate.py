@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident import _core
+from gaident.data.record import Record
 from gaident.errors import ModelError, RecordError
 from gaident.models._checks import one_of, real_number
 from gaident.models.controller import PI
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Discrete, Model
-
-if TYPE_CHECKING:
-    from gaident.data.record import Record
 
 Signal = NDArray[np.float64]
 AnyModel = Model | OneMass | TwoMass
@@ -170,6 +167,8 @@ def _roots(roots: tuple[complex, ...]) -> NDArray[np.complex128]:
 
 def _input(plant: Model, rec: Record, controller: PI | None) -> tuple[Signal, str]:
     """What drives the simulation, and its name; raises where record, model and loop do not fit together."""
+    if not isinstance(rec, Record):
+        raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record")
     _require_strictly_proper(plant, controller)
     if controller is not None:
         if rec.command is None:

@@ -44,7 +44,11 @@ def mechanics_comparison(found: Any, truth: Any, axis: str = "rotary") -> str:
 
 
 def _verdict(idn: Any, axis: str) -> list[str]:
-    stands = "the linear model is FALSIFIED" if idn.falsified else "the linear model stands"
+    stands = "the linear model stands"
+    if idn.falsified:
+        stands = "the linear model is FALSIFIED"
+    elif idn.adequacy.undecided:
+        stands = "whether a linear model holds is UNDECIDED"
     records = len(idn.digests)
     figures = (
         f"fit {number(idn.fit_percent)} %",
@@ -125,7 +129,11 @@ def _mechanics(idn: Any, axis: str) -> list[str]:
         if (idn.p, idn.q) in ((1, 0), (1, 2)):
             return ["Mechanics: no such mechanism has these poles and zeros"]
         return [f"Mechanics: none, ({idn.p},{idn.q}) is {structure_words(idn.p, idn.q)}"]
-    head = "Mechanics, NOT TO BE TRUSTED (the linear model is falsified)" if idn.falsified else "Mechanics"
+    head = "Mechanics"
+    if idn.falsified:
+        head += ", NOT TO BE TRUSTED (the linear model is falsified)"
+    elif idn.adequacy.undecided:
+        head += ", with reserve (the linear model is undecided)"
     damped = getattr(m, "with_shaft_damping", None)
     rows = [("", "no shaft damping", "with shaft damping", "")] if damped is not None else []
     for name, rotary in m.UNITS.items():
