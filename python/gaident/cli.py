@@ -44,25 +44,40 @@ def main(argv: Sequence[str] | None = None) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")  # a name of a record never stops the output
     try:
-        args = parser_of(COMMANDS).parse_args(argv)
-        args.run(args)
+        code = _run(argv)
         if sys.stdout is not None:  # None where the caller closed it
             sys.stdout.flush()
-    except SystemExit as exit_:  # --help, --version
-        return int(exit_.code or 0)
+        return code
     except GaidentError as error:
         return _failed(2, str(error))
     except KeyboardInterrupt:
         return _failed(130, "interrupted")
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the interpreter flushes once more
+        _drop_output()
         return _failed(1, "the output was closed before all of it was written")
     except OSError as error:
+        _drop_output()
         what = f"{error.filename}: {error.strerror}" if error.filename is not None else error.strerror
         return _failed(1, what or str(error))
     except Exception as error:
         return _failed(1, f"internal error, please report it: {type(error).__name__}: {error}")
+
+
+def _run(argv: Sequence[str] | None) -> int:
+    try:
+        args = parser_of(COMMANDS).parse_args(argv)
+        args.run(args)
+    except SystemExit as exit_:  # --help, --version, wrong options
+        return int(exit_.code or 0)
     return 0
+
+
+def _drop_output() -> None:
+    """Throws away what standard output still buffers where it cannot be written: the interpreter would try again at its end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _failed(code: int, message: str) -> int:
