@@ -197,3 +197,16 @@ def test_ctrl_c_returns_within_a_fifth_of_a_second() -> None:
         with pytest.raises(KeyboardInterrupt):
             ga.identify(rec, ctl, settings=settings, workers=2)
         assert time.perf_counter() - sent[0] < 0.2
+
+
+def test_a_damped_shaft_is_named_as_the_better_mechanics() -> None:
+    drive = ga.TwoMass(JM=4e-4, DM=5e-4, JL=9e-4, DL=1e-4, KG=1.2, DG=0.004)
+    ctl = ga.PI(0.05, 0.8)
+    idn = ga.identify(closed(drive.model(), ctl, stairs(2000), 0.02), ctl, workers=1)
+    assert isinstance(idn.mechanics, ga.TwoMass) and idn.mechanics.with_shaft_damping is not None
+    assert any("with_shaft_damping" in w for w in idn.warnings)
+    damped = idn.mechanics.with_shaft_damping
+    assert abs(damped.JM - 4e-4) < 5.0 * damped.std["JM"]
+    undamped = ga.TwoMass(JM=4e-4, DM=5e-4, JL=9e-4, DL=1e-4, KG=1.2)
+    plain = ga.identify(closed(undamped.model(), ctl, stairs(2000), 0.02), ctl, workers=1)
+    assert not any("with_shaft_damping" in w for w in plain.warnings)

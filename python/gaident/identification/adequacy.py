@@ -57,6 +57,11 @@ class Adequacy:
                 "Do not trust the mechanical parameters; an effect that is not in the model bends them."
             )
         if self.undecided:
+            if not np.isfinite(self.excess):
+                return (
+                    "Undecided: the residual is coloured, and the measured velocity shows no noise at all. Is it a measurement, "
+                    "or a command or a simulation? Missing dynamics cannot be told from coloured noise here."
+                )
             return (
                 f"Undecided: the residual is coloured and {self.excess:.1f} times the noise on the measured velocity. "
                 "Coloured noise "

@@ -323,8 +323,25 @@ def _warnings(
         names = ", ".join(f"({r.p},{r.q})" for r in rivals)
         notes.append(f"Structures within {MARGIN:.0f} BIC units of ({model.p},{model.q}): {names}; the smallest is reported.")
     if mechanics is not None:
+        notes.extend(_shaft_notes(mechanics))
         notes.extend(mechanics.notes)
     return tuple(notes)
+
+
+def _shaft_notes(mechanics: OneMass | TwoMass) -> list[str]:
+    """A sentence where the six numbers of a two-mass model contradict a shaft without damping by more than three deviations."""
+    std = mechanics.std.get("inconsistency", 0.0)
+    found = mechanics.inconsistency or 0.0
+    if not isinstance(mechanics, TwoMass) or not std > 0.0 or found < 3.0 * std:
+        return []
+    damped = mechanics.with_shaft_damping
+    remedy = "an effect that the model lacks bends them; trust neither"
+    if damped is not None and damped.physical:
+        remedy = (
+            f"use mechanics.with_shaft_damping (JM = {damped.JM:.4g}, JL = {damped.JL:.4g}, KG = {damped.KG:.4g}, "
+            f"DG = {damped.DG:.3g}), or look for an effect that the model lacks"
+        )
+    return [f"The mechanics without shaft damping contradict the model by {100 * found:.2g} +- {100 * std:.2g} %: {remedy}."]
 
 
 def _checked_records(rec: Record | Sequence[Record], controller: PI | None) -> list[Record]:

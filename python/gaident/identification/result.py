@@ -67,7 +67,7 @@ class Structure:
     delta_bic: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Identification:
     """Structure, parameters and what they are worth. Made by `identify`; see API for each attribute.
 
@@ -97,6 +97,10 @@ class Identification:
     initial_states: Mapping[str, tuple[float, ...]] = field(hash=False)
     version: str = ""
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
+
+    def __repr__(self) -> str:
+        verdict = "falsified" if self.falsified else "undecided" if self.adequacy.undecided else "stands"
+        return f"<Identification ({self.p},{self.q}), fit {self.fit_percent:.2f} %, linear model {verdict}; see summary()>"
 
     @property
     def p(self) -> int:
