@@ -4,4 +4,5 @@ PYBIND11_MODULE(_core, m) {
     m.doc() = "The core of gaident: recurrences, genetic search and local fit. Use the package's own functions instead.";
     bind_simulate(m);
     bind_identify(m);
+    bind_effects(m);
 }

@@ -17,16 +17,19 @@ from gaident.identification import Estimate, Identification, SearchSpace, Settin
 from gaident.models import (
     PI,
     Discrete,
+    Effect,
     Model,
     OneMass,
     Run,
     TwoMass,
+    effects,
     factor_parameters,
     initial_state,
     mechanics_from_model,
     model_from_factor_parameters,
     run,
     simulate,
+    simulate_many,
 )
 
 if TYPE_CHECKING:
@@ -35,6 +38,7 @@ if TYPE_CHECKING:
 __all__ = [
     "PI",
     "Discrete",
+    "Effect",
     "Estimate",
     "GaidentError",
     "Identification",
@@ -46,6 +50,7 @@ __all__ = [
     "Settings",
     "TwoMass",
     "differentiate",
+    "effects",
     "factor_parameters",
     "identify",
     "initial_state",
@@ -56,6 +61,7 @@ __all__ = [
     "read_columns",
     "run",
     "simulate",
+    "simulate_many",
 ]
 
 

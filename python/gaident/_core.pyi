@@ -154,6 +154,61 @@ def discrete(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(alpha, beta) of equation (7), powers of z^-1."""
 
+def effect_table() -> list[tuple[str, str, str, tuple[tuple[str, str, float, float, float, bool], ...], bool, bool, str]]:
+    """(name, place, meaning, parameters, simulated, needs two masses, relation) of every effect."""
+
+def broken_relation(name: str, values: Sequence[float]) -> str:
+    """The relation between an effect's parameters that these values break, or ""."""
+
+class EffectModel:
+    """A linear drive and its effects: (name, parameters in the order of the table) each."""
+
+    def __init__(
+        self,
+        gain: float,
+        poles: NDArray[np.complex128],
+        zeros: NDArray[np.complex128],
+        effects: Sequence[tuple[str, Sequence[float]]],
+    ) -> None: ...
+
+class EffectRecord:
+    """A record and its loop, as models with effects are run against them; an empty position is integrated."""
+
+    def __init__(
+        self,
+        dt: float,
+        input: NDArray[np.float64],
+        position: NDArray[np.float64],
+        velocity: NDArray[np.float64],
+        start_angle: float,
+        loop: str,
+        kp: float,
+        ki: float,
+        torque_limit: float,
+        integrator_limit: float,
+    ) -> None: ...
+    def simulate(
+        self,
+        models: Sequence[EffectModel],
+        initial_states: NDArray[np.float64],
+        substeps: int,
+        workers: int,
+        all: bool,
+        kernel: str = "",
+        lanes: bool = True,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """(velocity, torque, angle), models x samples; the last two empty unless `all`. substeps 0: as needed."""
+    def simulate_values(
+        self,
+        values: NDArray[np.float64],
+        structure: tuple[int, ...],
+        effects: Sequence[str],
+        initial_states: NDArray[np.float64],
+        substeps: int,
+        workers: int,
+    ) -> NDArray[np.float64]:
+        """Velocities of models given as rows of natural parameters and effects' parameters."""
+
 def colour(rows: NDArray[np.float64], phi: Sequence[float]) -> NDArray[np.float64]:
     """F'^-1 of each row (parameters x samples): z(n) = rows(n) + sum phi_i z(n+i)."""
 

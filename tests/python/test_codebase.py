@@ -23,7 +23,9 @@ PACKAGE = ROOT / "python" / "gaident"
 CORE_ORDER = [
     *("rng", "arithmetic", "float_pair", "lanes", "denormals", "chromosome", "genome", "factors", "decode", "parameters"),
     *("delta", "bilinear", "held", "controller", "closed_loop", "loop", "record", "fitness", "kernels/"),
+    *("elementary", "effects/", "friction", "two_mass", "effect_constants", "effect_plant", "effect_loop", "effect_kernels/"),
     *("batch", "simulate", "linear", "refine", "settings", "operators", "breeder", "parallel", "species", "engine", "reference/"),
+    *("effect_prepare", "effect_batch"),
 ]
 
 # Python: what each room may import of gaident, beside itself, and what inside a function only. A room is a

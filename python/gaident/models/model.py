@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gaident import _core
 from gaident.errors import ModelError
 from gaident.models._checks import known_keys, real_number
 from gaident.models.controller import PI
-from gaident.models.roots import canonical_roots
+from gaident.models.effects import Effect, ordered
+from gaident.models.roots import canonical_roots, quadratic_roots
 
 Roots = Sequence[complex] | NDArray[np.complex128] | NDArray[np.float64]
 
@@ -52,6 +54,7 @@ class Model:
     gain    real, not 0; for p = 1 it is 1/J_M [1/(kg m^2)]
     poles   roots of the denominator [rad/s] (the paper's -A: a stable pole has a negative real part)
     zeros   roots of the numerator [rad/s] (the paper's -B), at most as many as poles
+    effects what the drive does beyond that, in the order of `gaident.effects.table()`; see `with_effect`
 
     Complex roots come in conjugate pairs, in any order; asymmetry by rounding (1e-9 relative) is repaired.
     They are kept in one order: real roots by ascending magnitude, then pairs by ascending magnitude, positive
@@ -61,8 +64,9 @@ class Model:
     gain: float
     poles: tuple[complex, ...]
     zeros: tuple[complex, ...]
+    effects: tuple[Effect, ...]
 
-    def __init__(self, gain: float, poles: Roots = (), zeros: Roots = ()) -> None:
+    def __init__(self, gain: float, poles: Roots = (), zeros: Roots = (), effects: Iterable[Effect] = ()) -> None:
         number = real_number(gain, "gain", ModelError, "give one finite real number, not 0")
         if number == 0.0:
             raise ModelError("gain is 0: such a model never moves; give one finite real number, not 0")
@@ -74,6 +78,74 @@ class Model:
                 f"zeros has {len(self.zeros)} roots and poles {len(self.poles)}: a drive has at "
                 "least as many poles as zeros; drop zeros or add poles"
             )
+        object.__setattr__(self, "effects", self._checked(effects))
+
+    def with_effect(self, name: str, **parameters: float) -> Model:
+        """The same drive with one more effect, in place of one of the same name; see `gaident.effects.table()`.
+
+        Parameters by name, SI units. Raises ModelError for an unknown effect, unknown or missing parameters,
+        values outside their physical bounds, and where the model cannot carry it: p = 0; backlash and
+        hardening_stiffness without the structure of two masses (p = 1, q = 2) or together with extra_resonance.
+        """
+        return self._with((*self.effects, Effect(name, parameters)))
+
+    def without_effect(self, name: str) -> Model:
+        """The same drive without this effect; raises ModelError where it has none of that name."""
+        rest = tuple(effect for effect in self.effects if effect.name != name)
+        if len(rest) == len(self.effects):
+            names = ", ".join(effect.name for effect in self.effects) or "none"
+            raise ModelError(f"the model has no effect {name!r}: its effects are {names}")
+        return self._with(rest)
+
+    @property
+    def linear(self) -> Model:
+        """The linear drive: without effects, but with extra_resonance, which is linear, in its poles and zeros."""
+        if not self.effects:
+            return self
+        base = self._with(())
+        for effect in self.effects:
+            if effect.name == "extra_resonance":
+                wp, zp, wz, zz = effect.values
+                poles = [*base.poles, *quadratic_roots(2.0 * zp * wp, wp * wp)]
+                zeros = [*base.zeros, *quadratic_roots(2.0 * zz * wz, wz * wz)]
+                return Model(base.gain * (wp / wz) ** 2, poles, zeros)
+        return base
+
+    def _with(self, effects: tuple[Effect, ...]) -> Model:
+        model = object.__new__(Model)
+        for name in ("gain", "poles", "zeros"):
+            object.__setattr__(model, name, getattr(self, name))
+        object.__setattr__(model, "effects", model._checked(effects))
+        return model
+
+    def _checked(self, effects: Iterable[Effect]) -> tuple[Effect, ...]:
+        found = ordered(effects)
+        names = {effect.name for effect in found}
+        if found and self.p == 0:
+            raise ModelError(
+                f"the model has p = 0 (as many zeros as poles) and cannot carry {found[0].name}: effects need a drive "
+                "with inertia; use a model with more poles than zeros"
+            )
+        for effect in found:
+            if effect.row.needs_two_masses and (self.p, self.q) != (1, 2):
+                raise ModelError(
+                    f"the model has p = {self.p}, q = {self.q}, but {effect.name} acts between two masses: use a model "
+                    "with p = 1 and q = 2, for example TwoMass(...).model()"
+                )
+            if effect.row.needs_two_masses and "extra_resonance" in names:
+                raise ModelError(
+                    f"{effect.name} and extra_resonance cannot be simulated together: take one of them out with without_effect"
+                )
+        return found
+
+    def _require_linear(self, what: str) -> None:
+        if self.effects:
+            names = ", ".join(effect.name for effect in self.effects)
+            raise ModelError(f"{what} is of a linear model, and this one has effects ({names}): use model.linear")
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The core's object is not part of the value.
+        return {name: value for name, value in self.__dict__.items() if name != "_core_model"}
 
     @property
     def p(self) -> int:
@@ -120,6 +192,7 @@ class Model:
 
     def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
         """G(j omega), complex, of the shape of `omega` [rad/s]; not finite where j omega is a pole."""
+        self._require_linear("frequency_response")
         s = 1j * np.asarray(omega, dtype=np.float64)
         response = np.full(s.shape, complex(self.gain))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -135,20 +208,26 @@ class Model:
 
         Bilinear or held as the controller's loop says, its limits left out (the equation is linear); without
         a controller from torque to velocity by zero-order hold. Raises ModelError (dt; p = 0 in a sampled
-        loop).
+        loop; a model with effects).
         """
+        self._require_linear("discrete")
         from gaident.models.simulate import discrete
 
         return discrete(self, dt, controller)
 
     def to_scipy(self) -> Any:
-        """The same as scipy.signal.ZerosPolesGain (an lti system)."""
+        """The same as scipy.signal.ZerosPolesGain (an lti system); raises ModelError for a model with effects."""
+        self._require_linear("to_scipy")
         from scipy import signal
 
         return signal.ZerosPolesGain(list(self.zeros), list(self.poles), self.gain)
 
     def to_control(self) -> Any:
-        """The same as a control.TransferFunction; raises ImportError with the way to get python-control."""
+        """The same as a control.TransferFunction.
+
+        Raises ImportError with the way to get python-control, ModelError for a model with effects.
+        """
+        self._require_linear("to_control")
         try:
             import control
         except ImportError as reason:
@@ -156,22 +235,42 @@ class Model:
         return control.zpk(list(self.zeros), list(self.poles), self.gain)
 
     def to_dict(self) -> dict[str, Any]:
-        """The model for JSON: {"gain": K, "poles": [[re, im], ...], "zeros": [[re, im], ...]}."""
-        return {
+        """The model for JSON: {"gain": K, "poles": [[re, im], ...], "zeros": [[re, im], ...], "effects": [...]}.
+
+        A model without effects has no key "effects".
+        """
+        data: dict[str, Any] = {
             "gain": self.gain,
             "poles": [[r.real, r.imag] for r in self.poles],
             "zeros": [[r.real, r.imag] for r in self.zeros],
         }
+        if self.effects:
+            data["effects"] = [effect.to_dict() for effect in self.effects]
+        return data
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Model:
         """The inverse of `to_dict`; a real root may be written as one number."""
-        names = ("gain", "poles", "zeros")
+        names = ("gain", "poles", "zeros", "effects")
         values: dict[str, Any] = known_keys(data, "the model", names, ("gain",), ModelError)
-        return cls(values["gain"], _roots_of(values, "poles"), _roots_of(values, "zeros"))
+        effects = values.get("effects", ())
+        if not isinstance(effects, (list, tuple)):
+            raise ModelError(f"effects is {effects!r}: give a list of {{'name': ..., 'parameters': {{...}}}}")
+        found = [Effect.from_dict(entry) for entry in effects]
+        return cls(values["gain"], _roots_of(values, "poles"), _roots_of(values, "zeros"), found)
 
     def __repr__(self) -> str:
-        return f"Model(gain={self.gain!r}, poles={_list(self.poles)}, zeros={_list(self.zeros)})"
+        effects = f", effects={list(self.effects)!r}" if self.effects else ""
+        return f"Model(gain={self.gain!r}, poles={_list(self.poles)}, zeros={_list(self.zeros)}{effects})"
+
+    def core(self) -> _core.EffectModel:
+        """The model as the core takes it, made once."""
+        made: _core.EffectModel | None = self.__dict__.get("_core_model")
+        if made is None:
+            poles, zeros = (np.array(roots, dtype=np.complex128) for roots in (self.poles, self.zeros))
+            made = _core.EffectModel(self.gain, poles, zeros, [(effect.name, effect.values) for effect in self.effects])
+            object.__setattr__(self, "_core_model", made)
+        return made
 
 
 def _list(roots: tuple[complex, ...]) -> str:

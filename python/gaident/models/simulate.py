@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,21 +14,23 @@ from gaident.data.record import Record
 from gaident.errors import ModelError, RecordError
 from gaident.models._checks import one_of, real_number
 from gaident.models.controller import PI
+from gaident.models.factors import Structure
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Discrete, Model
 
 Signal = NDArray[np.float64]
 AnyModel = Model | OneMass | TwoMass
 ARITHMETICS = ("double", "float")
+MAX_SUBSTEPS = 64
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
     """A simulated run, arrays of the record's length."""
 
-    velocity: Signal  # rad/s
+    velocity: Signal  # rad/s, as the sensor shows it
     torque: Signal  # N m, as the controller issues it; the record's torque in the open loop
-    position: Signal  # rad, integral of velocity from the record's first position or 0
+    position: Signal  # rad, the motor's true angle from the record's first position or 0
 
 
 def simulate(
@@ -37,9 +40,10 @@ def simulate(
     initial_state: ArrayLike | None = None,
     *,
     arithmetic: str = "double",
+    substeps: int | None = None,
 ) -> Signal:
     """The model's velocity [rad/s] for the record, an array like `rec.velocity`; see `run`."""
-    return _simulated(model, rec, controller, initial_state, arithmetic)[0]
+    return _simulated(model, rec, controller, initial_state, arithmetic, substeps)[0]
 
 
 def run(
@@ -49,6 +53,7 @@ def run(
     initial_state: ArrayLike | None = None,
     *,
     arithmetic: str = "double",
+    substeps: int | None = None,
 ) -> Run:
     """The model's answer to the record: its velocity, torque and position.
 
@@ -57,13 +62,16 @@ def run(
     initial_state  None: at rest; otherwise what `gaident.models.initial_state` gives: p + q numbers of the
                    plant, the first of them the velocity [rad/s] before the first input acts; with a
                    controller one more, its stored torque [N m]
-    arithmetic     "double", or "float" for 32-bit arithmetic (within 1e-4 of the response)
+    arithmetic     "double", or "float" for 32-bit arithmetic (within 1e-4 of the response; models without effects)
+    substeps       steps per sample of a model with effects, 1..64; None: as many as it needs
 
     A model that diverges gives infinite or undefined values, no error. Raises RecordError where the record
     lacks the input, ModelError for p = 0 outside the continuous loop and for an initial state of the wrong
     length.
     """
-    velocity, torque = _simulated(model, rec, controller, initial_state, arithmetic)
+    velocity, torque, angle = _simulated(model, rec, controller, initial_state, arithmetic, substeps)
+    if angle is not None:
+        return Run(velocity, torque, angle)
     start = 0.0 if rec.position is None else float(rec.position[0])
     with np.errstate(invalid="ignore", over="ignore"):
         steps = 0.5 * rec.dt * (velocity[1:] + velocity[:-1])
@@ -76,10 +84,11 @@ def initial_state(model: AnyModel, rec: Record, controller: PI | None = None) ->
 
     The response is the one from rest plus the state's own, which is linear in it. Returns p + q numbers, with
     a controller one more, for the argument `initial_state` of `simulate` and `run`; states that the record
-    does not show are kept smallest. Raises ModelError for a controller with limits (the loop is then not
-    linear) and where the model diverges, RecordError where the record lacks the input.
+    does not show are kept smallest. Of a model with effects the linear part is taken. Raises ModelError for a
+    controller with limits (the loop is then not linear) and where the model diverges, RecordError where the
+    record lacks the input.
     """
-    plant = _as_model(model)
+    plant = _as_model(model).linear
     if controller is not None and controller.limited:
         raise ModelError(
             "the controller has a torque_limit or integrator_limit: with limits the response is "
@@ -111,40 +120,128 @@ def discrete(model: AnyModel, dt: float, controller: PI | None = None) -> Discre
     sample_time = real_number(dt, "dt", ModelError, "give the sample time in s, > 0")
     if sample_time <= 0.0:
         raise ModelError(f"dt is {sample_time:g}: give the sample time in s, > 0")
-    _require_strictly_proper(plant, controller)
-    loop, kp, ki = "open", 0.0, 0.0
-    if controller is not None:
-        loop, kp, ki = controller.loop, controller.kp, controller.ki
+    _require_strictly_proper(plant.p, controller)
+    loop, kp, ki, _, _ = _loop(controller)
     alpha, beta = _core.discrete(plant.gain, _roots(plant.poles), _roots(plant.zeros), sample_time, loop, kp, ki)
     return Discrete(alpha, beta)
 
 
+def simulate_many(
+    models: Sequence[AnyModel],
+    rec: Record,
+    controller: PI | None = None,
+    *,
+    initial_states: ArrayLike | None = None,
+    substeps: int | None = None,
+    workers: int = 1,
+) -> Signal:
+    """Velocities [rad/s] of many models for one record, shape (len(models), len(rec)).
+
+    Each row is what `simulate` gives for its model; models of one structure with the same effects run side by
+    side. initial_states: (len(models), states), see `run`; then all models have the same number of states.
+    Raises as `run` does.
+    """
+    plants = [_as_model(model) for model in models]
+    source, starts = None, np.zeros((0, 0))
+    for structure in {(plant.p, plant.q): plant for plant in plants}.values():
+        source, _ = _input(structure, rec, controller)
+    if source is None:
+        return np.zeros((0, len(rec)))
+    if initial_states is not None:
+        starts = np.array(initial_states, dtype=np.float64)
+        if starts.ndim != 2 or len(starts) != len(plants):
+            raise ModelError(f"initial_states has the shape {starts.shape}: give one row per model, {len(plants)}")
+        for i, plant in enumerate(plants):
+            _check_start(plant, controller, starts[i], "command" if controller is not None else "torque")
+    record = _core_record(rec, source, controller)
+    return record.simulate([plant.core() for plant in plants], starts, _steps(substeps), workers, False)[0]
+
+
+def simulate_values(
+    structure: Structure,
+    effects: Sequence[str],
+    values: ArrayLike,
+    rec: Record,
+    controller: PI | None = None,
+    *,
+    initial_states: ArrayLike | None = None,
+    substeps: int | None = None,
+    workers: int = 1,
+) -> Signal:
+    """`simulate_many` for models given as numbers, shape (len(values), len(rec)): the inner loop of a fit.
+
+    A row of `values` holds the natural parameters of the linear part in the order of `factor_parameters`, then
+    those of each effect named, in the order of `gaident.effects.table()`. Values are not checked against their
+    bounds: what makes no drive gives undefined numbers. Raises ModelError for a wrong shape or unknown names.
+    """
+    table = np.ascontiguousarray(values, dtype=np.float64)
+    source, _ = _input_for(structure.p, rec, controller)
+    starts = np.zeros((0, 0)) if initial_states is None else np.ascontiguousarray(initial_states, dtype=np.float64)
+    record = _core_record(rec, source, controller)
+    try:
+        return record.simulate_values(table, tuple(structure), list(effects), starts, _steps(substeps), workers)
+    except ValueError as reason:
+        raise ModelError(str(reason)) from None
+
+
 def _simulated(
-    model: AnyModel, rec: Record, controller: PI | None, state: ArrayLike | None, arithmetic: str
-) -> tuple[Signal, Signal]:
+    model: AnyModel, rec: Record, controller: PI | None, state: ArrayLike | None, arithmetic: str, substeps: int | None
+) -> tuple[Signal, Signal, Signal | None]:
+    """(velocity, torque, angle); a model without effects has no angle of its own."""
     plant = _as_model(model)
     one_of(arithmetic, "arithmetic", ARITHMETICS, ModelError)
     source, what = _input(plant, rec, controller)
-    size = plant.order + (controller is not None)
     start = np.zeros(0) if state is None else np.array(state, dtype=np.float64)
-    if state is not None and start.shape != (size,):
+    if state is not None:
+        _check_start(plant, controller, start, what)
+    steps = _steps(substeps)
+    if not plant.effects:
+        return *_core_simulate(plant, rec.dt, source, controller, start, arithmetic), None
+    if arithmetic != "double":
+        raise ModelError(f'arithmetic is {arithmetic!r}: a model with effects is simulated in "double" only')
+    starts = start.reshape(1, -1) if state is not None else np.zeros((0, 0))
+    found = _core_record(rec, source, controller).simulate([plant.core()], starts, steps, 1, True)
+    velocity, torque, angle = (signal[0] for signal in found)
+    return velocity, torque, angle
+
+
+def _steps(substeps: int | None) -> int:
+    if substeps is None:
+        return 0
+    if isinstance(substeps, bool) or not isinstance(substeps, int) or not 1 <= substeps <= MAX_SUBSTEPS:
+        raise ModelError(f"substeps is {substeps!r}: give a whole number from 1 to {MAX_SUBSTEPS}, or None for as many as needed")
+    return substeps
+
+
+def _core_record(rec: Record, source: Signal, controller: PI | None) -> _core.EffectRecord:
+    loop, kp, ki, torque_limit, integrator_limit = _loop(controller)
+    position = np.zeros(0) if rec.position is None else rec.position
+    start = 0.0 if rec.position is None else float(rec.position[0])
+    return _core.EffectRecord(rec.dt, source, position, rec.velocity, start, loop, kp, ki, torque_limit, integrator_limit)
+
+
+def _loop(controller: PI | None) -> tuple[str, float, float, float, float]:
+    if controller is None:
+        return "open", 0.0, 0.0, math.inf, math.inf
+    return controller.loop, controller.kp, controller.ki, *controller.limits
+
+
+def _check_start(plant: Model, controller: PI | None, start: Signal, what: str) -> None:
+    extra = 2 * any(effect.name == "extra_resonance" for effect in plant.effects)
+    size = plant.order + extra + (controller is not None)
+    if start.shape != (size,):
         raise ModelError(
             f"initial_state has the shape {start.shape}: this model driven by the {what} has "
             f"{size} states; use gaident.models.initial_state(model, rec, controller)"
         )
     if not np.all(np.isfinite(start)):
         raise ModelError(f"initial_state is {start}: every number must be finite")
-    return _core_simulate(plant, rec.dt, source, controller, start, arithmetic)
 
 
 def _core_simulate(
     plant: Model, dt: float, source: Signal, controller: PI | None, start: Signal, arithmetic: str
 ) -> tuple[Signal, Signal]:
-    if controller is None:
-        loop, kp, ki, torque_limit, integrator_limit = "open", 0.0, 0.0, math.inf, math.inf
-    else:
-        loop, kp, ki = controller.loop, controller.kp, controller.ki
-        torque_limit, integrator_limit = controller.limits
+    loop, kp, ki, torque_limit, integrator_limit = _loop(controller)
     return _core.simulate(
         plant.gain,
         _roots(plant.poles),
@@ -167,9 +264,13 @@ def _roots(roots: tuple[complex, ...]) -> NDArray[np.complex128]:
 
 def _input(plant: Model, rec: Record, controller: PI | None) -> tuple[Signal, str]:
     """What drives the simulation, and its name; raises where record, model and loop do not fit together."""
+    return _input_for(plant.p, rec, controller)
+
+
+def _input_for(p: int, rec: Record, controller: PI | None) -> tuple[Signal, str]:
     if not isinstance(rec, Record):
         raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record")
-    _require_strictly_proper(plant, controller)
+    _require_strictly_proper(p, controller)
     if controller is not None:
         if rec.command is None:
             raise RecordError(
@@ -185,8 +286,8 @@ def _input(plant: Model, rec: Record, controller: PI | None) -> tuple[Signal, st
     return np.ascontiguousarray(rec.torque, dtype=np.float64), "torque"
 
 
-def _require_strictly_proper(plant: Model, controller: PI | None) -> None:
-    if plant.p == 0 and (controller is None or controller.loop != "continuous"):
+def _require_strictly_proper(p: int, controller: PI | None) -> None:
+    if p == 0 and (controller is None or controller.loop != "continuous"):
         where = "the sampled loop" if controller is not None else "an open loop"
         raise ModelError(
             f"the model has p = 0 (as many zeros as poles), which does not exist in {where}: "

@@ -1,0 +1,191 @@
+#include "../gaident/effect_batch.hpp"
+#include "bindings.hpp"
+
+using namespace gaident;
+
+namespace {
+
+const char* name_of(Place place) {
+    switch (place) {
+        case Place::shaft: return "shaft";
+        case Place::coupling: return "coupling";
+        case Place::actuator: return "actuator";
+        case Place::controller: return "controller";
+        case Place::sensor: return "sensor";
+        case Place::plant: return "plant";
+        case Place::record: return "record";
+    }
+    return "";
+}
+
+py::list table() {
+    py::list rows;
+    for (const EffectInfo& info : effect_table) {
+        py::list parameters;
+        for (int i = 0; i < info.parameters(); ++i) {
+            const EffectParameter& p = info.parameter[i];
+            parameters.append(py::make_tuple(p.name, p.unit, p.neutral, p.lowest, p.highest, p.above_lowest));
+        }
+        rows.append(py::make_tuple(info.name, name_of(info.place), info.meaning, py::tuple(parameters), info.simulated,
+                                   info.needs_two_masses, info.relation));
+    }
+    return rows;
+}
+
+Effect effect_named(const std::string& name) {
+    for (int i = 0; i < effect_count; ++i)
+        if (name == effect_table[static_cast<std::size_t>(i)].name && effect_table[static_cast<std::size_t>(i)].simulated)
+            return static_cast<Effect>(i);
+    throw std::invalid_argument("effects: '" + name + "' is no effect that can be simulated");
+}
+
+const EffectInfo& info_of(Effect e) { return effect_table[static_cast<std::size_t>(e)]; }
+
+// The relation that these parameters break, or nothing.
+std::string broken_relation(const std::string& name, const std::vector<double>& values) {
+    const EffectInfo& info = info_of(effect_named(name));
+    if (static_cast<int>(values.size()) != info.parameters()) throw std::invalid_argument("values: wrong number of parameters");
+    return info.allowed == nullptr || info.allowed(values.data()) ? "" : info.relation;
+}
+
+void check_structure(Structure s, EffectSet effects) {
+    if (effects.bits == 0) return;
+    if (s.p < 1) throw std::invalid_argument("poles: a model with effects needs more poles than zeros");
+    if (effects.has_any(Effect::backlash, Effect::hardening_stiffness) && !(s == Structure{1, 2}))
+        throw std::invalid_argument("effects: backlash and hardening_stiffness need two masses, p = 1 and q = 2");
+    if (effects.has_any(Effect::backlash, Effect::hardening_stiffness) && effects.has(Effect::extra_resonance))
+        throw std::invalid_argument("effects: extra_resonance does not go together with backlash or hardening_stiffness");
+}
+
+EffectModel make_model(double gain, const ComplexArray& poles, const ComplexArray& zeros,
+                       const std::vector<std::pair<std::string, std::vector<double>>>& effects) {
+    EffectModel m;
+    m.linear = make_factors(gain, poles, zeros);
+    for (const auto& [name, values] : effects) {
+        const Effect e = effect_named(name);
+        if (static_cast<int>(values.size()) != info_of(e).parameters())
+            throw std::invalid_argument("effects: '" + name + "' has another number of parameters");
+        m.add(e, values.data());
+    }
+    check_structure(m.linear.structure, m.effects);
+    return m;
+}
+
+// Natural parameters as gaident.models.factors has them: gain, real poles, (e1, e0) of pole pairs, the same for zeros.
+Factors<double> factors_of(const double* x, int real_poles, int pole_pairs, int real_zeros, int zero_pairs) {
+    Factors<double> f;
+    const int poles = real_poles + 2 * pole_pairs, zeros = real_zeros + 2 * zero_pairs;
+    f.structure = {poles - zeros, zeros};
+    f.gain = *x++;
+    const auto gather = [&x](int reals, int pairs, Pair<double>* pair, double& single) {
+        const double* const real = x;
+        x += reals;
+        int n = 0;
+        for (int i = 0; i < pairs; ++i, x += 2) pair[n++] = {x[0], x[1]};
+        for (int i = 0; i + 1 < reals; i += 2) pair[n++] = real_pair(real[i], real[i + 1]);
+        if (reals % 2 != 0) single = real[reals - 1];
+    };
+    gather(real_poles, pole_pairs, f.pole_pair, f.pole);
+    gather(real_zeros, zero_pairs, f.zero_pair, f.zero);
+    return f;
+}
+
+struct PyRecord {
+    double dt;
+    RealArray input, position, velocity;
+    EffectJob job;
+
+    PyRecord(double sample_time, RealArray in, RealArray measured_position, const RealArray& measured_velocity, double start_angle,
+             const std::string& loop, double kp, double ki, double torque_limit, double integrator_limit)
+        : dt(sample_time), input(std::move(in)), position(std::move(measured_position)), velocity(measured_velocity) {
+        if (position.size() != 0 && position.size() != input.size())
+            throw std::invalid_argument("position: as many samples as the input are needed");
+        job.record.input = view(input);
+        job.record.position = view(position);
+        job.record.sample_time = dt;
+        job.record.start_angle = start_angle;
+        for (const double w : view(velocity)) job.record.top_speed = std::max(job.record.top_speed, std::abs(w));
+        job.loop = make_loop(loop, kp, ki, torque_limit, integrator_limit);
+    }
+};
+
+py::tuple simulate_models(const PyRecord& record, const std::vector<EffectModel>& models, const RealArray& initial_states, int substeps,
+                          int workers, bool all, const std::string& kernel, bool lanes) {
+    EffectJob job = record.job;
+    if (substeps < 0 || substeps > max_substeps) throw std::invalid_argument("substeps: 0 (as needed) to 64");
+    job.substeps = substeps;
+    job.workers = workers;
+    job.lanes = lanes;
+    if (!kernel.empty()) {
+        job.kernel = effects_named(kernel.c_str());
+        if (job.kernel == nullptr) throw std::invalid_argument("kernel: '" + kernel + "' is not available on this machine");
+    }
+    const std::size_t count = models.size(), samples = static_cast<std::size_t>(record.input.size());
+    std::vector<const double*> starts;
+    if (initial_states.size() != 0) {
+        if (initial_states.ndim() != 2 || static_cast<std::size_t>(initial_states.shape(0)) != count)
+            throw std::invalid_argument("initial_states: one row per model is needed");
+        for (std::size_t i = 0; i < count; ++i) {
+            const int states = start_states(reduced(models[i]).linear.structure, job.loop);
+            if (initial_states.shape(1) != states)
+                throw std::invalid_argument("initial_states: " + std::to_string(initial_states.shape(1)) + " numbers given, " +
+                                            std::to_string(states) + " needed");
+            starts.push_back(initial_states.data() + static_cast<py::ssize_t>(i) * initial_states.shape(1));
+        }
+    }
+    if (job.loop.kind != LoopKind::continuous)
+        for (const EffectModel& m : models)
+            if (m.linear.structure.p < 1)
+                throw std::invalid_argument("poles: a model without more poles than zeros exists only in the continuous loop");
+    const std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(count), static_cast<py::ssize_t>(samples)};
+    RealArray velocity(shape), torque(all ? shape : std::vector<py::ssize_t>{0, 0}), angle(all ? shape : std::vector<py::ssize_t>{0, 0});
+    const EffectOutputs out{velocity.mutable_data(), all ? torque.mutable_data() : nullptr, all ? angle.mutable_data() : nullptr};
+    {
+        const py::gil_scoped_release release;
+        simulate_effects(job, models, starts, out);
+    }
+    return py::make_tuple(velocity, torque, angle);
+}
+
+py::array simulate_values(const PyRecord& record, const RealArray& values, const std::tuple<int, int, int, int>& structure,
+                          const std::vector<std::string>& effects, const RealArray& initial_states, int substeps, int workers) {
+    const auto [real_poles, pole_pairs, real_zeros, zero_pairs] = structure;
+    const int factors = 1 + real_poles + 2 * pole_pairs + real_zeros + 2 * zero_pairs;
+    std::vector<Effect> chosen;
+    int columns = factors;
+    for (const std::string& name : effects) {
+        chosen.push_back(effect_named(name));
+        columns += info_of(chosen.back()).parameters();
+    }
+    if (values.ndim() != 2 || values.shape(1) != columns)
+        throw std::invalid_argument("values: rows of " + std::to_string(columns) + " numbers are needed");
+    std::vector<EffectModel> models(static_cast<std::size_t>(values.shape(0)));
+    const double* x = values.data();
+    for (EffectModel& m : models) {
+        m.linear = factors_of(x, real_poles, pole_pairs, real_zeros, zero_pairs);
+        x += factors;
+        for (const Effect e : chosen) {
+            m.add(e, x);
+            x += info_of(e).parameters();
+        }
+        check_structure(m.linear.structure, m.effects);
+    }
+    return simulate_models(record, models, initial_states, substeps, workers, false, "", true)[0];
+}
+
+}  // namespace
+
+void bind_effects(py::module_& m) {
+    m.def("effect_table", &table);
+    m.def("broken_relation", &broken_relation, py::arg("name"), py::arg("values"));
+    py::class_<EffectModel>(m, "EffectModel")
+        .def(py::init(&make_model), py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("effects"));
+    py::class_<PyRecord>(m, "EffectRecord")
+        .def(py::init<double, RealArray, RealArray, const RealArray&, double, const std::string&, double, double, double, double>(),
+             py::arg("dt"), py::arg("input"), py::arg("position"), py::arg("velocity"), py::arg("start_angle"), py::arg("loop"),
+             py::arg("kp"), py::arg("ki"), py::arg("torque_limit"), py::arg("integrator_limit"))
+        .def("simulate", &simulate_models, py::arg("models"), py::arg("initial_states"), py::arg("substeps"), py::arg("workers"),
+             py::arg("all"), py::arg("kernel") = "", py::arg("lanes") = true)
+        .def("simulate_values", &simulate_values, py::arg("values"), py::arg("structure"), py::arg("effects"),
+             py::arg("initial_states"), py::arg("substeps"), py::arg("workers"));
+}

@@ -1,0 +1,21 @@
+#include "effect_kernels.hpp"
+
+namespace gaident {
+
+namespace {
+struct Isa_effects_baseline {
+    static constexpr int register_bytes = 16;
+};
+
+void run(const EffectRun& run, const double* constants) {
+    using L = Lanes<double, static_cast<int>(effect_lanes), Isa_effects_baseline>;
+    run_effects<L>(run, load_constants<L>(constants));
+}
+}  // namespace
+
+const EffectKernel& baseline_effects() {
+    static const EffectKernel kernel{"baseline", run};
+    return kernel;
+}
+
+}  // namespace gaident

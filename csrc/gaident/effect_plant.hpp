@@ -1,0 +1,87 @@
+// The mechanism behind a zero-order hold of one substep, asked twice: which velocity w+ a torque would bring, then to move, under the total
+// torque, to the velocity that friction left.
+#pragma once
+
+#include "effect_constants.hpp"
+
+namespace gaident {
+
+// Any linear plant, in the delta observer form of closed_loop.hpp; N its order, -1 where it is known only at run time.
+template <class R, int N>
+struct ObserverPlant {
+    static constexpr int capacity = N >= 0 ? N : max_plant_order;
+    R a[capacity], b[capacity + 1], x[capacity];
+    int order;
+
+    ObserverPlant(const EffectConstants<R>& c, int n) : order(N >= 0 ? N : n) {
+        for (int i = 0; i < order; ++i) a[i] = c.a[i];
+        for (int i = 0; i <= order; ++i) b[i] = c.b[i];
+        for (int i = 0; i < order; ++i) x[i] = c.x[i];
+    }
+
+    [[gnu::always_inline]] R velocity() const { return x[0]; }
+    [[gnu::always_inline]] R beta() const { return b[1]; }
+
+    [[gnu::always_inline]] R free_velocity(R T, R) {
+        const int n = N >= 0 ? N : order;
+        const R own = n > 1 ? x[0] + x[1] : x[0];
+        return (own + b[1] * T) - a[0] * x[0];
+    }
+
+    [[gnu::always_inline]] void move(R T, R w_next) {
+        const int n = N >= 0 ? N : order;
+        const R w = x[0];
+        for (int i = 1; i + 1 < n; ++i) x[i] = ((x[i] + x[i + 1]) + b[i + 1] * T) - a[i] * w;
+        if (n > 1) x[n - 1] = (x[n - 1] + b[n] * T) - a[n - 1] * w;
+        x[0] = w_next;
+    }
+};
+
+// Two masses with a nonlinear coupling: its correction held over the substep is the mean of the values at both ends, the one at the end
+// predicted with the old value and the friction of the substep before (second order).
+template <class R>
+struct TwoMassPlant {
+    R phi[3][3], motor[3], coupling[3];
+    R KG, DG, per_scale, half_gap, cubic;
+    R x[3];  // w_M, w_L, psi
+    R correction = R(0.0);
+
+    TwoMassPlant(const EffectConstants<R>& c, int) : KG(c.KG), DG(c.DG), per_scale(c.per_scale), half_gap(c.half_gap), cubic(c.cubic) {
+        for (int i = 0; i < 3; ++i) {
+            for (int j = 0; j < 3; ++j) phi[i][j] = c.phi[i][j];
+            motor[i] = c.motor[i];
+            coupling[i] = c.coupling[i];
+            x[i] = c.x[i];
+        }
+    }
+
+    [[gnu::always_inline]] R velocity() const { return x[0]; }
+    [[gnu::always_inline]] R beta() const { return motor[0]; }
+
+    [[gnu::always_inline]] R correction_at(R w_M, R w_L, R psi) const {
+        const R twist = psi * per_scale;
+        const R play = Backlash::correction(half_gap, KG, DG, twist, w_M - w_L);
+        return play + HardeningStiffness::correction(cubic, twist - clamp(twist, -half_gap, half_gap));
+    }
+
+    [[gnu::always_inline]] R linear(int i, R T) const {
+        return (x[i] + motor[i] * T) + ((phi[i][0] * x[0] + phi[i][1] * x[1]) + phi[i][2] * x[2]);
+    }
+
+    [[gnu::always_inline]] R free_velocity(R T, R friction_before) {
+        const R now = correction_at(x[0], x[1], x[2]), T_total = T - friction_before;
+        const R then = correction_at(linear(0, T_total) + coupling[0] * now, linear(1, T_total) + coupling[1] * now,
+                                     linear(2, T_total) + coupling[2] * now);
+        correction = (now + then) * R(0.5);
+        return linear(0, T) + coupling[0] * correction;
+    }
+
+    [[gnu::always_inline]] void move(R T, R w_next) {
+        const R w_L = linear(1, T) + coupling[1] * correction, psi = linear(2, T) + coupling[2] * correction;
+        x[0] = w_next;
+        x[1] = w_L;
+        x[2] = psi;
+    }
+};
+
+}  // namespace gaident

@@ -1,0 +1,128 @@
+// Elementary functions for the sample loop, the same lines for double and for Lanes, so that both give the same bits on every machine:
+// comparisons as selections, rounding, exponential and sine by polynomials (no libm), the square root by the processor (correctly rounded).
+#pragma once
+
+#include "lanes.hpp"
+
+#include <bit>
+#include <cstdint>
+
+namespace gaident {
+
+// How many candidates a number stands for, and how they lie in memory.
+template <class R>
+struct Pack;
+
+template <>
+struct Pack<double> {
+    static constexpr int width = 1;
+    [[gnu::always_inline]] static inline double load(const double* p) { return *p; }
+    [[gnu::always_inline]] static inline void store(double x, double* p) { *p = x; }
+};
+
+template <int W, class Isa>
+struct Pack<Lanes<double, W, Isa>> {
+    static constexpr int width = W;
+    [[gnu::always_inline]] static inline Lanes<double, W, Isa> load(const double* p) { return Lanes<double, W, Isa>::load(p); }
+    [[gnu::always_inline]] static inline void store(const Lanes<double, W, Isa>& x, double* p) { x.store(p); }
+};
+
+// x where a > b, else y
+[[gnu::always_inline]] inline double greater(double a, double b, double x, double y) { return a > b ? x : y; }
+
+template <class T, int W, class Isa>
+[[gnu::always_inline]] inline Lanes<T, W, Isa> greater(const Lanes<T, W, Isa>& a, const Lanes<T, W, Isa>& b,
+                                                       const Lanes<T, W, Isa>& x, const Lanes<T, W, Isa>& y) {
+    using L = Lanes<T, W, Isa>;
+    L r;
+#pragma GCC unroll 8
+    for (int i = 0; i < L::registers; ++i) r.v[i] = typename L::Register(a.v[i] > b.v[i] ? x.v[i] : y.v[i]);
+    return r;
+}
+
+template <class R>
+[[gnu::always_inline]] inline R minimum(R a, R b) {
+    return greater(a, b, b, a);
+}
+template <class R>
+[[gnu::always_inline]] inline R maximum(R a, R b) {
+    return greater(a, b, a, b);
+}
+template <class R>
+[[gnu::always_inline]] inline R absolute(R x) {
+    return greater(x, R(0.0), x, R(0.0) - x);
+}
+
+[[gnu::always_inline]] inline double square_root(double x) { return __builtin_sqrt(x); }
+
+template <int W, class Isa>
+[[gnu::always_inline]] inline Lanes<double, W, Isa> square_root(const Lanes<double, W, Isa>& x) {
+    alignas(64) double v[W];
+    x.store(v);
+    for (int i = 0; i < W; ++i) v[i] = __builtin_sqrt(v[i]);
+    return Lanes<double, W, Isa>::load(v);
+}
+
+namespace detail {
+
+inline constexpr double round_magic = 6755399441055744.0;  // 1.5 * 2^52: adding it leaves the nearest integer in the low bits
+
+// x * 2^k, where `shifted` is round_magic + k; no overflow is looked after
+[[gnu::always_inline]] inline double scaled(double x, double shifted) {
+    return std::bit_cast<double>(std::bit_cast<std::uint64_t>(x) + (std::bit_cast<std::uint64_t>(shifted) << 52U));
+}
+
+template <int W, class Isa>
+[[gnu::always_inline]] inline Lanes<double, W, Isa> scaled(const Lanes<double, W, Isa>& x, const Lanes<double, W, Isa>& shifted) {
+    using L = Lanes<double, W, Isa>;
+    typedef unsigned long long Bits __attribute__((vector_size(Isa::register_bytes)));
+    L r;
+#pragma GCC unroll 8
+    for (int i = 0; i < L::registers; ++i) r.v[i] = typename L::Register(Bits(x.v[i]) + (Bits(shifted.v[i]) << 52));
+    return r;
+}
+
+}  // namespace detail
+
+// The nearest integer, ties to even, for abs(x) < 2^51.
+template <class R>
+[[gnu::always_inline]] inline R nearest(R x) {
+    return (x + R(detail::round_magic)) - R(detail::round_magic);
+}
+
+// e^-y for y >= 0; 1e-14 relative, 1e-304 where y > 700.
+template <class R>
+[[gnu::always_inline]] inline R exp_of_minus(R y) {
+    const R t = minimum(y, R(700.0));
+    const R shifted = t * R(-1.4426950408889634) + R(detail::round_magic);
+    const R k = shifted - R(detail::round_magic);
+    const R r = ((R(0.0) - t) - k * R(0.693147180369123816490)) - k * R(1.90821492927058770002e-10);
+    // Taylor series to r^11, abs(r) < 0.347, in pairs so that the chain is short
+    const R r2 = r * r, r4 = r2 * r2, r8 = r4 * r4;
+    const R p01 = R(1.0) + r, p23 = R(1.0 / 2) + r * R(1.0 / 6), p45 = R(1.0 / 24) + r * R(1.0 / 120);
+    const R p67 = R(1.0 / 720) + r * R(1.0 / 5040), p89 = R(1.0 / 40320) + r * R(1.0 / 362880);
+    const R pab = R(1.0 / 3628800) + r * R(1.0 / 39916800);
+    return detail::scaled(((p01 + r2 * p23) + r4 * (p45 + r2 * p67)) + r8 * (p89 + r2 * pab), shifted);
+}
+
+// sin x; 1e-13 absolute for abs(x) < 100, beyond that the rounding of x itself.
+template <class R>
+[[gnu::always_inline]] inline R sine(R x) {
+    const R turns = x * R(0.15915494309189535);
+    const R r = turns - nearest(turns);
+    // sin(2 pi r) = sin(2 pi (1/2 - r)): from half a turn to a quarter
+    const R half = greater(r, R(0.0), R(0.5), R(-0.5));
+    const R t = greater(absolute(r), R(0.25), half - r, r);
+    const R x1 = t * R(6.283185307179586476925), x2 = x1 * x1, x4 = x2 * x2, x8 = x4 * x4;
+    const R a = R(1.0) - x2 * R(1.0 / 6), b = R(1.0 / 120) - x2 * R(1.0 / 5040);
+    const R c = R(1.0 / 362880) - x2 * R(1.0 / 39916800), d = R(1.0 / 6227020800) - x2 * R(1.0 / 1307674368000);
+    const R e = R(1.0 / 355687428096000) - x2 * R(1.0 / 121645100408832000);
+    return x1 * ((a + x4 * b) + x8 * ((c + x4 * d) + x8 * e));
+}
+
+template <class R>
+[[gnu::always_inline]] inline R cosine(R x) {
+    return sine(x + R(1.5707963267948966));
+}
+
+}  // namespace gaident
