@@ -14,6 +14,8 @@
 
 using namespace gaident;
 
+void effect_rows(bool quick);  // effects.cpp
+
 namespace {
 
 constexpr double Ts = 0.444e-3, kp = 0.0232 * 5.5637, ki = 1.367 * 5.5637;
@@ -211,5 +213,6 @@ int main(int argc, char** argv) {
     referee_row();
     simulation_rows();
     generation_rows();
+    effect_rows(quick);
     return 0;
 }

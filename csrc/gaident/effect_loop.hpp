@@ -5,7 +5,7 @@
 //     command -> rate limit -> PI -> saturation -> dead band -> delay -> lag -> shaft -> mechanism -> ripple -> filter -> quantisation
 //
 // One sample is `substeps` steps of h. In the sampled and the open loop the torque is held over the sample; in the continuous one the
-// controller acts every substep on the linearly interpolated command, and its torque is extrapolated to the middle of the substep.
+// controller acts every substep on the linearly interpolated command, and its torque is extrapolated to the substep's mean (third order).
 #pragma once
 
 #include "effect_plant.hpp"
@@ -50,16 +50,18 @@ public:
         if (set_.has(integrator_clamp)) pi_.integrator_limit = minimum(pi_.integrator_limit, c_.integrator_limit);
         pi_.s = c_.stored;
         friction_ = set_.has_any(coulomb_friction, stribeck_friction, asymmetric_friction, presliding_friction, quadratic_drag, friction_drift);
+        steep_ = set_.has_any(asymmetric_friction, quadratic_drag);
         actuator_in_time_ = set_.has_any(transport_delay, torque_lag);
         turning_ = set_.has_any(unbalance, cogging, velocity_ripple);
         bristle_.torque = c_.bristle_torque;
         bristle_.stiffness = c_.bristle_stiffness;
         bristle_.per_break = c_.bristle_per_break;
         angle_ = R(run.start_angle);
+        theta_middle_ = angle_ + plant_.velocity() * R(0.5 * h_);
         lagging_ = c_.before;
         filtered_ = filter_input_ = plant_.velocity();
         limited_command_ = R(run.moving && !run.input.empty() ? run.input[0] : 0.0);
-        stribeck_level_ = c_.stribeck_static;
+        w_before_ = plant_.velocity();
         if (set_.has(transport_delay))
             for (std::size_t i = 0; i <= run.history_mask; ++i) Pack<R>::store(c_.before, run.history + i * width);
         // Friction that would push is no friction: such a candidate is as good as diverged.
@@ -99,19 +101,21 @@ private:
     void continuous() {
         const double share = 1.0 / run_.substeps;
         double r_before = run_.moving && !run_.input.empty() ? run_.input[0] : 0.0;
-        R u_before = c_.before;
+        R u_before = c_.before, u_long_before = c_.before;
         theta_ = run_.position.empty() ? angle_ : R(position_at(0));
         R y = sensor(), u = control(R(r_before), y);
         for (std::size_t n = 0; n < run_.input.size(); ++n) {
             const double r = run_.input[n], here = position_at(n > 0 ? n - 1 : 0), next = position_at(n);
             const int steps = n == 0 && run_.moving ? 0 : run_.substeps;
             for (int j = 0; j < steps; ++j) {
-                act(u + (u - u_before) * R(0.5));
+                // Adams and Bashforth's mean over the substep to come.
+                act(u * R(23.0 / 12.0) - u_before * R(16.0 / 12.0) + u_long_before * R(5.0 / 12.0));
                 middle(here, next, (j + 0.5) * share);
                 substep(0, (static_cast<double>(n) - 1.0 + (j + 0.5) * share) * run_.sample_time);
                 theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
                 if (set_.has(Effect::velocity_filter)) filter();
                 y = sensor();
+                u_long_before = u_before;
                 u_before = u;
                 u = control(R(r_before + (r - r_before) * ((j + 1) * share)), y);
             }
@@ -131,7 +135,13 @@ private:
     // theta in the middle of the substep
     [[gnu::always_inline]] void middle(double here, double next, double share) {
         if (!turning_) return;
-        theta_ = run_.position.empty() ? angle_ + plant_.velocity() * R(0.5 * h_) : R(here + (next - here) * share);
+        if (!run_.position.empty()) {
+            theta_ = R(here + (next - here) * share);
+            return;
+        }
+        // Foreseen a substep ahead (second order), so that its sine need not be waited for.
+        theta_ = theta_middle_;
+        theta_middle_ = angle_ + plant_.velocity() * R(1.5 * h_);
     }
 
     [[gnu::always_inline]] void write(std::size_t n, R y, R u) {
@@ -222,16 +232,15 @@ private:
             law.level_negative = law.level_negative + level;
         }
         if (set_.has(stribeck_friction)) {
-            // The level at the mean velocity, predicted with the level before.
-            const R zero = R(0.0);
-            const R level = greater(w_free, zero, law.level_positive, law.level_negative) + stribeck_level_;
-            const R speed = maximum(absolute(w_free) - beta * level, zero);
-            const R middle = (w + greater(w_free, zero, speed, zero - speed)) * R(0.5);
-            stribeck_level_ = StribeckFriction::level(c_.stribeck_torque, c_.stribeck_static, c_.stribeck_slowness, middle);
-            law.level_positive = law.level_positive + stribeck_level_;
-            law.level_negative = law.level_negative + stribeck_level_;
+            // The level at the mean velocity, which is foreseen, but never beyond a stop: at rest the static level holds.
+            const R zero = R(0.0), foreseen = w + (w - w_before_) * R(0.5);
+            const R middle = greater(w * foreseen, zero, foreseen, zero);
+            const R level = StribeckFriction::level(c_.stribeck_torque, c_.stribeck_static, c_.stribeck_slowness, middle);
+            law.level_positive = law.level_positive + level;
+            law.level_negative = law.level_negative + level;
+            w_before_ = w;
         }
-        const R w_next = velocity_under_friction(law, w, w_free, beta);
+        const R w_next = velocity_under_friction(law, w, w_free, beta, steep_);
         if (bristle) {
             other_friction_ = (w_free - w_next) / beta;
             bristle_.move(w, w_next);
@@ -245,14 +254,14 @@ private:
     Plant plant_;
     Controller<R> pi_;
     double h_;
-    bool friction_, actuator_in_time_, turning_;
+    bool friction_, steep_, actuator_in_time_, turning_;
 
-    R angle_, theta_ = R(0.0);
+    R angle_, theta_ = R(0.0), theta_middle_;
     R held_ = R(0.0), lagging_;
     R filtered_, filter_input_;
     R limited_command_;
     R friction_torque_ = R(0.0), per_beta_;
-    R stribeck_level_, other_friction_ = R(0.0);
+    R w_before_, other_friction_ = R(0.0);
     Bristle<R> bristle_;
     std::size_t issued_ = 0;
 };

@@ -37,8 +37,8 @@ struct ObserverPlant {
     }
 };
 
-// Two masses with a nonlinear coupling: its correction held over the substep is the mean of the values at both ends, the one at the end
-// predicted with the old value and the friction of the substep before (second order).
+// Two masses with a nonlinear coupling. Its correction over the substep is the mean along a twist that goes evenly to where the
+// correction at the substep's start, and the friction of the substep before, would bring it (second order).
 template <class R>
 struct TwoMassPlant {
     R phi[3][3], motor[3], coupling[3];
@@ -58,21 +58,19 @@ struct TwoMassPlant {
     [[gnu::always_inline]] R velocity() const { return x[0]; }
     [[gnu::always_inline]] R beta() const { return motor[0]; }
 
-    [[gnu::always_inline]] R correction_at(R w_M, R w_L, R psi) const {
-        const R twist = psi * per_scale;
-        const R play = Backlash::correction(half_gap, KG, DG, twist, w_M - w_L);
-        return play + HardeningStiffness::correction(cubic, twist - clamp(twist, -half_gap, half_gap));
-    }
-
     [[gnu::always_inline]] R linear(int i, R T) const {
         return (x[i] + motor[i] * T) + ((phi[i][0] * x[0] + phi[i][1] * x[1]) + phi[i][2] * x[2]);
     }
 
     [[gnu::always_inline]] R free_velocity(R T, R friction_before) {
-        const R now = correction_at(x[0], x[1], x[2]), T_total = T - friction_before;
-        const R then = correction_at(linear(0, T_total) + coupling[0] * now, linear(1, T_total) + coupling[1] * now,
-                                     linear(2, T_total) + coupling[2] * now);
-        correction = (now + then) * R(0.5);
+        const R half = R(0.5), x0 = x[2] * per_scale, dx0 = x[0] - x[1], beyond0 = x0 - clamp(x0, -half_gap, half_gap);
+        const R hardening = HardeningStiffness::correction(cubic, beyond0);
+        const R now = Backlash::correction(half_gap, KG, DG, x0, dx0) + hardening, T_total = T - friction_before;
+        const R x1 = (linear(2, T_total) + coupling[2] * now) * per_scale;
+        const R dx1 = (linear(0, T_total) - linear(1, T_total)) + (coupling[0] - coupling[1]) * now;
+        const R beyond1 = x1 - clamp(x1, -half_gap, half_gap);
+        correction = Backlash::mean_correction(half_gap, KG, DG, x0, x1, (dx0 + dx1) * half) +
+                     (hardening + HardeningStiffness::correction(cubic, beyond1)) * half;
         return linear(0, T) + coupling[0] * correction;
     }
 

@@ -148,14 +148,16 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
         double fastest = 0.0;
         for (int i = 0; i < g.structure.pole_pairs(); ++i) fastest = std::max(fastest, resonance(g.pole_pair[i]));
         for (int i = 0; i < g.structure.zero_pairs(); ++i) fastest = std::max(fastest, resonance(g.zero_pair[i]));
-        wanted = std::max({wanted, 4.0, fastest * Ts / 0.0215});
+        // A nonlinear coupling is part of the resonance itself and needs finer steps.
+        const bool coupling = model.effects.has_any(backlash, hardening_stiffness);
+        wanted = std::max({wanted, coupling ? 4.0 : 2.0, fastest * Ts / (coupling ? 0.0215 : 0.045)});
     }
     const auto turning = [&](double order) { wanted = std::max(wanted, order * record.top_speed * Ts / 0.3); };
     if (model.effects.has(unbalance)) turning(1.0);
     if (model.effects.has(cogging)) turning(model.of(cogging)[1]);
     if (model.effects.has(presliding_friction) && g.structure.p == 1)
         wanted = std::max(wanted, std::sqrt(std::abs(g.gain * model.of(presliding_friction)[1])) * Ts / 0.3);
-    if (loop.kind == LoopKind::continuous && g.structure.p == 1) wanted = std::max({wanted, 4.0, std::abs(g.gain * loop.kp) * Ts / 0.1});
+    if (loop.kind == LoopKind::continuous && g.structure.p == 1) wanted = std::max({wanted, 8.0, std::abs(g.gain * loop.kp) * Ts / 0.06});
     int m = 1;
     while (m < wanted && m < 16) m *= 2;
     return m;

@@ -40,6 +40,23 @@ template <class T, int W, class Isa>
     return r;
 }
 
+// Whether a > b everywhere: for short cuts that change no result.
+[[gnu::always_inline]] inline bool all_above(double a, double b) { return a > b; }
+
+template <int W, class Isa>
+[[gnu::always_inline]] inline bool all_above(const Lanes<double, W, Isa>& a, const Lanes<double, W, Isa>& b) {
+    using L = Lanes<double, W, Isa>;
+    typedef long long Mask __attribute__((vector_size(Isa::register_bytes)));
+    Mask all = Mask(a.v[0] > b.v[0]);
+#pragma GCC unroll 8
+    for (int i = 1; i < L::registers; ++i) all &= Mask(a.v[i] > b.v[i]);
+    long long lane[L::per_register], every = -1;
+    __builtin_memcpy(lane, &all, sizeof lane);
+#pragma GCC unroll 8
+    for (int i = 0; i < L::per_register; ++i) every &= lane[i];
+    return every != 0;
+}
+
 template <class R>
 [[gnu::always_inline]] inline R minimum(R a, R b) {
     return greater(a, b, b, a);
@@ -48,9 +65,16 @@ template <class R>
 [[gnu::always_inline]] inline R maximum(R a, R b) {
     return greater(a, b, a, b);
 }
-template <class R>
-[[gnu::always_inline]] inline R absolute(R x) {
-    return greater(x, R(0.0), x, R(0.0) - x);
+[[gnu::always_inline]] inline double absolute(double x) { return __builtin_fabs(x); }
+
+template <int W, class Isa>
+[[gnu::always_inline]] inline Lanes<double, W, Isa> absolute(const Lanes<double, W, Isa>& x) {
+    using L = Lanes<double, W, Isa>;
+    typedef unsigned long long Bits __attribute__((vector_size(Isa::register_bytes)));
+    L r;
+#pragma GCC unroll 8
+    for (int i = 0; i < L::registers; ++i) r.v[i] = typename L::Register(Bits(x.v[i]) & 0x7fffffffffffffffULL);
+    return r;
 }
 
 [[gnu::always_inline]] inline double square_root(double x) { return __builtin_sqrt(x); }
@@ -90,19 +114,17 @@ template <class R>
     return (x + R(detail::round_magic)) - R(detail::round_magic);
 }
 
-// e^-y for y >= 0; 1e-14 relative, 1e-304 where y > 700.
+// e^-y for y >= 0; 1e-11 relative, 1e-304 where y > 700.
 template <class R>
 [[gnu::always_inline]] inline R exp_of_minus(R y) {
     const R t = minimum(y, R(700.0));
-    const R shifted = t * R(-1.4426950408889634) + R(detail::round_magic);
-    const R k = shifted - R(detail::round_magic);
-    const R r = ((R(0.0) - t) - k * R(0.693147180369123816490)) - k * R(1.90821492927058770002e-10);
-    // Taylor series to r^11, abs(r) < 0.347, in pairs so that the chain is short
-    const R r2 = r * r, r4 = r2 * r2, r8 = r4 * r4;
+    const R shifted = R(detail::round_magic) - t * R(1.4426950408889634);
+    const R r = (R(detail::round_magic) - shifted) * R(0.69314718055994531) - t;
+    // Taylor series to r^9, abs(r) < 0.347, in pairs so that the chain is short
+    const R r2 = r * r, r4 = r2 * r2;
     const R p01 = R(1.0) + r, p23 = R(1.0 / 2) + r * R(1.0 / 6), p45 = R(1.0 / 24) + r * R(1.0 / 120);
     const R p67 = R(1.0 / 720) + r * R(1.0 / 5040), p89 = R(1.0 / 40320) + r * R(1.0 / 362880);
-    const R pab = R(1.0 / 3628800) + r * R(1.0 / 39916800);
-    return detail::scaled(((p01 + r2 * p23) + r4 * (p45 + r2 * p67)) + r8 * (p89 + r2 * pab), shifted);
+    return detail::scaled((p01 + r2 * p23) + r4 * ((p45 + r2 * p67) + r4 * p89), shifted);
 }
 
 // sin x; 1e-13 absolute for abs(x) < 100, beyond that the rounding of x itself.

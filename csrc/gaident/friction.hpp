@@ -15,17 +15,22 @@
 
 namespace gaident {
 
+// `steep`: whether B or Q are there at all.
 template <class R>
-[[gnu::always_inline]] inline R velocity_under_friction(const FrictionLaw<R>& law, R w, R w_free, R beta) {
+[[gnu::always_inline]] inline R velocity_under_friction(const FrictionLaw<R>& law, R w, R w_free, R beta, bool steep) {
     const R zero = R(0.0), one = R(1.0), half = R(0.5);
     const R speed = absolute(w), change = w_free - w;
     const R direction = greater(speed, zero, w, change);  // from rest, where the other torques push
     const R sign = greater(direction, zero, one, -one);
     const R C = greater(direction, zero, law.level_positive, law.level_negative);
-    const R C_back = greater(direction, zero, law.level_negative, law.level_positive);
-    const R B = greater(direction, zero, law.viscous_positive, law.viscous_negative) * half;
     const R rise = sign * change;
-    const R onward = ((speed + rise) - beta * (C + B * speed)) / (one + beta * (B + law.drag * speed));
+    R onward = (speed + rise) - beta * C;
+    if (steep) {
+        const R B = greater(direction, zero, law.viscous_positive, law.viscous_negative) * half;
+        onward = (onward - (beta * B) * speed) / (one + beta * (B + law.drag * speed));
+    }
+    if (all_above(onward, zero)) return sign * onward;  // a short cut past a division, no other result
+    const R C_back = greater(direction, zero, law.level_negative, law.level_positive);
     const R rest = onward / ((onward - speed) - R(1e-300));  // share of the substep after the stop; 0/0 becomes 0
     const R back = rest * minimum(rise + beta * C_back, zero);
     return sign * greater(onward, zero, onward, back);

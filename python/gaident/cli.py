@@ -27,6 +27,7 @@ from gaident.identification.identify import identify
 from gaident.identification.result import Identification, json_text, load
 from gaident.identification.settings import Settings
 from gaident.identification.starts import starts_moving
+from gaident.models import effects
 from gaident.models.controller import PI
 from gaident.models.mechanics import mechanics_from_dict
 from gaident.models.model import Model
@@ -198,6 +199,15 @@ def _demo(args: argparse.Namespace) -> None:
         _print_json(report)
 
 
+def _effects(args: argparse.Namespace) -> None:
+    if args.json:
+        _print_json({
+            "schema": "gaident/effects", "schema_version": 1, "effects": [row.to_dict() for row in effects.table()],
+        })  # fmt: skip
+    else:
+        print(effects.table())
+
+
 def _read_all(drive: Drive, logs: Sequence[str], controller: PI | None) -> list[Record]:
     records = [drive.read(log) for log in logs]
     for log, rec in zip(logs, records, strict=True):
@@ -266,4 +276,4 @@ def _print_json(data: dict[str, Any]) -> None:
     print(json_text(data))
 
 
-COMMANDS = {"identify": _identify, "simulate": _simulate, "demo": _demo}
+COMMANDS = {"identify": _identify, "simulate": _simulate, "effects": _effects, "demo": _demo}

@@ -77,6 +77,8 @@ examples:
   gaident simulate run1.json run*.csv --drive drive.toml --out simulated/     one CSV per log
   gaident simulate motor.json run2.csv --kp 0.0232 --ki 1.367 --json
 """
+EFFECTS_HELP = """Lists the effects: place in the loop, parameters with units, one line of meaning."""
+
 DEMO_HELP = """\
 The main job: identifies a two-mass drive (the paper's robot arm, Table III) from a noisy velocity step
 through its PI loop, and compares the result with the truth. Where the environment variable GAIDENT_DATA
@@ -142,6 +144,9 @@ def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], None]]) -> a
     g = sub.add_argument_group("results")
     g.add_argument("--out", metavar="PATH", help="CSV file; a folder where several logs are given")
     g.add_argument("--json", action="store_true", help="print everything as JSON instead of CSV")
+
+    sub = command("effects", "", "what a model can carry beyond its linear part", EFFECTS_HELP)
+    sub.add_argument("--json", action="store_true", help="print JSON instead of a table")
 
     sub = command("demo", "", "the main job, on data of its own", DEMO_HELP)
     sub.add_argument("--out", metavar="DIR", default=".", help="where pictures go (default: the current folder)")

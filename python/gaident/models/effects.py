@@ -39,6 +39,11 @@ class Parameter(NamedTuple):
             parts.append(f"<= {self.highest:g}")
         return " and ".join(parts)
 
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON: what is not finite (any value, no bound, no limit) is None."""
+        numbers = {"neutral": self.neutral, "lowest": self.lowest, "highest": self.highest}
+        return {"name": self.name, "unit": self.unit, **{k: v if math.isfinite(v) else None for k, v in numbers.items()}}
+
 
 class Row(NamedTuple):
     """One effect of the table."""
@@ -50,6 +55,11 @@ class Row(NamedTuple):
     simulated: bool  # False: found in records, but not part of a model
     needs_two_masses: bool
     relation: str  # what the parameters have to meet among themselves, empty if nothing
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        parameters = [p.to_dict() for p in self.parameters]
+        return {"name": self.name, "place": self.place, "parameters": parameters, "meaning": self.meaning}
 
 
 class Table(tuple[Row, ...]):

@@ -1,0 +1,300 @@
+// The loop with effects: elementary functions, registry, neutral parameters, lanes against scalar, standstill. Accuracy against an
+// independent integrator is tested in tests/python/test_effects.py.
+#include "../../csrc/gaident/effect_batch.hpp"
+
+#include "check.hpp"
+
+#include <cmath>
+#include <set>
+#include <string>
+#include <vector>
+
+using namespace gaident;
+
+namespace {
+
+constexpr double Ts = 1e-3;
+
+Factors<double> one_mass(double J = 5e-4, double D = 0.005) {
+    const std::complex<double> pole = -D / J;
+    return factors_from_roots(1.0 / J, {&pole, 1}, {});
+}
+
+Factors<double> table_three(double f = 1.0) {
+    const std::complex<double> poles[] = {-16.11, {-13.53, 172.14 * f}, {-13.53, -172.14 * f}};
+    const std::complex<double> zeros[] = {{-6.88, 66.38}, {-6.88, -66.38}};
+    return factors_from_roots(9803.92, poles, zeros);
+}
+
+// Typical parameters, and ones so small (or large) that the effect does next to nothing without being taken out.
+struct Sizes {
+    Effect effect;
+    double typical[4], slight[4];
+};
+
+const Sizes sizes[] = {
+    {Effect::coulomb_friction, {0.05}, {1e-14}},
+    {Effect::stribeck_friction, {0.04, 0.07, 2.0}, {1e-14, 2e-14, 2.0}},
+    {Effect::asymmetric_friction, {0.05, 0.035, 1e-4, 4e-4}, {1e-14, 1e-14, 1e-16, 1e-16}},
+    {Effect::presliding_friction, {0.05, 3.0}, {1e-14, 3.0}},
+    {Effect::quadratic_drag, {1.5e-5}, {1e-18}},
+    {Effect::load_torque, {0.03}, {1e-14}},
+    {Effect::unbalance, {0.05, 0.3}, {1e-14, 0.3}},
+    {Effect::cogging, {0.03, 12.0, 0.4}, {1e-14, 12.0, 0.4}},
+    {Effect::friction_drift, {0.05, -0.2}, {1e-14, -0.2}},
+    {Effect::backlash, {0.01}, {1e-15}},
+    {Effect::hardening_stiffness, {1e3}, {1e-10}},
+    {Effect::torque_saturation, {0.5}, {1e14}},
+    {Effect::torque_dead_band, {0.03}, {1e-14}},
+    {Effect::transport_delay, {0.73e-3}, {1e-16}},
+    {Effect::torque_lag, {1e-3}, {1e-16}},
+    {Effect::integrator_clamp, {0.05}, {1e14}},
+    {Effect::command_rate_limit, {3000.0}, {1e14}},
+    {Effect::velocity_filter, {1e-3}, {1e-16}},
+    {Effect::velocity_ripple, {0.005, 2.0, 0.2}, {1e-14, 2.0, 0.2}},
+    {Effect::velocity_quantisation, {0.6}, {1e-13}},
+    {Effect::extra_resonance, {900.0, 0.02, 800.0, 0.02}, {900.0, 0.02, 900.0 + 1e-10, 0.02}},
+};
+
+std::vector<double> staircase(std::size_t n) {
+    const double level[] = {3.0, -5.0, 20.0, 1.0, -40.0, 10.0, 0.0, -2.0, 60.0, -60.0};
+    std::vector<double> r(n);
+    for (std::size_t k = 0; k < n; ++k) r[k] = level[k * 10 / n];
+    return r;
+}
+
+EffectJob job_of(std::span<const double> input, LoopKind kind) {
+    EffectJob job;
+    job.record.input = input;
+    job.record.sample_time = Ts;
+    job.record.top_speed = 60.0;
+    job.loop.kind = kind;
+    job.loop.kp = 0.08;
+    job.loop.ki = 1.5;
+    return job;
+}
+
+std::vector<double> velocity_of(const EffectJob& job, const EffectModel& model) {
+    std::vector<double> w(job.record.input.size());
+    simulate_effects(job, {&model, 1}, {}, {w.data()});
+    return w;
+}
+
+EffectModel model_with(const Factors<double>& g, Effect e, std::initializer_list<double> values) {
+    EffectModel m{g, {}};
+    m.add(e, values.begin());
+    return m;
+}
+
+}  // namespace
+
+TEST_CASE("elementary functions agree with libm") {
+    for (int i = 0; i <= 4000; ++i) {
+        const double y = 0.0125 * i, x = 0.05 * (i - 2000);
+        CHECK_NEAR(exp_of_minus(y) / std::exp(-y), 1.0, 1e-10);
+        CHECK_NEAR(sine(x), std::sin(x), 2e-13);
+        CHECK_NEAR(cosine(x), std::cos(x), 2e-13);
+        CHECK(nearest(x * 7.3) == std::nearbyint(x * 7.3));
+        CHECK(absolute(x) == std::abs(x));
+    }
+    CHECK(exp_of_minus(0.0) == 1.0);
+    CHECK(exp_of_minus(1e9) < 1e-300);
+}
+
+TEST_CASE("the registry: names are unique, the enumeration has the table's order, every simulated effect is tested here") {
+    std::set<std::string> names;
+    for (const EffectInfo& info : effect_table) {
+        CHECK(names.insert(info.name).second);
+        CHECK(info.parameters() >= 1);
+    }
+    CHECK(std::string(effect_table[static_cast<std::size_t>(Effect::backlash)].name) == "backlash");
+    CHECK(std::string(effect_table[static_cast<std::size_t>(Effect::velocity_filter)].name) == "velocity_filter");
+    CHECK(static_cast<int>(Effect::outliers) + 1 == effect_count);
+    std::size_t simulated = 0;
+    for (const EffectInfo& info : effect_table) simulated += info.simulated;
+    CHECK(simulated == std::size(sizes));
+    for (const Sizes& s : sizes) {
+        const EffectInfo& info = effect_table[static_cast<std::size_t>(s.effect)];
+        CHECK(!info.neutral(s.typical));
+        double neutral[4];
+        for (int i = 0; i < info.parameters(); ++i) {
+            const double value = info.parameter[i].neutral;
+            neutral[i] = value == value ? value : 1.0;
+        }
+        CHECK(info.neutral(neutral));
+    }
+}
+
+TEST_CASE("neutral parameters are the identity, and their neighbourhood is next to it") {
+    const std::vector<double> r = staircase(300);
+    for (const LoopKind kind : {LoopKind::sampled, LoopKind::open, LoopKind::continuous}) {
+        std::vector<double> in = r;
+        if (kind == LoopKind::open)
+            for (double& v : in) v *= 0.01;
+        const EffectJob job = job_of(in, kind);
+        const std::vector<double> linear = velocity_of(job, {table_three(), {}});
+        for (const Sizes& s : sizes) {
+            const EffectInfo& info = effect_table[static_cast<std::size_t>(s.effect)];
+            EffectModel neutral{table_three(), {}}, slight = neutral;
+            double values[4];
+            for (int i = 0; i < info.parameters(); ++i) {
+                const double value = info.parameter[i].neutral;
+                values[i] = value == value ? value : s.slight[i];
+            }
+            if (s.effect == Effect::extra_resonance) values[2] = values[0];
+            neutral.add(s.effect, values);
+            slight.add(s.effect, s.slight);
+            CHECK(velocity_of(job, neutral) == linear);
+            const std::vector<double> w = velocity_of(job, slight);
+            double most = 0.0;
+            for (std::size_t k = 0; k < w.size(); ++k) most = std::max(most, std::abs(w[k] - linear[k]));
+            if (!(most < 1e-8)) check::fail(__FILE__, __LINE__, std::string(info.name) + ": " + std::to_string(most));
+        }
+    }
+}
+
+TEST_CASE("lanes equal the scalar loop bit for bit, with every effect, loop and instruction set") {
+    const std::vector<double> r = staircase(200);
+    std::vector<EffectModel> models;
+    for (const Sizes& s : sizes)
+        for (int i = 0; i < 3; ++i) {
+            double values[4];
+            for (int k = 0; k < 4; ++k) values[k] = s.typical[k] * (1.0 + 0.03 * i);
+            EffectModel m{table_three(1.0 + 0.01 * i), {}};
+            m.add(s.effect, values);
+            models.push_back(m);
+        }
+    for (int i = 0; i < 11; ++i) {  // several at once, more than one group of lanes
+        EffectModel m{one_mass(5e-4 * (1.0 + 0.02 * i)), {}};
+        for (const Sizes& s : sizes)
+            if (s.effect != Effect::backlash && s.effect != Effect::hardening_stiffness && s.effect != Effect::extra_resonance)
+                m.add(s.effect, s.typical);
+        models.push_back(m);
+    }
+    for (const LoopKind kind : {LoopKind::sampled, LoopKind::open, LoopKind::continuous})
+        for (const bool position : {false, true}) {
+            EffectJob job = job_of(r, kind);
+            if (position) job.record.position = r;
+            const std::size_t n = models.size() * r.size();
+            std::vector<double> w(n), u(n), a(n), lanes_w(n), lanes_u(n), lanes_a(n);
+            job.lanes = false;
+            simulate_effects(job, models, {}, {w.data(), u.data(), a.data()});
+            job.lanes = true;
+            for (const char* name : {"baseline", "avx2", "avx512"}) {
+                job.kernel = effects_named(name);
+                if (job.kernel == nullptr) continue;
+                job.workers = 2;
+                simulate_effects(job, models, {}, {lanes_w.data(), lanes_u.data(), lanes_a.data()});
+                CHECK(lanes_w == w);
+                CHECK(lanes_u == u);
+                CHECK(lanes_a == a);
+            }
+        }
+}
+
+TEST_CASE("friction holds exactly: no creep, no ringing, and lets go above its level") {
+    std::vector<double> torque(400);
+    for (std::size_t k = 0; k < torque.size(); ++k) torque[k] = k < 30 ? 0.3 : k < 300 ? 0.049 * std::sin(0.1 * static_cast<double>(k)) : 0.051;
+    const EffectJob job = job_of(torque, LoopKind::open);
+    for (const Factors<double>& g : {one_mass(), table_three()}) {
+        const std::vector<double> w = velocity_of(job, model_with(g, Effect::coulomb_friction, {0.05}));
+        CHECK(w[31] > 1.0);
+        for (std::size_t k = 250; k <= 300; ++k) CHECK(w[k] == 0.0);
+        CHECK(w[301] > 0.0);
+        const std::vector<double> s = velocity_of(job, model_with(g, Effect::stribeck_friction, {0.03, 0.0505, 2.0}));
+        for (std::size_t k = 250; k <= 300; ++k) CHECK(s[k] == 0.0);
+        CHECK(s[399] > w[399]);  // once it moves there is less friction
+    }
+}
+
+TEST_CASE("a stiff bristle does not ring, even in one step per sample") {
+    std::vector<double> torque(300, 0.0);
+    std::fill(torque.begin(), torque.begin() + 20, 0.08);
+    EffectJob job = job_of(torque, LoopKind::open);
+    job.substeps = 1;
+    const std::vector<double> w = velocity_of(job, model_with(one_mass(1e-4, 0.001), Effect::presliding_friction, {0.05, 500.0}));
+    CHECK(w[20] > 1.0);
+    for (std::size_t k = 200; k < w.size(); ++k) CHECK(std::abs(w[k]) < 1e-9);
+    int turns = 0;
+    for (std::size_t k = 21; k < w.size(); ++k) turns += w[k] * w[k - 1] < 0.0 && std::abs(w[k]) > 0.02;
+    CHECK(turns <= 2);
+}
+
+TEST_CASE("two masses are recovered from the factors, with shaft damping") {
+    const double DG = 0.002, JM = 1.02e-4, DM = 0.003, JL = 5.815e-4, DL = 0.008, KG = 2.59;
+    Factors<double> g;
+    g.structure = {1, 2};
+    g.gain = 1.0 / JM;
+    g.zero_pair[0] = {(DL + DG) / JL, KG / JL};
+    const double a2 = (DM + DG) / JM + (DL + DG) / JL, a1 = KG * (1.0 / JM + 1.0 / JL) + (DM * DL + (DM + DL) * DG) / (JM * JL);
+    const double a0 = (DM + DL) * KG / (JM * JL);
+    double s = -(DM + DL) / (JM + JL);
+    for (int i = 0; i < 50; ++i) s -= (((s + a2) * s + a1) * s + a0) / ((3.0 * s + 2.0 * a2) * s + a1);
+    g.pole = -s;
+    g.pole_pair[0] = {a2 + s, -a0 / s};
+    TwoMasses m{};
+    CHECK(two_masses_of(g, m));
+    const double found[] = {m.JM, m.DM, m.JL, m.DL, m.KG, m.DG}, truth[] = {JM, DM, JL, DL, KG, DG};
+    for (int i = 0; i < 6; ++i) CHECK_NEAR(found[i] / truth[i], 1.0, 1e-9);
+}
+
+TEST_CASE("a held torque delayed keeps its integral, whatever the fraction of a sample") {
+    for (const double delay : {0.0, 0.1e-3, 0.25e-3, 0.3e-3, 1e-3, 1.73e-3, 4e-3})
+        for (const int m : {1, 2, 4, 8}) {
+            // The mean over a sample of a held ramp u(n) = n, `delay` late, is the ramp at the delayed time.
+            double sum = 0.0;
+            for (int j = 0; j < m; ++j) {
+                int back = 0;
+                double share = 0.0;
+                TransportDelay::mean(delay, Ts, j, m, back, share);
+                CHECK(share >= 0.0 && share <= 1.0 && back >= 0);
+                sum += (1.0 - share) * (10.0 - back) + share * (11.0 - back);
+            }
+            CHECK_NEAR(sum / m, 10.0 - delay / Ts, 1e-9);
+        }
+}
+
+TEST_CASE("what is no drive gives undefined numbers and no crash") {
+    const std::vector<double> r = staircase(100);
+    const EffectJob job = job_of(r, LoopKind::sampled);
+    Factors<double> backwards = one_mass();
+    backwards.gain = -backwards.gain;
+    const auto undefined = [&](const EffectModel& m) { return !std::isfinite(velocity_of(job, m).back()); };
+    CHECK(undefined(model_with(backwards, Effect::coulomb_friction, {0.05})));
+    Factors<double> impossible = table_three();
+    impossible.pole_pair[0] = {1.0, 10.0};
+    CHECK(undefined(model_with(impossible, Effect::backlash, {0.01})));
+    CHECK(undefined(model_with(one_mass(), Effect::transport_delay, {std::nan("")})));
+    CHECK(undefined(model_with(one_mass(), Effect::transport_delay, {5.0})));
+    CHECK(undefined(model_with(one_mass(), Effect::load_torque, {std::nan("")})));
+    EffectModel all = model_with(one_mass(), Effect::presliding_friction, {-1.0, -2.0});
+    for (const Sizes& s : sizes)
+        if (s.effect != Effect::backlash && s.effect != Effect::hardening_stiffness) {
+            double wild[4];
+            for (int i = 0; i < 4; ++i) wild[i] = -1e3 * s.typical[i];
+            all.add(s.effect, wild);
+        }
+    velocity_of(job, all);
+    const EffectModel p0{factors_from_roots(1.0, {}, {}), {}};
+    EffectModel with_load = p0;
+    const double load[] = {0.1};
+    with_load.add(Effect::load_torque, load);
+    CHECK_THROWS(velocity_of(job, with_load), std::invalid_argument);
+}
+
+TEST_CASE("a record that starts in motion continues the linear loop's own state") {
+    const std::vector<double> r = staircase(200);
+    const double state[] = {20.0, 0.3, -0.02, 0.2};
+    const double* const start = state;
+    for (const LoopKind kind : {LoopKind::sampled, LoopKind::open, LoopKind::continuous}) {
+        const EffectJob job = job_of(r, kind);
+        std::vector<double> linear(r.size()), w(r.size());
+        const EffectModel plain{table_three(), {}};
+        simulate_effects(job, {&plain, 1}, {&start, 1}, {linear.data()});
+        for (const EffectModel& m : {model_with(table_three(), Effect::load_torque, {1e-14}), model_with(table_three(), Effect::backlash, {1e-15})}) {
+            simulate_effects(job, {&m, 1}, {&start, 1}, {w.data()});
+            const double scale = kind == LoopKind::open ? 1e3 : 1e2;  // the torque of the open loop is the staircase itself
+            for (std::size_t k = 0; k < w.size(); ++k) CHECK_NEAR(w[k], linear[k], 1e-10 * scale);
+        }
+    }
+}
