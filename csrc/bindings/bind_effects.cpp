@@ -106,6 +106,8 @@ struct PyRecord {
         job.record.start_angle = start_angle;
         for (const double w : view(velocity)) job.record.top_speed = std::max(job.record.top_speed, std::abs(w));
         job.loop = make_loop(loop, kp, ki, torque_limit, integrator_limit);
+        if (job.loop.kind == LoopKind::open) return;
+        for (const double r : job.record.input) job.record.top_speed = std::max(job.record.top_speed, std::abs(r));
     }
 };
 

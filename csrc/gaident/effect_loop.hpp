@@ -62,6 +62,7 @@ public:
         filtered_ = filter_input_ = plant_.velocity();
         limited_command_ = R(run.moving && !run.input.empty() ? run.input[0] : 0.0);
         w_before_ = plant_.velocity();
+        torque_before_ = c_.before;
         if (set_.has(transport_delay))
             for (std::size_t i = 0; i <= run.history_mask; ++i) Pack<R>::store(c_.before, run.history + i * width);
         // Friction that would push is no friction: such a candidate is as good as diverged.
@@ -212,7 +213,7 @@ private:
         const R w_free = plant_.free_velocity(T, friction_torque_);
         R w_next = w_free;
         if (friction_) {
-            w_next = under_friction(w, w_free, t);
+            w_next = under_friction(w, w_free, T, t);
             friction_torque_ = (w_free - w_next) * per_beta_;
             T = T - friction_torque_;
         }
@@ -220,7 +221,7 @@ private:
         angle_ = angle_ + (w + w_next) * R(0.5 * h_);
     }
 
-    [[gnu::always_inline]] R under_friction(R w, R w_free, double t) {
+    [[gnu::always_inline]] R under_friction(R w, R w_free, R T, double t) {
         using enum Effect;
         FrictionLaw<R> law = c_.law;
         R beta = plant_.beta();
@@ -233,12 +234,15 @@ private:
         }
         if (set_.has(stribeck_friction)) {
             // The level at the mean velocity, which is foreseen, but never beyond a stop: at rest the static level holds.
-            const R zero = R(0.0), foreseen = w + (w - w_before_) * R(0.5);
+            // The change of torque is added, which the velocity does not know yet.
+            const R zero = R(0.0), foreseen = w + ((w - w_before_) + plant_.beta() * (T - torque_before_)) * R(0.5);
             const R middle = greater(w * foreseen, zero, foreseen, zero);
             const R level = StribeckFriction::level(c_.stribeck_torque, c_.stribeck_static, c_.stribeck_slowness, middle);
             law.level_positive = law.level_positive + level;
             law.level_negative = law.level_negative + level;
+            law.more_at_rest = c_.stribeck_static - level;
             w_before_ = w;
+            torque_before_ = T;
         }
         const R w_next = velocity_under_friction(law, w, w_free, beta, steep_);
         if (bristle) {
@@ -261,7 +265,7 @@ private:
     R filtered_, filter_input_;
     R limited_command_;
     R friction_torque_ = R(0.0), per_beta_;
-    R w_before_, other_friction_ = R(0.0);
+    R w_before_, torque_before_, other_friction_ = R(0.0);
     Bristle<R> bristle_;
     std::size_t issued_ = 0;
 };

@@ -32,7 +32,7 @@ template <class R>
     if (all_above(onward, zero)) return sign * onward;  // a short cut past a division, no other result
     const R C_back = greater(direction, zero, law.level_negative, law.level_positive);
     const R rest = onward / ((onward - speed) - R(1e-300));  // share of the substep after the stop; 0/0 becomes 0
-    const R back = rest * minimum(rise + beta * C_back, zero);
+    const R back = rest * minimum(rise + beta * (C_back + law.more_at_rest), zero);
     return sign * greater(onward, zero, onward, back);
 }
 

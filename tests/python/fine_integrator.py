@@ -173,9 +173,12 @@ def integrate(cases: list[FineCase], fine: int = 100) -> FineRun:
             T = np.where(tau_u > 0.0, lag + 0.5 * step_u, v)
             lag = lag + step_u
 
+            old1, old2 = x1, x2
             x2 = x2 + h * (T - 2.0 * zp * wp * x2 - wp * wp * x1)
             x1 = x1 + h * x2
-            T = resonant * (T + 2.0 * (zz * wz - zp * wp) * x2 + (wz * wz - wp * wp) * x1)
+            # Its mean over the step: at both ends, the half step between x1 and x2 taken back.
+            x1_mean = 0.5 * (old1 + x1) - 0.5 * h * 0.5 * (x2 - old2)
+            T = resonant * (T + (zz * wz - zp * wp) * (old2 + x2) + (wz * wz - wp * wp) * x1_mean)
 
             theta = angle + 0.5 * h * w
             T = T - load - Au * np.sin(theta + pu) - Ac * np.sin(nc * theta + pc)

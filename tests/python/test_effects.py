@@ -64,10 +64,13 @@ def pulses(n: int = SAMPLES) -> Array:
     return np.where(k > 0.93 * n, 0.0, slow + 0.6 * (k % 90 < 6))
 
 
-def record(dt: float, loop: str, position: Array | None = None, n: int = SAMPLES) -> ga.Record:
+def record(
+    dt: float, loop: str, position: Array | None = None, velocity: Array | None = None, n: int = SAMPLES
+) -> ga.Record:
+    measured = np.zeros(n) if velocity is None else velocity
     if loop == "open":
-        return ga.Record(dt, torque=pulses(n), velocity=np.zeros(n), position=position)
-    return ga.Record(dt, command=staircase(n), velocity=np.zeros(n), position=position)
+        return ga.Record(dt, torque=pulses(n), velocity=measured, position=position)
+    return ga.Record(dt, command=staircase(n), velocity=measured, position=position)
 
 
 def controller_of(loop: str, two: bool) -> ga.PI | None:
@@ -123,7 +126,7 @@ def test_effect_agrees_with_the_fine_integrator(reference: dict[Key, tuple[Array
             truth, _, angle = reference[dt, two, loop, name]
             plain = reference[dt, two, loop, None][0]
             # In open loop the angle is the record's, elsewhere the simulation's own.
-            rec = record(dt, loop, angle if loop == "open" else None)
+            rec = record(dt, loop, angle if loop == "open" else None, truth)
             ctl = controller_of(loop, two)
             ours = ga.simulate(model.with_effect(name, **SIZES[name]), rec, ctl)
             # With minus without on both sides: what the reference's own steps do to the linear drive is no matter of the effect.
@@ -166,10 +169,10 @@ def test_quantisation_rounds_what_the_sensor_shows(reference: dict[Key, tuple[Ar
 def test_the_fine_integrator_itself_converges() -> None:
     effects = [{}, *({name: SIZES[name]} for name in ("stribeck_friction", "presliding_friction", "backlash", "torque_lag"))]
     cases = [
-        FineCase(1e-3, "sampled", staircase(100), (TWO.JM, TWO.DM), (TWO.JL, TWO.DL), (TWO.KG, TWO.DG), 0.08, 1.5, e)
+        FineCase(1e-3, "sampled", staircase(40), (TWO.JM, TWO.DM), (TWO.JL, TWO.DL), (TWO.KG, TWO.DG), 0.08, 1.5, e)
         for e in effects
     ]
-    coarse, fine = (integrate(cases, n).velocity for n in (120, 480))
+    coarse, fine = (integrate(cases, n).velocity for n in (100, 300))
     for i in range(1, len(cases)):
         size = rms(fine[:, i] - fine[:, 0])
         assert rms((coarse - fine)[:, i] - (coarse - fine)[:, 0]) < 0.006 * size

@@ -56,6 +56,7 @@ struct FrictionLaw {
     R level_positive = R(0.0), level_negative = R(0.0);      // N m
     R viscous_positive = R(0.0), viscous_negative = R(0.0);  // N m s/rad
     R drag = R(0.0);                                         // N m s^2/rad^2
+    R more_at_rest = R(0.0);                                 // what the levels at w = 0 have more, N m
 };
 
 }  // namespace gaident
