@@ -98,9 +98,11 @@ def random_plant(rng: np.random.Generator, two_masses: bool | None = None) -> Pl
     plant = choice[rng.integers(len(choice))]
     names = ("J", "D", "JL", "DL", "KG", "DG")
     plant = replace(plant, **{name: getattr(plant, name) * rng.uniform(0.7, 1.3) for name in names})
-    if plant.kp:
-        return plant
-    # Poles of the rigid loop at wn with damping zeta: kp = 2 zeta wn J - D, ki = wn^2 J.
+    return plant if plant.kp else tuned(plant, rng)
+
+
+def tuned(plant: Plant, rng: np.random.Generator) -> Plant:
+    """With a PI controller, the poles of the rigid loop at wn with damping zeta: kp = 2 zeta wn J - D, ki = wn^2 J."""
     wn, zeta = BANDWIDTH[plant.name] * rng.uniform(0.8, 1.2), rng.uniform(0.6, 0.9)
     inertia, damping = plant.J + plant.JL, plant.D + plant.DL
     return replace(plant, kp=float(f"{2 * zeta * wn * inertia - damping:.4g}"), ki=float(f"{wn**2 * inertia:.4g}"))

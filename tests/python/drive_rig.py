@@ -33,7 +33,7 @@ Effects = Mapping[str, Mapping[str, float]]
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "tests" / "cpp" / "drive_rig.cpp"
-SUBSTEPS = 40
+SUBSTEPS, MOST_SUBSTEPS = 40, 400
 MATH = ("-std=c++20", "-O2", "-ffp-contract=off", "-shared", "-fPIC")
 
 
@@ -195,7 +195,10 @@ def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:
 def substeps_for(values: Mapping[str, float], dt: float, least: int) -> int:
     """So many substeps that the bristle, the stiffest state, stays well inside the step's stability."""
     fastest = values["dahl_stiffness"] * 150 / values["dahl"] if values["dahl"] else 0.0
-    return max(least, int(np.ceil(dt * fastest / 0.5)))
+    needed = int(np.ceil(dt * fastest / 0.5))
+    if needed > MOST_SUBSTEPS:
+        raise RanAwayError(f"a bristle this stiff needs {needed} substeps; give a softer or stronger one")
+    return max(least, needed)
 
 
 def run_drive(
