@@ -158,7 +158,9 @@ def read(path: Path) -> dict[str, dict[str, Any]]:
 def work(path: Path, jobs: list[tuple[Any, ...]], workers: int) -> None:
     """Run jobs (function, arguments ...) and write each result as it comes."""
     started = time.perf_counter()
+    cut_off = path.exists() and not path.read_text().endswith("\n") and path.stat().st_size > 0
     with path.open("a") as out, ProcessPoolExecutor(workers) as pool:
+        out.write("\n" if cut_off else "")
         waiting = [pool.submit(*job) for job in jobs]
         try:
             for done, future in enumerate(as_completed(waiting), 1):

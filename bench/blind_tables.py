@@ -135,10 +135,9 @@ def limit_table(limits: list[Line]) -> str:
     for effect in EFFECTS:
         some = {x["plant"]: x["limit"] for x in limits if x["effect"] == effect and "limit" in x}
         if some:
-            rows.append(
-                [effect, *(f"{at_25(v):.2g} ({v['rival'].replace('_', ' ')})" for v in some.values()), *[""] * (5 - len(some))]
-            )
-    return table(["effect", *("limit / typical size (nearest)" for _ in range(5))], rows)
+            texts = {name: f"{at_25(v):.2g} ({v['rival'].replace('_', ' ')})" for name, v in some.items()}
+            rows.append([effect, *(texts.get(name, "") for name in plants)])
+    return table(["limit / typical size (nearest rival)", *plants], rows)
 
 
 def at_25(limit: Line) -> float:
