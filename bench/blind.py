@@ -37,11 +37,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "python")
 
 import blind_refit
 import numpy as np
-from blind_tables import report
+from blind_tables import limits_of, report
 
 import gaident as ga
 from blind_judge import describes_noise, judge
-from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS, PAIRS, Truth, nominal_plants, random_case, tuned
+from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS, PAIRS, Truth, nominal_plants, random_case, random_plant, tuned
 from drive_rig import COUPLING, OUTSIDE
 
 NOISE_KINDS = ("white", "encoder", "coloured")
@@ -60,6 +60,7 @@ class Cell:
     seed: int
     factor: float | None = None
     settle: int = 0
+    plant: str | None = None
 
     @property
     def key(self) -> str:
@@ -67,8 +68,11 @@ class Cell:
         return "/".join([self.group, "+".join(self.effects), self.kind, self.noise, f"u{self.torque:d}", factor, str(self.seed)])
 
 
-def cells(group: str, cases: int, seed: int) -> Iterator[Cell]:
-    """The cases of a group, `cases` of each combination, in an order that is balanced when it is interrupted."""
+def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float] | None = None) -> Iterator[Cell]:
+    """The cases of a group, `cases` of each combination, in an order that is balanced when it is interrupted.
+
+    `limits`: (effect, plant) -> factor at the separability limit; with them half of the sizes are drawn around the limit.
+    """
     for number in range(seed * 1_000_000, seed * 1_000_000 + cases):
         # Effects and pairs take the noises and the torque in turn; clean records take all of them.
         turn = [(noise, torque) for torque in (True, False) for noise in NOISE_KINDS]
@@ -80,11 +84,18 @@ def cells(group: str, cases: int, seed: int) -> Iterator[Cell]:
             for kind in KINDS:
                 for effect in EFFECTS:
                     noise, torque = turn[(number + zlib.crc32(effect.encode())) % len(turn)]
+                    if effect == "velocity_quantisation" and noise == "encoder":
+                        noise = "white"  # one lattice is enough
                     yield Cell(group, (effect,), kind, noise, torque, number)
         elif group == "sizes":
             for effect in [e for e in EFFECTS if e not in NOISE_EFFECTS]:
-                factor = float(10 ** np.random.default_rng([number, zlib.crc32(effect.encode())]).uniform(-1, np.log10(4)))
-                yield Cell(group, (effect,), "multi", "white", bool(number % 2), number, factor)
+                rng = np.random.default_rng([number, zlib.crc32(effect.encode())])
+                plant = str(rng.choice([p.name for p in nominal_plants() if p.two_masses or effect not in COUPLING]))
+                factor = 10 ** rng.uniform(-1, np.log10(4))
+                limit = (limits or {}).get((effect, plant))
+                if limit is not None and number % 2:
+                    factor = limit * 2 ** rng.uniform(-2, 3)
+                yield Cell(group, (effect,), "multi", "white", bool(number // 2 % 2), number, float(factor), plant=plant)
         elif group == "pairs":
             pair = PAIRS[int(np.random.default_rng(number).integers(len(PAIRS)))]
             yield Cell(group, pair, "multi", turn[number % 6][0], turn[number % 6][1], number)
@@ -100,9 +111,11 @@ def cells(group: str, cases: int, seed: int) -> Iterator[Cell]:
 def run(cell: Cell, with_oracle: bool) -> dict[str, Any]:
     """One diagnosis and its judgement as a line of the file."""
     line: dict[str, Any] = {"key": cell.key, "cell": asdict(cell)}
+    rng = np.random.default_rng(cell.seed)
+    plant = next(p for p in iter(lambda: random_plant(rng), None) if p.name == cell.plant) if cell.plant else None
     try:
         record, validation, controller, truth = random_case(
-            cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, settle=cell.settle
+            cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, plant, settle=cell.settle
         )
     except RuntimeError as none:  # this effect does not act there
         return line | {"impossible": str(none)}
@@ -120,8 +133,10 @@ def run(cell: Cell, with_oracle: bool) -> dict[str, Any]:
     return line
 
 
-def limit_cells() -> Iterator[tuple[str, int]]:
+def limit_cells(plants: list[str]) -> Iterator[tuple[str, int]]:
     for index, plant in enumerate(nominal_plants()):
+        if plant.name not in plants:
+            continue
         for effect in blind_refit.NEAR:
             if plant.two_masses or effect not in COUPLING:
                 yield effect, index
@@ -183,6 +198,8 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=GROUPS, default=list(GROUPS))
     parser.add_argument("--effects", nargs="+", default=None, help="of the groups, only cases that hide one of these")
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
+    names = [plant.name for plant in nominal_plants()]
+    parser.add_argument("--plants", nargs="+", choices=names, default=names, help="of --limits")
     parser.add_argument("--no-oracle", action="store_true")
     parser.add_argument("--limits", action="store_true")
     parser.add_argument("--report", action="store_true")
@@ -191,12 +208,15 @@ def main() -> None:
     there = read(options.out)
     jobs: list[tuple[Any, ...]] = []
     if options.limits:
-        keys = {f"limit/{effect}/{nominal_plants()[index].name}": (effect, index) for effect, index in limit_cells()}
+        keys = {
+            f"limit/{effect}/{nominal_plants()[index].name}": (effect, index) for effect, index in limit_cells(options.plants)
+        }
         jobs = [(run_limit, *arguments) for key, arguments in keys.items() if key not in there]
     elif not options.report:
         if not hasattr(ga, "diagnose"):
             sys.exit("this gaident has no diagnose()")
-        chosen = [cell for group in options.only for cell in cells(group, options.cases, options.seed)]
+        limits = limits_of(list(there.values()))
+        chosen = [cell for group in options.only for cell in cells(group, options.cases, options.seed, limits)]
         chosen = [c for c in chosen if c.kind in options.kinds and c.key not in there]
         chosen = [c for c in chosen if not options.effects or set(c.effects) & set(options.effects)]
         jobs = [(run, cell, not options.no_oracle) for cell in chosen]

@@ -228,7 +228,7 @@ class Limit:
         return float(self.factor * np.sqrt(25 / max(self.nearest, 1e-9)))
 
 
-def separability(truth: Truth, only: Sequence[str] | None = None, evaluations: int = 12) -> tuple[Limit, dict[str, float]]:
+def separability(truth: Truth, only: Sequence[str] | None = None, evaluations: int = 10) -> tuple[Limit, dict[str, float]]:
     """Refit every rival to the noise-free record of a case."""
     log = run_drive(truth.plant, truth.command, truth.effects)
     left: dict[str, float] = {}
@@ -244,9 +244,11 @@ def separability(truth: Truth, only: Sequence[str] | None = None, evaluations: i
 def limit(case: Callable[[float], Truth]) -> Limit:
     """The separability limit of an effect: at its typical size first, then near the limit with the rivals that came nearest."""
     first, left = separability(case(1.0))
-    near = sorted(left, key=left.__getitem__)[:4]
-    closer = float(np.clip(2 * first.at_25, 0.02, 4.0))
-    try:
-        return separability(case(closer), near)[0]
-    except RuntimeError:  # the effect no longer acts at that size
-        return first
+    near = sorted(left, key=left.__getitem__)[:2]
+    closer = 2 * first.at_25
+    while closer < 1:
+        try:
+            return separability(case(closer), near)[0]
+        except RuntimeError:  # a limit this wide is never reached
+            closer *= 2
+    return first

@@ -144,9 +144,14 @@ def at_25(limit: Line) -> float:
     return float(limit["factor"] * np.sqrt(25 / max(limit["nearest"], 1e-9)))
 
 
+def limits_of(lines: list[Line]) -> dict[tuple[str, str], float]:
+    """(effect, plant) -> factor at which the nearest rival leaves chi2 = 25."""
+    return {(x["effect"], x["plant"]): at_25(x["limit"]) for x in lines if "limit" in x}
+
+
 def curve_table(lines: list[Line], limits: list[Line]) -> str:
     """Detection against size over separability limit, per effect and in all; without limits against the size itself."""
-    known = {(x["effect"], x["plant"]): at_25(x["limit"]) for x in limits if "limit" in x}
+    known = limits_of(limits)
     edges = [0, 0.5, 1, 2, 4, np.inf]
     bins = [f"{a:g}-{b:g}" for a, b in pairwise(edges)]
     above = [x["factor"] / known.get((x["cell"]["effects"][0], x["plant"]), 1.0) for x in lines]

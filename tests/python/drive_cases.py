@@ -155,7 +155,7 @@ def move_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> A
     return command[:LONG_SAMPLES]
 
 
-def draw_effect(name: str, factor: float, plant: Plant, duration: float, rng: np.random.Generator) -> dict[str, float]:
+def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.random.Generator) -> dict[str, float]:
     """Parameters of one effect at `factor` times its typical size."""
     sign = float(rng.choice([-1, 1]))
     phase = float(rng.uniform(-np.pi, np.pi))
@@ -172,7 +172,7 @@ def draw_effect(name: str, factor: float, plant: Plant, duration: float, rng: np
         }
     if name == "friction_drift":
         rate = 0.2 * factor
-        return {"torque": 0.05 * near, "rate": rate if sign > 0 else -min(rate, 0.8 / duration)}
+        return {"torque": 0.05 * near, "rate": rate if sign > 0 else -min(rate, 0.8 / (samples * plant.dt))}
     if name == "extra_resonance":
         # A third mass on the motor: (wp/wz)^2 - 1 is its share of the inertia before it.
         wz, ratio, zz = 1000.0 * near, float(np.sqrt(1 + 0.3 * factor)), float(rng.uniform(0.01, 0.03))
@@ -198,7 +198,7 @@ def draw_effect(name: str, factor: float, plant: Plant, duration: float, rng: np
         "velocity_filter": {"time_constant": 1e-3 * factor},
         "velocity_ripple": {"amplitude": 5e-3 * factor, "order": float(rng.choice([1, 2, 4])), "phase": phase},
         "velocity_quantisation": {"step": 0.63 * factor},
-        "outliers": {"fraction": 0.002 * factor},
+        "outliers": {"fraction": max(3, round(0.002 * factor * samples)) / samples},
         "torque_hum": {"amplitude": 0.03 * factor, "frequency": 2 * np.pi * float(rng.uniform(10, 50)), "phase": phase},
         "uneven_friction": {"torque": 0.05 * factor, "depth": 0.8, "order": float(rng.choice([1, 2, 3])), "phase": phase},
         "root_drag": {"coefficient": 0.05 / np.sqrt(80) * factor},
@@ -256,12 +256,11 @@ def random_case(
     noise_now = replace(NOISES[noise], encoder=encoder) if noise in ("encoder", "differenced") else noise
     noise_now = NOISES[noise_now] if isinstance(noise_now, str) else noise_now
     samples = STEP_SAMPLES if kind == "step" else LONG_SAMPLES
-    for _ in range(200):
+    for _ in range(200 if plant is None else 10):
         factors = [float(np.exp(rng.uniform(np.log(0.5), np.log(2)))) for _ in effects]
         now = plant or random_plant(rng, True if set(effects) & set(COUPLING) else None)
         hidden = {
-            name: draw_effect(name, factors[i] if factor is None else factor, now, samples * now.dt, rng)
-            for i, name in enumerate(effects)
+            name: draw_effect(name, factors[i] if factor is None else factor, now, samples, rng) for i, name in enumerate(effects)
         }
         commands = [command_for(kind, now, rng, other_order) for other_order in (False, True)]
         truth = Truth(

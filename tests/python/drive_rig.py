@@ -269,7 +269,7 @@ def rig(
     log = run_drive(plant, full, effects, substeps=substeps, **sensor, **disturbances(noise, len(full), rng))
     velocity = log.velocity.copy()
     if "outliers" in effects:
-        count = max(3, round(effects["outliers"]["fraction"] * len(command)))
+        count = round(effects["outliers"]["fraction"] * len(command))
         hit = settle + rng.choice(len(command), count, replace=False)
         velocity[hit] += rng.choice([-1, 1], count) * rng.uniform(10, 60, count)
     return ga.Record(
