@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import beta
 
-from blind_judge import DRIVERS, TWINS
+from blind_judge import CLASSES, DRIVERS, TWINS
 from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS
 from drive_rig import OUTSIDE
 
@@ -73,8 +73,8 @@ def clean_table(lines: list[Line]) -> str:
             named = sum(right(x, "named") for x in some)
             found = Counter(f for x in some for each in x["judged"]["sets"] for f in each[:1])
             rows.append([kind, noise, rate(named, len(some)), rate(sum(right(x, "sets") for x in some), len(some)),
-                         listing(found)])  # fmt: skip
-    return table(["record", "noise", "something named", "anything reported", "what"], rows)
+                         rate(sum(x["judged"]["verdict"] != "adequate" for x in some), len(some)), listing(found)])  # fmt: skip
+    return table(["record", "noise", "something named", "anything reported", "verdict not adequate", "what"], rows)
 
 
 def effect_table(lines: list[Line]) -> str:
@@ -94,10 +94,10 @@ def effect_table(lines: list[Line]) -> str:
                      median(gain_ratio(x) for x in some),
                      share(right(x, "twins_together") for x in some) if effect in TWINS else ""])  # fmt: skip
     drive = [x for x in lines if x["cell"]["effects"][0] not in NOISE_EFFECTS]
-    apart = [x for x in drive if x["cell"]["effects"][0] not in TWINS]
+    apart = [x for x in drive if x["cell"]["effects"][0] not in CLASSES]
     errors_all = [v for x in drive for v in x["judged"]["parameter_errors"].values()]
     total = [
-        f"exact name outside twins: {rate(sum(right(x, 'exact') for x in apart), len(apart))}",
+        f"exact name outside structural classes: {rate(sum(right(x, 'exact') for x in apart), len(apart))}",
         f"truth in the reported set: {rate(sum(right(x, 'in_set') for x in drive), len(drive))}",
         f"a wrong name: {rate(sum(right(x, 'wrong') for x in drive), len(drive))}",
         f"median parameter error: {100 * float(np.median(errors_all)) if errors_all else float('nan'):.2g} %; "
@@ -167,10 +167,10 @@ def curve_table(lines: list[Line], limits: list[Line]) -> str:
         if any(row[1:]):
             rows.append(row)
     twice = [x for x, a in zip(lines, above, strict=True) if a > 2]
-    apart = [x for x in twice if x["cell"]["effects"][0] not in TWINS]
+    apart = [x for x in twice if x["cell"]["effects"][0] not in CLASSES]
     below = [x for x, a in zip(lines, above, strict=True) if a < 1]
     total = [
-        f"above twice the limit, exact outside twins: {rate(sum(right(x, 'exact') for x in apart), len(apart))}",
+        f"above twice the limit, exact outside classes: {rate(sum(right(x, 'exact') for x in apart), len(apart))}",
         f"above twice the limit, in set: {rate(sum(right(x, 'in_set') for x in twice), len(twice))}",
         f"below the limit, a wrong name: {rate(sum(right(x, 'wrong') for x in below), len(below))}",
     ]

@@ -13,12 +13,11 @@ from typing import Any
 from drive_cases import NOISE_EFFECTS
 from drive_rig import OUTSIDE
 
-# Truth -> what no record of command, velocity and torque can tell from it.
-TWINS = {
-    "torque_lag": "velocity_filter",
-    "velocity_filter": "torque_lag",
-    "load_torque": "asymmetric_friction",  # the same torque once the shaft turns
-}
+# Truth -> what no record of command, velocity and torque can tell from it: always reported together.
+TWINS = {"torque_lag": "velocity_filter", "velocity_filter": "torque_lag"}
+# Members of structural classes: reported, but an exact name is not asked for. A load and dry friction of two levels are the same
+# torque as long as the shaft turns; a load alone, or unequal viscous parts, may be told apart.
+CLASSES = (*TWINS, "load_torque", "asymmetric_friction")
 # What `driver` may say about an effect outside the library, and what such an effect really contains of the library.
 DRIVERS = {
     "torque_hum": ("time",),

@@ -11,7 +11,7 @@ from functools import lru_cache
 import pytest
 
 import gaident as ga
-from blind_judge import DRIVERS, TWINS, Judgement, judge
+from blind_judge import CLASSES, DRIVERS, Judgement, judge
 from drive_cases import EFFECTS, random_case, records
 from drive_rig import OUTSIDE, library
 
@@ -40,14 +40,14 @@ def diagnosed(
     return judge(dia, truth.effects)
 
 
-@pytest.mark.parametrize("effect", [e for e in EFFECTS if e not in TWINS])
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if e not in CLASSES])
 def test_a_hidden_effect_is_named(effect: str) -> None:
     judged = diagnosed((effect,), torque=EFFECTS.index(effect) % 2 == 0)
     assert judged.exact, judged
 
 
-@pytest.mark.parametrize("effect", TWINS)
-def test_a_twin_is_reported_and_nothing_else(effect: str) -> None:
+@pytest.mark.parametrize("effect", CLASSES)
+def test_a_member_of_a_class_is_reported_and_nothing_else(effect: str) -> None:
     judged = diagnosed((effect,))
     assert judged.in_set and not judged.wrong and not judged.extra, judged
 
@@ -103,7 +103,8 @@ def test_nothing_is_named_where_nothing_is_hidden(kind: str, noise: str) -> None
     for torque in (True, False) if kind == "multi" else (True,):
         judged = diagnosed((), kind, noise, torque)
         assert not judged.sets, judged
-        assert judged.verdict == "adequate", judged
+        if noise == "white":  # coloured remainders may be called unexplained, but not by a name
+            assert judged.verdict == "adequate", judged
 
 
 @pytest.mark.parametrize("pair", [("coulomb_friction", "transport_delay"), ("cogging", "quadratic_drag")])

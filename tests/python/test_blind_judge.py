@@ -100,7 +100,7 @@ def test_tables_count_what_happened() -> None:
     limit = {"factor": 1.0, "nearest": 100.0, "rival": "none"}  # so half of the typical size leaves 25
     limits = [{"key": "limit/", "effect": "coulomb_friction", "plant": "one mass", "limit": limit}]
     curve = blind_tables.curve_table([good | {"factor": 1.2}, line("coulomb_friction", 0.1, finding("cogging"))], limits)
-    assert "above twice the limit, exact outside twins: 1/1" in curve
+    assert "above twice the limit, exact outside classes: 1/1" in curve
     assert "below the limit, a wrong name: 1/1" in curve and "100 %, 100 %, 0 % of 1" in curve
     assert "no results" in blind_tables.report([])
     assert "### Crashes" in blind_tables.report([{"key": "x", "crash": "ValueError: no"}])
