@@ -18,6 +18,7 @@ Every finished case is a line of the file: stop at will, start again and it goes
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import os
 import sys
@@ -142,8 +143,12 @@ def limit_cells(plants: list[str]) -> Iterator[tuple[str, int]]:
                 yield effect, index
 
 
-def run_limit(effect: str, index: int) -> dict[str, Any]:
-    """The separability limit of an effect on a nominal drive, tuned as a random one is."""
+def run_limit(effect: str, index: int, method: str) -> dict[str, Any]:
+    """The separability limit of an effect on a nominal drive, tuned as a random one is.
+
+    `method` is "module:function"; the function takes factor -> Truth and returns a blind_refit.Limit.
+    """
+    module, function = method.split(":")
     rng = np.random.default_rng(index)
     plant = nominal_plants()[index]
     plant = plant if plant.kp else tuned(plant, rng)
@@ -153,7 +158,7 @@ def run_limit(effect: str, index: int) -> dict[str, Any]:
 
     line: dict[str, Any] = {"key": f"limit/{effect}/{plant.name}", "effect": effect, "plant": plant.name}
     try:
-        return line | {"limit": asdict(blind_refit.limit(case))}
+        return line | {"limit": asdict(getattr(importlib.import_module(module), function)(case))}
     except RuntimeError as none:
         return line | {"impossible": str(none)}
 
@@ -200,6 +205,7 @@ def main() -> None:
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
     names = [plant.name for plant in nominal_plants()]
     parser.add_argument("--plants", nargs="+", choices=names, default=names, help="of --limits")
+    parser.add_argument("--limit-with", default="blind_refit:limit", metavar="MODULE:FUNCTION")
     parser.add_argument("--no-oracle", action="store_true")
     parser.add_argument("--limits", action="store_true")
     parser.add_argument("--report", action="store_true")
@@ -211,7 +217,7 @@ def main() -> None:
         keys = {
             f"limit/{effect}/{nominal_plants()[index].name}": (effect, index) for effect, index in limit_cells(options.plants)
         }
-        jobs = [(run_limit, *arguments) for key, arguments in keys.items() if key not in there]
+        jobs = [(run_limit, *arguments, options.limit_with) for key, arguments in keys.items() if key not in there]
     elif not options.report:
         if not hasattr(ga, "diagnose"):
             sys.exit("this gaident has no diagnose()")

@@ -32,6 +32,8 @@ LOGARITHMIC = {"stribeck_velocity", "stiffness", "limit", "frequency", "zero_fre
 SCALES = {"torque": 0.02, "static_torque": 0.02, "torque_positive": 0.02, "torque_negative": 0.02, "coefficient": 5e-6,
           "rate": 0.1, "gap": 2e-3, "width": 0.01, "delay": 3e-4, "time_constant": 3e-4, "share": 0.1,
           "yield_twist": 0.01}  # fmt: skip
+# Without bounds a resonance becomes a lag, and Stribeck friction imitates half of the library.
+BOUNDS = {"damping": 0.3, "zero_damping": 0.3, "stribeck_velocity": 8.0}
 SIGNED = {("load_torque", "torque"), ("friction_drift", "rate"), ("hardening_stiffness", "cubic_stiffness")}
 
 
@@ -81,13 +83,14 @@ class Structure:
                 effects[effect] = {**values, "amplitude": scale * float(np.hypot(c, s)), "phase": float(np.arctan2(s, c))}
             else:
                 effects[effect] = {
-                    name: value * float(np.exp(next(parts)))
+                    name: min(value * float(np.exp(next(parts))), BOUNDS.get(name, np.inf))
                     if self._log(effect, name)
                     else (next(parts) if (effect, name) in SIGNED else abs(next(parts))) * self._scale(effect, name)
                     for name, value in values.items()
                 }
             if effect == "stribeck_friction":
-                effects[effect]["static_torque"] = max(effects[effect]["static_torque"], effects[effect]["torque"])
+                kinetic = effects[effect]["torque"]
+                effects[effect]["static_torque"] = float(np.clip(effects[effect]["static_torque"], kinetic, 3 * kinetic))
         return replace(self.plant, **mechanics), effects
 
     def _damping(self, name: str) -> float:
@@ -215,21 +218,17 @@ def rivals(truth: Truth, torque: Array) -> dict[str, list[dict[str, Values]]]:
 
 @dataclass(frozen=True)
 class Limit:
-    """chi2 left by the mechanics alone and by the nearest rival for an effect of `factor` times its typical size."""
+    """The size, in typical sizes, at which the nearest rival leaves chi2 = 25, and what was left close to it, at `factor`."""
 
+    size: float
     factor: float
     base: float
     nearest: float
     rival: str
 
-    @property
-    def at_25(self) -> float:
-        """The factor at which the nearest rival leaves 25; chi2 grows with the square of a small effect."""
-        return float(self.factor * np.sqrt(25 / max(self.nearest, 1e-9)))
 
-
-def separability(truth: Truth, only: Sequence[str] | None = None, evaluations: int = 10) -> tuple[Limit, dict[str, float]]:
-    """Refit every rival to the noise-free record of a case."""
+def separability(truth: Truth, only: Sequence[str] | None = None, evaluations: int = 10) -> dict[str, float]:
+    """chi2 that each rival leaves of the noise-free record of a case after its refit."""
     log = run_drive(truth.plant, truth.command, truth.effects)
     left: dict[str, float] = {}
     for rival, structures in rivals(truth, log.torque).items():
@@ -237,18 +236,34 @@ def separability(truth: Truth, only: Sequence[str] | None = None, evaluations: i
             continue
         fits = (refit(Structure(truth.plant, start), truth, log.velocity, None, evaluations) for start in structures)
         left[rival] = min(fit.chi2 for fit in fits)
-    nearest = min(left, key=left.__getitem__)
-    return Limit(truth.factor, left["none"], left[nearest], nearest), left
+    return left
 
 
-def limit(case: Callable[[float], Truth]) -> Limit:
-    """The separability limit of an effect: at its typical size first, then near the limit with the rivals that came nearest."""
-    first, left = separability(case(1.0))
-    near = sorted(left, key=left.__getitem__)[:2]
-    closer = 2 * first.at_25
-    while closer < 1:
+def limit(case: Callable[[float], Truth], largest: float = 8.0, rounds: int = 9) -> Limit:
+    """The separability limit of an effect: every rival at the typical size, the three nearest on the way to chi2 = 25.
+
+    chi2 grows with the square of a small effect, but not always: a delay inside one sample is a lag, and a limit acts
+    suddenly. So the square is only the first guess; once the size lies between two others, their middle is tried.
+    """
+    factor, below, above = 1.0, 0.0, float("inf")
+    near: list[str] | None = None
+    best: Limit | None = None
+    for _ in range(rounds):
         try:
-            return separability(case(closer), near)[0]
+            left = separability(case(factor), near)
         except RuntimeError:  # a limit this wide is never reached
-            closer *= 2
-    return first
+            left = {"none": 0.0}
+        if near is None:
+            near = sorted(left, key=left.__getitem__)[:3]
+        rival = min(left, key=left.__getitem__)
+        guess = factor * np.sqrt(25 / max(left[rival], 1e-9))
+        if left[rival] > 0 and (best is None or abs(np.log(guess / factor)) < abs(np.log(best.size / best.factor))):
+            best = Limit(float(guess), factor, left["none"], left[rival], rival)
+        if 12 < left[rival] < 50 or below > 0.8 * above or below >= largest:
+            break
+        below, above = (max(below, factor), above) if left[rival] < 25 else (below, min(above, factor))
+        inside = (below < guess < above and above == float("inf")) or below == 0
+        factor = float(np.clip(guess, factor / 100, min(largest, factor * 4)) if inside else np.sqrt(below * above))
+    if best is None:
+        raise RuntimeError("the effect never acts")
+    return replace(best, size=best.size if below < best.size < above else min(above, largest))

@@ -135,18 +135,14 @@ def limit_table(limits: list[Line]) -> str:
     for effect in EFFECTS:
         some = {x["plant"]: x["limit"] for x in limits if x["effect"] == effect and "limit" in x}
         if some:
-            texts = {name: f"{at_25(v):.2g} ({v['rival'].replace('_', ' ')})" for name, v in some.items()}
+            texts = {name: f"{v['size']:.2g} ({v['rival'].replace('_', ' ')})" for name, v in some.items()}
             rows.append([effect, *(texts.get(name, "") for name in plants)])
     return table(["limit / typical size (nearest rival)", *plants], rows)
 
 
-def at_25(limit: Line) -> float:
-    return float(limit["factor"] * np.sqrt(25 / max(limit["nearest"], 1e-9)))
-
-
 def limits_of(lines: list[Line]) -> dict[tuple[str, str], float]:
     """(effect, plant) -> factor at which the nearest rival leaves chi2 = 25."""
-    return {(x["effect"], x["plant"]): at_25(x["limit"]) for x in lines if "limit" in x}
+    return {(x["effect"], x["plant"]): float(x["limit"]["size"]) for x in lines if "limit" in x}
 
 
 def curve_table(lines: list[Line], limits: list[Line]) -> str:

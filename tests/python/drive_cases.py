@@ -191,7 +191,8 @@ def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.ra
         # 1.4 N m where a reversal at full speed asks for 3.7.
         "torque_saturation": {"limit": 1.4 / factor * max(1.0, plant.kp / 0.0232)},
         "torque_dead_band": {"width": 0.03 * factor},
-        "transport_delay": {"delay": 1e-3 * factor},
+        # Two samples: a delay inside one sample is, at the samples, the same as a lag.
+        "transport_delay": {"delay": max(1e-3, 2 * plant.dt) * factor},
         "torque_lag": {"time_constant": 1e-3 * factor},
         "integrator_clamp": {"limit": 0.05 / factor},
         "command_rate_limit": {"rate": 3000 / factor},

@@ -97,7 +97,7 @@ def test_tables_count_what_happened() -> None:
     assert blind_tables.gain_ratio(good) == pytest.approx(0.9)
     matrix = blind_tables.confusion([good, bad, line("", 0.0)])
     assert "| nothing |  |  | 1 |" in matrix and "| coulomb_friction | 1 | 1 |" in matrix
-    limit = {"factor": 1.0, "nearest": 100.0, "rival": "none"}  # so half of the typical size leaves 25
+    limit = {"size": 0.5, "factor": 1.0, "nearest": 100.0, "rival": "none"}
     limits = [{"key": "limit/", "effect": "coulomb_friction", "plant": "one mass", "limit": limit}]
     curve = blind_tables.curve_table([good | {"factor": 1.2}, line("coulomb_friction", 0.1, finding("cogging"))], limits)
     assert "above twice the limit, exact outside classes: 1/1" in curve
