@@ -1,0 +1,234 @@
+"""Blind tests of ga.diagnose: hidden effects on simulated drives that share no code with the library.
+
+    python bench/blind.py --out results.jsonl [--cases 20] [--workers 2] [--seed 1] [--only GROUP ...] [--effects NAME ...]
+    python bench/blind.py --out results.jsonl --report          # tables only, from what is there
+    python bench/blind.py --out results.jsonl --limits          # separability limits (slow; once, they keep)
+
+Every finished case is a line of the file: stop at will, start again and it goes on. Groups for --only:
+
+    clean    nothing hidden; every record, noise, with and without logged torque (--cases of each combination)
+    effects  one effect at 0.5..2 times its typical size
+    sizes    the same at 0.1..4 times, multi-level records with white noise: the detection curves
+    pairs    two effects at once, multi-level
+    outside  effects that the library does not know, multi-level
+    encoder  an encoder that is really differenced: half a sample of delay is there, and nothing else
+    settled  a load that the integrator carries before the record starts, torque logged
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import os
+import sys
+import time
+import zlib
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+# One core per diagnosis, also in the linear algebra.
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+# ruff: noqa: E402
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "python"))
+
+import blind_refit
+import numpy as np
+from blind_tables import limits_of, report
+
+import gaident as ga
+from blind_judge import describes_noise, judge
+from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS, PAIRS, Truth, nominal_plants, random_case, random_plant, tuned
+from drive_rig import COUPLING, OUTSIDE
+
+NOISE_KINDS = ("white", "encoder", "coloured")
+GROUPS = ("clean", "effects", "sizes", "pairs", "outside", "encoder", "settled")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One case, complete: the same cell is the same record."""
+
+    group: str
+    effects: tuple[str, ...]
+    kind: str
+    noise: str
+    torque: bool
+    seed: int
+    factor: float | None = None
+    settle: int = 0
+    plant: str | None = None
+
+    @property
+    def key(self) -> str:
+        factor = "" if self.factor is None else f"{self.factor:.4g}"
+        return "/".join([self.group, "+".join(self.effects), self.kind, self.noise, f"u{self.torque:d}", factor, str(self.seed)])
+
+
+def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float] | None = None) -> Iterator[Cell]:
+    """The cases of a group, `cases` of each combination, in an order that is balanced when it is interrupted.
+
+    `limits`: (effect, plant) -> factor at the separability limit; with them half of the sizes are drawn around the limit.
+    """
+    for number in range(seed * 1_000_000, seed * 1_000_000 + cases):
+        # Effects and pairs take the noises and the torque in turn; clean records take all of them.
+        turn = [(noise, torque) for torque in (True, False) for noise in NOISE_KINDS]
+        if group == "clean":
+            for kind in KINDS:
+                for noise, torque in turn:
+                    yield Cell(group, (), kind, noise, torque, number)
+        elif group == "effects":
+            for kind in KINDS:
+                for effect in EFFECTS:
+                    noise, torque = turn[(number + zlib.crc32(effect.encode())) % len(turn)]
+                    if effect == "velocity_quantisation" and noise == "encoder":
+                        noise = "white"  # one lattice is enough
+                    yield Cell(group, (effect,), kind, noise, torque, number)
+        elif group == "sizes":
+            for effect in [e for e in EFFECTS if e not in NOISE_EFFECTS]:
+                rng = np.random.default_rng([number, zlib.crc32(effect.encode())])
+                plant = str(rng.choice([p.name for p in nominal_plants() if p.two_masses or effect not in COUPLING]))
+                factor = 10 ** rng.uniform(-1, np.log10(4))
+                limit = (limits or {}).get((effect, plant))
+                if limit is not None and number % 2:
+                    factor = limit * 2 ** rng.uniform(-2, 3)
+                yield Cell(group, (effect,), "multi", "white", bool(number // 2 % 2), number, float(factor), plant=plant)
+        elif group == "pairs":
+            pair = PAIRS[int(np.random.default_rng(number).integers(len(PAIRS)))]
+            yield Cell(group, pair, "multi", turn[number % 6][0], turn[number % 6][1], number)
+        elif group == "outside":
+            for effect in OUTSIDE:
+                yield Cell(group, (effect,), "multi", turn[number % 6][0], turn[number % 6][1], number)
+        elif group == "encoder":
+            yield Cell(group, (), "multi", "differenced", bool(number % 2), number)
+        elif group == "settled":
+            yield Cell(group, ("load_torque",), "multi", NOISE_KINDS[number % 3], True, number, settle=1500)
+
+
+def run(cell: Cell, with_oracle: bool) -> dict[str, Any]:
+    """One diagnosis and its judgement as a line of the file."""
+    line: dict[str, Any] = {"key": cell.key, "cell": asdict(cell)}
+    rng = np.random.default_rng(cell.seed)
+    plant = next(p for p in iter(lambda: random_plant(rng), None) if p.name == cell.plant) if cell.plant else None
+    try:
+        record, validation, controller, truth = random_case(
+            cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, plant, settle=cell.settle
+        )
+    except RuntimeError as none:  # this effect does not act there
+        return line | {"impossible": str(none)}
+    line |= {"plant": truth.plant.name, "factor": truth.factor, "effects": truth.effects}
+    started = time.perf_counter()
+    try:
+        dia = ga.diagnose(record, controller=controller, validation=validation)  # type: ignore[attr-defined]
+    except Exception as failure:  # a crash is a result, too
+        return line | {"crash": f"{type(failure).__name__}: {failure}", "seconds": time.perf_counter() - started}
+    line |= {"seconds": time.perf_counter() - started, "judged": judge(dia, truth.effects).as_dict()}
+    line |= {"before": dia.before.rmse, "after": dia.after.rmse}
+    inside = cell.effects and not set(cell.effects) & set(OUTSIDE) and not describes_noise(cell.effects)
+    if with_oracle and validation is not None and inside and not cell.settle:
+        line["oracle"] = blind_refit.oracle(truth, record.velocity, validation.velocity)
+    return line
+
+
+def limit_cells(plants: list[str]) -> Iterator[tuple[str, int]]:
+    for index, plant in enumerate(nominal_plants()):
+        if plant.name not in plants:
+            continue
+        for effect in blind_refit.NEAR:
+            if plant.two_masses or effect not in COUPLING:
+                yield effect, index
+
+
+def run_limit(effect: str, index: int, method: str) -> dict[str, Any]:
+    """The separability limit of an effect on a nominal drive, tuned as a random one is.
+
+    `method` is "module:function"; the function takes factor -> Truth and returns a blind_refit.Limit.
+    """
+    module, function = method.split(":")
+    rng = np.random.default_rng(index)
+    plant = nominal_plants()[index]
+    plant = plant if plant.kp else tuned(plant, rng)
+
+    def case(factor: float) -> Truth:
+        return random_case(7, effect, noise="none", factor=factor, plant=plant)[3]
+
+    line: dict[str, Any] = {"key": f"limit/{effect}/{plant.name}", "effect": effect, "plant": plant.name}
+    try:
+        return line | {"limit": asdict(getattr(importlib.import_module(module), function)(case))}
+    except RuntimeError as none:
+        return line | {"impossible": str(none)}
+
+
+def read(path: Path) -> dict[str, dict[str, Any]]:
+    """Lines by their key; a last line that was cut off is dropped."""
+    lines = {}
+    for text in path.read_text().splitlines() if path.exists() else []:
+        try:
+            line = json.loads(text)
+        except json.JSONDecodeError:
+            continue
+        lines[line["key"]] = line
+    return lines
+
+
+def work(path: Path, jobs: list[tuple[Any, ...]], workers: int) -> None:
+    """Run jobs (function, arguments ...) and write each result as it comes."""
+    started = time.perf_counter()
+    cut_off = path.exists() and not path.read_text().endswith("\n") and path.stat().st_size > 0
+    with path.open("a") as out, ProcessPoolExecutor(workers) as pool:
+        out.write("\n" if cut_off else "")
+        waiting = [pool.submit(*job) for job in jobs]
+        try:
+            for done, future in enumerate(as_completed(waiting), 1):
+                out.write(json.dumps(future.result()) + "\n")
+                out.flush()
+                if sys.stderr.isatty():
+                    print(f"\r{done} of {len(jobs)}, {time.perf_counter() - started:.0f} s", end="", file=sys.stderr)
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+            print(f"\ninterrupted; what is done stands in {path}", file=sys.stderr)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="blind tests of gaident.diagnose", epilog=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
+    parser.add_argument("--out", type=Path, default=Path("build/blind.jsonl"), help="JSON lines; what is in it is not run again")
+    parser.add_argument("--cases", type=int, default=20)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", nargs="+", choices=GROUPS, default=list(GROUPS))
+    parser.add_argument("--effects", nargs="+", default=None, help="of the groups, only cases that hide one of these")
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
+    names = [plant.name for plant in nominal_plants()]
+    parser.add_argument("--plants", nargs="+", choices=names, default=names, help="of --limits")
+    parser.add_argument("--limit-with", default="blind_refit:limit", metavar="MODULE:FUNCTION")
+    parser.add_argument("--no-oracle", action="store_true")
+    parser.add_argument("--limits", action="store_true")
+    parser.add_argument("--report", action="store_true")
+    options = parser.parse_args()
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    there = read(options.out)
+    jobs: list[tuple[Any, ...]] = []
+    if options.limits:
+        keys = {
+            f"limit/{effect}/{nominal_plants()[index].name}": (effect, index) for effect, index in limit_cells(options.plants)
+        }
+        jobs = [(run_limit, *arguments, options.limit_with) for key, arguments in keys.items() if key not in there]
+    elif not options.report:
+        if not hasattr(ga, "diagnose"):
+            sys.exit("this gaident has no diagnose()")
+        limits = limits_of(list(there.values()))
+        chosen = [cell for group in options.only for cell in cells(group, options.cases, options.seed, limits)]
+        chosen = [c for c in chosen if c.kind in options.kinds and c.key not in there]
+        chosen = [c for c in chosen if not options.effects or set(c.effects) & set(options.effects)]
+        jobs = [(run, cell, not options.no_oracle) for cell in chosen]
+    work(options.out, jobs, options.workers)
+    print(report(list(read(options.out).values())))
+
+
+if __name__ == "__main__":
+    main()

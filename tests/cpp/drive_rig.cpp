@@ -1,0 +1,312 @@
+// A drive in continuous time, for blind tests: written from the definitions of the effects alone, sharing nothing with the library.
+//
+//   motor   J1 dw/dt = M - D1 w - Tc        M  = g (s^2 + 2 zz wz s + wz^2)/(s^2 + 2 zp wp s + wp^2) {T + q - f},  g = (wp/wz)^2
+//   load    J2 dw2/dt = Tc - D2 w2          Tc = K x + DG dx/dt + k3 x^3 beyond the gap, 0 inside; x = theta - theta2
+//
+// T: torque behind saturation, dead band, delay and lag; q: smooth shaft torques; f: dry friction. Every sample is cut at the instant
+// where the delayed torque changes and into substeps of a Runge-Kutta step of fourth order. Dry friction has three regimes
+// (sliding +, sliding -, at rest); the instant of a zero crossing is found by a secant iteration, and at rest w is exactly 0
+// until the torque that holds the shaft exceeds the friction's level. The controller is digital, as a drive has it.
+//
+// Compiled and called by tests/python/drive_rig.py, which reads the list of fields below.
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace {
+
+constexpr double inf = std::numeric_limits<double>::infinity();
+
+struct Drive {  // SI units, rad; neutral values
+    // fields
+    double J1 = 1e-3;  // kg m2
+    double D1 = 0;     // N m s/rad
+    double J2 = 0;     // 0: one mass
+    double D2 = 0;
+    double K = 0;  // N m/rad
+    double DG = 0;
+    double kp = 0;  // N m s/rad
+    double ki = 0;  // N m/rad
+    double torque_limit = inf;
+    double integrator_limit = inf;  // known setting or hidden effect
+    double command_rate = inf;      // rad/s2
+    double saturation = inf;
+    double dead_band = 0;
+    double delay = 0;   // s
+    double lag = 0;     // s
+    double filter = 0;  // s
+    double ripple = 0;
+    double ripple_order = 1;
+    double ripple_phase = 0;
+    double quantum = 0;            // rad/s
+    double differenced = 0;        // not 0: the encoder's own angle is differenced, half a sample late
+    double encoder = 0;            // rad
+    double friction_positive = 0;  // dry friction for w > 0 and w < 0, N m
+    double friction_negative = 0;
+    double viscous_positive = 0;  // N m s/rad
+    double viscous_negative = 0;
+    double stribeck = 0;  // Ts - Tc, N m
+    double stribeck_velocity = 1;
+    double drifting = 0;  // friction Tc (1 + rate t), N m
+    double drift_rate = 0;
+    double dahl = 0;  // N m
+    double dahl_stiffness = 1;
+    double drag = 0;  // N m s2/rad2
+    double load = 0;  // N m
+    double unbalance = 0;
+    double unbalance_phase = 0;
+    double cogging = 0;
+    double cogging_order = 2;
+    double cogging_phase = 0;
+    double gap = 0;    // rad
+    double cubic = 0;  // N m/rad3
+    double wp = 0;     // rad/s; 0: no extra resonance
+    double zp = 0;
+    double wz = 1;
+    double zz = 0;
+    double hum = 0;            // outside the library: torque in time,
+    double hum_frequency = 0;  // rad/s
+    double hum_phase = 0;
+    double uneven = 0;  // dry friction uneven (1 + depth sin(order theta + phase)),
+    double uneven_depth = 0;
+    double uneven_order = 1;
+    double uneven_phase = 0;
+    double root = 0;        // drag root sqrt|w| sign(w),
+    double hysteretic = 0;  // share of a Bouc-Wen spring in K,
+    double yield = 1;       // and its yield twist, rad
+    // end of fields
+};
+
+enum Index { w1, angle, w2, twist, lagged, bristle, filtered, e1, e2, hysteresis, states };
+using State = std::array<double, states>;
+
+double sign(double value) { return static_cast<double>((value > 0) - (value < 0)); }
+
+class Rig {
+public:
+    explicit Rig(const Drive& drive)
+        : d(drive),
+          dry(d.friction_positive != 0 || d.friction_negative != 0 || d.viscous_positive != 0 || d.viscous_negative != 0 ||
+              d.stribeck != 0 || d.drifting != 0 || d.uneven != 0),
+          extra(d.wp > 0),
+          g(extra ? (d.wp / d.wz) * (d.wp / d.wz) : 1) {}
+
+    State s{};
+    double held = 0;       // torque at the input of the lag
+    double disturbed = 0;  // disturbance torque on the shaft
+
+    double rippled() const { return rippled(s); }
+
+    // Integrate from time t over `span` seconds in `count` steps.
+    void advance(double t, double span, int count) {
+        const double h = span / count;
+        for (int i = 0; i < count; ++i) {
+            if (dry) {
+                substep_with_friction(t + i * h, h);
+            } else {
+                s = runge_kutta(s, t + i * h, h, 0);
+            }
+        }
+    }
+
+private:
+    const Drive& d;
+    const bool dry;
+    const bool extra;
+    const double g;
+    int regime = 0;  // -1, 0 (at rest), 1
+
+    double rippled(const State& x) const {
+        if (d.ripple == 0) return x[w1];
+        return x[w1] * (1 + d.ripple * d.ripple_order * std::cos(d.ripple_order * x[angle] + d.ripple_phase));
+    }
+
+    // Magnitude of dry friction when the shaft turns, or is about to turn, in the direction `way`.
+    double level(const State& x, double t, int way) const {
+        const double speed = std::abs(x[w1]);
+        double f = way > 0 ? d.friction_positive + d.viscous_positive * speed : d.friction_negative + d.viscous_negative * speed;
+        if (d.stribeck != 0) f += d.stribeck * std::exp(-(speed / d.stribeck_velocity) * (speed / d.stribeck_velocity));
+        if (d.drifting != 0) f += d.drifting * (1 + d.drift_rate * t);
+        if (d.uneven != 0) f += d.uneven * (1 + d.uneven_depth * std::sin(d.uneven_order * x[angle] + d.uneven_phase));
+        return f;
+    }
+
+    double smooth(const State& x, double t) const {
+        double q = (d.lag > 0 ? x[lagged] : held) + disturbed - d.load;
+        if (d.drag != 0) q -= d.drag * x[w1] * std::abs(x[w1]);
+        if (d.dahl != 0) q -= d.dahl_stiffness * x[bristle];
+        if (d.unbalance != 0) q -= d.unbalance * std::sin(x[angle] + d.unbalance_phase);
+        if (d.cogging != 0) q -= d.cogging * std::sin(d.cogging_order * x[angle] + d.cogging_phase);
+        if (d.hum != 0) q += d.hum * std::sin(d.hum_frequency * t + d.hum_phase);
+        if (d.root != 0) q -= d.root * std::sqrt(std::abs(x[w1])) * sign(x[w1]);
+        return q;
+    }
+
+    double coupling(const State& x) const {
+        double open = x[twist];
+        if (d.gap > 0) {
+            if (std::abs(open) < d.gap / 2) return 0;
+            open -= d.gap / 2 * sign(open);
+        }
+        double spring = d.K * open;
+        if (d.hysteretic != 0) spring = d.K * ((1 - d.hysteretic) * open + d.hysteretic * x[hysteresis]);
+        return spring + d.DG * (x[w1] - x[w2]) + d.cubic * open * open * open;
+    }
+
+    // What the resonance's own states add to the torque behind it.
+    double stored(const State& x) const {
+        return extra ? g * ((d.wz * d.wz - d.wp * d.wp) * x[e1] + 2 * (d.zz * d.wz - d.zp * d.wp) * x[e2]) : 0;
+    }
+
+    // The friction torque that keeps the shaft at rest.
+    double holding(const State& x, double t) const { return smooth(x, t) + (stored(x) - (d.J2 > 0 ? coupling(x) : 0)) / g; }
+
+    State slope(const State& x, double t, int way) const {
+        State dx{};
+        const double tc = d.J2 > 0 ? coupling(x) : 0;
+        const double q = smooth(x, t);
+        const bool resting = dry && way == 0;
+        double net = q;
+        if (resting) {
+            net = (tc - stored(x)) / g;
+        } else if (dry) {
+            net = q - way * level(x, t, way);
+        }
+        dx[w1] = resting ? 0 : (g * net + stored(x) - d.D1 * x[w1] - tc) / d.J1;
+        dx[angle] = x[w1];
+        if (d.J2 > 0) {
+            dx[w2] = (tc - d.D2 * x[w2]) / d.J2;
+            dx[twist] = x[w1] - x[w2];
+            if (d.hysteretic != 0) {
+                // z turns at the rate of the twist, less the more it is yielded: Bouc-Wen with n = 2, beta = gamma = 1/2.
+                const double rate = dx[twist], z = x[hysteresis] / d.yield;
+                dx[hysteresis] = rate - 0.5 * (std::abs(rate) * z * std::abs(z) + rate * z * z);
+            }
+        }
+        if (d.lag > 0) dx[lagged] = (held - x[lagged]) / d.lag;
+        if (d.dahl != 0) dx[bristle] = x[w1] - d.dahl_stiffness * std::abs(x[w1]) * x[bristle] / d.dahl;
+        if (d.filter > 0) dx[filtered] = (rippled(x) - x[filtered]) / d.filter;
+        if (extra) {
+            dx[e1] = x[e2];
+            dx[e2] = net - 2 * d.zp * d.wp * x[e2] - d.wp * d.wp * x[e1];
+        }
+        return dx;
+    }
+
+    State runge_kutta(const State& x, double t, double h, int way) const {
+        const auto moved = [&](const State& k, double by) {
+            State y = x;
+            for (int i = 0; i < states; ++i) y[i] += by * k[i];
+            return y;
+        };
+        const State k1 = slope(x, t, way), k2 = slope(moved(k1, h / 2), t + h / 2, way);
+        const State k3 = slope(moved(k2, h / 2), t + h / 2, way), k4 = slope(moved(k3, h), t + h, way);
+        State y = x;
+        for (int i = 0; i < states; ++i) y[i] += h / 6 * (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i]);
+        return y;
+    }
+
+    // The regime that follows from rest.
+    int from_rest(double t) const {
+        const double needed = holding(s, t);
+        return needed > level(s, t, 1) ? 1 : needed < -level(s, t, -1) ? -1 : 0;
+    }
+
+    void substep_with_friction(double t, double h) {
+        const double end = t + h;
+        for (int events = 0; events < 20 && end - t > 1e-6 * h; ++events) {
+            const double left = end - t;
+            if (regime == 0) regime = from_rest(t);
+            if (regime == 0) {
+                s = runge_kutta(s, t, left, 0);
+                return;
+            }
+            const State whole = runge_kutta(s, t, left, regime);
+            if (regime * whole[w1] >= 0) {
+                s = whole;
+                return;
+            }
+            // w(a) >= 0 >= w(b), seen in the direction of motion: regula falsi between the two, Illinois.
+            double a = 0, b = left, wa = s[w1], wb = whole[w1];
+            State crossing = s;
+            for (int i = 0; i < 40 && b - a > 1e-9 * h; ++i) {
+                const double middle = wa == wb ? b : a + (b - a) * wa / (wa - wb);
+                crossing = runge_kutta(s, t, middle, regime);
+                if (std::abs(crossing[w1]) < 1e-13) {
+                    a = b = middle;
+                } else if (regime * crossing[w1] > 0) {
+                    a = middle, wa = crossing[w1], wb /= 2;
+                } else {
+                    b = middle, wb = crossing[w1], wa /= 2;
+                }
+            }
+            s = crossing;
+            s[w1] = 0;
+            t += b;
+            regime = from_rest(t);
+        }
+        if (end - t > 1e-6 * h) {  // too many events for one substep: the shaft is at rest
+            regime = 0;
+            s = runge_kutta(s, t, end - t, 0);
+        }
+    }
+};
+
+double clamp(double value, double limit) { return value > limit ? limit : value < -limit ? -limit : value; }
+
+}  // namespace
+
+// One run of n samples. `command` drives the loop; where it is null, `given` is the torque command of an open loop. `measured`,
+// where given, is what the controller reads instead of the velocity (a replay). Returns 0, or 1 where the drive ran away.
+extern "C" int drive_rig_run(const Drive* drive, int n, double dt, int substeps, const double* command, const double* given,
+                             const double* measured, const double* velocity_noise, const double* torque_noise, double* velocity,
+                             double* torque, double* position, double* truth) {
+    const Drive& d = *drive;
+    Rig rig(d);
+    std::vector<double> acted(static_cast<std::size_t>(n));
+    const auto at = [&](int i) { return i < 0 ? 0.0 : acted[static_cast<std::size_t>(i)]; };
+    const int whole = static_cast<int>(d.delay / dt + 1e-12);
+    const double part = d.delay - whole * dt > 1e-9 * dt ? d.delay - whole * dt : 0;
+    const int before = static_cast<int>(std::ceil(substeps * part / dt)),
+              after = static_cast<int>(std::ceil(substeps * (1 - part / dt)));
+    double integral = 0, last_error = 0, reference = 0, encoded = 0, last_line = 0;
+    for (int i = 0; i < n; ++i) {
+        double w = d.filter > 0 ? rig.s[filtered] : rig.rippled();
+        truth[i] = rig.s[w1];
+        position[i] = rig.s[angle];
+        if (!(std::abs(truth[i]) < 1e5)) return 1;
+        if (velocity_noise) w += velocity_noise[i];
+        if (d.quantum > 0) w = std::round(w / d.quantum) * d.quantum;
+        if (d.encoder > 0) {
+            // Differences of a position lattice. The sum of the samples follows w without the half sample that the
+            // difference of the angle itself costs.
+            encoded += dt * w;
+            const double line = std::floor((d.differenced != 0 ? rig.s[angle] : encoded) / d.encoder + 0.5);
+            w = (line - last_line) * d.encoder / dt;
+            last_line = line;
+        }
+        velocity[i] = w;
+        double u = 0;
+        if (command) {
+            reference += clamp(command[i] - reference, d.command_rate * dt);
+            const double error = reference - (measured ? measured[i] : w);
+            integral = clamp(integral + d.ki * dt / 2 * (error + last_error), d.integrator_limit);
+            u = clamp(d.kp * error + integral, d.torque_limit);
+            last_error = error;
+        } else {
+            u = given[i];
+        }
+        torque[i] = u;
+        u = clamp(u, d.saturation);
+        acted[static_cast<std::size_t>(i)] = std::abs(u) <= d.dead_band ? 0 : u - d.dead_band * sign(u);
+        if (torque_noise) rig.disturbed = torque_noise[i];
+        if (part > 0) {
+            rig.held = at(i - whole - 1);
+            rig.advance(i * dt, part, before);
+        }
+        rig.held = at(i - whole);
+        rig.advance(i * dt + part, dt - part, after);
+    }
+    return 0;
+}

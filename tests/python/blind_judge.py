@@ -1,0 +1,107 @@
+"""What a diagnosis said about a blind case, judged: pure functions of the result and the truth.
+
+A finding with no alternatives *names* its effect; one with alternatives *abstains* between them. Findings that only describe the
+record's noise do not count, unless that is what was hidden.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from drive_cases import NOISE_EFFECTS
+from drive_rig import OUTSIDE
+
+# Truth -> what no record of command, velocity and torque can tell from it: always reported together.
+TWINS = {"torque_lag": "velocity_filter", "velocity_filter": "torque_lag"}
+# Members of structural classes: reported, but an exact name is not asked for. A load and dry friction of two levels are the same
+# torque as long as the shaft turns; a load alone, or unequal viscous parts, may be told apart.
+CLASSES = (*TWINS, "load_torque", "asymmetric_friction")
+# What `driver` may say about an effect outside the library, and what such an effect really contains of the library.
+DRIVERS = {
+    "torque_hum": ("time",),
+    "uneven_friction": ("position",),
+    "root_drag": ("velocity",),
+    "hysteretic_spring": ("position", "past"),
+}
+PARTS = {"uneven_friction": ("coulomb_friction",)}
+ANGLES = ("phase",)
+
+
+@dataclass
+class Judgement:
+    """Outcome of one diagnosis."""
+
+    truth: tuple[str, ...]
+    named: list[str] = field(default_factory=list)  # without alternatives
+    sets: list[list[str]] = field(default_factory=list)  # of every finding that counts
+    verdict: str = ""
+    driver: str | None = None
+    exact: bool = False  # every hidden effect named, nothing else found
+    in_set: bool = False  # every hidden effect in some finding's set
+    wrong: list[str] = field(default_factory=list)  # named, and not there
+    parts: list[str] = field(default_factory=list)  # named, and a true part of something outside the library
+    twins_together: bool | None = None
+    extra: int = 0  # findings in which no hidden effect occurs
+    parameter_errors: dict[str, float] = field(default_factory=dict)  # "effect.parameter" -> relative error
+    column: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def counted(findings: Iterable[Any], truth: tuple[str, ...]) -> list[Any]:
+    """The findings that count: those about the drive, and those about noise where noise was hidden."""
+    return [f for f in findings if not f.is_noise or f.effect in truth]
+
+
+def judge(dia: Any, effects: dict[str, dict[str, float]]) -> Judgement:
+    """Compare a diagnosis with the hidden effects ({} for a clean record)."""
+    truth = tuple(effects)
+    findings = counted(dia.findings, truth)
+    sets = [[f.effect, *f.alternatives] for f in findings]
+    named = [f.effect for f in findings if not f.alternatives]
+    parts = {part for name in truth for part in PARTS.get(name, ())}
+    judged = Judgement(truth=truth, named=named, sets=sets, verdict=dia.verdict, driver=dia.driver)
+    judged.wrong = [name for name in named if name not in truth and name not in parts]
+    judged.parts = [name for name in named if name in parts]
+    judged.in_set = all(any(name in each for each in sets) for name in truth)
+    judged.exact = sorted(named) == sorted(truth) and len(findings) == len(truth)
+    judged.extra = sum(not set(each) & (set(truth) | parts) for each in sets)
+    if len(truth) == 1 and truth[0] in TWINS:
+        judged.twins_together = any({truth[0], TWINS[truth[0]]} <= set(each) for each in sets)
+    judged.parameter_errors = parameter_errors(findings, effects)
+    judged.column = column(judged)
+    return judged
+
+
+def parameter_errors(findings: list[Any], effects: dict[str, dict[str, float]]) -> dict[str, float]:
+    """Relative errors of the parameters of what was rightly found first in its set; phases and zeros have none."""
+    errors = {}
+    for finding in findings:
+        for name, true in effects.get(finding.effect, {}).items():
+            if name in ANGLES or not true or name not in finding.parameters:
+                continue
+            value = float(finding.parameters[name].value)
+            errors[f"{finding.effect}.{name}"] = abs((abs(value) if name == "amplitude" else value) - true) / abs(true)
+    return errors
+
+
+def column(judged: Judgement) -> str:
+    """The column of the confusion matrix: a name (a wrong one first), else abstained, unexplained or none."""
+    if judged.wrong:
+        return judged.wrong[0]
+    if judged.named:
+        return next((name for name in judged.named if name in judged.truth), judged.named[0])
+    if judged.sets:
+        return "abstained" if judged.in_set or not judged.truth else "abstained without it"
+    return "unexplained" if judged.verdict in ("unexplained", "partly explained") else "none"
+
+
+def driver_right(judged: Judgement) -> bool:
+    return any(judged.driver in DRIVERS[name] for name in judged.truth if name in OUTSIDE)
+
+
+def describes_noise(truth: tuple[str, ...]) -> bool:
+    return bool(set(truth) & set(NOISE_EFFECTS))

@@ -1,0 +1,286 @@
+"""Blind cases: random drives, commands and hidden effects for drive_rig; `random_case(seed, effect)` draws one.
+
+Sizes are the typical ones of a small servo (1 N m rated) times a factor; for the limiting effects (saturation, clamp, rate
+limit) a larger factor is a lower limit. Cases in which the effect changes nothing at all, or the loop is unstable, are redrawn.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import gaident as ga
+from drive_rig import COUPLING, NOISES, Array, Noise, Plant, RanAwayError, rig, run_drive
+
+__all__ = ["EFFECTS", "KINDS", "NOISE_EFFECTS", "PAIRS", "Truth", "command_for", "draw_effect", "random_case", "random_plant"]
+
+EFFECTS = (
+    "coulomb_friction",
+    "stribeck_friction",
+    "asymmetric_friction",
+    "presliding_friction",
+    "quadratic_drag",
+    "load_torque",
+    "unbalance",
+    "cogging",
+    "friction_drift",
+    "backlash",
+    "hardening_stiffness",
+    "torque_saturation",
+    "torque_dead_band",
+    "transport_delay",
+    "torque_lag",
+    "integrator_clamp",
+    "command_rate_limit",
+    "velocity_filter",
+    "velocity_ripple",
+    "velocity_quantisation",
+    "extra_resonance",
+    "outliers",
+)
+NOISE_EFFECTS = ("velocity_quantisation", "outliers")
+FRICTION = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "presliding_friction", "friction_drift")
+LINEAR = ("transport_delay", "torque_lag", "velocity_filter", "extra_resonance")
+# Of these only one at a time, in a pair: the others would act on the same thing and hide or imitate it.
+RELATED = (FRICTION, ("transport_delay", "torque_lag", "velocity_filter"), (*COUPLING, "extra_resonance"),
+           ("torque_saturation", "integrator_clamp", "command_rate_limit"), ("load_torque", "asymmetric_friction"))  # fmt: skip
+PAIRS = tuple(
+    (a, b)
+    for i, a in enumerate(EFFECTS)
+    for b in EFFECTS[i + 1 :]
+    if not {a, b} & set(NOISE_EFFECTS) and not any(a in group and b in group for group in RELATED)
+)
+KINDS = ("multi", "step", "move")
+
+STEP_SAMPLES, LONG_SAMPLES = 250, 3500
+SPEEDS = (1, 3, 5, 10, 20, 30, 40, 60, 80)  # rad/s
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is hidden in a case; `effects` as the drive has them, {} for a clean one."""
+
+    effects: dict[str, dict[str, float]]
+    plant: Plant
+    kind: str
+    noise: Noise
+    factor: float
+    seed: int
+    command: Array
+    validation_command: Array | None
+    settle: int = 0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.effects)
+
+
+def nominal_plants() -> list[Plant]:
+    """Small servo axes. The first has the published controller, the others (kp = ki = 0) are tuned when they are varied."""
+    return [
+        Plant(J=1.02e-4, D=0.003, JL=5.815e-4, DL=0.008, KG=2.59, kp=0.0232, ki=1.367, dt=0.444e-3, name="table 3"),
+        Plant(J=2e-4, D=1e-3, JL=3e-4, DL=1e-3, KG=55.0, DG=2.4e-3, kp=0, ki=0, dt=0.444e-3, name="stiff shaft"),
+        Plant(J=3e-4, D=2e-3, JL=3e-4, DL=1e-3, KG=12.0, DG=1e-3, kp=0, ki=0, dt=1e-3, name="soft shaft"),
+        Plant(J=3e-4, D=1.5e-3, kp=0, ki=0, dt=1e-3, name="one mass"),
+        Plant(J=1.2e-4, D=0.8e-3, kp=0, ki=0, dt=0.444e-3, name="small motor"),
+    ]
+
+
+BANDWIDTH = {"stiff shaft": 70.0, "soft shaft": 45.0, "one mass": 80.0, "small motor": 110.0}  # rad/s
+
+
+def random_plant(rng: np.random.Generator, two_masses: bool | None = None) -> Plant:
+    """One of the nominal plants, every parameter within 30 %."""
+    choice = [p for p in nominal_plants() if two_masses is None or p.two_masses == two_masses]
+    plant = choice[rng.integers(len(choice))]
+    names = ("J", "D", "JL", "DL", "KG", "DG")
+    plant = replace(plant, **{name: getattr(plant, name) * rng.uniform(0.7, 1.3) for name in names})
+    return plant if plant.kp else tuned(plant, rng)
+
+
+def tuned(plant: Plant, rng: np.random.Generator) -> Plant:
+    """With a PI controller, the poles of the rigid loop at wn with damping zeta: kp = 2 zeta wn J - D, ki = wn^2 J."""
+    wn, zeta = BANDWIDTH[plant.name] * rng.uniform(0.8, 1.2), rng.uniform(0.6, 0.9)
+    inertia, damping = plant.J + plant.JL, plant.D + plant.DL
+    return replace(plant, kp=float(f"{2 * zeta * wn * inertia - damping:.4g}"), ki=float(f"{wn**2 * inertia:.4g}"))
+
+
+def command_for(kind: str, plant: Plant, rng: np.random.Generator, other_order: bool = False) -> Array:
+    """A velocity command [rad/s]: one step, levels with reversals and dither, or point-to-point moves."""
+    return {"step": step_command, "multi": level_command, "move": move_command}[kind](plant, rng, other_order)
+
+
+def step_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> Array:
+    command = np.zeros(STEP_SAMPLES)
+    command[10:] = 50.0 if not other_order else 35.0
+    return command
+
+
+def level_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> Array:
+    """Twenty levels, slow ones together so that they settle; every other one with a PRBS worth 0.05 N m."""
+    groups = [list(rng.permutation(SPEEDS[:4])), list(rng.permutation(SPEEDS[4:]))]
+    levels = [0.0]
+    for group in reversed(groups) if other_order else groups:
+        for speed in group:
+            first = rng.choice([-1, 1])
+            levels += [first * speed, -first * speed]
+    levels.append(0.0)
+    edges = np.linspace(0, LONG_SAMPLES, len(levels) + 1).astype(int)
+    command = np.empty(LONG_SAMPLES)
+    for i, level in enumerate(levels):
+        length = edges[i + 1] - edges[i]
+        command[edges[i] : edges[i + 1]] = level
+        if i % 2 == 1:
+            clock = max(1, round((4e-3 if i % 4 == 1 else 1e-3) / plant.dt))
+            chips = rng.choice([-1.0, 1.0], length // clock + 1)
+            command[edges[i] : edges[i + 1]] += 0.05 / plant.kp * np.repeat(chips, clock)[:length]
+    return command
+
+
+def move_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> Array:
+    """Moves back and forth with limited acceleration and jerk, and dwells; the other order is another job."""
+    command = np.zeros(0)
+    while len(command) < LONG_SAMPLES:
+        speed, acceleration = rng.uniform(20, 90), 10 ** rng.uniform(3, 3.6)
+        ramp = max(2, round(speed / acceleration / plant.dt))
+        hold = round(rng.uniform(0.03, 0.15) / plant.dt)
+        profile = np.concatenate([np.arange(ramp) / ramp, np.ones(hold), 1 - np.arange(ramp) / ramp])
+        smooth = np.ones(max(1, ramp // 3)) / max(1, ramp // 3)
+        dwell = np.zeros(round(rng.uniform(0.05, 0.12) / plant.dt))
+        move = speed * np.convolve(np.concatenate([profile, np.zeros(len(smooth))]), smooth)
+        command = np.concatenate([command, dwell, move, dwell, -move])
+    return command[:LONG_SAMPLES]
+
+
+def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.random.Generator) -> dict[str, float]:
+    """Parameters of one effect at `factor` times its typical size."""
+    sign = float(rng.choice([-1, 1]))
+    phase = float(rng.uniform(-np.pi, np.pi))
+    near = float(np.exp(rng.uniform(-0.35, 0.35)))  # for parameters that are no size
+    damping = plant.D + plant.DL
+    if name == "asymmetric_friction":
+        viscous = (0.4 * damping * factor, 0.0)[:: int(sign)]
+        uneven = 0.3 * float(rng.choice([-1, 1]))
+        return {
+            "torque_positive": 0.05 * factor * (1 + uneven),
+            "torque_negative": 0.05 * factor * (1 - uneven),
+            "viscous_positive": viscous[0],
+            "viscous_negative": viscous[1],
+        }
+    if name == "friction_drift":
+        rate = 0.2 * factor
+        return {"torque": 0.05 * near, "rate": rate if sign > 0 else -min(rate, 0.8 / (samples * plant.dt))}
+    if name == "extra_resonance":
+        # A third mass on the motor: (wp/wz)^2 - 1 is its share of the inertia before it.
+        wz, ratio, zz = 1000.0 * near, float(np.sqrt(1 + 0.3 * factor)), float(rng.uniform(0.01, 0.03))
+        return {"frequency": wz * ratio, "damping": zz * ratio, "zero_frequency": wz, "zero_damping": zz}
+    drawn: dict[str, dict[str, float]] = {
+        "coulomb_friction": {"torque": 0.05 * factor},
+        "stribeck_friction": {"torque": 0.04 * factor, "static_torque": 0.07 * factor, "stribeck_velocity": 2 * near},
+        "presliding_friction": {"torque": 0.05 * factor, "stiffness": 3 * near},
+        "quadratic_drag": {"coefficient": 1.5e-5 * factor},
+        "load_torque": {"torque": 0.03 * factor * sign},
+        "unbalance": {"amplitude": 0.05 * factor, "phase": phase},
+        "cogging": {"amplitude": 0.03 * factor, "order": float(rng.choice([4, 6, 12, 18])), "phase": phase},
+        "backlash": {"gap": 0.01 * factor},
+        # The same relative hardening at the same torque: k3 (T/K)^2 / K.
+        "hardening_stiffness": {"cubic_stiffness": 1e5 * (plant.KG / 55) ** 3 * factor},
+        # 1.4 N m where a reversal at full speed asks for 3.7.
+        "torque_saturation": {"limit": 1.4 / factor * max(1.0, plant.kp / 0.0232)},
+        "torque_dead_band": {"width": 0.03 * factor},
+        # Two samples: a delay inside one sample is, at the samples, the same as a lag.
+        "transport_delay": {"delay": max(1e-3, 2 * plant.dt) * factor},
+        "torque_lag": {"time_constant": 1e-3 * factor},
+        "integrator_clamp": {"limit": 0.05 / factor},
+        "command_rate_limit": {"rate": 3000 / factor},
+        "velocity_filter": {"time_constant": 1e-3 * factor},
+        "velocity_ripple": {"amplitude": 5e-3 * factor, "order": float(rng.choice([1, 2, 4])), "phase": phase},
+        "velocity_quantisation": {"step": 0.63 * factor},
+        "outliers": {"fraction": max(3, round(0.002 * factor * samples)) / samples},
+        "torque_hum": {"amplitude": 0.03 * factor, "frequency": 2 * np.pi * float(rng.uniform(10, 50)), "phase": phase},
+        "uneven_friction": {"torque": 0.05 * factor, "depth": 0.8, "order": float(rng.choice([1, 2, 3])), "phase": phase},
+        "root_drag": {"coefficient": 0.05 / np.sqrt(80) * factor},
+        "hysteretic_spring": {"share": min(0.9, 0.4 * factor), "yield_twist": 0.1 / plant.KG if plant.KG else 1.0},
+    }
+    return drawn[name]
+
+
+def stable(plant: Plant, effects: dict[str, dict[str, float]]) -> bool:
+    """Whether the loop with its linear effects comes to rest at a level."""
+    linear = {name: values for name, values in effects.items() if name in LINEAR}
+    if not linear:
+        return True
+    try:
+        end = run_drive(plant, np.full(round(0.9 / plant.dt), 50.0), linear).truth[-round(0.15 / plant.dt) :]
+    except RanAwayError:
+        return False
+    return bool(np.ptp(end) < 0.5)
+
+
+def acts(truth: Truth) -> bool:
+    """Whether every hidden effect changes the noise-free record at all."""
+    if not truth.effects:
+        return True
+    try:
+        whole = run_drive(truth.plant, truth.command, truth.effects).velocity
+        for name in set(truth.effects) - {"outliers"}:
+            rest = {key: value for key, value in truth.effects.items() if key != name}
+            if np.sqrt(np.mean((run_drive(truth.plant, truth.command, rest).velocity - whole) ** 2)) < 1e-6:
+                return False
+    except RanAwayError:
+        return False
+    return True
+
+
+def random_case(
+    seed: int,
+    effect: str | Sequence[str] | None = None,
+    kind: str = "multi",
+    noise: str | Noise = "white",
+    torque_logged: bool = True,
+    factor: float | None = None,
+    plant: Plant | None = None,
+    position_logged: bool = False,
+    settle: int = 0,
+) -> tuple[ga.Record, ga.Record | None, ga.PI, Truth]:
+    """Draw record, validation record (None for a single step), controller and truth; the same arguments give the same case.
+
+    `factor` None: log-uniform in 0.5..2, for each effect of a pair its own. Random numbers depend on seed, effect and kind,
+    not on noise or factor, so that curves over the size follow one drive.
+    """
+    effects = (effect,) if isinstance(effect, str) else tuple(effect or ())
+    rng = np.random.default_rng([seed, zlib.crc32(" ".join((kind, *effects)).encode())])
+    encoder = float(np.exp(rng.uniform(np.log(1e-4), np.log(6.3e-4))))
+    noise_now = replace(NOISES[noise], encoder=encoder) if noise in ("encoder", "differenced") else noise
+    noise_now = NOISES[noise_now] if isinstance(noise_now, str) else noise_now
+    samples = STEP_SAMPLES if kind == "step" else LONG_SAMPLES
+    for _ in range(200 if plant is None else 10):
+        factors = [float(np.exp(rng.uniform(np.log(0.5), np.log(2)))) for _ in effects]
+        now = plant or random_plant(rng, True if set(effects) & set(COUPLING) else None)
+        hidden = {
+            name: draw_effect(name, factors[i] if factor is None else factor, now, samples, rng) for i, name in enumerate(effects)
+        }
+        commands = [command_for(kind, now, rng, other_order) for other_order in (False, True)]
+        truth = Truth(
+            effects=hidden, plant=now, kind=kind, noise=noise_now, factor=factor or (factors[0] if factors else 0.0), seed=seed,
+            command=commands[0], validation_command=None if kind == "step" else commands[1], settle=settle,
+        )  # fmt: skip
+        if stable(now, hidden) and acts(truth):
+            break
+    else:
+        raise RuntimeError(f"no drive found on which {effects} acts in a {kind} record at factor {factor}")
+    return *records(truth, torque_logged, position_logged), now.controller, truth
+
+
+def records(truth: Truth, torque_logged: bool = True, position_logged: bool = False) -> tuple[ga.Record, ga.Record | None]:
+    """The log and, with other noise, the validation log of a case."""
+    logs = [
+        rig(truth.plant, command, truth.effects, truth.noise, seed=2 * truth.seed + i, torque_logged=torque_logged,
+            position_logged=position_logged, settle=truth.settle, name=name)
+        for i, (command, name) in enumerate([(truth.command, truth.kind), (truth.validation_command, "validation")])
+        if command is not None
+    ]  # fmt: skip
+    return logs[0], logs[1] if len(logs) > 1 else None

@@ -1,0 +1,293 @@
+"""A simulated drive to hide effects in, independent of the library: `rig(plant, command, effects)` returns its log as a Record.
+
+The drive itself is tests/cpp/drive_rig.cpp: continuous time, fourth-order Runge-Kutta steps cut at every event, at least
+40 to a sample, dry friction with exact rest, a digital PI controller, noise inside the loop (what is logged as torque
+follows from what is logged as velocity). It is compiled here when it is first needed. Names and signs of effects are those
+of the library's table; OUTSIDE lists what the library does not know.
+
+    rec = rig(Plant(J=3e-4, D=2e-3, kp=0.03, ki=1.9, dt=1e-3), command, {"coulomb_friction": {"torque": 0.05}}, seed=1)
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+import gaident as ga
+
+Array = NDArray[np.float64]
+Effects = Mapping[str, Mapping[str, float]]
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = ROOT / "tests" / "cpp" / "drive_rig.cpp"
+SUBSTEPS, MOST_SUBSTEPS = 40, 400
+MATH = ("-std=c++20", "-O2", "-ffp-contract=off", "-shared", "-fPIC")
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A drive without effects. One mass J [kg m2], D [N m s/rad]; with JL also a load JL, DL on a shaft KG [N m/rad], DG."""
+
+    J: float
+    D: float
+    kp: float
+    ki: float
+    dt: float
+    JL: float = 0.0
+    DL: float = 0.0
+    KG: float = 0.0
+    DG: float = 0.0
+    name: str = "drive"
+
+    @property
+    def controller(self) -> ga.PI:
+        return ga.PI(self.kp, self.ki)
+
+    @property
+    def two_masses(self) -> bool:
+        return self.JL > 0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What disturbs a record: white velocity noise [rad/s], encoder resolution [rad], AR(1) shaft torque [N m rms]."""
+
+    white: float = 0.1
+    encoder: float = 0.0
+    torque: float = 0.0
+    pole: float = 0.98
+    differenced: bool = False  # the encoder's angle is really differenced, which costs half a sample: no noise, but an effect
+
+
+NOISES = {
+    "none": Noise(white=0.0),
+    "white": Noise(),
+    "encoder": Noise(white=0.0, encoder=2e-4),
+    "coloured": Noise(torque=0.004),
+    "differenced": Noise(white=0.0, encoder=2e-4, differenced=True),
+}
+
+# Library effect -> parameter -> field of the drive; friction adds to fields that several effects share.
+FIELDS: dict[str, dict[str, str]] = {
+    "presliding_friction": {"torque": "dahl", "stiffness": "dahl_stiffness"},
+    "quadratic_drag": {"coefficient": "drag"},
+    "load_torque": {"torque": "load"},
+    "unbalance": {"amplitude": "unbalance", "phase": "unbalance_phase"},
+    "cogging": {"amplitude": "cogging", "order": "cogging_order", "phase": "cogging_phase"},
+    "friction_drift": {"torque": "drifting", "rate": "drift_rate"},
+    "backlash": {"gap": "gap"},
+    "hardening_stiffness": {"cubic_stiffness": "cubic"},
+    "torque_saturation": {"limit": "saturation"},
+    "torque_dead_band": {"width": "dead_band"},
+    "transport_delay": {"delay": "delay"},
+    "torque_lag": {"time_constant": "lag"},
+    "integrator_clamp": {"limit": "integrator_limit"},
+    "command_rate_limit": {"rate": "command_rate"},
+    "velocity_filter": {"time_constant": "filter"},
+    "velocity_ripple": {"amplitude": "ripple", "order": "ripple_order", "phase": "ripple_phase"},
+    "velocity_quantisation": {"step": "quantum"},
+    "extra_resonance": {"frequency": "wp", "damping": "zp", "zero_frequency": "wz", "zero_damping": "zz"},
+    "torque_hum": {"amplitude": "hum", "frequency": "hum_frequency", "phase": "hum_phase"},
+    "uneven_friction": {"torque": "uneven", "depth": "uneven_depth", "order": "uneven_order", "phase": "uneven_phase"},
+    "root_drag": {"coefficient": "root"},
+    "hysteretic_spring": {"share": "hysteretic", "yield_twist": "yield"},
+}
+FRICTION: dict[str, dict[str, str]] = {
+    "coulomb_friction": {"torque": "both"},
+    "stribeck_friction": {"torque": "both", "static_torque": "static", "stribeck_velocity": "stribeck_velocity"},
+    "asymmetric_friction": {
+        "torque_positive": "friction_positive",
+        "torque_negative": "friction_negative",
+        "viscous_positive": "viscous_positive",
+        "viscous_negative": "viscous_negative",
+    },
+}
+OUTSIDE = ("torque_hum", "uneven_friction", "root_drag", "hysteretic_spring")
+COUPLING = ("backlash", "hardening_stiffness", "hysteretic_spring")
+
+
+@dataclass(frozen=True)
+class Log:
+    """Everything one run left behind, arrays (n,); `truth` is the velocity [rad/s] that no sensor saw."""
+
+    velocity: Array
+    torque: Array
+    position: Array
+    truth: Array
+
+
+class RanAwayError(RuntimeError):
+    """The simulated drive is unstable with these settings."""
+
+
+@lru_cache(maxsize=1)
+def fields() -> dict[str, float]:
+    """Name -> neutral value of the fields of the drive, in their order, from the C++ source."""
+    block = SOURCE.read_text().split("// fields")[1].split("// end of fields")[0]
+    found = re.findall(r"^\s*double (\w+) = ([^;]+);", block, re.MULTILINE)
+    return {name: float(value) for name, value in found}
+
+
+@lru_cache(maxsize=1)
+def library() -> ctypes.CDLL:
+    """Compile the drive, once for each text of its source, into build/rig; else, where that is not writable, for this run."""
+    compiler = shutil.which(os.environ.get("CXX", "g++").split()[0]) or shutil.which("c++")
+    if compiler is None:
+        raise RuntimeError("the simulated drive needs a C++ compiler: install g++ or name one in CXX")
+    key = hashlib.sha256(SOURCE.read_bytes() + " ".join(MATH).encode()).hexdigest()[:16]
+    folder = ROOT / "build" / "rig"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        folder = Path(tempfile.mkdtemp(prefix="drive_rig"))
+    target = folder / f"drive_rig_{key}.so"
+    if not target.exists():
+        # Under a name of its own first: several processes may be here at once.
+        with tempfile.TemporaryDirectory(dir=folder) as own:
+            made = Path(own) / "drive_rig.so"
+            subprocess.run([compiler, *MATH, str(SOURCE), "-o", str(made)], check=True, capture_output=True)
+            os.replace(made, target)
+    loaded = ctypes.CDLL(str(target))
+    pointer = ctypes.POINTER(ctypes.c_double)
+    loaded.drive_rig_run.argtypes = [pointer, ctypes.c_int, ctypes.c_double, ctypes.c_int, *[pointer] * 9]
+    return loaded
+
+
+def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:
+    """The fields of the simulated drive that has these effects."""
+    values = dict(fields())
+    values.update(J1=plant.J, D1=plant.D, J2=plant.JL, D2=plant.DL, K=plant.KG, DG=plant.DG, kp=plant.kp, ki=plant.ki)
+    for effect, parameters in effects.items():
+        if effect == "outliers":
+            continue  # they spoil the log, not the drive
+        known = FIELDS.get(effect) or FRICTION[effect]
+        if set(parameters) != set(known):
+            raise ValueError(f"{effect} takes {sorted(known)}, not {sorted(parameters)}")
+        if effect in COUPLING and not plant.two_masses:
+            raise ValueError(f"{effect} acts in the shaft between two masses")
+        if effect == "coulomb_friction" or effect == "stribeck_friction":
+            values["friction_positive"] += parameters["torque"]
+            values["friction_negative"] += parameters["torque"]
+        if effect == "stribeck_friction":
+            values["stribeck"] = parameters["static_torque"] - parameters["torque"]
+            values["stribeck_velocity"] = parameters["stribeck_velocity"]
+        elif effect == "asymmetric_friction":
+            for name, place in known.items():
+                values[place] += parameters[name]
+        elif effect in FIELDS:
+            values.update({known[name]: value for name, value in parameters.items()})
+    return values
+
+
+def substeps_for(values: Mapping[str, float], dt: float, least: int) -> int:
+    """So many substeps that the bristle, the stiffest state, stays well inside the step's stability."""
+    fastest = values["dahl_stiffness"] * 150 / values["dahl"] if values["dahl"] else 0.0
+    needed = int(np.ceil(dt * fastest / 0.5))
+    if needed > MOST_SUBSTEPS:
+        raise RanAwayError(f"a bristle this stiff needs {needed} substeps; give a softer or stronger one")
+    return max(least, needed)
+
+
+def run_drive(
+    plant: Plant,
+    command: Array | None,
+    effects: Effects | None = None,
+    *,
+    torque: Array | None = None,
+    measured: Array | None = None,
+    velocity_noise: Array | None = None,
+    torque_noise: Array | None = None,
+    encoder: float = 0.0,
+    differenced: bool = False,
+    substeps: int = SUBSTEPS,
+) -> Log:
+    """Simulate from rest. `torque` without a command: open loop; `measured`: the controller reads this (a replay)."""
+    values = drive_values(plant, effects or {})
+    values.update(encoder=encoder, differenced=float(differenced))
+    driving = command if command is not None else torque
+    if driving is None:
+        raise ValueError("give a command, or a torque for the open loop")
+    n = len(driving)
+
+    def pointer(array: Array | None) -> ctypes.Array[ctypes.c_double] | None:
+        if array is None:
+            return None
+        if array.shape != (n,) or array.dtype != np.float64 or not array.flags.c_contiguous:
+            raise ValueError(f"every array is float64, contiguous and {n} long")
+        return array.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+
+    drive = np.array(list(values.values()))
+    out = [np.empty(n) for _ in range(4)]
+    given = [
+        None if a is None else np.ascontiguousarray(a, dtype=np.float64)
+        for a in (command, torque if command is None else None, measured, velocity_noise, torque_noise)
+    ]
+    failed = library().drive_rig_run(
+        drive.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
+        n,
+        plant.dt,
+        substeps_for(values, plant.dt, substeps),
+        *map(pointer, given),
+        *map(pointer, out),
+    )
+    if failed:
+        raise RanAwayError(f"{plant.name} with {sorted(effects or {})} ran away")
+    return Log(*out)
+
+
+def rig(
+    plant: Plant,
+    command: Array,
+    effects: Effects | None = None,
+    noise: Noise | str = "white",
+    seed: int = 0,
+    torque_logged: bool = True,
+    position_logged: bool = False,
+    settle: int = 0,
+    substeps: int = SUBSTEPS,
+    name: str = "",
+) -> ga.Record:
+    """The log of one run. Starts from rest with an empty integrator; `settle` samples at command 0 before it are not logged."""
+    noise = NOISES[noise] if isinstance(noise, str) else noise
+    effects = effects or {}
+    rng = np.random.default_rng(seed)
+    full = np.concatenate([np.zeros(settle), np.asarray(command, dtype=np.float64)])
+    sensor = {"encoder": noise.encoder, "differenced": noise.differenced}
+    log = run_drive(plant, full, effects, substeps=substeps, **sensor, **disturbances(noise, len(full), rng))
+    velocity = log.velocity.copy()
+    if "outliers" in effects:
+        count = round(effects["outliers"]["fraction"] * len(command))
+        hit = settle + rng.choice(len(command), count, replace=False)
+        velocity[hit] += rng.choice([-1, 1], count) * rng.uniform(10, 60, count)
+    return ga.Record(
+        dt=plant.dt,
+        command=full[settle:],
+        velocity=velocity[settle:],
+        torque=log.torque[settle:] if torque_logged else None,
+        position=log.position[settle:] - log.position[settle] if position_logged else None,
+        name=name or plant.name,
+    )
+
+
+def disturbances(noise: Noise, n: int, rng: np.random.Generator) -> dict[str, Array | None]:
+    """White velocity noise and coloured torque for one run, from its own random numbers."""
+    white, driving = rng.standard_normal((2, n))
+    driving[1:] *= np.sqrt(1 - noise.pole**2)
+    coloured = lfilter([1.0], [1.0, -noise.pole], driving)
+    return {
+        "velocity_noise": noise.white * white if noise.white else None,
+        "torque_noise": noise.torque * coloured if noise.torque else None,
+    }

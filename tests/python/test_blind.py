@@ -1,0 +1,113 @@
+"""Hide an effect in a simulated drive, and require that the diagnosis finds it: the quick set of bench/blind.py.
+
+The drive shares no code with the library (drive_rig.py), drives, sizes and noise are drawn (drive_cases.py); what counts as named
+or abstained is decided in blind_judge.py. Fixed seeds, so that a failure repeats.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import pytest
+
+import gaident as ga
+from blind_judge import CLASSES, DRIVERS, Judgement, judge
+from drive_cases import EFFECTS, random_case, records
+from drive_rig import OUTSIDE, library
+
+if not hasattr(ga, "diagnose"):
+    pytest.skip("this gaident has no diagnose()", allow_module_level=True)
+try:
+    library()
+except RuntimeError as missing:
+    pytest.skip(str(missing), allow_module_level=True)
+
+SEED = 20261121
+
+
+@lru_cache
+def diagnosed(
+    effects: tuple[str, ...],
+    kind: str = "multi",
+    noise: str = "white",
+    torque: bool = True,
+    factor: float | None = None,
+    seed: int = SEED,
+) -> Judgement:
+    record, validation, controller, truth = random_case(seed, effects, kind, noise, torque, factor)
+    dia = ga.diagnose(record, controller=controller, validation=validation)
+    assert dia.verdict in ("adequate", "explained", "partly explained", "unexplained")
+    return judge(dia, truth.effects)
+
+
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if e not in CLASSES])
+def test_a_hidden_effect_is_named(effect: str) -> None:
+    judged = diagnosed((effect,), torque=EFFECTS.index(effect) % 2 == 0)
+    assert judged.exact, judged
+
+
+@pytest.mark.parametrize("effect", CLASSES)
+def test_a_member_of_a_class_is_reported_and_nothing_else(effect: str) -> None:
+    judged = diagnosed((effect,))
+    assert judged.in_set and not judged.wrong and not judged.extra, judged
+
+
+@pytest.mark.parametrize("effect", ["torque_lag", "velocity_filter"])
+def test_lag_and_filter_are_never_told_apart(effect: str) -> None:
+    for torque in (True, False):
+        judged = diagnosed((effect,), torque=torque)
+        assert judged.twins_together and not judged.named, judged
+
+
+def test_a_load_and_uneven_dry_friction_are_never_told_apart() -> None:
+    """Tc sign(w) + T is the same torque as friction of two levels."""
+    *_, controller, truth = random_case(SEED, ("coulomb_friction",), factor=1.0)
+    truth.effects["load_torque"] = {"torque": 0.02}
+    record, validation = records(truth)
+    dia = ga.diagnose(record, controller=controller, validation=validation)
+    judged = judge(dia, truth.effects)
+    together = {"load_torque", "asymmetric_friction"}
+    assert any(together <= set(each) for each in judged.sets), judged
+    assert not together & set(judged.named), judged
+
+
+# Classes of effects between which one velocity step cannot decide.
+STEP_CLASSES = {
+    "dry friction": ("coulomb_friction", "stribeck_friction", "presliding_friction"),
+    "friction or dead band": ("torque_dead_band",),
+    "limits": ("torque_saturation", "command_rate_limit", "integrator_clamp"),
+    "drag or drift": ("quadratic_drag", "friction_drift"),
+    "shaft": ("hardening_stiffness", "extra_resonance"),
+    "lag or filter": ("torque_lag", "velocity_filter"),
+}
+
+
+@pytest.mark.parametrize("members", STEP_CLASSES.values(), ids=STEP_CLASSES.keys())
+def test_on_a_single_step_no_wrong_name(members: tuple[str, ...]) -> None:
+    for effect in members:
+        judged = diagnosed((effect,), kind="step", torque=False)
+        assert not judged.wrong, judged
+
+
+@pytest.mark.parametrize("effect", OUTSIDE)
+def test_what_the_library_does_not_know_gets_no_name(effect: str) -> None:
+    judged = diagnosed((effect,), factor=1.5)
+    assert not judged.wrong, judged
+    assert judged.driver in DRIVERS[effect], judged
+    assert judged.verdict in ("unexplained", "partly explained"), judged
+
+
+@pytest.mark.parametrize("kind", ["multi", "step", "move"])
+@pytest.mark.parametrize("noise", ["white", "encoder", "coloured"])
+def test_nothing_is_named_where_nothing_is_hidden(kind: str, noise: str) -> None:
+    for torque in (True, False) if kind == "multi" else (True,):
+        judged = diagnosed((), kind, noise, torque)
+        assert not judged.sets, judged
+        if noise == "white":  # coloured remainders may be called unexplained, but not by a name
+            assert judged.verdict == "adequate", judged
+
+
+@pytest.mark.parametrize("pair", [("coulomb_friction", "transport_delay"), ("cogging", "quadratic_drag")])
+def test_two_effects_are_both_found(pair: tuple[str, str]) -> None:
+    judged = diagnosed(pair)
+    assert judged.in_set and not judged.wrong and len(judged.sets) == 2, judged
