@@ -1,0 +1,182 @@
+"""The missing torque: what must be added to the model's torque so that it moves as measured, with its standard deviation.
+
+    x(n+1) = A x(n) + B (u(n) + d(n)),   w(n) = C x(n) + D (u(n) + d(n)) + e(n)
+    d(n+1) = d(n) + v(n),                var e = noise^2, var v = walk^2 dt
+
+A random-walk torque d rides on the model's input; a Kalman filter and its smoother (fixed interval, de Jong's backward form,
+no covariance is inverted) estimate it from the whole record. Coulomb friction shows as -Tc sign(w), a load T as -T. No
+derivative is taken, resonances are undone correctly, and what the sensor's noise hides stays within `std`.
+
+The gains are the steady ones, so that the recursions are triangular linear filters over whole arrays; the initial state is the
+one that makes the innovations smallest. The plant is discretised as the loop says: by zero-order hold, or bilinearly for
+loop="continuous".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.diagnosis.replay import replay
+from gaident.diagnosis.state_space import Discretised, discretised, recursion, steady_covariance
+from gaident.errors import RecordError
+from gaident.models.controller import PI
+from gaident.models.model import Model
+
+__all__ = ["MissingTorque", "missing_torque"]
+
+Vector = NDArray[np.float64]
+
+TUNED_ON = 30_000  # samples of a longer record on which noise and walk are chosen
+DECADES = (-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0)  # of walk per sample over the noise, seen at the velocity after one sample
+
+
+@dataclass(frozen=True, eq=False)
+class MissingTorque:
+    """dhat(t) [N m], shape (n,), and what it is worth.
+
+    dhat         the torque that must be added to the model's; dhat[n] acts from sample n to n+1
+    std          its standard deviation [N m], shape (n,), larger towards the ends
+    velocity     the smoothed velocity [rad/s], shape (n,)
+    innovations  one-step prediction errors of the filter [rad/s], shape (n,): white where the random walk describes d well
+    noise        standard deviation of the velocity noise [rad/s]
+    walk         of the torque's random walk [N m/sqrt(s)]
+    log_likelihood  of the tuning part of the record
+    """
+
+    dhat: Vector
+    std: Vector
+    velocity: Vector
+    innovations: Vector
+    noise: float
+    walk: float
+    log_likelihood: float
+
+
+def missing_torque(
+    model: Model,
+    rec: Record,
+    controller: PI | None = None,
+    torque: Vector | None = None,
+    noise: float | None = None,
+    walk: float | None = None,
+) -> MissingTorque:
+    """Smooths the missing torque out of one record.
+
+    model   the linear model, torque to velocity
+    torque  what drives it [N m], shape (n,); None: the record's, or what the controller makes of command and velocity
+    noise   standard deviation of the velocity noise [rad/s]; None: chosen with the walk by likelihood
+    walk    of the random walk [N m/sqrt(s)]; None: chosen by likelihood on a grid
+
+    Raises ModelError for p = 0 outside the continuous loop and for a model that shows no torque at standstill (a zero at 0),
+    RecordError where torque is missing or of another length.
+    """
+    u = replay(rec, controller).torque if torque is None else np.asarray(torque, dtype=np.float64)
+    if u.shape != rec.velocity.shape:
+        raise RecordError(f"torque has the shape {u.shape}, the record has {len(rec)} samples: give one number per sample")
+    loop = "sampled" if controller is None else controller.loop
+    plant = discretised(model, rec.dt, loop)
+    tuned = slice(0, TUNED_ON)
+    if noise is None or walk is None:
+        noise, walk, likelihood = _tuned(plant, u[tuned], rec.velocity[tuned], noise, walk)
+    else:
+        walk *= float(np.sqrt(rec.dt))
+        steady = _Filter(plant, noise, walk)
+        likelihood = steady.log_likelihood(steady.predict(u[tuned], rec.velocity[tuned])[0])
+    smoother = _Filter(plant, noise, walk)
+    dhat, velocity, innovations = smoother.smooth(u, rec.velocity)
+    std = smoother.deviation(len(rec))
+    return MissingTorque(dhat, std, velocity, innovations, noise, walk / float(np.sqrt(rec.dt)), likelihood)
+
+
+def _tuned(plant: Discretised, u: Vector, w: Vector, noise: float | None, walk: float | None) -> tuple[float, float, float]:
+    """(noise, walk per sample, log-likelihood): the most likely on the grid and a finer one around its best."""
+    tried: dict[float, tuple[float, float, float]] = {}
+
+    def value(decade: float) -> float:
+        if decade not in tried:
+            ratio = 10.0**decade / plant.first_response
+            # Innovations depend on the ratio alone; with neither given, their size says which scale is the most likely.
+            level = noise if noise is not None else 1.0 if walk is None else walk / ratio
+            steady = _Filter(plant, level, ratio * level)
+            v, _ = steady.predict(u, w)
+            scale = float(np.sqrt(v @ v / len(v) / steady.F)) if noise is None and walk is None else 1.0
+            steady.F *= scale**2
+            tried[decade] = (scale * level, ratio * scale * level, steady.log_likelihood(v))
+        return tried[decade][2]
+
+    best = max(DECADES, key=value)
+    for step in (0.5, 0.25):
+        best = max((best - step, best, best + step), key=value)
+    return tried[best]
+
+
+class _Filter:
+    """The steady Kalman filter of (x, d) for one pair of deviations: noise [rad/s], walk per sample [N m]."""
+
+    def __init__(self, plant: Discretised, noise: float, walk: float) -> None:
+        m = len(plant.B)
+        self.A = np.zeros((m + 1, m + 1), dtype=np.complex128)
+        self.A[:m, :m], self.A[:m, m], self.A[m, m] = plant.A, plant.B, 1.0
+        self.B = np.append(plant.B, 0.0)
+        self.H = np.append(plant.C, plant.D)
+        self.D = plant.D
+        # In units of the noise, so that the covariances stay near 1.
+        Q = np.zeros((m + 1, m + 1), dtype=np.complex128)
+        Q[m, m] = (walk / noise) ** 2
+        P = steady_covariance(self.A, self.H, Q)
+        self.P = P * noise**2
+        self.F = float((self.H @ self.P @ self.H.conj()).real) + noise**2
+        self.K = self.A @ self.P @ self.H.conj() / self.F
+        self.L = self.A - np.outer(self.K, self.H)
+
+    def predict(self, u: Vector, w: Vector) -> tuple[Vector, NDArray[np.complex128]]:
+        """(innovations (n,), predicted states (n, m+1)) from the initial state that makes the innovations smallest."""
+        states = recursion(self.L, np.outer(u, self.B - self.K * self.D) + np.outer(w, self.K))
+        v = w - self.D * u - np.einsum("ni,i->n", states, self.H).real
+        # v is linear in the initial state, v(n) - H L^n x(0), and H L^n fades: the record's head is enough.
+        head = min(len(w), self.memory)
+        seen = recursion(self.L.T, np.zeros((head, len(self.B))), self.H)
+        columns = np.hstack([seen.real, -seen.imag])
+        sizes = np.tile(np.linalg.norm(seen, axis=0), 2)
+        sizes[sizes == 0.0] = 1.0
+        columns /= sizes
+        # What the record does not show of the state stays smallest.
+        inverse = np.linalg.pinv(np.einsum("ni,nj->ij", columns, columns), rcond=1e-12, hermitian=True)
+        solved = inverse @ np.einsum("ni,n->i", columns, v[:head]) / sizes
+        start = solved[: len(self.B)] + 1j * solved[len(self.B) :]
+        v[:head] -= (seen @ start).real
+        states[:head] += recursion(self.L, np.zeros((head, len(self.B))), start)
+        return v, states
+
+    @property
+    def memory(self) -> int:
+        """Samples after which the filter has forgotten its start to 1e-12."""
+        slowest = float(np.abs(np.linalg.eigvals(self.L)).max())
+        return 100_000 if slowest > 0.9997 else 2 + int(np.log(1e-12) / np.log(max(slowest, 1e-3)))
+
+    def log_likelihood(self, v: Vector) -> float:
+        """Of innovations, Gaussian."""
+        return -0.5 * (len(v) * float(np.log(2.0 * np.pi * self.F)) + float(v @ v) / self.F)
+
+    def smooth(self, u: Vector, w: Vector) -> tuple[Vector, Vector, Vector]:
+        """(dhat, smoothed velocity, innovations): r(n-1) = H' v(n)/F + L' r(n), x(n) = predicted(n) + P r(n-1)."""
+        v, states = self.predict(u, w)
+        back = recursion(self.L.conj().T, np.outer(v[::-1] / self.F, self.H.conj()), newest=True)
+        smoothed = states + np.einsum("ij,nj->ni", self.P, back[::-1])
+        return smoothed[:, -1].real.copy(), np.einsum("ni,i->n", smoothed, self.H).real + self.D * u, v
+
+    def deviation(self, samples: int) -> Vector:
+        """Standard deviation of dhat: P_dd less what the k samples from n on tell; at the start as if time ran backwards."""
+        head = min(samples, self.memory)
+        told = recursion(self.L, np.zeros((head, len(self.B))), self.P[:, -1]) @ self.H
+        prior = self.P[-1, -1].real
+        var = np.full(samples, 0.0)
+        var[:head] = np.maximum(prior - np.cumsum(np.abs(told) ** 2) / self.F, 1e-12 * prior)
+        var[head:] = var[head - 1]
+        n = np.arange(samples)
+        std: Vector = np.sqrt(var[np.minimum(n, samples - 1 - n)])
+        return std
