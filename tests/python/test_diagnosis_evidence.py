@@ -173,15 +173,17 @@ def kalman(model: ga.Model, loop: str, u: np.ndarray, w: np.ndarray, noise: floa
 @pytest.mark.parametrize(("model", "loop"), [(ONE_MASS, "sampled"), (TWO_MASS, "sampled"), (TWO_MASS, "continuous")])
 def test_the_smoother_equals_the_textbook_one(model: ga.OneMass | ga.TwoMass, loop: str) -> None:
     controller = ga.PI(0.02, 0.5, loop=loop)
-    still = ga.Record(DT, np.repeat([20.0, -40.0, 5.0], 200), np.zeros(600))
+    still = ga.Record(DT, np.repeat([20.0, -40.0, 5.0], 700), np.zeros(2100))
     done = ga.run(model, still, controller)
     rng = np.random.default_rng(3)
-    rec = ga.Record(DT, still.command, done.velocity + 0.1 * rng.standard_normal(600), torque=done.torque)
+    rec = ga.Record(DT, still.command, done.velocity + 0.1 * rng.standard_normal(2100), torque=done.torque)
     found = missing_torque(model.model(), rec, controller, noise=0.1, walk=0.3)
     dhat, std = kalman(model.model(), loop, rec.torque, rec.velocity, 0.1, 0.3)
-    np.testing.assert_allclose(found.dhat[100:], dhat[100:], rtol=0.0, atol=2e-3 * std[300])
-    np.testing.assert_allclose(found.std[100:], std[100:], rtol=1e-3)
-    assert np.abs(found.dhat - dhat).max() < 0.05 * std.max()
+    # The steady gains differ from the growing ones where the start is not yet forgotten (damping 4 rad/s of the zeros).
+    np.testing.assert_allclose(found.dhat, dhat, rtol=0.0, atol=0.01 * std[1000])
+    np.testing.assert_allclose(found.dhat[1000:], dhat[1000:], rtol=0.0, atol=1e-5 * std[1000])
+    np.testing.assert_allclose(found.std, std, rtol=0.01)
+    np.testing.assert_allclose(found.std[1000:], std[1000:], rtol=1e-4)
 
 
 def test_dry_friction_and_load_show_with_their_sign_and_size() -> None:
@@ -240,7 +242,7 @@ def test_the_staircase_triggers_almost_everything() -> None:
     found = excitation(drive(Tc=0.05, samples=4000), CONTROLLER, TWO_MASS.model())
     assert set(found.not_testable) == set()
     assert found.reversals >= 8 and found.torque_reversals >= 10 and 4 < found.revolutions < 5
-    assert len([v for v in found.speeds if v]) >= 6 and found.steps[-1] == pytest.approx(140.0, abs=10)
+    assert len([v for v in found.speeds if v]) >= 6 and found.steps[-1] == 100.0
     assert set(found.one_sided) >= {"torque_saturation", "integrator_clamp", "command_rate_limit"}
     assert "reversals" in found.sentence
 

@@ -137,20 +137,30 @@ class _Filter:
         """(innovations (n,), predicted states (n, m+1)) from the initial state that makes the innovations smallest."""
         states = recursion(self.L, np.outer(u, self.B - self.K * self.D) + np.outer(w, self.K))
         v = w - self.D * u - np.einsum("ni,i->n", states, self.H).real
-        # v is linear in the initial state, v(n) - H L^n x(0), and H L^n fades: the record's head is enough.
-        head = min(len(w), self.memory)
-        seen = recursion(self.L.T, np.zeros((head, len(self.B))), self.H)
+        columns, inverse = self.start(len(w))
+        head = len(columns)
+        parts = inverse @ np.einsum("ni,n->i", columns, v[:head])
+        v[:head] -= np.einsum("ni,i->n", columns, parts)
+        fitted = parts[: len(self.B)] + 1j * parts[len(self.B) :]
+        states[:head] += recursion(self.L, np.zeros((head, len(self.B))), fitted)
+        return v, states
+
+    def start(self, samples: int) -> tuple[Vector, Vector]:
+        """How the initial state shows in the velocity until it is forgotten, and the inverse of the Gram matrix of that.
+
+        (head, 2m+2): H L^n per real and imaginary part of each state; what the record does not show of it stays smallest.
+        """
+        head = min(samples, self.memory)
+        seen = self.powers(self.H, head)
         columns = np.hstack([seen.real, -seen.imag])
         sizes = np.tile(np.linalg.norm(seen, axis=0), 2)
         sizes[sizes == 0.0] = 1.0
-        columns /= sizes
-        # What the record does not show of the state stays smallest.
-        inverse = np.linalg.pinv(np.einsum("ni,nj->ij", columns, columns), rcond=1e-12, hermitian=True)
-        solved = inverse @ np.einsum("ni,n->i", columns, v[:head]) / sizes
-        start = solved[: len(self.B)] + 1j * solved[len(self.B) :]
-        v[:head] -= (seen @ start).real
-        states[:head] += recursion(self.L, np.zeros((head, len(self.B))), start)
-        return v, states
+        gram = np.einsum("ni,nj->ij", columns / sizes, columns / sizes)
+        return columns, np.linalg.pinv(gram, rcond=1e-12, hermitian=True) / np.outer(sizes, sizes)
+
+    def powers(self, row: NDArray[np.complex128], samples: int) -> NDArray[np.complex128]:
+        """row L^n, n = 0.. (samples, m+1)."""
+        return recursion(self.L.T, np.zeros((samples, len(self.B))), row)
 
     @property
     def memory(self) -> int:
@@ -163,20 +173,32 @@ class _Filter:
         return -0.5 * (len(v) * float(np.log(2.0 * np.pi * self.F)) + float(v @ v) / self.F)
 
     def smooth(self, u: Vector, w: Vector) -> tuple[Vector, Vector, Vector]:
-        """(dhat, smoothed velocity, innovations): r(n-1) = H' v(n)/F + L' r(n), x(n) = predicted(n) + P r(n-1)."""
+        """(dhat, smoothed velocity, innovations)."""
         v, states = self.predict(u, w)
-        back = recursion(self.L.conj().T, np.outer(v[::-1] / self.F, self.H.conj()), newest=True)
-        smoothed = states + np.einsum("ij,nj->ni", self.P, back[::-1])
+        smoothed = states + self.corrections(v)
         return smoothed[:, -1].real.copy(), np.einsum("ni,i->n", smoothed, self.H).real + self.D * u, v
 
+    def corrections(self, v: Vector) -> NDArray[np.complex128]:
+        """What later innovations add to the predicted states (n, m+1): P r(n-1), r(n-1) = H' v(n)/F + L' r(n)."""
+        back = recursion(self.L.conj().T, np.outer(v[::-1] / self.F, self.H.conj()), newest=True)
+        added: NDArray[np.complex128] = np.einsum("ij,nj->ni", self.P, back[::-1])
+        return added
+
     def deviation(self, samples: int) -> Vector:
-        """Standard deviation of dhat: P_dd less what the k samples from n on tell; at the start as if time ran backwards."""
-        head = min(samples, self.memory)
-        told = recursion(self.L, np.zeros((head, len(self.B))), self.P[:, -1]) @ self.H
-        prior = self.P[-1, -1].real
-        var = np.full(samples, 0.0)
-        var[:head] = np.maximum(prior - np.cumsum(np.abs(told) ** 2) / self.F, 1e-12 * prior)
-        var[head:] = var[head - 1]
-        n = np.arange(samples)
-        std: Vector = np.sqrt(var[np.minimum(n, samples - 1 - n)])
+        """Standard deviation of dhat (n,).
+
+        var(n) = P_dd - sum_{k < N-n} |H L^k P_d|^2 / F, what the samples from n on tell, plus what the fitted initial state
+        leaves open: F s(n) Gram^-1 s(n)', s the sensitivity of dhat(n) to it.
+        """
+        head, m, prior = min(samples, self.memory), len(self.B), self.P[-1, -1].real
+        columns, inverse = self.start(samples)
+        told = (columns[:, :m] - 1j * columns[:, m:]) @ self.P[:, -1]
+        left = np.maximum(prior - np.cumsum(np.abs(told) ** 2) / self.F, 1e-12 * prior)
+        var = np.full(samples, left[-1])
+        var[samples - head :] = left[::-1]
+        own = self.powers(np.eye(m)[-1], head)
+        own = np.hstack([own.real, -own.imag])
+        s = own - np.stack([self.corrections(c)[:, -1].real for c in columns.T], axis=1)
+        var[:head] += self.F * np.einsum("ni,ij,nj->n", s, inverse, s)
+        std: Vector = np.sqrt(var)
         return std
