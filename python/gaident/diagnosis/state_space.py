@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident.errors import ModelError
+from gaident.models.controller import PI
 from gaident.models.model import Model
 
-__all__ = ["Discretised", "discretised", "recursion", "steady_covariance"]
+__all__ = ["Discretised", "discretised", "disturbed", "recursion", "steady_covariance"]
 
 Complex = NDArray[np.complex128]
 
@@ -26,6 +27,11 @@ class Discretised:
     B: Complex
     C: Complex
     D: float
+
+    def response(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """w of the input u from rest, shape (n,) each."""
+        w: NDArray[np.float64] = np.einsum("ni,i->n", recursion(self.A, np.outer(u, self.B)), self.C).real + self.D * u
+        return w
 
     @property
     def first_response(self) -> float:
@@ -67,6 +73,28 @@ def discretised(model: Model, dt: float, loop: str = "sampled") -> Discretised:
     half = np.linalg.inv(np.eye(m) - 0.5 * dt * A)
     D += float((C @ half @ B).real) * 0.5 * dt
     return Discretised(half @ (np.eye(m) + 0.5 * dt * A), dt * (half @ B), C @ half, D)
+
+
+def disturbed(plant: Discretised, controller: PI | None, dt: float) -> Discretised:
+    """From a torque added to the controller's to the measured velocity: the plant in its loop, limits left out.
+
+        w (1 + D (kp + h)) = C x + D (J + f),  u = J - (kp + h) w,  J(n+1) = J(n) - 2 h w,  h = ki dt/2
+
+    with J what the integrator holds of the past. Without a controller the plant itself.
+    """
+    if controller is None:
+        return plant
+    m, h = len(plant.B), 0.5 * controller.ki * dt
+    k = controller.kp + h
+    scale = 1.0 / (1.0 + plant.D * k)
+    C = np.append(plant.C, plant.D) * scale  # w = C [x, J] + D f
+    D = plant.D * scale
+    A = np.zeros((m + 1, m + 1), dtype=np.complex128)
+    A[:m, :m], A[:m, m], A[m, m] = plant.A, plant.B, 1.0
+    A[:m] -= k * np.outer(plant.B, C)
+    A[m] -= 2.0 * h * C
+    B = np.append((1.0 - k * D) * plant.B, -2.0 * h * D)
+    return Discretised(A, B, C, D)
 
 
 def recursion(A: Complex, drive: ArrayLike, start: ArrayLike | None = None, newest: bool = False) -> Complex:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gaident.identification.noise import Autoregression, chi2_tail, ljung_box, whiten
 from gaident.identification.starts import noise_std
 
-__all__ = ["Adequacy", "assess"]
+__all__ = ["Adequacy", "assess", "independence_p"]
 
 Vector = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ def assess(
     columns.append(_joined([y * np.abs(y) for y in outputs], noise.phi))
     own = [_joined(_split(row, lengths), noise.phi) for row in J]
     v = _joined(residuals, noise.phi)
-    p = _independence(v, np.array(own), np.array(columns), total - noise.order * len(lengths))
+    p = independence_p(v, np.array(own), np.array(columns), total - noise.order * len(lengths))
     measured = [y + e for y, e in zip(outputs, residuals, strict=True)]
     quiet = float(np.sqrt(sum(len(w) * noise_std(w) ** 2 for w in measured) / total))
     excess = float(np.sqrt(power)) / quiet if quiet > 0.0 else (0.0 if power == 0.0 else float("inf"))
@@ -112,7 +112,7 @@ def assess(
     return Adequacy(white_p, noise.order, noise.std, float(max(predictable, 0.0)), excess, p, falsified, undecided)
 
 
-def _independence(v: Vector, own: NDArray[np.float64], extra: NDArray[np.float64], samples: int) -> float:
+def independence_p(v: Vector, own: NDArray[np.float64], extra: NDArray[np.float64], samples: int) -> float:
     """p-value of the F-test that `extra` explains nothing of v beyond `own`."""
     basis = _orthonormal(own)
     rest = v - basis.T @ (basis @ v)

@@ -1,0 +1,264 @@
+"""Tests of the residual that stay valid under feedback. They order suspicions and raise alarms; they never name a cause.
+
+Everything is one regression: the residual e = w_measured - w_simulated, whitened with its own colour, on columns that come from
+outside the loop (command, simulated motion) and are whitened alike; what a change of the model's own parameters explains is
+taken out first. The noise colour is that of what no column explains. A regression on white residuals has exact p-values
+whatever the colour of the columns is; correlations with the measured torque, which carries the noise, are not used.
+(Ljung: model error models; Billings and Voon: even and odd powers; directed score tests with physical regressors.)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.diagnosis.directed import torque_columns
+from gaident.diagnosis.excitation import position_of
+from gaident.diagnosis.pi_torque import pi_torque
+from gaident.diagnosis.state_space import discretised, disturbed
+from gaident.errors import RecordError
+from gaident.identification.adequacy import independence_p
+from gaident.identification.noise import Autoregression, chi2_tail, fit_autoregression, ljung_box, whiten
+from gaident.identification.starts import starts_moving
+from gaident.models.controller import PI
+from gaident.models.model import Model
+from gaident.models.simulate import initial_state, simulate
+
+__all__ = ["ResidualTests", "parameter_sensitivities", "residual_tests"]
+
+Vector = NDArray[np.float64]
+Rows = NDArray[np.float64]
+
+LEVEL = 1e-4
+LAGS = (0, 1, 2, 3, 4, 6, 8, 11, 16, 23, 32, 45, 64, 91, 128)
+
+
+@dataclass(frozen=True)
+class ResidualTests:
+    """p-values of "nothing of this kind is left", small ones speak against it.
+
+    white          the whitened residual is white (Ljung-Box)
+    command        nothing depends on the command at any lag (torque from the past in open loop)
+    even, odd      nothing depends on even, on odd powers of the command beyond its first
+    stationary     first and last third of each record have the same residual power
+    directed       kind of missing torque -> nothing of its shape is left, see `directed.torque_columns`
+    linear_share   of the whitened residual's power that a linear model of the command explains (model error model)
+    nonlinear_share  what the torques of `directed` explain beyond that
+    noise          the noise model, its deviation in rad/s
+    """
+
+    white: float
+    command: float
+    even: float
+    odd: float
+    stationary: float
+    directed: Mapping[str, float]
+    linear_share: float
+    nonlinear_share: float
+    noise: Autoregression
+
+    @property
+    def alarms(self) -> tuple[str, ...]:
+        """Names of the tests that are significant (p < 1e-4), directed ones by rising p-value."""
+        own = [name for name in ("command", "even", "odd", "stationary") if getattr(self, name) < LEVEL]
+        return (*own, *(name for name, p in sorted(self.directed.items(), key=lambda item: item[1]) if p < LEVEL))
+
+    @property
+    def sentence(self) -> str:
+        """What is left, in words; no cause."""
+        if not self.alarms:
+            colour = "" if self.white >= LEVEL else ", beyond a colour of its own"
+            return f"Nothing is left in the residual that depends on command or motion{colour}."
+        what = []
+        if self.linear_share > 0.05 and self.linear_share > self.nonlinear_share:
+            what.append("mostly linear (dynamics that the model lacks or has wrong)")
+        elif self.nonlinear_share > 0.05:
+            what.append("mostly nonlinear in the motion")
+        if self.even < LEVEL or self.odd < LEVEL:
+            kinds = [name for name in ("even", "odd") if getattr(self, name) < LEVEL]
+            what.append(f"with {' and '.join(kinds)} powers of the command")
+        if self.stationary < LEVEL:
+            what.append("different at the record's start and end")
+        shares = f"{100 * self.linear_share:.0f} % linear, {100 * self.nonlinear_share:.0f} % more by torques that depend on motion"
+        return f"Something is left in the residual, {', '.join(what) or 'small but significant'} ({shares})."
+
+
+def residual_tests(
+    model: Model,
+    records: Record | Sequence[Record],
+    controller: PI | None = None,
+    simulated: Sequence[Vector] | None = None,
+    sensitivities: Rows | None = None,
+) -> ResidualTests:
+    """Tests what the model leaves of the records.
+
+    model          the linear model (of an extended one its linear part); decides how a missing torque shows in the velocity
+    simulated      velocities [rad/s] of the model under test, one array per record; None: of the linear model
+    sensitivities  of the simulated velocity to the parameters under test, (parameters, all samples); None: to gain and roots of
+                   the linear model
+
+    Raises RecordError where there is no record or a record lacks the input.
+    """
+    listed = [records] if isinstance(records, Record) else list(records)
+    if not listed:
+        raise RecordError("records is empty: give at least one Record")
+    outputs = [_simulated(model, rec, controller) for rec in listed] if simulated is None else list(simulated)
+    residuals = [rec.velocity - y for rec, y in zip(listed, outputs, strict=True)]
+    lengths = [len(e) for e in residuals]
+    own = parameter_sensitivities(model, listed, controller) if sensitivities is None else np.atleast_2d(sensitivities)
+    linear, even, odd = _command_columns(listed, controller)
+    directed = _directed(model, listed, outputs, controller)
+    parts = [own, *directed.values()] if sum(lengths) < 1000 else [own, linear, even, odd, *directed.values()]
+    noise = fit_autoregression(_split(_rest(np.concatenate(residuals), np.vstack(parts)), lengths))
+
+    def white(rows: Rows) -> Rows:
+        return np.array([np.concatenate([whiten(x, noise.phi) for x in _split(row, lengths)]) for row in rows])
+
+    v, own = white(np.concatenate(residuals)[None])[0], white(own)
+    linear, even, odd = white(linear), white(even), white(odd)
+    whitened = {name: white(rows) for name, rows in directed.items()}
+    dof = len(v) - noise.order * len(lengths)
+    base = _rest(v, own)
+    total = float(base @ base)
+    after_linear = _rest(v, np.vstack([own, linear]))
+    after_all = _rest(v, np.vstack([own, linear, *whitened.values()]))
+    line = float(after_linear @ after_linear)
+    return ResidualTests(
+        white=ljung_box(_split(v, lengths), min(20, len(v) // 5)),
+        command=independence_p(v, own, linear, dof),
+        even=independence_p(v, np.vstack([own, linear]), even, dof),
+        odd=independence_p(v, np.vstack([own, linear]), odd, dof),
+        stationary=_stationary(_split(base, lengths)),
+        directed={name: independence_p(v, own, rows, dof) for name, rows in whitened.items()},
+        linear_share=1.0 - line / total if total > 0.0 else 0.0,
+        nonlinear_share=(line - float(after_all @ after_all)) / total if total > 0.0 else 0.0,
+        noise=noise,
+    )
+
+
+def parameter_sensitivities(model: Model, records: Sequence[Record], controller: PI | None) -> Rows:
+    """Change of the simulated velocity with gain and roots of the model (central differences), (p + 2 q + 1, all samples)."""
+    rows = []
+    for step in _changes(model):
+        up, down = (
+            np.concatenate([_simulated(_changed(model, step, sign), rec, controller) for rec in records]) for sign in (1.0, -1.0)
+        )
+        row = up - down
+        if np.all(np.isfinite(row)):
+            rows.append(row)
+    return np.array(rows) if rows else np.zeros((0, sum(len(rec) for rec in records)))
+
+
+Change = tuple[float, dict[int, complex], dict[int, complex]]
+
+
+def _changes(model: Model) -> list[Change]:
+    """(relative change of gain, changes of poles, of zeros), one free parameter each."""
+    changes: list[Change] = [(1e-4, {}, {})]
+    for kind, roots in enumerate((model.poles, model.zeros)):
+        for i, root in enumerate(roots):
+            if root.imag < 0.0:
+                continue  # moves with its pair
+            size = 1e-4 * max(abs(root), 1e-2)
+            for step in (size + 0j, 1j * size) if root.imag > 0.0 else (size + 0j,):
+                moved = {i: step}
+                if root.imag > 0.0:
+                    moved[roots.index(root.conjugate())] = step.conjugate()
+                changes.append((0.0, moved, {}) if kind == 0 else (0.0, {}, moved))
+    return changes
+
+
+def _changed(model: Model, change: Change, sign: float) -> Model:
+    gain, poles, zeros = change
+    return Model(
+        model.gain * (1.0 + sign * gain),
+        [root + sign * poles.get(i, 0.0) for i, root in enumerate(model.poles)],
+        [root + sign * zeros.get(i, 0.0) for i, root in enumerate(model.zeros)],
+    )
+
+
+def _simulated(model: Model, rec: Record, controller: PI | None) -> Vector:
+    limited = controller is not None and controller.limited
+    state = initial_state(model, rec, controller) if not limited and starts_moving(rec, controller) else None
+    return simulate(model, rec, controller, state)
+
+
+def _command_columns(records: Sequence[Record], controller: PI | None) -> tuple[Rows, Rows, Rows]:
+    """(linear, even, odd) columns: lags of the command itself, of its square and modulus, of its cube and r|r|."""
+    sources, lags = [], LAGS
+    for rec in records:
+        source = rec.torque if controller is None else rec.command
+        if source is None:
+            raise RecordError(f"the record has no {'torque' if controller is None else 'command'}, which drives the simulation")
+        sources.append(source / max(float(np.abs(source).max()), 1e-300))
+    shortest = min(len(x) for x in sources)
+    # A measured torque may carry the noise of its own sample.
+    lags = tuple(k for k in lags if k < shortest // 4 and not (controller is None and k == 0))
+    few = lags[:: max(1, len(lags) // 5)]
+    even, odd = (lambda x: x * x, np.abs), (lambda x: x**3, lambda x: x * np.abs(x))
+    one = np.concatenate([np.ones(len(x)) for x in sources])
+    linear = np.array([one, *(np.concatenate([_lagged(x, k) for x in sources]) for k in lags)])
+    return linear, *(
+        np.array([np.concatenate([_lagged(f(x), k) for x in sources]) for f in powers for k in few]) for powers in (even, odd)
+    )
+
+
+def _directed(
+    model: Model, records: Sequence[Record], outputs: Sequence[Vector], controller: PI | None
+) -> dict[str, Rows]:
+    """How each kind of missing torque would show in the velocity, (columns, all samples)."""
+    top = max(float(np.abs(y).max()) for y in outputs)
+    found: dict[str, list[list[Vector]]] = {}
+    for rec, w in zip(records, outputs, strict=True):
+        if controller is not None and rec.command is not None:
+            u = pi_torque(rec.command, w, rec.dt, controller)
+        else:
+            u = np.zeros_like(w) if rec.torque is None else rec.torque
+        theta = position_of(rec) if rec.position is not None else rec.dt * np.cumsum(w)
+        loop = disturbed(discretised(model, rec.dt, "sampled" if controller is None else controller.loop), controller, rec.dt)
+        for name, columns in torque_columns(w, theta, u, rec.time, top).items():
+            shown = [loop.response(f) for f in columns]
+            found.setdefault(name, [[] for _ in shown])
+            for kept, response in zip(found[name], shown, strict=True):
+                kept.append(response)
+    rows = {name: np.array([np.concatenate(column) for column in columns]) for name, columns in found.items()}
+    return {name: block[np.all(np.isfinite(block), axis=1)] for name, block in rows.items()}
+
+
+def _rest(v: Vector, rows: Rows) -> Vector:
+    """v without what the rows explain."""
+    sizes = np.linalg.norm(rows, axis=1)
+    rows = rows[(sizes > 0.0) & np.isfinite(sizes)]
+    if len(rows) == 0:
+        return v
+    table = (rows / np.linalg.norm(rows, axis=1)[:, None]).T
+    left: Vector = v - table @ np.linalg.lstsq(table, v, rcond=1e-7)[0]
+    return left
+
+
+def _stationary(parts: Sequence[Vector]) -> float:
+    """p-value of equal power in first and last thirds, log ratio against its deviation from the actual fourth moment."""
+    first = np.concatenate([x[: len(x) // 3] for x in parts])
+    last = np.concatenate([x[-(len(x) // 3) :] for x in parts])
+    both = np.concatenate([first, last])
+    power = float(np.mean(both**2))
+    if not (power > 0.0 and np.mean(first**2) > 0.0 and np.mean(last**2) > 0.0):
+        return 1.0
+    kurtosis = max(float(np.mean(both**4)) / power**2, 1.5)
+    z = math.log(float(np.mean(first**2) / np.mean(last**2))) / math.sqrt((kurtosis - 1.0) * (1 / len(first) + 1 / len(last)))
+    return chi2_tail(z * z, 1)
+
+
+def _lagged(x: Vector, k: int) -> Vector:
+    out = np.zeros_like(x)
+    out[k:] = x[: len(x) - k]
+    return out
+
+
+def _split(row: Vector, lengths: Sequence[int]) -> list[Vector]:
+    return np.split(row, np.cumsum(lengths)[:-1])
