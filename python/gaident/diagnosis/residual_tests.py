@@ -10,7 +10,7 @@ whatever the colour of the columns is; correlations with the measured torque, wh
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,7 +84,9 @@ class ResidualTests:
             what.append(f"with {' and '.join(kinds)} powers of the command")
         if self.stationary < LEVEL:
             what.append("different at the record's start and end")
-        shares = f"{100 * self.linear_share:.0f} % linear, {100 * self.nonlinear_share:.0f} % more by torques that depend on motion"
+        shares = (
+            f"{100 * self.linear_share:.0f} % linear, {100 * self.nonlinear_share:.0f} % more by torques that depend on motion"
+        )
         return f"Something is left in the residual, {', '.join(what) or 'small but significant'} ({shares})."
 
 
@@ -190,7 +192,7 @@ def _simulated(model: Model, rec: Record, controller: PI | None) -> Vector:
 
 def _command_columns(records: Sequence[Record], controller: PI | None) -> tuple[Rows, Rows, Rows]:
     """(linear, even, odd) columns: lags of the command itself, of its square and modulus, of its cube and r|r|."""
-    sources, lags = [], LAGS
+    sources: list[Vector] = []
     for rec in records:
         source = rec.torque if controller is None else rec.command
         if source is None:
@@ -198,19 +200,18 @@ def _command_columns(records: Sequence[Record], controller: PI | None) -> tuple[
         sources.append(source / max(float(np.abs(source).max()), 1e-300))
     shortest = min(len(x) for x in sources)
     # A measured torque may carry the noise of its own sample.
-    lags = tuple(k for k in lags if k < shortest // 4 and not (controller is None and k == 0))
+    lags = tuple(k for k in LAGS if k < shortest // 4 and not (controller is None and k == 0))
     few = lags[:: max(1, len(lags) // 5)]
-    even, odd = (lambda x: x * x, np.abs), (lambda x: x**3, lambda x: x * np.abs(x))
     one = np.concatenate([np.ones(len(x)) for x in sources])
-    linear = np.array([one, *(np.concatenate([_lagged(x, k) for x in sources]) for k in lags)])
-    return linear, *(
-        np.array([np.concatenate([_lagged(f(x), k) for x in sources]) for f in powers for k in few]) for powers in (even, odd)
-    )
+
+    def block(powers: Sequence[Callable[[Vector], Vector]], chosen: Sequence[int]) -> Rows:
+        return np.array([np.concatenate([_lagged(f(x), k) for x in sources]) for f in powers for k in chosen])
+
+    linear = np.vstack([one, block([lambda x: x], lags)])
+    return linear, block([np.square, np.abs], few), block([lambda x: x**3, lambda x: x * np.abs(x)], few)
 
 
-def _directed(
-    model: Model, records: Sequence[Record], outputs: Sequence[Vector], controller: PI | None
-) -> dict[str, Rows]:
+def _directed(model: Model, records: Sequence[Record], outputs: Sequence[Vector], controller: PI | None) -> dict[str, Rows]:
     """How each kind of missing torque would show in the velocity, (columns, all samples)."""
     top = max(float(np.abs(y).max()) for y in outputs)
     found: dict[str, list[list[Vector]]] = {}

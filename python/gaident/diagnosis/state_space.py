@@ -87,7 +87,7 @@ def disturbed(plant: Discretised, controller: PI | None, dt: float) -> Discretis
     m, h = len(plant.B), 0.5 * controller.ki * dt
     k = controller.kp + h
     scale = 1.0 / (1.0 + plant.D * k)
-    C = np.append(plant.C, plant.D) * scale  # w = C [x, J] + D f
+    C: Complex = np.append(plant.C, plant.D).astype(np.complex128) * scale  # w = C [x, J] + D f
     D = plant.D * scale
     A = np.zeros((m + 1, m + 1), dtype=np.complex128)
     A[:m, :m], A[:m, m], A[m, m] = plant.A, plant.B, 1.0
