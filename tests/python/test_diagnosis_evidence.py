@@ -235,6 +235,11 @@ def test_the_smoother_is_fast_and_refuses_what_it_cannot_see() -> None:
         missing_torque(ga.Model(5000.0, [-3.0], [-20.0]), rec, CONTROLLER)
     with pytest.raises(RecordError, match="one number per sample"):
         missing_torque(ONE_MASS.model(), rec, CONTROLLER, torque=np.zeros(7))
+    with pytest.raises(ModelError, match="noise is 0"):
+        missing_torque(ONE_MASS.model(), rec, CONTROLLER, noise=0.0)
+    # A velocity smoothed to its last digits: the noise stays what a sensor can have.
+    smooth = changed(rec, ga.simulate(ONE_MASS, rec, CONTROLLER), None)
+    assert missing_torque(ONE_MASS.model(), smooth, CONTROLLER).noise >= 0.9e-5 * np.ptp(smooth.velocity)
 
 
 # --- excitation

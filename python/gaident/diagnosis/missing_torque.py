@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from gaident.data.record import Record
 from gaident.diagnosis.replay import replay
 from gaident.diagnosis.state_space import Discretised, discretised, recursion, steady_covariance
-from gaident.errors import RecordError
+from gaident.errors import ModelError, RecordError
+from gaident.models._checks import real_number
 from gaident.models.controller import PI
 from gaident.models.model import Model
 
@@ -31,6 +32,7 @@ __all__ = ["MissingTorque", "missing_torque"]
 Vector = NDArray[np.float64]
 
 TUNED_ON = 30_000  # samples of a longer record on which noise and walk are chosen
+LEAST_NOISE = 1e-5  # of the velocity's range: a log smoothed beyond that would make any torque of its last digits
 DECADES = (-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0)  # of walk per sample over the noise, seen at the velocity after one sample
 
 
@@ -71,19 +73,26 @@ def missing_torque(
     noise   standard deviation of the velocity noise [rad/s]; None: chosen with the walk by likelihood
     walk    of the random walk [N m/sqrt(s)]; None: chosen by likelihood on a grid
 
-    Raises ModelError for p = 0 outside the continuous loop and for a model that shows no torque at standstill (a zero at 0),
-    RecordError where torque is missing or of another length.
+    Raises ModelError for p = 0 outside the continuous loop, for a model that shows no torque at standstill (a zero at 0) and for
+    deviations <= 0, RecordError where torque is missing or of another length.
     """
     u = replay(rec, controller).torque if torque is None else np.asarray(torque, dtype=np.float64)
     if u.shape != rec.velocity.shape:
         raise RecordError(f"torque has the shape {u.shape}, the record has {len(rec)} samples: give one number per sample")
+    for name, value in (("noise", noise), ("walk", walk)):
+        if value is not None and not real_number(value, name, ModelError, "give one number > 0, or None") > 0.0:
+            raise ModelError(f"{name} is {value!r}: give one number > 0, or None to have it chosen")
     loop = "sampled" if controller is None else controller.loop
     plant = discretised(model, rec.dt, loop)
     tuned = slice(0, TUNED_ON)
-    if noise is None or walk is None:
-        noise, walk, likelihood = _tuned(plant, u[tuned], rec.velocity[tuned], noise, walk)
-    else:
+    if walk is not None:
         walk *= float(np.sqrt(rec.dt))
+    if noise is None or walk is None:
+        free = noise is None and walk is None
+        noise, walk, likelihood = _tuned(plant, u[tuned], rec.velocity[tuned], noise, walk)
+        if free and noise < (least := LEAST_NOISE * float(np.ptp(rec.velocity))):
+            noise, walk, likelihood = _tuned(plant, u[tuned], rec.velocity[tuned], least, None)
+    else:
         steady = _Filter(plant, noise, walk)
         likelihood = steady.log_likelihood(steady.predict(u[tuned], rec.velocity[tuned])[0])
     smoother = _Filter(plant, noise, walk)

@@ -39,7 +39,7 @@ def plot_torque_velocity(
     fig = _figure(7.5, 4.8)
     ax = fig.subplots()
     _torque_velocity(ax, velocity, dhat, dt, std, curve, axis)
-    _head(ax, "Missing torque against velocity", "upper right")
+    _head(ax, f"Missing {_kind(axis)} against velocity", "upper right")
     _tidy(fig)
     return fig
 
@@ -49,7 +49,7 @@ def plot_orders(position: Vector, dhat: Vector, velocity: Vector, highest: float
     fig = _figure(7.5, 3.8)
     ax = fig.subplots()
     _orders(ax, position, dhat, velocity, highest, axis)
-    _head(ax, "Missing torque: lines per turn")
+    _head(ax, f"Missing {_kind(axis)}: lines per {_period(axis)}")
     _tidy(fig)
     return fig
 
@@ -120,11 +120,11 @@ def plot_evidence(
     _reversals(turning, measured, dhat, drive_torque, dt, axis, None)
     heads: Sequence[tuple[Axes, str]] = (
         (run, "Measured and simulated"),
-        (cloud, "Missing torque against velocity"),
+        (cloud, f"Missing {_kind(axis)} against velocity"),
         (over_time, "Residual over time"),
-        (lines, "Missing torque: lines per turn"),
+        (lines, f"Missing {_kind(axis)}: lines per {_period(axis)}"),
         (over_frequency, "Residual over frequency"),
-        (turning, "Missing torque around reversals"),
+        (turning, f"Missing {_kind(axis)} around reversals"),
     )
     for letter, (ax, head) in zip("abcdef", heads, strict=True):
         _head(ax, f"{letter}  {head}", "upper right" if ax is cloud else "above", bold=True)
@@ -164,19 +164,27 @@ def _torque_velocity(
 
 
 def _orders(ax: Axes, position: Vector, dhat: Vector, velocity: Vector, highest: float, axis: str) -> None:
+    """Lines per turn; of a linear axis per metre, up to 200 in its travel."""
+    scale = 1.0
+    if axis == "linear":
+        scale, highest = float(np.ptp(position)) or 1.0, 200.0
+        position = position * (math.tau / scale)
     lines = order_lines(position, dhat, velocity, highest)
-    ax.set_xlabel("order [per turn]" if axis == "rotary" else "order [per 2 pi m]")
+    orders = lines.order / scale
+    ax.set_xlabel("order [per turn]" if axis == "rotary" else "lines [1/m]")
     ax.set_ylabel(f"amplitude [{unit('N m', axis)}]")
-    if len(lines.order) == 0:
+    if len(orders) == 0:
         ax.text(0.5, 0.5, f"{lines.turns:.2g} turns travelled: too few", transform=ax.transAxes, ha="center", color=GREY)
         return
-    ax.fill_between(lines.order, lines.amplitude, color=BLUE, alpha=0.25, linewidth=0)
-    ax.plot(lines.order, lines.amplitude, color=BLUE, linewidth=0.8, label=f"{lines.turns:.1f} turns")
+    ax.fill_between(orders, lines.amplitude, color=BLUE, alpha=0.25, linewidth=0)
+    travel = f"{lines.turns:.1f} turns" if axis == "rotary" else f"{scale:.3g} m"
+    ax.plot(orders, lines.amplitude, color=BLUE, linewidth=0.8, label=travel)
     ax.axhline(lines.level, color=ORANGE, linewidth=1.2, linestyle="--", label="1 % level of chance")
     for order, amplitude in lines.peaks:
-        ax.annotate(f"{order:.4g}", (order, amplitude), xytext=(0, 3), textcoords="offset points", ha="center", fontsize="small")
-    ax.set_xlim(0.0, highest)
-    ax.set_ylim(0.0, 1.18 * max(float(lines.amplitude.max()), lines.level))
+        where, text = (order / scale, amplitude), f"{order / scale:.3g}"
+        ax.annotate(text, where, xytext=(0, 3), textcoords="offset points", ha="center", fontsize="small")
+    ax.set_xlim(0.0, highest / scale)
+    ax.set_ylim(0.0, 1.18 * max(float(lines.amplitude.max()), lines.level) or 1.0)
 
 
 def _reversals(ax: Axes, velocity: Vector, dhat: Vector, drive_torque: Vector, dt: float, axis: str, low: Axes | None) -> None:
@@ -228,7 +236,15 @@ def _residual_frequency(ax: Axes, time: Vector, residual: Vector, noise_std: flo
 
 
 def _torque_label(axis: str) -> str:
-    return f"missing {'torque' if axis == 'rotary' else 'force'} [{unit('N m', axis)}]"
+    return f"missing {_kind(axis)} [{unit('N m', axis)}]"
+
+
+def _kind(axis: str) -> str:
+    return "torque" if axis == "rotary" else "force"
+
+
+def _period(axis: str) -> str:
+    return "turn" if axis == "rotary" else "metre"
 
 
 def _robust(values: Vector) -> tuple[float, float]:
