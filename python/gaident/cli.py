@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gaident import demo as demonstration
-from gaident.cli_options import PICTURES, drive_of, parser_of
+from gaident.cli_options import PICTURES, drive_of, in_options, parser_of
 from gaident.cli_output import Progress, csv_targets, csv_text, naming, target_of, write
 from gaident.data.record import Record
 from gaident.drive_file import Drive
@@ -49,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return code
     except GaidentError as error:
-        return _failed(2, str(error))
+        return _failed(2, in_options(str(error)))
     except KeyboardInterrupt:
         return _failed(130, "interrupted")
     except BrokenPipeError:
