@@ -24,7 +24,7 @@ py::tuple simulate_model(double gain, const ComplexArray& poles, const ComplexAr
     {
         const py::gil_scoped_release release;
         if (arithmetic == "double") simulate<double>(g, in, dt, l, start, w, u);
-        else if (arithmetic == "float") simulate<float>(g, in, dt, l, start, w, u);
+        else if (arithmetic == "float") simulate_in_float(g, in, dt, l, start, w, u);
         else throw std::invalid_argument("arithmetic must be 'double' or 'float', not '" + arithmetic + "'");
     }
     return py::make_tuple(velocity, torque);

@@ -110,8 +110,8 @@ void load_group(const Experiment& experiment, const Record& record, std::span<co
 }
 
 Batch::Batch(const Experiment& experiment, std::size_t capacity, bool in_float)
-    : experiment_(experiment), in_float_(in_float), order_(capacity), sorted_(capacity) {
-    if (!in_float) return;
+    : experiment_(experiment), in_float_(in_float && !experiment.loop.limited()), order_(capacity), sorted_(capacity) {
+    if (!in_float_) return;
     inputs_.reserve(experiment.samples());
     outputs_.reserve(experiment.samples());
     for (const Record& r : experiment.records) {
@@ -143,39 +143,71 @@ void narrow(const DoubleGroup& from, int offset, FloatGroup& to) {
 
 }  // namespace
 
-template <class G, class T>
-void Batch::run(const KernelSet<G, T>& kernels, G& group, std::span<const T> in, std::span<const T> out, const Record& record,
-                std::span<const Factors<double>> candidates, double* sums) {
-    constexpr bool halves = G::width == 2 * DoubleGroup::width;
-    const std::size_t count = candidates.size();
-    const Controller<T> controller(experiment_.loop, record.sample_time);
-    const bool stepped = experiment_.loop.limited();
-    const auto load = [&](std::size_t first, std::size_t end, DoubleGroup& into) {
-        load_group(experiment_, record, std::span(sorted_).subspan(first, end - first), {}, into);
+// Advances a group over a record, chunk by chunk; adds each lane's squared errors.
+template <class G, class T, class Errors>
+void Batch::advance(Errors&& errors, G& group, std::span<const T> in, std::span<const T> out, double* sums) const {
+    for (std::size_t i = 0; i < in.size(); i += chunk_samples) {
+        const std::size_t n = std::min(chunk_samples, in.size() - i);
+        T part[G::width];
+        errors(group, in.data() + i, out.data() + i, n, part);
+        for (std::size_t lane = 0; lane < G::width; ++lane) sums[lane] += static_cast<double>(part[lane]);
+        experiment_.stop_if_asked();
+    }
+}
+
+void Batch::advance_double(DoubleGroup& group, const Record& record, double* sums) const {
+    const auto& kernels = experiment_.kernels->in_double;
+    if (!experiment_.loop.limited()) return advance(kernels.errors, group, record.input, record.output, sums);
+    const Controller<double> controller(experiment_.loop, record.sample_time);
+    const auto stepped = [&](DoubleGroup& g, const double* in, const double* out, std::size_t n, double* part) {
+        kernels.stepped_errors(g, controller, in, out, n, part);
     };
+    advance(stepped, group, record.input, record.output, sums);
+}
+
+// The next candidates from `first` on that share a group; returns the first that does not.
+std::size_t Batch::load(const Record& record, std::size_t first, std::size_t count, DoubleGroup& group) const {
+    const std::size_t end = group_end(first, count);
+    load_group(experiment_, record, std::span(sorted_).subspan(first, end - first), {}, group);
+    return end;
+}
+
+void Batch::run_double(const Record& record, std::size_t count, double* sums) {
     for (std::size_t first = 0; first < count;) {
-        const std::size_t middle = group_end(first, count);
-        std::size_t end = middle;
-        load(first, middle, double_group_);
-        if constexpr (halves) {
-            if (middle < count) {
-                end = group_end(middle, count);
-                load(middle, end, other_half_);
-            } else {
-                other_half_ = double_group_;
-            }
-            group.order = std::max(double_group_.order, other_half_.order);
-            narrow(double_group_, 0, group);
-            narrow(other_half_, DoubleGroup::width, group);
-        }
-        const auto lane = [&](std::size_t i) { return i < middle ? i - first : DoubleGroup::width + (i - middle); };
-        for (std::size_t i = 0; i < in.size(); i += chunk_samples) {
-            const std::size_t n = std::min(chunk_samples, in.size() - i);
-            T part[G::width];
-            if (stepped) kernels.stepped_errors(group, controller, in.data() + i, out.data() + i, n, part);
-            else kernels.errors(group, in.data() + i, out.data() + i, n, part);
-            for (std::size_t k = first; k < end; ++k) sums[order_[k]] += static_cast<double>(part[lane(k)]);
-            experiment_.stop_if_asked();
+        const std::size_t end = load(record, first, count, halves_[0]);
+        double part[DoubleGroup::width] = {};
+        advance_double(halves_[0], record, part);
+        for (std::size_t i = first; i < end; ++i) sums[order_[i]] += part[i - first];
+        first = end;
+    }
+}
+
+// Two groups of eight side by side; a lane that 24 bits cannot hold takes its sum from a run of its eight in double.
+void Batch::run_float(const Record& record, std::span<const float> in, std::span<const float> out, std::size_t count,
+                      double* sums) {
+    for (std::size_t first = 0; first < count;) {
+        const std::size_t middle = load(record, first, count, halves_[0]);
+        const std::size_t end = middle < count ? load(record, middle, count, halves_[1]) : middle;
+        if (middle == count) halves_[1] = halves_[0];
+        float_group_.order = std::max(halves_[0].order, halves_[1].order);
+        narrow(halves_[0], 0, float_group_);
+        narrow(halves_[1], DoubleGroup::width, float_group_);
+        double part[FloatGroup::width] = {};
+        advance(experiment_.kernels->in_float.errors, float_group_, in, out, part);
+
+        const std::size_t starts[] = {first, middle, end};
+        for (std::size_t h = 0; h < 2; ++h) {
+            DoubleGroup& half = halves_[h];
+            const std::size_t used = starts[h + 1] - starts[h];
+            const auto suffices = [&](std::size_t lane) {
+                return float_suffices(half.order, [&](int i) { return half.a[i][lane]; });
+            };
+            bool in_float[DoubleGroup::width], all = true;
+            for (std::size_t lane = 0; lane < used; ++lane) all = (in_float[lane] = suffices(lane)) && all;
+            double exact[DoubleGroup::width] = {};
+            if (!all) advance_double(half, record, exact);
+            for (std::size_t lane = 0; lane < used; ++lane)
+                sums[order_[starts[h] + lane]] += in_float[lane] ? part[h * DoubleGroup::width + lane] : exact[lane];
         }
         first = end;
     }
@@ -202,9 +234,9 @@ void Batch::errors(std::span<const Factors<double>> candidates, std::span<double
         if (in_float_) {
             const std::span<const float> in(inputs_.data() + offset, record.size());
             const std::span<const float> out(outputs_.data() + offset, record.size());
-            run(experiment_.kernels->in_float, float_group_, in, out, record, candidates, sums.data());
+            run_float(record, in, out, count, sums.data());
         } else {
-            run(experiment_.kernels->in_double, double_group_, record.input, record.output, record, candidates, sums.data());
+            run_double(record, count, sums.data());
         }
         offset += record.size();
     }

@@ -56,7 +56,8 @@ Prepared prepare(const Factors<double>& g, const Record& record, const Loop& loo
 void load_group(const Experiment& experiment, const Record& record, std::span<const Factors<double>* const> candidates,
                 std::span<const double* const> starts, DoubleGroup& group);
 
-// Error sums of candidates of any mixture of structures. All memory is taken in the constructor.
+// Error sums of candidates of any mixture of structures. All memory is taken in the constructor. In float a candidate that 24 bits cannot
+// hold (float_suffices) is run in double all the same, and so is every loop with limits, where a rounded torque goes through the plant.
 class Batch {
 public:
     Batch(const Experiment& experiment, std::size_t capacity, bool in_float);
@@ -66,16 +67,19 @@ public:
 
 private:
     std::size_t group_end(std::size_t first, std::size_t count) const;
-    template <class G, class T>
-    void run(const KernelSet<G, T>& kernels, G& group, std::span<const T> in, std::span<const T> out, const Record& record,
-             std::span<const Factors<double>> candidates, double* sums);
+    std::size_t load(const Record& record, std::size_t first, std::size_t count, DoubleGroup& group) const;
+    template <class G, class T, class Errors>
+    void advance(Errors&& errors, G& group, std::span<const T> in, std::span<const T> out, double* sums) const;
+    void advance_double(DoubleGroup& group, const Record& record, double* sums) const;
+    void run_double(const Record& record, std::size_t count, double* sums);
+    void run_float(const Record& record, std::span<const float> in, std::span<const float> out, std::size_t count, double* sums);
 
     const Experiment& experiment_;
     bool in_float_;
-    std::vector<std::size_t> order_;       // candidates sorted by order, stable
+    std::vector<std::size_t> order_;  // candidates sorted by order, stable
     std::vector<const Factors<double>*> sorted_;
     std::vector<float> inputs_, outputs_;  // the records in float, one after the other
-    DoubleGroup double_group_, other_half_;
+    DoubleGroup halves_[2];
     FloatGroup float_group_;
 };
 

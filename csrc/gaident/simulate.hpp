@@ -1,8 +1,9 @@
-// One model, one record: velocity and torque, in the arithmetic asked for.
+// One model, one record: velocity and torque, in double or in float.
 #pragma once
 
 #include "batch.hpp"
 #include "denormals.hpp"
+#include "float_pair.hpp"
 
 namespace gaident {
 
@@ -40,6 +41,19 @@ void simulate(const Factors<double>& g, std::span<const double> input, double sa
         velocity[k] = static_cast<double>(y);
         torque[k] = loop.kind == LoopKind::open ? input[k] : static_cast<double>(controller.step(r - y));
     }
+}
+
+// In 32-bit arithmetic: plain floats where they hold the loop's polynomial, pairs of floats where they do not, and where a limit keeps
+// controller and plant apart, so that a torque rounded to 24 bits would go through the plant.
+inline void simulate_in_float(const Factors<double>& g, std::span<const double> input, double sample_time, const Loop& loop,
+                              const double* start, std::span<double> velocity, std::span<double> torque) {
+    Record record;
+    record.input = record.output = input;
+    record.sample_time = sample_time;
+    const Delta<double> h = prepare(g, record, loop, start).response;
+    if (!loop.limited() && float_suffices(h.order, [&](int i) { return h.a[i]; }))
+        simulate<float>(g, input, sample_time, loop, start, velocity, torque);
+    else simulate<FloatPair>(g, input, sample_time, loop, start, velocity, torque);
 }
 
 // Equation (7) in powers of z^-1: w(n) = sum_0^N alpha_i r(n-i) + sum_1^N beta_i w(n-i), by expanding delta = z - 1.

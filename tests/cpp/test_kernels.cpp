@@ -56,8 +56,7 @@ struct Case {
     Case(Random& random, int poles, bool stepped, std::size_t samples) {
         for (int lane = 0; lane < W; ++lane) {
             const auto n = static_cast<std::size_t>(
-                lane == 0 || poles == 0 ? poles
-                                        : 1 + static_cast<int>(random.below(static_cast<std::uint32_t>(poles))));
+                lane == 0 || poles == 0 ? poles : 1 + static_cast<int>(random.below(static_cast<std::uint32_t>(poles))));
             const std::size_t q_most = std::min<std::size_t>(n / 2, 7), q_least = n > 7 ? n - 7 : 0;
             const std::size_t q = q_least + random.below(static_cast<std::uint32_t>(q_most - q_least + 1));
             drives.push_back(
@@ -132,12 +131,15 @@ Results<T> run(const Kernels& kernels, const Case<T>& c, bool stepped) {
     r.sums.resize(W);
     r.after = c.group;
     const T *const in = c.input.data(), *const out = c.output.data();
-    if (stepped) {
-        set.stepped_outputs(r.after, pi, in, cut, r.outputs.data());
-        set.stepped_outputs(r.after, pi, in + cut, n - cut, r.outputs.data() + cut * W);
-        auto again = c.group;
-        set.stepped_errors(again, pi, in, out, n, r.sums.data());
-    } else {
+    if constexpr (std::same_as<T, double>) {
+        if (stepped) {
+            set.stepped_outputs(r.after, pi, in, cut, r.outputs.data());
+            set.stepped_outputs(r.after, pi, in + cut, n - cut, r.outputs.data() + cut * W);
+            auto again = c.group;
+            set.stepped_errors(again, pi, in, out, n, r.sums.data());
+        }
+    }
+    if (!stepped) {
         set.outputs(r.after, in, cut, r.outputs.data());
         set.outputs(r.after, in + cut, n - cut, r.outputs.data() + cut * W);
         auto again = c.group;
@@ -171,9 +173,11 @@ void compare(bool stepped, double tolerance) {
                 CHECK(same_bits(y, c.scalar(lane, stepped)));
                 CHECK(sum == first.sums[static_cast<std::size_t>(lane)]);
                 const auto exact = c.drives[static_cast<std::size_t>(lane)].template respond<long double>().velocity;
-                const double own = reference::deviation(
-                    c.drives[static_cast<std::size_t>(lane)].template respond<double>().velocity, exact);
-                if (own < 1e-12) worst = std::max(worst, reference::deviation(y, exact));
+                const double own =
+                    reference::deviation(c.drives[static_cast<std::size_t>(lane)].template respond<double>().velocity, exact);
+                const Delta<double>& h = c.prepared[static_cast<std::size_t>(lane)].response;
+                const bool held = std::same_as<T, double> || float_suffices(h.order, [&](int i) { return h.a[i]; });
+                if (own < 1e-12 && held) worst = std::max(worst, reference::deviation(y, exact));
             }
             for (const Kernels* k : available()) {
                 const Results<T> other = run(*k, c, stepped);
@@ -206,9 +210,8 @@ TEST_CASE("kernels: every available instruction set is found by its name, the be
 TEST_CASE("kernels: linear loop in double, equal bit for bit to the scalar, among each other, and to the referee") {
     compare<double>(false, 1e-9);
 }
-TEST_CASE("kernels: linear loop in float") { compare<float>(false, 1e-3); }
+TEST_CASE("kernels: linear loop in float") { compare<float>(false, 1e-4); }
 TEST_CASE("kernels: stepped loop with limits in double") { compare<double>(true, 1e-9); }
-TEST_CASE("kernels: stepped loop with limits in float") { compare<float>(true, 1e-2); }
 
 TEST_CASE("kernels: order 0 passes the input through its gain") {
     for (const Kernels* k : available()) {

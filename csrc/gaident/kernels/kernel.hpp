@@ -34,9 +34,8 @@ struct KernelSource {
         if (f.counts.single_pole) g.pole = L::load(f.pole);
         if (f.counts.single_zero) g.zero = L::load(f.zero);
         for (int i = 0; i < f.counts.p; ++i) g.has_excess[i] = L::load(f.excess[i]);
-        Delta<L> h = loop.kind == LoopKind::continuous
-                         ? bilinear_plant<L>(g, sample_time)
-                         : held_plant<L>(g, sample_time, f.doublings);
+        Delta<L> h =
+            loop.kind == LoopKind::continuous ? bilinear_plant<L>(g, sample_time) : held_plant<L>(g, sample_time, f.doublings);
         if (closed) h = close_loop(h, loop.kp, loop.ki, sample_time);
         out.order = h.order;
         for (int i = 0; i < h.order; ++i) h.a[i].store(out.a[i]);
@@ -68,8 +67,7 @@ struct KernelSource {
             Bank<T, W, N> k(g);
             L sum(0.0);
             for (std::size_t i = 0; i < n; ++i) {
-                const L e = L::all(output[i]) -
-                            recurrence_step<L, N>(k.order, k.a, k.b, k.x, L::all(input[i]));
+                const L e = L::all(output[i]) - recurrence_step<L, N>(k.order, k.a, k.b, k.x, L::all(input[i]));
                 sum = sum + e * e;
             }
             k.save(g);
@@ -78,8 +76,7 @@ struct KernelSource {
         static void outputs(Group<T, W>& g, const T* input, std::size_t n, T* y) {
             using L = Lanes<T, W, Isa>;
             Bank<T, W, N> k(g);
-            for (std::size_t i = 0; i < n; ++i)
-                recurrence_step<L, N>(k.order, k.a, k.b, k.x, L::all(input[i])).store(y + i * W);
+            for (std::size_t i = 0; i < n; ++i) recurrence_step<L, N>(k.order, k.a, k.b, k.x, L::all(input[i])).store(y + i * W);
             k.save(g);
         }
     };
@@ -112,8 +109,7 @@ struct KernelSource {
             Bank<T, W, N> k(g);
             SteppedLoop<L, N> loop = loop_of(g, c);
             L u(0.0);
-            for (std::size_t i = 0; i < n; ++i)
-                loop.step(k.order, k.a, k.b, k.x, L::all(input[i]), u).store(y + i * W);
+            for (std::size_t i = 0; i < n; ++i) loop.step(k.order, k.a, k.b, k.x, L::all(input[i]), u).store(y + i * W);
             k.save(g);
             loop.pi.s.store(g.s);
         }
@@ -155,10 +151,13 @@ struct KernelSource {
 
     template <class T, int W>
     static constexpr KernelSet<Group<T, W>, T> set() {
-        return {errors<T, W>, outputs<T, W>, stepped_errors<T, W>, stepped_outputs<T, W>};
+        return {errors<T, W>, outputs<T, W>};
     }
     static Kernels all(const char* name) {
-        return {name, coefficients, set<double, double_lanes>(), set<float, float_lanes>()};
+        return {name,
+                coefficients,
+                {set<double, double_lanes>(), stepped_errors<double, double_lanes>, stepped_outputs<double, double_lanes>},
+                set<float, float_lanes>()};
     }
 };
 

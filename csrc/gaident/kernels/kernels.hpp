@@ -33,7 +33,7 @@ struct FactorGroup {
     alignas(64) double pole_e1[max_pairs][width], pole_e0[max_pairs][width], pole[width];
     alignas(64) double zero_e1[max_pairs][width], zero_e0[max_pairs][width], zero[width];
     alignas(64) double excess[max_plant_order][width];  // 1 where the lane has more than i poles in excess of zeros, else 0
-    int doublings = 0;  // of the hold's matrix exponential, enough for the fastest lane
+    int doublings = 0;                                  // of the hold's matrix exponential, enough for the fastest lane
 };
 
 template <class G, class T>
@@ -42,16 +42,20 @@ struct KernelSet {
     void (*errors)(G&, const T* input, const T* output, std::size_t n, T* sums);
     // y[sample][lane]
     void (*outputs)(G&, const T* input, std::size_t n, T* y);
-    // The same with the controller's limits, the group holding plants and not closed loops.
-    void (*stepped_errors)(G&, const Controller<T>&, const T* input, const T* output, std::size_t n, T* sums);
-    void (*stepped_outputs)(G&, const Controller<T>&, const T* input, std::size_t n, T* y);
+};
+
+// The same with the controller's limits, the group holding plants and not closed loops.
+struct SteppedKernelSet : KernelSet<DoubleGroup, double> {
+    void (*stepped_errors)(DoubleGroup&, const Controller<double>&, const double* input, const double* output, std::size_t n,
+                           double* sums);
+    void (*stepped_outputs)(DoubleGroup&, const Controller<double>&, const double* input, std::size_t n, double* y);
 };
 
 struct Kernels {
     const char* name;
     // Coefficients of the plants (`closed` false) or of the closed loops into the group's a, b and order; its states are left alone.
     void (*coefficients)(const FactorGroup&, const Loop&, double sample_time, bool closed, DoubleGroup&);
-    KernelSet<DoubleGroup, double> in_double;
+    SteppedKernelSet in_double;
     KernelSet<FloatGroup, float> in_float;
 };
 

@@ -57,7 +57,7 @@ def run(
     initial_state  None: at rest; otherwise what `gaident.models.initial_state` gives: p + q numbers of the
                    plant, the first of them the velocity [rad/s] before the first input acts; with a
                    controller one more, its stored torque [N m]
-    arithmetic     "double" or "float"
+    arithmetic     "double", or "float" for 32-bit arithmetic (within 1e-4 of the response)
 
     A model that diverges gives infinite or undefined values, no error. Raises RecordError where the record
     lacks the input, ModelError for p = 0 outside the continuous loop and for an initial state of the wrong
