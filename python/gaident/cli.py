@@ -235,7 +235,7 @@ def _load_model(path: str) -> tuple[AnyModel, PI | None, dict[str, tuple[float, 
 def _summary(idn: Identification, axis: str) -> str:
     from gaident.show.summary import identification_summary
 
-    return identification_summary(idn, axis)
+    return identification_summary(replace(idn, warnings=tuple(in_options(w) for w in idn.warnings)), axis)
 
 
 def _draw(idn: Identification, records: Sequence[Record], axis: str, path: Path) -> None:

@@ -90,9 +90,20 @@ def test_messages_speak_of_options(here: Path, capsys: pytest.CaptureFixture[str
         ),
         ("use p=(1, 3), or PI(..., loop='continuous')", "use --p 1..3, or --loop continuous"),
         ("give delimiter=',' and decimal='.' as in my--run_1.csv", "give --delimiter ',' and --decimal '.' as in my--run_1.csv"),
+        (
+            "if the drive is not a digital one, give loop='continuous'.",
+            "if the drive is not a digital one, give --loop continuous.",
+        ),
         ("reverse one, or give space=SearchSpace(gain=...)", "reverse one, or give --gain LOW HIGH"),
     ):
         assert " ".join(in_options(text).split()) == options
+
+
+def test_warnings_in_the_summary_speak_of_options_too(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["identify", "step.csv", *NAMES, "--kp", "0.0232", "--ki", "1.367"]) == 0
+    out, _ = capsys.readouterr()
+    assert "--loop continuous" in out and "loop='" not in out
+    assert out.index("Keep in mind") < out.index("Mechanics")
 
 
 def test_a_forgotten_unit_is_named_and_not_taken_for_a_sign(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -107,3 +107,16 @@ def test_separation_counts_what_a_rival_leaves() -> None:
 def test_impossible_limits_are_refused(wrong: object, message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         wrong()  # type: ignore[operator]
+
+
+def test_limits_of_records_are_what_the_records_did() -> None:
+    command = np.repeat([30.0, -20.0], 300)
+    done = ga.run(MASS, ga.Record(DT, command, 0.0 * command), ga.PI(**GAINS))
+    rec = ga.Record(DT, command, done.velocity, torque=done.torque)
+    limits = Limits.of(rec, ga.PI(**GAINS))
+    assert limits.speed == pytest.approx(30.0 / 0.9) and limits.torque == np.abs(done.torque).max()
+    assert limits.travel == math.inf and limits.duration == pytest.approx(0.6)  # more than a turn: it turns freely
+    short = Limits.of([rec[:60], rec[:100]], ga.PI(**GAINS, torque_limit=2.0))
+    assert short.torque == 2.0 and short.travel == pytest.approx(np.ptp(done.position[:100]) / 0.9, rel=1e-3)
+    with pytest.raises(SettingsError, match="speed is 0"):
+        Limits.of(ga.Record(DT, 0.0 * command, 0.0 * command), ga.PI(**GAINS))

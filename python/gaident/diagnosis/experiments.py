@@ -14,9 +14,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.data.record import Record
 from gaident.diagnosis.commands import dithered, rest, strokes, swept, triangles
+from gaident.diagnosis.excitation import position_of
+from gaident.diagnosis.replay import replay
 from gaident.errors import SettingsError
 from gaident.models._checks import real_number
+from gaident.models.controller import PI
 
 __all__ = ["Limits", "MenuItem", "Proposal", "candidate_commands", "first_experiment", "separation"]
 
@@ -49,6 +53,26 @@ class Limits:
             if number <= 0.0:
                 raise SettingsError(f"{field.name} is {number:g}: give one number > 0")
             object.__setattr__(self, field.name, number)
+
+    @classmethod
+    def of(cls, records: Record | Sequence[Record], controller: PI | None = None) -> Limits:
+        """What records show to be allowed: their highest speed, torque (the controller's limit, if it has one) and duration.
+
+        Their travel too, but for an axis that has gone through a turn or more, which is taken to turn freely. Raises
+        SettingsError where nothing moves.
+        """
+        listed = [records] if isinstance(records, Record) else list(records)
+        asked = [rec.velocity if rec.command is None else rec.command for rec in listed]
+        travel = max((float(np.ptp(position_of(rec))) for rec in listed), default=0.0)
+        torque = max((float(np.abs(replay(rec, controller).torque).max()) for rec in listed), default=0.0)
+        if controller is not None and controller.torque_limit is not None:
+            torque = controller.torque_limit
+        return cls(
+            speed=max((float(np.abs(r).max()) for r in asked), default=0.0) / FREE,
+            torque=torque,
+            travel=math.inf if travel >= math.tau else travel / FREE,
+            duration=max((rec.duration for rec in listed), default=0.0),
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -94,7 +94,7 @@ def missing_torque(
             noise, walk, likelihood = _tuned(plant, u[tuned], rec.velocity[tuned], least, None)
     else:
         steady = _Filter(plant, noise, walk)
-        likelihood = steady.log_likelihood(steady.predict(u[tuned], rec.velocity[tuned])[0])
+        likelihood = steady.log_likelihood(steady.innovations(u[tuned], rec.velocity[tuned]))
     smoother = _Filter(plant, noise, walk)
     dhat, velocity, innovations = smoother.smooth(u, rec.velocity)
     std = smoother.deviation(len(rec))
@@ -111,7 +111,7 @@ def _tuned(plant: Discretised, u: Vector, w: Vector, noise: float | None, walk: 
             # Innovations depend on the ratio alone; with neither given, their size says which scale is the most likely.
             level = noise if noise is not None else 1.0 if walk is None else walk / ratio
             steady = _Filter(plant, level, ratio * level)
-            v, _ = steady.predict(u, w)
+            v = steady.innovations(u, w)
             scale = float(np.sqrt(v @ v / len(v) / steady.F)) if noise is None and walk is None else 1.0
             steady.F *= scale**2
             tried[decade] = (scale * level, ratio * scale * level, steady.log_likelihood(v))
@@ -141,18 +141,30 @@ class _Filter:
         self.F = float((self.H @ self.P @ self.H.conj()).real) + noise**2
         self.K = self.A @ self.P @ self.H.conj() / self.F
         self.L = self.A - np.outer(self.K, self.H)
+        # Samples after which the filter has forgotten its start to 1e-9.
+        slowest = min(max(float(np.abs(np.linalg.eigvals(self.L)).max()), 1e-3), 0.9998)
+        self.memory = 2 + int(np.log(1e-9) / np.log(slowest))
 
     def predict(self, u: Vector, w: Vector) -> tuple[Vector, NDArray[np.complex128]]:
         """(innovations (n,), predicted states (n, m+1)) from the initial state that makes the innovations smallest."""
+        states, v, fitted = self._run(u, w)
+        head = min(len(w), self.memory)
+        states[:head] += recursion(self.L, np.zeros((head, len(self.B))), fitted)
+        return v, states
+
+    def innovations(self, u: Vector, w: Vector) -> Vector:
+        """The innovations (n,) of `predict` alone."""
+        return self._run(u, w)[1]
+
+    def _run(self, u: Vector, w: Vector) -> tuple[NDArray[np.complex128], Vector, NDArray[np.complex128]]:
+        """States predicted from 0 (n, m+1), innovations (n,) from the initial state that makes them smallest, and that state."""
         states = recursion(self.L, np.outer(u, self.B - self.K * self.D) + np.outer(w, self.K))
         v = w - self.D * u - np.einsum("ni,i->n", states, self.H).real
         columns, inverse = self.start(len(w))
         head = len(columns)
         parts = inverse @ np.einsum("ni,n->i", columns, v[:head])
         v[:head] -= np.einsum("ni,i->n", columns, parts)
-        fitted = parts[: len(self.B)] + 1j * parts[len(self.B) :]
-        states[:head] += recursion(self.L, np.zeros((head, len(self.B))), fitted)
-        return v, states
+        return states, v, parts[: len(self.B)] + 1j * parts[len(self.B) :]
 
     def start(self, samples: int) -> tuple[Vector, Vector]:
         """How the initial state shows in the velocity until it is forgotten, and the inverse of the Gram matrix of that.
@@ -164,18 +176,13 @@ class _Filter:
         columns = np.hstack([seen.real, -seen.imag])
         sizes = np.tile(np.linalg.norm(seen, axis=0), 2)
         sizes[sizes == 0.0] = 1.0
-        gram = np.einsum("ni,nj->ij", columns / sizes, columns / sizes)
+        scaled = columns / sizes
+        gram = scaled.T @ scaled
         return columns, np.linalg.pinv(gram, rcond=1e-12, hermitian=True) / np.outer(sizes, sizes)
 
     def powers(self, row: NDArray[np.complex128], samples: int) -> NDArray[np.complex128]:
         """row L^n, n = 0.. (samples, m+1)."""
         return recursion(self.L.T, np.zeros((samples, len(self.B))), row)
-
-    @property
-    def memory(self) -> int:
-        """Samples after which the filter has forgotten its start to 1e-12."""
-        slowest = float(np.abs(np.linalg.eigvals(self.L)).max())
-        return 100_000 if slowest > 0.9997 else 2 + int(np.log(1e-12) / np.log(max(slowest, 1e-3)))
 
     def log_likelihood(self, v: Vector) -> float:
         """Of innovations, Gaussian."""

@@ -22,7 +22,7 @@ from gaident.diagnosis.excitation import position_of
 from gaident.diagnosis.pi_torque import pi_torque
 from gaident.diagnosis.state_space import discretised, disturbed
 from gaident.errors import RecordError
-from gaident.identification.adequacy import independence_p
+from gaident.identification.adequacy import independence_p, orthonormal_rows
 from gaident.identification.noise import Autoregression, chi2_tail, fit_autoregression, ljung_box, whiten
 from gaident.identification.starts import starts_moving
 from gaident.models.controller import PI
@@ -233,13 +233,8 @@ def _directed(model: Model, records: Sequence[Record], outputs: Sequence[Vector]
 
 def _rest(v: Vector, rows: Rows) -> Vector:
     """v without what the rows explain."""
-    sizes = np.linalg.norm(rows, axis=1)
-    rows = rows[(sizes > 0.0) & np.isfinite(sizes)]
-    if len(rows) == 0:
-        return v
-    table = (rows / np.linalg.norm(rows, axis=1)[:, None]).T
-    left: Vector = v - table @ np.linalg.lstsq(table, v, rcond=1e-7)[0]
-    return left
+    basis = orthonormal_rows(rows)
+    return v - basis.T @ (basis @ v)
 
 
 def _stationary(parts: Sequence[Vector]) -> float:

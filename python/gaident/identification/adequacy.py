@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gaident.identification.noise import Autoregression, chi2_tail, ljung_box, whiten
 from gaident.identification.starts import noise_std
 
-__all__ = ["Adequacy", "assess", "independence_p"]
+__all__ = ["Adequacy", "assess", "independence_p", "orthonormal_rows"]
 
 Vector = NDArray[np.float64]
 
@@ -114,14 +114,14 @@ def assess(
 
 def independence_p(v: Vector, own: NDArray[np.float64], extra: NDArray[np.float64], samples: int) -> float:
     """p-value of the F-test that `extra` explains nothing of v beyond `own`."""
-    basis = _orthonormal(own)
+    basis = orthonormal_rows(own)
     rest = v - basis.T @ (basis @ v)
     more = extra - (extra @ basis.T) @ basis
     sizes = np.linalg.norm(extra, axis=1)
     keep = np.linalg.norm(more, axis=1) > 1e-6 * np.where(sizes > 0.0, sizes, 1.0)
     if not np.any(keep):
         return 1.0
-    directions = _orthonormal(more[keep])
+    directions = orthonormal_rows(more[keep])
     m = len(directions)
     explained = float(np.sum((directions @ rest) ** 2))
     left = float(rest @ rest) - explained
@@ -132,7 +132,7 @@ def independence_p(v: Vector, own: NDArray[np.float64], extra: NDArray[np.float6
     return chi2_tail((dof + 0.5 * m) * float(np.log1p(explained / left)), m)
 
 
-def _orthonormal(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def orthonormal_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """An orthonormal basis of the row space, as rows."""
     sizes = np.linalg.norm(rows, axis=1)
     rows = rows[(sizes > 0.0) & np.isfinite(sizes)]
