@@ -1,10 +1,13 @@
 """Tests of the residual that stay valid under feedback. They order suspicions and raise alarms; they never name a cause.
 
-Everything is one regression: the residual e = w_measured - w_simulated, whitened with its own colour, on columns that come from
-outside the loop (command, simulated motion) and are whitened alike; what a change of the model's own parameters explains is
-taken out first. The noise colour is that of what no column explains. A regression on white residuals has exact p-values
-whatever the colour of the columns is; correlations with the measured torque, which carries the noise, are not used.
-(Ljung: model error models; Billings and Voon: even and odd powers; directed score tests with physical regressors.)
+Each is a likelihood ratio: the residual e = w_measured - w_simulated is explained by what a change of the model's own parameters
+does, against that and the columns under test, each with its own autoregressive noise,
+
+    LR = n ln(var v0 / var v1),   v = e - columns, whitened.
+
+The columns come from outside the loop (command, simulated motion); correlations with the measured torque, which carries the
+noise, are not used. A colour found under the null only would make smooth columns significant, one found on the bare residual
+would swallow the effect. (Ljung: model error models; Billings and Voon: even and odd powers; directed score tests.)
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +26,7 @@ from gaident.diagnosis.excitation import position_of
 from gaident.diagnosis.pi_torque import pi_torque
 from gaident.diagnosis.state_space import discretised, disturbed
 from gaident.errors import RecordError
-from gaident.identification.adequacy import independence_p, orthonormal_rows
+from gaident.identification.adequacy import orthonormal_rows
 from gaident.identification.noise import Autoregression, chi2_tail, fit_autoregression, ljung_box, whiten
 from gaident.identification.starts import starts_moving
 from gaident.models.controller import PI
@@ -35,7 +39,8 @@ Vector = NDArray[np.float64]
 Rows = NDArray[np.float64]
 
 LEVEL = 1e-4
-LAGS = (0, 1, 2, 3, 4, 6, 8, 11, 16, 23, 32, 45, 64, 91, 128)
+LAGS = (0, 1, 2, 3, 4, 6, 8, 11, 16, 23, 32, 45, 64)
+BLOCK = 50  # samples over which the power is averaged to see it change
 
 
 @dataclass(frozen=True)
@@ -115,32 +120,94 @@ def residual_tests(
     own = parameter_sensitivities(model, listed, controller) if sensitivities is None else np.atleast_2d(sensitivities)
     linear, even, odd = _command_columns(listed, controller)
     directed = _directed(model, listed, outputs, controller)
-    parts = [own, *directed.values()] if sum(lengths) < 1000 else [own, linear, even, odd, *directed.values()]
-    noise = fit_autoregression(_split(_rest(np.concatenate(residuals), np.vstack(parts)), lengths))
+    error = np.concatenate(residuals)
+    order = _order(_rest(error, own), lengths)
+    base = _explained(error, own, lengths, order)
 
-    def white(rows: Rows) -> Rows:
-        return np.array([np.concatenate([whiten(x, noise.phi) for x in _split(row, lengths)]) for row in rows])
+    def p_value(extra: Rows, beside: Rows, null: _Fit) -> float:
+        fit = _explained(error, np.vstack([beside, extra]), lengths, order, null)
+        added = fit.columns - null.columns
+        dof = len(error) - fit.columns - fit.noise.order * len(lengths) + 0.5 * added
+        if added < 1 or dof < 1 or not fit.power > 0.0:
+            return 1.0
+        return chi2_tail(dof * math.log(max(null.power / fit.power, 1.0)), added)
 
-    v, own = white(np.concatenate(residuals)[None])[0], white(own)
-    linear, even, odd = white(linear), white(even), white(odd)
-    whitened = {name: white(rows) for name, rows in directed.items()}
-    dof = len(v) - noise.order * len(lengths)
-    base = _rest(v, own)
-    total = float(base @ base)
-    after_linear = _rest(v, np.vstack([own, linear]))
-    after_all = _rest(v, np.vstack([own, linear, *whitened.values()]))
-    line = float(after_linear @ after_linear)
+    with_command = np.vstack([own, linear])
+    null = _explained(error, with_command, lengths, order, base)
+    p_directed = {name: p_value(rows, own, base) for name, rows in directed.items()}
+    best = sorted(p_directed, key=p_directed.__getitem__)[:3]
+    p_command = p_value(linear, own, base)
+    found = np.vstack([own, linear if p_command < p_directed[best[0]] else directed[best[0]]])
+    noise = _explained(error, found, lengths, order).noise
+
+    def left(rows: Rows) -> float:
+        v = _rest(_white(error[None], noise, lengths)[0], _white(rows, noise, lengths))
+        return float(v @ v)
+
+    total, line = left(own), left(with_command)
+    more = left(np.vstack([with_command, *(directed[name] for name in best)]))
+    v = _split(_rest(_white(error[None], noise, lengths)[0], _white(own, noise, lengths)), lengths)
     return ResidualTests(
-        white=ljung_box(_split(v, lengths), min(20, len(v) // 5)),
-        command=independence_p(v, own, linear, dof),
-        even=independence_p(v, np.vstack([own, linear]), even, dof),
-        odd=independence_p(v, np.vstack([own, linear]), odd, dof),
-        stationary=_stationary(_split(base, lengths)),
-        directed={name: independence_p(v, own, rows, dof) for name, rows in whitened.items()},
+        white=ljung_box(v, min(20, len(error) // 5)),
+        command=p_command,
+        even=p_value(even, with_command, null),
+        odd=p_value(odd, with_command, null),
+        stationary=_stationary(v),
+        directed=p_directed,
         linear_share=1.0 - line / total if total > 0.0 else 0.0,
-        nonlinear_share=(line - float(after_all @ after_all)) / total if total > 0.0 else 0.0,
+        nonlinear_share=(line - more) / total if total > 0.0 else 0.0,
         noise=noise,
     )
+
+
+class _Fit(NamedTuple):
+    """What is left of the residual: mean square of its white part, number of independent columns, noise model."""
+
+    power: float
+    columns: int
+    noise: Autoregression
+
+
+def _explained(error: Vector, rows: Rows, lengths: Sequence[int], order: int, null: _Fit | None = None) -> _Fit:
+    """The residual less the rows: weights and noise model by turns, each the best for the other.
+
+    From the plain least-squares weights, and from the noise model of the null, which alone must not do better.
+    """
+    starts = [_colour(_rest(error, rows), lengths, order)] + ([] if null is None else [null.noise])
+    fits = []
+    for noise in starts:
+        for _ in range(3):
+            v, white = _white(error[None], noise, lengths)[0], _white(rows, noise, lengths)
+            sizes = np.linalg.norm(white, axis=1)
+            sizes[sizes == 0.0] = 1.0
+            scaled = white / sizes[:, None]
+            weights = np.linalg.pinv(scaled @ scaled.T, rcond=1e-10, hermitian=True) @ (scaled @ v)
+            left = error - (weights / sizes) @ rows
+            noise = _colour(left, lengths, order)
+        fits.append(noise)
+    best = min(fits, key=lambda noise: noise.std)
+    return _Fit(best.std**2, len(orthonormal_rows(rows)), best)
+
+
+def _order(left: Vector, lengths: Sequence[int]) -> int:
+    """Order of the noise model, one for all hypotheses: twice that of BIC, as a sum of two noises has no finite one."""
+    return min(2 * fit_autoregression(_split(left, lengths)).order, min(lengths) // 20)
+
+
+def _colour(left: Vector, lengths: Sequence[int], order: int) -> Autoregression:
+    """Coefficients by least squares: those of the autocovariance are biased where the colour is strong."""
+    parts = _split(left, lengths)
+    if order == 0:
+        return Autoregression(np.zeros(0), float(np.sqrt(np.mean(left**2))))
+    past = np.concatenate([np.array([x[order - i : len(x) - i] for i in range(1, order + 1)]).T for x in parts])
+    now = np.concatenate([x[order:] for x in parts])
+    gram = past.T @ past
+    phi = np.linalg.solve(gram + 1e-12 * np.trace(gram) / order * np.eye(order), past.T @ now)
+    return Autoregression(phi, float(np.sqrt(np.mean((now - past @ phi) ** 2))))
+
+
+def _white(rows: Rows, noise: Autoregression, lengths: Sequence[int]) -> Rows:
+    return np.array([np.concatenate([whiten(x, noise.phi) for x in _split(row, lengths)]) for row in rows])
 
 
 def parameter_sensitivities(model: Model, records: Sequence[Record], controller: PI | None) -> Rows:
@@ -201,7 +268,7 @@ def _command_columns(records: Sequence[Record], controller: PI | None) -> tuple[
     shortest = min(len(x) for x in sources)
     # A measured torque may carry the noise of its own sample.
     lags = tuple(k for k in LAGS if k < shortest // 4 and not (controller is None and k == 0))
-    few = lags[:: max(1, len(lags) // 5)]
+    few = lags[::3]
     one = np.concatenate([np.ones(len(x)) for x in sources])
 
     def block(powers: Sequence[Callable[[Vector], Vector]], chosen: Sequence[int]) -> Rows:
@@ -238,16 +305,17 @@ def _rest(v: Vector, rows: Rows) -> Vector:
 
 
 def _stationary(parts: Sequence[Vector]) -> float:
-    """p-value of equal power in first and last thirds, log ratio against its deviation from the actual fourth moment."""
-    first = np.concatenate([x[: len(x) // 3] for x in parts])
-    last = np.concatenate([x[-(len(x) // 3) :] for x in parts])
-    both = np.concatenate([first, last])
-    power = float(np.mean(both**2))
-    if not (power > 0.0 and np.mean(first**2) > 0.0 and np.mean(last**2) > 0.0):
-        return 1.0
-    kurtosis = max(float(np.mean(both**4)) / power**2, 1.5)
-    z = math.log(float(np.mean(first**2) / np.mean(last**2))) / math.sqrt((kurtosis - 1.0) * (1 / len(first) + 1 / len(last)))
-    return chi2_tail(z * z, 1)
+    """p-value of equal power in first and last thirds, by the spread of block means of the squared residual."""
+    groups = []
+    for third in (slice(None, 1), slice(-1, None)):
+        blocks = [b for x in parts for t in np.array_split(x, 3)[third] for b in np.array_split(t, max(2, len(t) // BLOCK))]
+        groups.append(np.log(np.array([max(float(np.mean(b**2)), 1e-300) for b in blocks])))
+    first, last = groups
+    variance = first.var(ddof=1) / len(first) + last.var(ddof=1) / len(last)
+    # Student's t with the blocks' degrees of freedom, by its normal limit: t^2 -> nu ln(1 + t^2/nu).
+    nu = len(first) + len(last) - 2
+    t2 = float((first.mean() - last.mean()) ** 2 / variance) if variance > 0.0 else 0.0
+    return chi2_tail(max(nu - 0.5, 0.5) * math.log1p(t2 / nu), 1)
 
 
 def _lagged(x: Vector, k: int) -> Vector:
