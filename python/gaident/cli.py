@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gaident import demo as demonstration
-from gaident.cli_options import PICTURES, drive_of, parser_of
+from gaident.cli_options import PICTURES, drive_of, in_options, parser_of
 from gaident.cli_output import Progress, csv_targets, csv_text, naming, target_of, write
 from gaident.data.record import Record
 from gaident.drive_file import Drive
@@ -50,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return code
     except GaidentError as error:
-        return _failed(2, str(error))
+        return _failed(2, in_options(str(error)))
     except KeyboardInterrupt:
         return _failed(130, "interrupted")
     except BrokenPipeError:
@@ -245,7 +245,7 @@ def _load_model(path: str) -> tuple[AnyModel, PI | None, dict[str, tuple[float, 
 def _summary(idn: Identification, axis: str) -> str:
     from gaident.show.summary import identification_summary
 
-    return identification_summary(idn, axis)
+    return identification_summary(replace(idn, warnings=tuple(in_options(w) for w in idn.warnings)), axis)
 
 
 def _draw(idn: Identification, records: Sequence[Record], axis: str, path: Path) -> None:

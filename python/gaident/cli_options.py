@@ -13,7 +13,7 @@ from gaident.identification.settings import INITIAL_STATES
 from gaident.models._checks import one_of
 from gaident.models.controller import LOOPS
 
-__all__ = ["PICTURES", "drive_of", "parser_of"]
+__all__ = ["PICTURES", "drive_of", "in_options", "parser_of"]
 
 PICTURES = (".png", ".pdf", ".svg")
 CONSTANT_HELP = {
@@ -199,6 +199,50 @@ def _as_number(text: str | float) -> str | float:
         return text
 
 
+def _number(text: str) -> float:
+    """argparse's number; a decimal comma gets its remedy."""
+    try:
+        return float(text)
+    except ValueError:
+        point = text.replace(",", ".")
+        hint = f": write a decimal point, {point}" if "," in text and re.fullmatch(r"[-+\d.]+(e[-+]?\d+)?", point) else ""
+        raise argparse.ArgumentTypeError(f"{text!r} is no number{hint}") from None
+
+
+# What messages of the library say in Python -> the options that do it.
+_IN_OPTIONS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
+    (r"columns=\{'(\w+)': None\}", r"--columns \1="),
+    (r"(columns|units)=\{'(\w+)': '([^']*)'\}", r"--\1 \2=\3"),
+    (r"(columns|units)=\{'(\w+)': ([^}]*)\}", r"--\1 \2=\3"),
+    (r"space=SearchSpace\(gain=\.\.\.\)", "--gain LOW HIGH"),
+    (r"space=SearchSpace\(\.\.\.\)", "--inertia LOW HIGH or --gain LOW HIGH"),
+    (r"PI\(\.\.\., loop=['\"]continuous['\"]\)", "--loop continuous"),
+    (r"\bloop='(\w+)'", r"--loop \1"),
+    (r"controller=None", "--loop open"),
+    (r"controller=PI\(\.\.\.\)", "--kp and --ki"),
+    (r"PI\(kp=\.\.\., ki=\.\.\.\)", "--kp and --ki"),
+    (r"Record\((\w+)=\.\.\.\)", r"--columns \1=..."),
+    (r"\b([pq])=\((\d+), (\d+)\)", r"--\1 \2..\3"),
+    (r"\bki=0\b", "--ki 0"),
+    (r"\bkp=0\b", "--kp 0"),
+    (
+        r"\b(dt|delimiter|decimal|skip|encoding|counts_per_turn|torque_constant|rated_torque|torque_per_volt|loop|trials|seed|workers)"
+        r"=(?=[^=]|$)",
+        r"--\1 ",
+    ),
+    (r"\bvelocity_cutoff_hz=?", "--velocity-cutoff "),
+    (r"(?<!\S)--(counts|torque|rated)_(\w+)", lambda found: f"--{found[1]}-{found[2].replace('_', '-')}"),
+    (r" +(?=[,;)](?:\s|$)|$)", ""),
+)
+
+
+def in_options(message: str) -> str:
+    """A message of the library for the command line: `columns={'velocity': ...}` becomes `--columns velocity=...`."""
+    for pattern, words in _IN_OPTIONS:
+        message = re.sub(pattern, words, message)
+    return message
+
+
 def _whole_range(text: str) -> tuple[int, int]:
     """(1, 1) of "1", (0, 3) of "0..3"."""
     match = re.fullmatch(r"(\d+)(?:\.\.(\d+))?", text.strip())
@@ -226,16 +270,16 @@ def _add_log_options(parser: argparse.ArgumentParser) -> None:
         metavar="CH=UNIT,...",
         help="unit of each channel (rpm, deg, counts, %%, A, V, ms, ...), or the factor to SI as a number",
     )
-    g.add_argument("--dt", type=float, metavar="S", help="sample time [s], for logs without a time column")
+    g.add_argument("--dt", type=_number, metavar="S", help="sample time [s], for logs without a time column")
     g.add_argument(
         "--velocity-cutoff",
-        type=float,
+        type=_number,
         metavar="HZ",
         dest="velocity_cutoff_hz",
         help="a log without velocity gets it from position, low-passed at this corner [Hz]",
     )
     for name, text in CONSTANT_HELP.items():
-        g.add_argument(f"--{name.replace('_', '-')}", type=float, metavar="X", help=text)
+        g.add_argument(f"--{name.replace('_', '-')}", type=_number, metavar="X", help=text)
     for name, text in TEXT_TABLE_HELP.items():
         kind, meta = (int, "LINES") if name == "skip" else (str, "TEXT")
         g.add_argument(f"--{name}", type=kind, metavar=meta, help=f"of a text table: {text}")
@@ -245,16 +289,16 @@ def _add_log_options(parser: argparse.ArgumentParser) -> None:
 def _add_controller_options(parser: argparse.ArgumentParser) -> None:
     """The velocity loop."""
     g = parser.add_argument_group("the velocity controller", "without one: open loop, torque to velocity")
-    g.add_argument("--kp", type=float, metavar="X", help="proportional gain [N m s/rad]")
-    g.add_argument("--ki", type=float, metavar="X", help="integral gain [N m/rad]")
+    g.add_argument("--kp", type=_number, metavar="X", help="proportional gain [N m s/rad]")
+    g.add_argument("--ki", type=_number, metavar="X", help="integral gain [N m/rad]")
     g.add_argument(
         "--loop",
         choices=(*LOOPS, "open"),
         help="sampled: a digital drive (default); continuous: everything bilinear, as in the paper; open: "
         "leave the controller out",
     )
-    g.add_argument("--torque-limit", type=float, metavar="X", help="the controller's torque limit [N m]")
-    g.add_argument("--integrator-limit", type=float, metavar="X", help="limit of its integral part [N m]")
+    g.add_argument("--torque-limit", type=_number, metavar="X", help="the controller's torque limit [N m]")
+    g.add_argument("--integrator-limit", type=_number, metavar="X", help="limit of its integral part [N m]")
 
 
 def _add_space_options(parser: argparse.ArgumentParser) -> None:
@@ -268,7 +312,7 @@ def _add_space_options(parser: argparse.ArgumentParser) -> None:
         ("--real", "negated real parts of poles and zeros [rad/s]"),
         ("--imaginary", "imaginary parts [rad/s]"),
     ):
-        g.add_argument(name, nargs=2, type=float, metavar=("LOW", "HIGH"), help=text)
+        g.add_argument(name, nargs=2, type=_number, metavar=("LOW", "HIGH"), help=text)
     for name, text in (("--p", "poles in excess of zeros"), ("--q", "zeros")):
         g.add_argument(name, type=_whole_range, metavar="N|A..B", help=f"{text}: 1, or 0..3")
     g.add_argument("--bits", type=int, metavar="N", help="bits per number of the genetic code (default 10)")

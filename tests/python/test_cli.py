@@ -17,7 +17,7 @@ import pytest
 
 import gaident as ga
 from gaident.cli import main
-from gaident.cli_options import drive_of, parser_of
+from gaident.cli_options import drive_of, in_options, parser_of
 from gaident.data import differentiate
 from gaident.drive_file import read_drive_file
 
@@ -72,6 +72,50 @@ def test_identify_prints_a_summary_and_writes_files(here: Path, capsys: pytest.C
     idn = ga.load("idn.json")
     assert isinstance(idn.mechanics, ga.TwoMass)
     assert pytest.approx(TRUTH.JL, rel=0.05) == idn.mechanics.JL
+
+
+def test_messages_speak_of_options(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    err = refusal(["identify", "step.csv", *LOOP], capsys)
+    assert "--columns velocity=..." in err and "columns={" not in err
+    err = refusal(["identify", "step.csv", *NAMES, "--kp", "0,0232", "--ki", "1.367"], capsys)
+    assert "argument --kp: '0,0232' is no number: write a decimal point, 0.0232" in err
+    err = refusal(["identify", "step.csv", *NAMES, "--kp", "lots", "--ki", "1.367"], capsys)
+    assert "'lots' is no number; see" in err
+    for text, options in (
+        ("set columns={'time': None} to trust dt", "set --columns time= to trust dt"),
+        ("give units={'time': 'ms'}; give dt= [s] then", "give --units time=ms; give --dt [s] then"),
+        (
+            "counts_per_turn=0.0 is no number; give velocity_cutoff_hz=",
+            "--counts-per-turn 0.0 is no number; give --velocity-cutoff",
+        ),
+        ("use p=(1, 3), or PI(..., loop='continuous')", "use --p 1..3, or --loop continuous"),
+        ("give delimiter=',' and decimal='.' as in my--run_1.csv", "give --delimiter ',' and --decimal '.' as in my--run_1.csv"),
+        (
+            "if the drive is not a digital one, give loop='continuous'.",
+            "if the drive is not a digital one, give --loop continuous.",
+        ),
+        ("reverse one, or give space=SearchSpace(gain=...)", "reverse one, or give --gain LOW HIGH"),
+    ):
+        assert " ".join(in_options(text).split()) == options
+
+
+def test_warnings_in_the_summary_speak_of_options_too(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["identify", "step.csv", *NAMES, "--kp", "0.0232", "--ki", "1.367"]) == 0
+    out, _ = capsys.readouterr()
+    assert "--loop continuous" in out and "loop='" not in out
+    assert out.index("Keep in mind") < out.index("Mechanics")
+
+
+def test_a_forgotten_unit_is_named_and_not_taken_for_a_sign(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The command or the velocity left in rpm, a command against the velocity: each has its own remedy."""
+    for wrong, text in (
+        ("command=9.549", "the command seems to be in rpm, the other in rad/s: give --units command=rpm"),
+        ("velocity=9.549", "the velocity seems to be in rpm, the other in rad/s: give --units velocity=rpm"),
+        ("command=0.0314", "times the velocity all along: they are in different units"),
+        ("command=-1", "the velocity runs against its command all along: reverse the sign of one of them"),
+    ):
+        err = refusal(["identify", "step.csv", "--columns", "command=w_ref,velocity=w,time=t", *LOOP, "--unit", wrong], capsys)
+        assert text in err, wrong
 
 
 def test_json_is_what_is_saved_and_valid(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -195,7 +239,7 @@ WRONG = [
     (["identify", "stp.csv"], "stp.csv: there is no such file (did you mean 'step.csv'?)"),
     (["identify", "step.csv", *NAMES, "--frobnicate"], "unrecognized arguments: --frobnicate"),
     (["identify", "step.csv", "--kp", "1", "other.csv"], "name all files in one place"),
-    (["identify", "step.csv", *NAMES, "--kp", "much"], "--kp: invalid float value: 'much'"),
+    (["identify", "step.csv", *NAMES, "--kp", "much"], "--kp: 'much' is no number"),
     (["identify", "step.csv", *NAMES, "--kp", "0.02"], "the controller lacks ki"),
     (["identify", "step.csv", *NAMES, "--kp", "-1", "--ki", "1"], "kp is -1"),
     (["identify", "step.csv", "--columns", "torque=u,velocity=w", "--kp", "1", "--ki", "1"], "no command"),

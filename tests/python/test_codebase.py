@@ -37,6 +37,7 @@ ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "data": ({"errors"}, set()),
     "models": ({"errors", "data", "_core"}, set()),
     "identification": ({"errors", "version", "data", "models", "_core"}, {"show"}),
+    "diagnosis": ({"errors", "data", "models", "identification"}, {"show"}),
     "show": ({"errors"}, set()),
     "drive_file": (DESK, set()),
     "demo": (DESK, {"show"}),

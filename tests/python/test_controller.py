@@ -72,3 +72,11 @@ def test_from_dict_names_the_wrong_key() -> None:
         PI.from_dict({"kp": 1.0})
     with pytest.raises(ControllerError, match="give a dictionary"):
         PI.from_dict([1.0, 2.0])  # type: ignore[arg-type]
+
+
+def test_a_forgotten_gain_is_named_with_its_remedy() -> None:
+    with pytest.raises(ControllerError, match=r"PI lacks ki: give PI\(kp=..., ki=...\), ki=0 for a proportional controller"):
+        PI(kp=1.0)
+    with pytest.raises(ControllerError, match="PI lacks kp and ki"):
+        PI()
+    assert PI(kp=1.0, ki=0).ki == 0.0

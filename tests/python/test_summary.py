@@ -108,11 +108,19 @@ def test_summary_of_a_falsified_linear_axis() -> None:
     text = identification_summary(fake, axis="linear")
     assert text.startswith("(p,q) = (1,0), one mass; the linear model is FALSIFIED\n")
     assert "Mechanics, NOT TO BE TRUSTED" in text
-    assert "105.7 +- 8.3  kg\n" in text
+    assert "105.7 +- 8.3  kg     mass\n" in text and "429 +- 17     N s/m  viscous damping\n" in text
     assert "N s/m" in text and "m/s^2/N" in text and "open loop, force [N] to velocity [m/s]" in text
     assert "not identifiable, unstable" in text
     assert text.count(sentence) == 1  # the verdict stands at the top, not again among the warnings
     assert "rad/s^2" not in text and "N m" not in text
+
+
+def test_warnings_stand_under_the_verdict_and_letters_are_explained() -> None:
+    sections = identification_summary(Fake()).split("\n\n")
+    assert [s.split()[0] for s in sections] == ["(p,q)", "Keep", "Mechanics", "Model:", "Structures,", "Searched"]
+    words = {line.split()[0]: line for line in sections[2].splitlines()}
+    assert words["KG"].endswith("stiffness of the shaft") and words["JL"].endswith("inertia of the load")
+    assert "mass of the load" in identification_summary(Fake(), axis="linear")
 
 
 def test_summary_without_mechanics_names_the_reason() -> None:

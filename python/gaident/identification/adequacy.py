@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gaident.identification.noise import Autoregression, chi2_tail, ljung_box, whiten
 from gaident.identification.starts import noise_std
 
-__all__ = ["Adequacy", "assess"]
+__all__ = ["Adequacy", "assess", "independence_p", "orthonormal_rows"]
 
 Vector = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ def assess(
     columns.append(_joined([y * np.abs(y) for y in outputs], noise.phi))
     own = [_joined(_split(row, lengths), noise.phi) for row in J]
     v = _joined(residuals, noise.phi)
-    p = _independence(v, np.array(own), np.array(columns), total - noise.order * len(lengths))
+    p = independence_p(v, np.array(own), np.array(columns), total - noise.order * len(lengths))
     measured = [y + e for y, e in zip(outputs, residuals, strict=True)]
     quiet = float(np.sqrt(sum(len(w) * noise_std(w) ** 2 for w in measured) / total))
     excess = float(np.sqrt(power)) / quiet if quiet > 0.0 else (0.0 if power == 0.0 else float("inf"))
@@ -112,16 +112,16 @@ def assess(
     return Adequacy(white_p, noise.order, noise.std, float(max(predictable, 0.0)), excess, p, falsified, undecided)
 
 
-def _independence(v: Vector, own: NDArray[np.float64], extra: NDArray[np.float64], samples: int) -> float:
+def independence_p(v: Vector, own: NDArray[np.float64], extra: NDArray[np.float64], samples: int) -> float:
     """p-value of the F-test that `extra` explains nothing of v beyond `own`."""
-    basis = _orthonormal(own)
+    basis = orthonormal_rows(own)
     rest = v - basis.T @ (basis @ v)
     more = extra - (extra @ basis.T) @ basis
     sizes = np.linalg.norm(extra, axis=1)
     keep = np.linalg.norm(more, axis=1) > 1e-6 * np.where(sizes > 0.0, sizes, 1.0)
     if not np.any(keep):
         return 1.0
-    directions = _orthonormal(more[keep])
+    directions = orthonormal_rows(more[keep])
     m = len(directions)
     explained = float(np.sum((directions @ rest) ** 2))
     left = float(rest @ rest) - explained
@@ -132,7 +132,7 @@ def _independence(v: Vector, own: NDArray[np.float64], extra: NDArray[np.float64
     return chi2_tail((dof + 0.5 * m) * float(np.log1p(explained / left)), m)
 
 
-def _orthonormal(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def orthonormal_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """An orthonormal basis of the row space, as rows."""
     sizes = np.linalg.norm(rows, axis=1)
     rows = rows[(sizes > 0.0) & np.isfinite(sizes)]

@@ -160,8 +160,9 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
     torque or, without one, what the controller makes of command and velocity. Searched is from thirty times less to a thousand
     times more: behind resonances the motor alone may be far lighter than the whole drive. Roots go up to where the sampling
     still shows them: real parts to 1/dt, imaginary parts to 0.8 of the Nyquist frequency. Raises SpaceError
-    where nothing moves.
+    where nothing moves, and where command and velocity are in different units or of opposite sign.
     """
+    _check_scales(records, controller, only_certain=True)
     gram, right = np.zeros((2, 2)), np.zeros(2)
     steps = energy = 0.0
     for rec in records:
@@ -181,6 +182,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
     rigid = float(np.linalg.solve(gram, right)[0]) if np.linalg.cond(gram) < 1e14 else 0.0
     found = [k for k in (rigid, steps / energy) if np.isfinite(k) and k > 0.0]
     if not found:
+        _check_scales(records, controller, only_certain=False)
         raise SpaceError(
             "the velocity falls when the torque rises: reverse the sign of one of them (for example by a unit of -1), "
             "or give space=SearchSpace(gain=...)"
@@ -195,6 +197,34 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
         p=(0, 3) if controller is not None and controller.loop == "continuous" else (1, 3),
         source=f"derived from the data: K about {shown}, sample time {1e3 * dt:.4g} ms",
     )
+
+
+def _check_scales(records: Sequence[Record], controller: PI | None, only_certain: bool) -> None:
+    """Raises SpaceError where command and velocity of a loop go together, but in another unit or against one another.
+
+    r = factor w by least squares. A loop may lag far behind its command (a short record, no integral part), so that a factor
+    above 3 is certain only where it is that of rpm; a velocity far above the command is no loop's.
+    """
+    if controller is None:
+        return
+    pairs = [(rec.command, rec.velocity) for rec in records if rec.command is not None]
+    together = sum(float(r @ w) for r, w in pairs)
+    commands, velocities = sum(float(r @ r) for r, _ in pairs), sum(float(w @ w) for _, w in pairs)
+    size = math.sqrt(commands * velocities)
+    if together < -0.9 * size < 0.0:
+        raise SpaceError(
+            "the velocity runs against its command all along: reverse the sign of one of them (for example by a unit of -1)"
+        )
+    if not 0.0 < 0.9 * size < together:
+        return
+    factor = together / velocities
+    rpm = next((name for name, rate in (("command", 9.549), ("velocity", 1 / 9.549)) if 0.8 < factor / rate < 1.25), None)
+    if 1.0 / 3.0 <= factor <= 3.0 or (only_certain and rpm is None and factor > 3.0):
+        return
+    hint = "they are in different units: give units={'command': ...} or units={'velocity': ...}"
+    if rpm:
+        hint = f"the {rpm} seems to be in rpm, the other in rad/s: give units={{'{rpm}': 'rpm'}}"
+    raise SpaceError(f"the command is {factor:.3g} times the velocity all along: {hint}")
 
 
 def torque_of(rec: Record, controller: PI | None) -> NDArray[np.float64]:

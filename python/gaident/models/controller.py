@@ -11,6 +11,7 @@ from gaident.errors import ControllerError
 from gaident.models._checks import known_keys, one_of, real_number
 
 LOOPS = ("sampled", "continuous")
+_NOT_GIVEN = float("nan")  # told from a given nan by identity
 
 
 @dataclass(frozen=True)
@@ -30,13 +31,18 @@ class PI:
     For a linear axis read N for N m and m for rad. Raises ControllerError.
     """
 
-    kp: float
-    ki: float
+    kp: float = _NOT_GIVEN
+    ki: float = _NOT_GIVEN
     loop: str = "sampled"
     torque_limit: float | None = None
     integrator_limit: float | None = None
 
     def __post_init__(self) -> None:
+        missing = [name for name in ("kp", "ki") if getattr(self, name) is _NOT_GIVEN]
+        if missing:
+            raise ControllerError(
+                f"PI lacks {' and '.join(missing)}: give PI(kp=..., ki=...), ki=0 for a proportional controller"
+            )
         for name in ("kp", "ki"):
             gain = real_number(getattr(self, name), name, ControllerError)
             if gain < 0.0:

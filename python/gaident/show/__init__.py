@@ -1,5 +1,12 @@
 """Results as text and pictures: pure functions of what a result says about itself."""
 
+from gaident.show.diagnosis_plots import (
+    plot_evidence,
+    plot_orders,
+    plot_residual,
+    plot_reversals,
+    plot_torque_velocity,
+)
 from gaident.show.plots import (
     plot_bode,
     plot_convergence,
@@ -14,7 +21,12 @@ __all__ = [
     "mechanics_comparison",
     "plot_bode",
     "plot_convergence",
+    "plot_evidence",
     "plot_identification",
+    "plot_orders",
     "plot_poles_zeros",
+    "plot_residual",
+    "plot_reversals",
     "plot_structures",
+    "plot_torque_velocity",
 ]

@@ -45,8 +45,9 @@ def plot_identification(idn: Any, records: Sequence[Any], axis: str = "rotary") 
         simulated = idn.simulate(rec)
         if rec.command is not None and not open_loop:
             _line(top, rec.time, rec.command, color=GREY, linewidth=1.2, linestyle="--", label="command")
-        _line(top, rec.time, rec.velocity, color=SKY, linewidth=1.8, label="measured")
-        _line(top, rec.time, simulated, color=BLACK, linewidth=0.9, label="simulated")
+        # Wide below, thin above: both are seen where they agree to the width of a line.
+        _line(top, rec.time, rec.velocity, color=SKY, linewidth=3.0, label="measured")
+        _line(top, rec.time, simulated, color=BLACK, linewidth=0.8, label="simulated")
         band = 2.0 * idn.adequacy.noise_std
         low.axhspan(-band, band, color=ORANGE, alpha=0.35, linewidth=0, label="+-2 std of the noise")
         low.axhline(0.0, color=BLACK, linewidth=0.5)

@@ -21,11 +21,11 @@ def identification_summary(idn: Any, axis: str = "rotary") -> str:
     """
     sections = [
         _verdict(idn, axis),
-        _model(idn, axis),
+        _warnings(idn),
         _mechanics(idn, axis),
+        _model(idn, axis),
         _structures(idn),
         _search(idn, axis),
-        _warnings(idn),
     ]
     return "\n\n".join("\n".join(lines) for lines in sections if lines)
 
@@ -55,13 +55,11 @@ def _verdict(idn: Any, axis: str) -> list[str]:
         f"rmse {number(idn.rmse)} {velocity_unit(axis)}",
         f"noise {number(idn.adequacy.noise_std)} {velocity_unit(axis)}",
         f"{idn.samples} samples of {records} record{'s' if records != 1 else ''}",
-        f"found in {idn.seconds:.2f} s",
     )
     return [
         f"(p,q) = ({idn.p},{idn.q}), {structure_words(idn.p, idn.q)}; {stands}",
         *textwrap.wrap(idn.adequacy.sentence, WIDTH),
         ", ".join(figures),
-        _loop(idn.controller, axis),
     ]
 
 
@@ -135,12 +133,12 @@ def _mechanics(idn: Any, axis: str) -> list[str]:
     elif idn.adequacy.undecided:
         head += ", with reserve (the linear model is undecided)"
     damped = getattr(m, "with_shaft_damping", None)
-    rows = [("", "no shaft damping", "with shaft damping", "")] if damped is not None else []
+    rows = [("", "no shaft damping", "with shaft damping", "", "")] if damped is not None else []
     for name, rotary in m.UNITS.items():
         value = getattr(m, name)
         cell = "0 (set)" if name == "DG" and value == 0.0 else with_std(value, m.std.get(name))
         beside = "" if damped is None else with_std(getattr(damped, name), damped.std.get(name))
-        rows.append((name, cell, beside, unit(rotary, axis)))
+        rows.append((name, cell, beside, unit(rotary, axis), _meaning(name, hasattr(m, "KG"), axis)))
     lines = [head, *table(rows)]
     if hasattr(m, "resonance"):
         lines.append(
@@ -150,6 +148,22 @@ def _mechanics(idn: Any, axis: str) -> list[str]:
     if damped is not None:
         lines += [f"  with shaft damping: {note}" for note in damped.notes]
     return lines
+
+
+def _meaning(name: str, two_masses: bool, axis: str) -> str:
+    """What a letter of the mechanics table stands for."""
+    mass = "mass" if axis == "linear" else "inertia"
+    words = {
+        "JM": f"{mass} of the motor's side",
+        "DM": "viscous damping of the motor's side",
+        "JL": f"{mass} of the load",
+        "DL": "viscous damping of the load",
+        "KG": "stiffness of the shaft" if axis == "rotary" else "stiffness between them",
+        "DG": "damping in the shaft" if axis == "rotary" else "damping between them",
+        "J": f"total {mass}" if two_masses else mass,
+        "D": "total viscous damping" if two_masses else "viscous damping",
+    }
+    return words.get(name, "")
 
 
 def _inconsistency(m: Any) -> str:
@@ -184,7 +198,8 @@ def _search(idn: Any, axis: str) -> list[str]:
     gain_unit = unit("rad/s^2/(N m)", axis)
     trials = len(idn.trials)
     return [
-        f"Searched ({space.source})",
+        f"Searched in {idn.seconds:.2f} s ({space.source})",
+        f"  {_loop(idn.controller, axis)}",
         f"  K {_span(*space.gain)} {gain_unit}, real parts {_span(-space.real[1], -space.real[0])} rad/s, "
         f"imaginary parts {_span(*space.imaginary)} rad/s,",
         f"  p {space.p[0]}..{space.p[1]}, q {space.q[0]}..{space.q[1]}, {space.bits} bits a number",

@@ -1,0 +1,79 @@
+"""Velocity commands [rad/s] as arrays: holds, ramps, stairs, pseudo-random binary signals.
+
+Every pattern starts and ends at rest and comes back to where it began: whatever goes forwards goes backwards as long, forwards
+first, so that the positions swept are 0 to the longest single stroke.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["both_ways", "dithered", "levels", "rest", "strokes", "swept", "triangles"]
+
+Vector = NDArray[np.float64]
+
+
+def rest(seconds: float, dt: float) -> Vector:
+    """Standstill."""
+    return np.zeros(max(1, round(seconds / dt)))
+
+
+def levels(speeds: Sequence[float], dwell: float, slope: float, dt: float) -> Vector:
+    """Each of the speeds held for `dwell` [s], reached from the one before at `slope` [rad/s^2] (inf: at once), back to 0."""
+    parts, now = [], 0.0
+    for speed in [*speeds, 0.0]:
+        count = 0 if not np.isfinite(slope) else int(abs(speed - now) / (slope * dt))
+        parts.append(now + (speed - now) * np.arange(1, count + 1) / (count + 1))
+        parts.append(np.full(max(1, round(dwell / dt)), speed))
+        now = speed
+    return np.concatenate(parts)
+
+
+def strokes(speeds: Sequence[float], dwell: float, travel: float, slope: float, dt: float) -> Vector:
+    """Each speed forwards and backwards for up to `dwell` [s], shortened so that no stroke is longer than `travel` [rad]."""
+    parts = []
+    for speed in speeds:
+        ramp = 0.0 if not np.isfinite(slope) else speed / slope
+        # One stroke covers speed (dwell + ramp): half a ramp at each end.
+        held = min(dwell, travel / speed - ramp) if speed > 0.0 else dwell
+        parts.append(both_ways(levels([speed], max(held, dt), slope, dt)[: -max(1, round(max(held, dt) / dt))], dt))
+    return np.concatenate(parts)
+
+
+def both_ways(forwards: Vector, dt: float) -> Vector:
+    """A pattern, the same backwards, and a sample of rest behind each."""
+    still = rest(dt, dt)
+    return np.concatenate([forwards, still, -forwards, still])
+
+
+def triangles(tops: Sequence[float], period: float, travel: float, dt: float) -> Vector:
+    """One triangle through zero per top speed: up, down through zero, up again; shortened to sweep no more than `travel`."""
+    parts = []
+    for top in tops:
+        # A half period sweeps top * period / 4.
+        quarter = max(2, round(min(period, 4.0 * travel / top) / 4.0 / dt))
+        rise = top * np.arange(quarter) / quarter
+        parts += [rise, top - rise, -rise, rise - top]
+    return np.concatenate([*parts, np.zeros(1)])
+
+
+def dithered(command: Vector, amplitude: float, clock: int, seed: int = 0) -> Vector:
+    """`command` with a pseudo-random binary signal of `amplitude` [rad/s] and `clock` samples a bit where it is not at rest.
+
+    A command at rest throughout gets it throughout, but for the last sample. The signal's mean is zero.
+    """
+    moving = command != 0.0 if np.any(command != 0.0) else np.arange(len(command)) < len(command) - 1
+    bits = np.random.default_rng(seed).choice((-1.0, 1.0), -(-len(command) // clock))
+    signal = np.repeat(bits, clock)[: len(command)] * moving
+    signal -= moving * (signal.sum() / max(int(moving.sum()), 1))
+    out: Vector = command + amplitude * signal
+    return out
+
+
+def swept(command: Vector, dt: float) -> tuple[float, float]:
+    """Lowest and highest angle [rad] of a drive that follows the command exactly, from 0, each value held for a sample."""
+    angle = dt * np.cumsum(command)
+    return min(0.0, float(angle.min())), max(0.0, float(angle.max()))

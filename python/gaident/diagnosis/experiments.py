@@ -1,0 +1,338 @@
+"""Which experiment to make: before any record the one that excites everything, afterwards a menu to choose from.
+
+Commands keep to the drive's limits: speed; travel, by integrating the command exactly; slopes that the torque can follow where
+the inertia is known. A drive in its loop overshoots: a tenth of speed and travel is kept free for that. One family of steps
+asks for more than the torque limit on purpose, as nothing else shows saturation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.diagnosis.commands import dithered, rest, strokes, swept, triangles
+from gaident.diagnosis.excitation import position_of
+from gaident.diagnosis.replay import replay
+from gaident.errors import SettingsError
+from gaident.models._checks import real_number
+from gaident.models.controller import PI
+
+__all__ = ["Limits", "MenuItem", "Proposal", "candidate_commands", "first_experiment", "separation"]
+
+Vector = NDArray[np.float64]
+
+FREE = 0.9  # of speed and travel that commands use
+LEAST_SAMPLES = 400
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What an experiment may do. Raises SettingsError.
+
+    speed     highest speed [rad/s]; torque: highest torque [N m]
+    travel    highest minus lowest position [rad]; inf: it may turn freely
+    duration  longest record [s]
+    """
+
+    speed: float
+    torque: float
+    travel: float = math.inf
+    duration: float = 5.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name == "travel" and value == math.inf:
+                continue
+            number = real_number(value, field.name, SettingsError, "give one number > 0")
+            if number <= 0.0:
+                raise SettingsError(f"{field.name} is {number:g}: give one number > 0")
+            object.__setattr__(self, field.name, number)
+
+    @classmethod
+    def of(cls, records: Record | Sequence[Record], controller: PI | None = None) -> Limits:
+        """What records show to be allowed: their highest speed, torque (the controller's limit, if it has one) and duration.
+
+        Their travel too, but for an axis that has gone through a turn or more, which is taken to turn freely. Raises
+        SettingsError where nothing moves.
+        """
+        listed = [records] if isinstance(records, Record) else list(records)
+        asked = [rec.velocity if rec.command is None else rec.command for rec in listed]
+        travel = max((float(np.ptp(position_of(rec))) for rec in listed), default=0.0)
+        torque = max((float(np.abs(replay(rec, controller).torque).max()) for rec in listed), default=0.0)
+        if controller is not None and controller.torque_limit is not None:
+            torque = controller.torque_limit
+        return cls(
+            speed=max((float(np.abs(r).max()) for r in asked), default=0.0) / FREE,
+            torque=torque,
+            travel=math.inf if travel >= math.tau else travel / FREE,
+            duration=max((rec.duration for rec in listed), default=0.0),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """An experiment to make.
+
+    command    velocity command [rad/s], shape (n,), one value every dt [s]
+    separates  names of effects that it tells apart, or makes visible where there is no record yet
+    margin     chi2 that the wrong one of two rivals would leave (25 tells them apart); nan where nothing was compared
+    reason     one plain sentence
+    """
+
+    command: Vector
+    dt: float
+    separates: tuple[str, ...]
+    margin: float
+    reason: str
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return len(self.command) * self.dt
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Lowest and highest position [rad] relative to the start, of a drive that follows the command."""
+        return swept(self.command, self.dt)
+
+
+@dataclass(frozen=True, eq=False)
+class MenuItem:
+    """One experiment of the menu: name, command [rad/s] (n,), the effects it is good at, one line why."""
+
+    name: str
+    command: Vector
+    dt: float
+    separates: tuple[str, ...]
+    reason: str
+
+    def proposal(self, separates: Sequence[str], margin: float) -> Proposal:
+        """This item as a proposal for the rivals `separates`."""
+        return Proposal(self.command, self.dt, tuple(separates), margin, self.reason)
+
+
+@dataclass(frozen=True)
+class _Bench:
+    """Limits in the terms of the builders: speed, stroke and slope that may be used, seconds for one item."""
+
+    dt: float
+    speed: float
+    travel: float
+    slope: float
+    seconds: float
+    torque: float
+    kp: float | None
+
+
+_Builder = Callable[[_Bench], Vector]
+
+
+def first_experiment(dt: float, limits: Limits, inertia: float | None = None, kp: float | None = None) -> Proposal:
+    """A command for the first record of a drive: it triggers every effect of the library within the limits.
+
+    dt       sample time [s]
+    inertia  total inertia [kg m^2]: ramps then use at most 60 % of the torque; None: gentle ramps
+    kp       proportional gain of the controller [N m s/rad]: steps and dither are then sized by the torque they ask for
+
+    Levels with reversals and dither, slow stairs with rests, reversals with small and large torque, steps of three sizes of
+    which the largest saturates, and the first levels once more at the end. Raises SettingsError for a duration of fewer than
+    400 samples.
+    """
+    bench = _bench(dt, limits, inertia, kp)
+    course: tuple[tuple[_Builder, float], ...] = (
+        (_speed_ladder, 0.22),
+        (_slow_stairs, 0.18),
+        (_reversals, 0.10),
+        (_prbs_moving, 0.12),
+        (_steps, 0.16),
+        (_speed_ladder, 0.22),
+    )
+    command = _within(
+        np.concatenate([_filled(build, replace(bench, seconds=share * bench.seconds)) for build, share in course]), bench
+    )
+    names = dict.fromkeys(effect for item in _MENU for effect in item[2])
+    return Proposal(command, dt, tuple(names), math.nan, "No record yet: this triggers every effect, as far as travel allows.")
+
+
+def candidate_commands(dt: float, limits: Limits, inertia: float | None = None, kp: float | None = None) -> list[MenuItem]:
+    """The menu within the limits; arguments as for `first_experiment`. Each command fills the duration at most."""
+    bench = _bench(dt, limits, inertia, kp)
+    return [MenuItem(name, _within(_filled(build, bench), bench), dt, effects, why) for name, build, effects, why in _MENU]
+
+
+def separation(
+    command: Vector, simulate: Callable[[Vector], Vector], refit: Callable[[Vector, Vector], Vector], noise: float
+) -> float:
+    """chi2 that the rival leaves: simulate(command) is what one explanation predicts [rad/s], refit(command, velocity) the
+    other's velocity after it has been fitted to that, base parameters included; noise [rad/s].
+    """
+    velocity = simulate(command)
+    off = (refit(command, velocity) - velocity) / noise
+    return float(off @ off)
+
+
+def _bench(dt: float, limits: Limits, inertia: float | None, kp: float | None) -> _Bench:
+    if not isinstance(limits, Limits):
+        raise SettingsError(f"limits is {limits!r}: give gaident.Limits(speed, torque, travel, duration)")
+    for name, value in (("dt", dt), ("inertia", inertia), ("kp", kp)):
+        if value is not None and not real_number(value, name, SettingsError, "give one number > 0") > 0.0:
+            raise SettingsError(f"{name} is {value!r}: give one number > 0")
+    if limits.duration < LEAST_SAMPLES * dt:
+        raise SettingsError(
+            f"duration is {limits.duration:g} s, {int(limits.duration / dt)} samples: give {LEAST_SAMPLES * dt:g} s or more"
+        )
+    stroke = FREE * limits.travel
+    # A stroke lasts 20 samples at least.
+    speed = min(FREE * limits.speed, stroke / (20.0 * dt))
+    slope = 0.6 * limits.torque / inertia if inertia is not None else 150.0 * speed / limits.duration
+    # Half a stroke to rise, half to fall: v^2 = slope * stroke.
+    speed = min(speed, 0.8 * math.sqrt(slope * stroke)) if math.isfinite(stroke) else speed
+    return _Bench(dt, speed, stroke, slope, limits.duration, limits.torque, kp)
+
+
+def _filled(build: _Builder, bench: _Bench) -> Vector:
+    """The pattern, quickened (then slowed down) until it fits the bench's time, as often as it then fits."""
+    room = int(bench.seconds / bench.dt + 1e-9)
+    pattern = build(bench)
+    for attempt in range(60):
+        if len(pattern) <= room:
+            break
+        # Ramps of a heavy axis take their time whatever the dwell: lower speeds are reached sooner.
+        bench = replace(bench, seconds=0.85 * bench.seconds, speed=bench.speed * (1.0 if attempt < 10 else 0.9))
+        pattern = build(bench)
+    return np.tile(pattern, max(1, room // len(pattern)))[: max(room, 1)]
+
+
+def _within(command: Vector, bench: _Bench) -> Vector:
+    """The command, lowered where it still is too fast or sweeps too much."""
+    low, high = swept(command, bench.dt)
+    factor = min(1.0, bench.travel / max(high - low, 1e-300), bench.speed / max(float(np.abs(command).max()), 1e-300))
+    return command * factor
+
+
+def _speed_ladder(b: _Bench) -> Vector:
+    """Five speeds to the top, mixed in order, forwards and backwards, dithered on every other one."""
+    shares = (0.5, 0.1, 1.0, 0.25, 0.75)
+    dwell = b.seconds / (2.6 * len(shares))
+    parts = []
+    for i, share in enumerate(shares):
+        stroke = strokes([share * b.speed], dwell, b.travel, b.slope, b.dt)
+        parts.append(_dither(stroke, b) if i % 2 else stroke)
+    return np.concatenate(parts)
+
+
+def _dither(command: Vector, b: _Bench) -> Vector:
+    size = 0.03 * b.speed if b.kp is None else min(0.05 * b.speed, 0.05 * b.torque / b.kp)
+    return dithered(command, size, 4)
+
+
+def _slow_stairs(b: _Bench) -> Vector:
+    """Half to five per cent of the speed, rests between, both directions."""
+    shares = (0.005, 0.01, 0.02, 0.05)
+    dwell = b.seconds / (3.0 * len(shares))
+    parts: list[Vector] = []
+    for share in shares:
+        parts += [strokes([share * b.speed], dwell, b.travel, math.inf, b.dt), rest(0.5 * dwell, b.dt)]
+    return np.concatenate(parts)
+
+
+def _triangles(b: _Bench) -> Vector:
+    return triangles((0.05 * b.speed, 0.2 * b.speed, 0.6 * b.speed), b.seconds / 3.0, b.travel, b.dt)
+
+
+def _reversals(b: _Bench) -> Vector:
+    """Square waves around zero, small and large."""
+    parts = []
+    for share in (0.02, 0.3):
+        dwell = max(b.seconds / 16.0, 10 * b.dt)
+        parts += [strokes([share * b.speed], dwell, b.travel, math.inf if share < 0.1 else b.slope, b.dt)] * 3
+    return np.concatenate(parts)
+
+
+def _prbs_moving(b: _Bench) -> Vector:
+    """A binary signal on half the speed, three amplitudes, forwards and backwards."""
+    stroke = strokes([0.5 * b.speed], b.seconds / 7.0, b.travel, b.slope, b.dt)
+    largest = 0.1 * b.speed if b.kp is None else min(0.2 * b.speed, 0.4 * b.torque / b.kp)
+    parts = [dithered(stroke, f * largest, c) for f, c in ((0.3, 1), (0.6, 2), (1.0, 4))]
+    return np.concatenate(parts)
+
+
+def _prbs_standing(b: _Bench) -> Vector:
+    largest = 0.1 * b.speed if b.kp is None else min(0.2 * b.speed, 0.4 * b.torque / b.kp)
+    piece = rest(b.seconds / 3.0 - b.dt, b.dt)
+    parts = [dithered(piece, f * largest, c) for f, c in ((0.1, 8), (0.4, 4), (1.0, 4))]
+    return np.concatenate(parts)
+
+
+def _steps(b: _Bench) -> Vector:
+    """Steps of 10, 30 and 100 %, the last with more torque than there is, where the speed allows that."""
+    full = 0.8 * b.speed  # a jump overshoots more than a ramp
+    if b.kp is not None:
+        full = min(full, 1.5 * b.torque / b.kp)
+    return np.concatenate([strokes([share * full], b.seconds / 6.5, b.travel, math.inf, b.dt) for share in (0.1, 0.3, 1.0)])
+
+
+def _constant_slow(b: _Bench) -> Vector:
+    """Three slow speeds, each for five turns where travel and time allow."""
+    dwell = b.seconds / 6.5
+    wanted = 5.0 * math.tau / dwell
+    shares = [min(f * b.speed, g * wanted) for f, g in ((0.1, 0.4), (0.3, 1.0), (0.6, 2.5))]
+    return strokes(shares, dwell, b.travel, b.slope, b.dt)
+
+
+def _holds(b: _Bench) -> Vector:
+    """Eight angles within a turn or the travel, approached from both sides, a hold at each."""
+    angle = min(b.travel, math.tau) / 8.0
+    period = b.seconds / 16.0
+    move, hold = 0.5 * period, rest(0.5 * period, b.dt)
+    count = max(2, round(move / b.dt))
+    shape = np.sin(np.pi * (np.arange(count) + 0.5) / count)
+    move_once = min(b.speed, angle / (b.dt * float(shape.sum()))) * shape
+    once = np.concatenate([move_once, hold])
+    return np.concatenate([np.tile(once, 8), np.tile(-once, 8)])
+
+
+def _repeat(b: _Bench) -> Vector:
+    """The same levels at start and end, a fast warm-up between."""
+    segment = strokes([0.2 * b.speed, 0.6 * b.speed], b.seconds / 17.0, b.travel, b.slope, b.dt)
+    warm = strokes([b.speed] * 3, b.seconds / 13.0, b.travel, b.slope, b.dt)
+    return np.concatenate([segment, warm, segment])
+
+
+def _creep(b: _Bench) -> Vector:
+    """Tiny triangles: torque that rises and falls below break-away."""
+    return triangles((0.001 * b.speed, 0.003 * b.speed, 0.01 * b.speed), b.seconds / 3.0, b.travel, b.dt)
+
+
+_MENU: tuple[tuple[str, _Builder, tuple[str, ...], str], ...] = (
+    ("slow stairs", _slow_stairs,
+     ("coulomb_friction", "stribeck_friction", "presliding_friction", "asymmetric_friction", "torque_dead_band"),
+     "Slow levels with rests show how friction behaves from standstill on."),
+    ("triangle across zero", _triangles, ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "quadratic_drag"),
+     "A speed that sweeps through zero draws the whole friction curve, accelerating and decelerating."),
+    ("reversals", _reversals, ("backlash", "torque_dead_band", "presliding_friction", "coulomb_friction", "hardening_stiffness"),
+     "Reversals with small and with large torque: a gap takes time, a dead band torque, a bristle angle."),
+    ("random signal at speed", _prbs_moving,
+     ("extra_resonance", "torque_lag", "transport_delay", "velocity_filter", "hardening_stiffness"),
+     "A binary signal on a constant speed, dry friction out of the way, shows the dynamics up to half the sampling rate."),
+    ("random signal at standstill", _prbs_standing, ("backlash", "presliding_friction", "torque_dead_band", "coulomb_friction"),
+     "The same around standstill, in three amplitudes: what the two differ in is friction and play."),
+    ("steps of three sizes", _steps, ("torque_saturation", "command_rate_limit", "integrator_clamp"),
+     "Steps of which only the largest runs into limits tell them apart by slope and torque."),
+    ("slow constant speeds", _constant_slow, ("cogging", "velocity_ripple", "unbalance"),
+     "Several turns at three slow speeds: a torque ripple keeps its torque, a sensor's ripple grows with speed."),
+    ("holds up and down", _holds, ("unbalance", "load_torque", "asymmetric_friction", "coulomb_friction"),
+     "The same angles approached from both sides: the mean is load or gravity, half the difference friction."),
+    ("repeated segment", _repeat, ("friction_drift", "quadratic_drag"),
+     "The same motion cold and after a warm-up: only what depends on time differs."),
+    ("speeds mixed in time", _speed_ladder, ("quadratic_drag", "friction_drift", "asymmetric_friction", "coulomb_friction"),
+     "Speeds up to the highest, in mixed order and both directions, draw drag against speed."),
+    ("creep below break-away", _creep, ("presliding_friction", "stribeck_friction", "torque_dead_band"),
+     "A torque that rises slowly below break-away: a bristle gives way like a spring, dry friction holds."),
+)  # fmt: skip

@@ -1,0 +1,32 @@
+"""The lattice that a signal lives on: encoder steps, converter bits, decimals of a text log."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["lattice_step"]
+
+Vector = NDArray[np.float64]
+
+
+def lattice_step(values: Vector) -> float:
+    """The step q of the lattice x = x0 + k q, k whole, that all `values` lie on, in their unit; 0.0 where there is none.
+
+    The gaps between neighbouring distinct values are multiples of q; their sum over the sum of the multiples gives q to the
+    accuracy of the numbers. A signal of fewer than four distinct values has no lattice that could be told from chance.
+    """
+    distinct = np.unique(values)
+    size = float(np.abs(distinct).max())
+    if len(distinct) < 4 or not size > 0.0:
+        return 0.0
+    gaps = np.diff(distinct)
+    gaps = gaps[gaps > 1e-9 * size]  # below, the same value in the last digits of a float
+    if len(gaps) < 3:
+        return 0.0
+    multiples = np.round(gaps / gaps.min())
+    step = float(gaps.sum() / multiples.sum())
+    places = (values - distinct[0]) / step
+    off = np.abs(places - np.round(places))
+    # On no lattice, the gaps are no multiples of the least one and `off` is spread evenly over 0..0.5.
+    return step if float(off.max()) < 0.1 else 0.0

@@ -1,0 +1,53 @@
+"""The PI run on a measured velocity (no plant).
+
+e(n) = r(n) - w(n)
+I(n) = I(n-1) + ki dt (e(n) + e(n-1))/2,  e(-1) = 0,  clamped to +-integrator_limit
+u(n) = kp e(n) + I(n),                                clamped to +-torque_limit
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.models.controller import PI
+
+__all__ = ["pi_torque", "rate_limited"]
+
+Vector = NDArray[np.float64]
+
+
+def pi_torque(command: Vector, velocity: Vector, dt: float, controller: PI, initial_integral: float = 0.0) -> Vector:
+    """The torque [N m], shape (n,), that `controller` makes of command and measured velocity [rad/s], shape (n,) each.
+
+    initial_integral: what the integrator held before sample 0 [N m]. Both loops of `PI` share this rule.
+    """
+    e = command - velocity
+    half = 0.5 * controller.ki * dt * e
+    steps = half.copy()
+    steps[1:] += half[:-1]
+    torque_limit, integrator_limit = controller.limits
+    integral = initial_integral + np.cumsum(steps)
+    if float(np.abs(integral).max()) > integrator_limit:
+        integral = _clamped_sum(steps, integrator_limit, initial_integral)
+    u: Vector = np.clip(controller.kp * e + integral, -torque_limit, torque_limit)
+    return u
+
+
+def rate_limited(command: Vector, rate: float, dt: float, start: float) -> Vector:
+    """`command` [rad/s] followed from `start` with a slope of at most `rate` [rad/s^2], shape (n,)."""
+    step = rate * dt
+    out, value = [], start
+    for wanted in command.tolist():
+        value += min(max(wanted - value, -step), step)
+        out.append(value)
+    return np.array(out)
+
+
+def _clamped_sum(steps: Vector, limit: float, start: float) -> Vector:
+    """I(n) = I(n-1) + steps(n), clamped after each update: only one sample after the other gives it."""
+    out, total = [], start
+    for step in steps.tolist():
+        total = min(max(total + step, -limit), limit)
+        out.append(total)
+    return np.array(out)

@@ -1,0 +1,199 @@
+"""Why a logged torque does not follow from command and velocity: the simple reasons, simplest first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.diagnosis.pi_torque import pi_torque, rate_limited
+from gaident.identification.noise import ljung_box
+from gaident.models.controller import PI
+
+__all__ = ["Explanation", "explain", "white_noise"]
+
+Vector = NDArray[np.float64]
+
+SHIFTS = (0, 1, -1, 2, -2)  # samples by which what the controller saw may be older (+) than the log's
+RULES = ("trapezoidal", "rectangular", "rectangular, old error")
+SAME = 2e-3  # relative difference below which a fitted gain is the configured one
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A changed controller; its torque [N m], shape (n,), but for `edge` samples at both ends. Cause and value as in `Replay`."""
+
+    torque: Vector
+    cause: str
+    value: float
+    sentence: str
+    edge: int = 0
+    changes: int = 1  # how much of the configured controller is given up; the fewer the better
+
+    def off(self, logged: Vector) -> Vector:
+        """Logged minus explained torque [N m], without the edges."""
+        return (logged - self.torque)[self.edge : len(logged) - self.edge]
+
+
+class _Case(NamedTuple):
+    """What every reason is tried on."""
+
+    command: Vector
+    velocity: Vector
+    dt: float
+    controller: PI
+    logged: Vector
+
+    def torque(self, controller: PI, start: float = 0.0) -> Vector:
+        return pi_torque(self.command, self.velocity, self.dt, controller, start)
+
+
+def explain(command: Vector, velocity: Vector, dt: float, controller: PI, logged: Vector, tolerance: float) -> Explanation | None:
+    """The first reason that leaves at most `tolerance` [N m] at every sample; else the best, if it leaves white noise."""
+    case = _Case(command, velocity, dt, controller, logged)
+    best, least = None, np.inf
+    for reason in (_start, _limits, _rate, _linear):
+        for found in reason(case):
+            off = found.off(logged)
+            if float(np.abs(off).max()) <= tolerance:
+                return found
+            rms = float(np.sqrt(np.mean(off**2)))
+            if rms < 0.99 * least:  # a later, more complicated reason must be better
+                best, least = found, rms
+    return best if best is not None and white_noise(best.off(logged), logged) else None
+
+
+def white_noise(off: Vector, logged: Vector) -> float:
+    """Standard deviation [N m] of `off` where it is white noise small against the torque; 0.0 where it is not."""
+    spread = float(np.std(off))
+    small = spread < 0.1 * float(np.std(logged)) and abs(float(np.mean(off))) < 4.0 * spread / np.sqrt(len(off))
+    return spread if small and ljung_box([off], min(20, len(off) // 5)) > 1e-4 else 0.0
+
+
+def _start(case: _Case) -> Iterator[Explanation]:
+    """A record that starts under load: the integrator held something before it."""
+    start = float(np.median(case.logged - case.torque(case.controller)))
+    sentence = f"with {start:.4g} N m in the integrator at the record's start: the record begins under load."
+    yield Explanation(case.torque(case.controller, start), "initial_integral", start, sentence)
+
+
+def _limits(case: _Case) -> Iterator[Explanation]:
+    """Clamps that are not configured act where the log shows their plateaus."""
+    controller, highest = case.controller, float(np.abs(case.logged).max())
+    if controller.torque_limit is None or highest < 0.999 * controller.torque_limit:
+        acting = int(np.sum(np.abs(case.logged) >= 0.999 * highest))
+        sentence = f"It does with a torque limit of {highest:.4g} N m, which acts at {acting} samples."
+        yield Explanation(case.torque(replace(controller, torque_limit=highest)), "torque_limit", highest, sentence)
+    proportional = controller.kp * (case.command - case.velocity)
+    for torque_limit in (controller.torque_limit, highest):
+        free = np.ones(len(proportional), bool) if torque_limit is None else np.abs(case.logged) < 0.999 * torque_limit
+        clamp = float(np.abs((case.logged - proportional)[free]).max(initial=0.0))
+        if not clamp > 0.0:
+            continue
+        torque = case.torque(replace(controller, torque_limit=torque_limit, integrator_limit=clamp))
+        more = "" if torque_limit == controller.torque_limit else f" and a torque limit of {torque_limit:.4g} N m"
+        acting = int(np.sum(np.abs(torque - proportional) >= 0.999 * clamp))
+        sentence = f"It does with the integral clamped to {clamp:.4g} N m{more}; the clamp acts at {acting} samples."
+        yield Explanation(torque, "integrator_clamp", clamp, sentence)
+
+
+def _rate(case: _Case) -> Iterator[Explanation]:
+    """A rate limit ahead of the controller: the command it must have seen, solved from the torque,
+
+        u(n) - u(n-1) = (kp + h) e(n) - (kp - h) e(n-1),  h = ki dt/2,  r(n) = e(n) + w(n),
+
+    moves with the slope of the limit where it is not the logged one.
+    """
+    from scipy.signal import lfilter
+
+    kp, h = case.controller.kp, 0.5 * case.controller.ki * case.dt
+    if kp <= h or case.controller.limited:
+        return
+    seen = lfilter([1.0, -1.0], [kp + h, h - kp], case.logged) + case.velocity
+    behind = np.abs(seen - case.command)[1:] > 1e-3 * float(np.abs(case.command).max())
+    slopes = np.abs(np.diff(seen))[behind] / case.dt
+    if len(slopes) == 0:
+        return
+    middle = float(np.median(slopes))
+    rate = float(np.mean(slopes[np.abs(slopes - middle) <= 0.2 * middle]))
+    if not rate > 0.0:
+        return
+    for start in (float(case.command[0]), 0.0):
+        limited = rate_limited(case.command, rate, case.dt, start)
+        torque = pi_torque(limited, case.velocity, case.dt, case.controller)
+        sentence = f"It does with the command limited to a slope of {rate:.4g} rad/s^2 ahead of the controller."
+        yield Explanation(torque, "command_rate_limit", rate, sentence)
+
+
+def _linear(case: _Case) -> Iterator[Explanation]:
+    """u(n) = kp' e(n - shift) + ki' dt sum e + I0 by least squares, for every rule of integration and shift.
+
+    A rectangular integral is a trapezoidal one with kp + ki dt/2 or kp - ki dt/2: what keeps the configured gains comes first.
+    """
+    yield from sorted(_fitted(case), key=lambda found: found.changes)
+
+
+def _fitted(case: _Case) -> Iterator[Explanation]:
+    top = case.controller.limits[0]
+    for shift in SHIFTS:
+        e = _shifted(case.command - case.velocity, shift)
+        for rule in RULES if case.controller.ki else RULES[:1]:
+            columns = [e, case.dt * _sum(e, rule), np.ones(len(e))] if case.controller.ki else [e, np.ones(len(e))]
+            table = np.column_stack(columns)
+            used = np.abs(case.logged) < 0.999 * top
+            used[: abs(shift)] = used[len(used) - abs(shift) :] = False
+            sizes = np.linalg.norm(table[used], axis=0)
+            if not np.all(sizes > 0.0):
+                continue
+            solved = np.linalg.lstsq(table[used] / sizes, case.logged[used], rcond=1e-12)[0] / sizes
+            torque = np.clip(table @ solved, -top, top)
+            kp, start = float(solved[0]), float(solved[-1])
+            ki = float(solved[1]) if case.controller.ki else 0.0
+            yield _named(case.controller, kp, ki, start, shift, rule, torque)
+
+
+def _named(controller: PI, kp: float, ki: float, start: float, shift: int, rule: str, torque: Vector) -> Explanation:
+    """Says what of a fitted controller differs from the configured one."""
+    differs, cause, value = [], "", np.nan
+    if shift:
+        age = "older" if shift > 0 else "newer"
+        differs.append(f"command and velocity {abs(shift)} sample{'s' if abs(shift) > 1 else ''} {age} than the log's")
+        cause, value = "shift", float(shift)
+    if rule != RULES[0]:
+        differs.append("a rectangular integral" + (" that lacks the newest error" if rule == RULES[2] else ""))
+        cause = cause or "integration_rule"
+    factors = [found / given for found, given in ((kp, controller.kp), (ki, controller.ki)) if given]
+    fitted_kp = abs(kp) > SAME * ki and not controller.kp
+    if any(abs(f - 1.0) > SAME for f in factors) or fitted_kp:
+        if max(factors) - min(factors) <= SAME * abs(factors[0]) and not fitted_kp:
+            turned = " (a reversed sign)" if factors[0] < 0.0 else ""
+            differs.append(f"its torque multiplied by {factors[0]:.5g}{turned}: check the unit of the torque or of the gains")
+            cause, value = "scale", factors[0]
+        else:
+            differs.append(f"kp = {kp:.4g} N m s/rad and ki = {ki:.4g} N m/rad")
+            cause, value = "gains", np.nan
+    if abs(start) > 1e-3 * float(np.abs(torque).max()):
+        differs.append(f"an integral that starts at {start:.4g} N m")
+        if not cause:
+            cause, value = "initial_integral", start
+    sentence = f"It does with {', and '.join(differs) or 'these gains'}."
+    return Explanation(torque, cause or "gains", value, sentence, abs(shift), len(differs) + 2 * (cause == "gains"))
+
+
+def _sum(e: Vector, rule: str) -> Vector:
+    total = np.cumsum(e)
+    if rule == RULES[0]:
+        return total - 0.5 * e
+    return total if rule == RULES[1] else total - e
+
+
+def _shifted(x: Vector, shift: int) -> Vector:
+    """x(n - shift); what lies beyond the ends repeats them."""
+    if shift == 0:
+        return x
+    if shift > 0:
+        return np.concatenate([np.full(shift, x[0]), x[:-shift]])
+    return np.concatenate([x[-shift:], np.full(-shift, x[-1])])

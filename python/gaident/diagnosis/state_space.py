@@ -1,0 +1,144 @@
+"""The factored model as a chain of first-order sections, discretised; linear recursions over whole arrays; Riccati's equation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gaident.errors import ModelError
+from gaident.models.controller import PI
+from gaident.models.model import Model
+
+__all__ = ["Discretised", "discretised", "disturbed", "recursion", "steady_covariance"]
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class Discretised:
+    """x(n+1) = A x(n) + B u(n), w(n) = C x(n) + D u(n); complex coordinates, real from u to w.
+
+    first_response: the velocity [rad/s] that a torque of 1 N m held for one sample leaves behind (largest of the first samples).
+    """
+
+    A: Complex
+    B: Complex
+    C: Complex
+    D: float
+
+    def response(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """w of the input u from rest, shape (n,) each."""
+        w: NDArray[np.float64] = np.einsum("ni,i->n", recursion(self.A, np.outer(u, self.B)), self.C).real + self.D * u
+        return w
+
+    @property
+    def first_response(self) -> float:
+        x, largest = self.B, abs(self.D)
+        for _ in range(3):
+            largest = max(largest, abs(float((self.C @ x).real)))
+            x = self.A @ x
+        return largest
+
+
+def discretised(model: Model, dt: float, loop: str = "sampled") -> Discretised:
+    """The model at sample time dt [s]: zero-order hold, or bilinear for loop="continuous".
+
+    A chain of sections keeps each root as it is: with input v, x' = pole x + v, the section (s - zero)/(s - pole) gives
+    v + (pole - zero) x, the section 1/(s - pole) gives x. Raises ModelError for p = 0 outside the continuous loop.
+    """
+    from scipy.linalg import expm
+
+    if model.p == 0 and loop != "continuous":
+        raise ModelError('the model has p = 0, which exists with loop="continuous" only: use more poles than zeros')
+    m = model.order
+    A, B = np.zeros((m, m), dtype=np.complex128), np.zeros(m, dtype=np.complex128)
+    row, through = np.zeros(m, dtype=np.complex128), 1.0 + 0.0j  # what the chain gives so far: row x + through u
+    for i, pole in enumerate(model.poles):
+        A[i], B[i] = row, through
+        A[i, i] += pole
+        if i < model.q:
+            row = row.copy()
+            row[i] += pole - model.zeros[i]
+        else:
+            row, through = np.zeros(m, dtype=np.complex128), 0.0j
+            row[i] = 1.0
+    C, D = model.gain * row, model.gain * through.real
+    if loop != "continuous":
+        both = np.zeros((m + 1, m + 1), dtype=np.complex128)
+        both[:m, :m], both[:m, m] = A * dt, B * dt
+        held = expm(both)
+        return Discretised(held[:m, :m], held[:m, m], C, 0.0)
+    half = np.linalg.inv(np.eye(m) - 0.5 * dt * A)
+    D += float((C @ half @ B).real) * 0.5 * dt
+    return Discretised(half @ (np.eye(m) + 0.5 * dt * A), dt * (half @ B), C @ half, D)
+
+
+def disturbed(plant: Discretised, controller: PI | None, dt: float) -> Discretised:
+    """From a torque added to the controller's to the measured velocity: the plant in its loop, limits left out.
+
+        w (1 + D (kp + h)) = C x + D (J + f),  u = J - (kp + h) w,  J(n+1) = J(n) - 2 h w,  h = ki dt/2
+
+    with J what the integrator holds of the past. Without a controller the plant itself.
+    """
+    if controller is None:
+        return plant
+    m, h = len(plant.B), 0.5 * controller.ki * dt
+    k = controller.kp + h
+    scale = 1.0 / (1.0 + plant.D * k)
+    C: Complex = np.append(plant.C, plant.D).astype(np.complex128) * scale  # w = C [x, J] + D f
+    D = plant.D * scale
+    A = np.zeros((m + 1, m + 1), dtype=np.complex128)
+    A[:m, :m], A[:m, m], A[m, m] = plant.A, plant.B, 1.0
+    A[:m] -= k * np.outer(plant.B, C)
+    A[m] -= 2.0 * h * C
+    B = np.append((1.0 - k * D) * plant.B, -2.0 * h * D)
+    return Discretised(A, B, C, D)
+
+
+def recursion(A: Complex, drive: ArrayLike, start: ArrayLike | None = None, newest: bool = False) -> Complex:
+    """x(n+1) = A x(n) + drive(n) from x(0) = start (None: 0); drive (n, m) -> x(0..n-1) (n, m), with `newest` x(1..n).
+
+    Schur's form A = Z T Z*, T triangular, makes it a cascade of first-order filters, last state first.
+    """
+    from scipy.linalg import schur
+    from scipy.signal import lfilter
+
+    m = len(A)
+    T, Z = schur(A, output="complex")
+    # einsum: such flat products are slower in a BLAS that spreads them over threads.
+    f = np.einsum("ji,nj->in", Z.conj(), np.asarray(drive, dtype=np.complex128))
+    first = np.zeros(m) if start is None else Z.conj().T @ np.asarray(start)
+    y = np.empty((m, f.shape[1] + 1), dtype=np.complex128)  # x(0..n), one state a row
+    y[:, 0] = first
+    for i in range(m - 1, -1, -1):
+        inflow = f[i]
+        for j in range(i + 1, m):
+            inflow = inflow + T[i, j] * y[j, :-1]
+        y[i, 1:], _ = lfilter([1.0], [1.0, -T[i, i]], inflow, zi=np.array([T[i, i] * first[i]]))
+    out: Complex = np.einsum("ij,jn->ni", Z, y[:, 1:] if newest else y[:, :-1])
+    return out
+
+
+def steady_covariance(A: Complex, H: Complex, Q: Complex) -> Complex:
+    """P of the steady Kalman filter with noise variance 1: P = A P A* - A P H*(H P H* + 1)^-1 H P A* + Q, by doubling.
+
+    Raises ModelError where the doubling does not settle: a state is not seen at the output and does not fade.
+    """
+    a, g, p = A.conj().T, np.outer(H.conj(), H), Q
+    eye = np.eye(len(A))
+    for _ in range(60):
+        inverse = np.linalg.inv(eye + g @ p)
+        step = a.conj().T @ p @ inverse @ a
+        g = g + a @ inverse @ g @ a.conj().T
+        a = a @ inverse @ a
+        p = p + step
+        p = 0.5 * (p + p.conj().T)
+        if not np.all(np.isfinite(p)):
+            break
+        if float(np.abs(step).max()) <= 1e-12 * float(np.abs(p).max()):
+            return p
+    raise ModelError(
+        "a missing torque does not show in this model's velocity: it has a zero at 0, or a pole that no torque moves"
+    )

@@ -1,0 +1,189 @@
+"""What the pictures of a diagnosis draw, as numbers: means over bins, order lines, averages around reversals, spectra."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "Binned",
+    "OrderLines",
+    "Reversals",
+    "Spectrum",
+    "binned_mean",
+    "branches",
+    "order_lines",
+    "reversal_averages",
+    "smoothed",
+    "spectrum",
+]
+
+Vector = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LEAST_IN_BIN = 8
+MOST_STEPS = 1_000_000  # of angle, over all turns
+
+
+@dataclass(frozen=True, eq=False)
+class Binned:
+    """Per bin of x with enough samples: its mean x, mean and standard deviation of y, number of samples; arrays (bins,)."""
+
+    x: Vector
+    mean: Vector
+    std: Vector
+    count: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class OrderLines:
+    """Amplitude [N m] per order (lines per turn), the level that chance passes in one spectrum of a hundred, turns travelled."""
+
+    order: Vector
+    amplitude: Vector
+    level: float
+    turns: float
+
+    @property
+    def peaks(self) -> list[tuple[float, float]]:
+        """(order, amplitude) of up to four local maxima clearly above the level, the largest first.
+
+        An order is whole where the turns travelled do not tell it from a whole one.
+        """
+        a = self.amplitude
+        least = max(1.2 * self.level, 0.25 * float(a.max(initial=0.0)))
+        tops = [i for i in range(1, len(a) - 1) if a[i] > least and a[i] >= a[i - 1] and a[i] > a[i + 1]]
+        tops.sort(key=lambda i: -a[i])
+        kept: list[int] = []
+        for i in tops:
+            # A line has side lobes a turn's resolution wide.
+            if all(abs(self.order[i] - self.order[j]) > max(0.3, 3.0 / max(self.turns, 0.1)) for j in kept):
+                kept.append(i)
+        blur = 0.5 / max(self.turns, 0.5)
+        orders = [float(self.order[i]) for i in kept[:4]]
+        whole = [float(round(k)) if abs(k - round(k)) < blur and round(k) else k for k in orders]
+        return [(k, float(a[i])) for k, i in zip(whole, kept, strict=False)]
+
+
+@dataclass(frozen=True, eq=False)
+class Reversals:
+    """Averages over reversals, turned so that the new direction is positive; time [s] from the reversal, shape (n,).
+
+    Per group ("small torque", "large torque", or "all"): mean and standard deviation of torque and mean velocity, (n,) each,
+    and how many reversals.
+    """
+
+    time: Vector
+    groups: dict[str, tuple[Vector, Vector, Vector, int]]
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Amplitude density [unit/sqrt(Hz)] over frequency [Hz], mean over half-overlapping Hann windows."""
+
+    frequency: Vector
+    density: Vector
+
+
+def smoothed(x: Vector, width: int) -> Vector:
+    """Moving average over an odd number of samples near `width`, the ends repeated."""
+    half = max(0, min(width, len(x)) // 2)
+    total = np.concatenate([[0.0], np.cumsum(np.concatenate([np.full(half, x[0]), x, np.full(half, x[-1])]))])
+    out: Vector = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+    return out
+
+
+def branches(velocity: Vector, dt: float) -> tuple[Mask, Mask]:
+    """(accelerating, decelerating) samples: the speed |w| grows or falls by more than a fifth of its typical rate of change."""
+    w = smoothed(velocity, max(5, len(velocity) // 300))
+    rate = np.gradient(w, dt) * np.sign(w)
+    typical = float(np.sqrt(np.mean(rate**2)))
+    return rate > 0.2 * typical, rate < -0.2 * typical
+
+
+def binned_mean(x: Vector, y: Vector, bins: int = 40, used: Mask | None = None) -> Binned:
+    """Over `bins` equal bins of +-max |x|, with an edge at 0; bins of fewer than eight samples are left out."""
+    top = float(np.abs(x).max()) * (1.0 + 1e-9) or 1.0
+    index = np.clip(((x / top + 1.0) * 0.5 * (bins // 2 * 2)).astype(int), 0, bins // 2 * 2 - 1)
+    if used is not None:
+        index, x, y = index[used], x[used], y[used]
+    count = np.bincount(index, minlength=bins)
+    kept = count >= LEAST_IN_BIN
+    n = np.maximum(count, 1)
+    mean = np.bincount(index, y, minlength=bins) / n
+    square = np.bincount(index, (y - mean[index]) ** 2, minlength=bins) / n
+    return Binned((np.bincount(index, x, minlength=bins) / n)[kept], mean[kept], np.sqrt(square)[kept], count[kept])
+
+
+def order_lines(position: Vector, torque: Vector, velocity: Vector, highest: float = 40.0) -> OrderLines:
+    """Amplitudes of sin and cos(order * angle) in the torque while the axis turns, even in angle.
+
+    What depends on the velocity alone (the mean per velocity bin) is taken out first: dry friction is no line.
+    """
+    w = smoothed(velocity, max(5, len(velocity) // 300))
+    moving = np.abs(w) > 0.02 * float(np.abs(w).max(initial=0.0))
+    theta, d, speed = position[moving], torque[moving], w[moving]
+    turns = float(np.ptp(theta)) / math.tau if len(theta) else 0.0
+    if turns < 0.05 or len(theta) < 50:
+        return OrderLines(np.zeros(0), np.zeros(0), 0.0, turns)
+    top = float(np.abs(speed).max()) * (1.0 + 1e-9)
+    index = ((speed / top + 1.0) * 20.0).astype(int)
+    count = np.maximum(np.bincount(index, minlength=40), 1)
+    rest = d - (np.bincount(index, d, minlength=40) / count)[index]
+    weight = np.abs(speed) / float(np.sum(np.abs(speed)))
+    # Collected over small steps of angle, the sums over all orders are one Fourier transform.
+    per_turn = max(2.0 * highest, min(16.0 * highest, MOST_STEPS / turns))
+    place = ((theta - theta.min()) / math.tau * per_turn).astype(int)
+    course = np.bincount(place, weight * rest)
+    size = 1 << max(len(course), math.ceil(per_turn / 0.25), math.ceil(4.0 * turns * per_turn)).bit_length()
+    orders = np.arange(size // 2 + 1, dtype=np.float64) * (per_turn / size)
+    lines = 2.0 * np.abs(np.fft.rfft(course, size))
+    shown = (orders >= max(0.5, 0.5 / turns)) & (orders <= highest)
+    orders, lines = orders[shown], lines[shown]
+    # Of noise the amplitudes are Rayleigh: median sigma sqrt(2 ln 2), passed by one of K with 1 % at sigma sqrt(2 ln(K/0.01)).
+    sigma = float(np.median(lines)) / math.sqrt(2.0 * math.log(2.0))
+    return OrderLines(orders, lines, sigma * math.sqrt(2.0 * math.log(max(len(orders), 2) / 0.01)), turns)
+
+
+def reversal_averages(velocity: Vector, torque: Vector, drive_torque: Vector, dt: float, half_window: float = 0.05) -> Reversals:
+    """Averages of missing torque and velocity [rad/s] around the samples where the velocity changes its sign.
+
+    torque: the missing torque; drive_torque: the controller's, by whose size before the reversal the groups are made [N m].
+    """
+    half = max(3, round(half_window / dt))
+    w = smoothed(velocity, 5)
+    floor = 0.02 * float(np.abs(w).max(initial=0.0))
+    far = np.flatnonzero(np.abs(w) > floor)
+    signs = np.sign(w[far])
+    turns = np.flatnonzero(signs[1:] != signs[:-1])
+    found = []
+    for i in turns:
+        a, b = far[i], far[i + 1]
+        centre = a + int(np.argmax(np.sign(w[a : b + 1]) != signs[i]))
+        if centre >= half and centre + half < len(w):
+            found.append((centre, float(signs[i + 1]), float(np.abs(drive_torque[centre - half : centre + half]).max())))
+    groups: dict[str, tuple[Vector, Vector, Vector, int]] = {}
+    sizes = [size for *_, size in found]
+    split = math.sqrt(min(sizes) * max(sizes)) if found else 0.0
+    several = len(found) >= 4 and max(sizes) > 1.5 * min(sizes)
+    for name in ("small torque", "large torque") if several else ("all",):
+        chosen = [(c, s) for c, s, size in found if not several or (size <= split) == (name == "small torque")]
+        if chosen:
+            d = np.array([s * torque[c - half : c + half + 1] for c, s in chosen])
+            v = np.array([s * velocity[c - half : c + half + 1] for c, s in chosen])
+            groups[name] = (d.mean(axis=0), d.std(axis=0), v.mean(axis=0), len(chosen))
+    return Reversals(np.arange(-half, half + 1, dtype=np.float64) * dt, groups)
+
+
+def spectrum(x: Vector, dt: float, segments: int = 8) -> Spectrum:
+    """Of x without its mean; white noise of standard deviation s stands at s sqrt(2 dt) at every frequency."""
+    size = max(16, min(len(x), 2 * len(x) // (segments + 1)))
+    window = np.hanning(size + 2)[1:-1]
+    starts = range(0, max(len(x) - size, 0) + 1, max(1, size // 2))
+    power = np.mean([np.abs(np.fft.rfft((x[a : a + size] - x.mean()) * window)) ** 2 for a in starts], axis=0)
+    density = np.sqrt(2.0 * dt * power / np.sum(window**2))
+    f = np.arange(1, len(density), dtype=np.float64) / (size * dt)
+    return Spectrum(f, density[1:])

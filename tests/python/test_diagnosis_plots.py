@@ -1,0 +1,153 @@
+"""Pictures of a diagnosis: the numbers they draw are right, every kind renders, no state is left behind."""
+
+from __future__ import annotations
+
+import io
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gaident.errors import SettingsError
+from gaident.show import plot_evidence, plot_orders, plot_residual, plot_reversals, plot_torque_velocity
+from gaident.show.diagnosis_numbers import binned_mean, branches, order_lines, reversal_averages, spectrum
+
+DT = 1e-3
+N = 4000
+TIME = DT * np.arange(N)
+VELOCITY = 60.0 * np.sin(2.0 * math.pi * 1.5 * TIME) * np.repeat([0.2, 1.0], N // 2)
+POSITION = DT * np.cumsum(VELOCITY)
+NOISE = np.random.default_rng(0).standard_normal(N)
+FRICTION = -0.05 * np.sign(VELOCITY)
+
+
+def rendered(figure: Any) -> None:
+    drawn = io.BytesIO()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # a layout that does not fit together warns
+        figure.savefig(drawn, format="png", dpi=50)
+    assert drawn.getvalue().startswith(b"\x89PNG")
+
+
+def test_bins_have_an_edge_at_standstill_and_the_right_mean_and_spread() -> None:
+    found = binned_mean(VELOCITY, FRICTION + 0.01 * NOISE, 20)
+    assert np.all(np.diff(found.x) > 0.0) and found.count.sum() > 0.99 * N
+    np.testing.assert_allclose(found.mean, -0.05 * np.sign(found.x), atol=0.003)
+    np.testing.assert_allclose(found.std, 0.01, rtol=0.3)
+    half = binned_mean(VELOCITY, FRICTION, 20, VELOCITY > 0.0)
+    assert np.all(half.x > 0.0)
+    assert len(binned_mean(np.zeros(50), np.ones(50)).x) == 1
+
+
+def test_branches_are_told_by_speed_not_velocity() -> None:
+    faster, slower = branches(VELOCITY, DT)
+    assert not np.any(faster & slower)
+    late = slice(N // 2 + 100, N - 100)
+    rate = np.gradient(np.abs(VELOCITY), DT)[late]
+    clear = np.abs(rate) > 0.5 * np.abs(rate).max()
+    assert np.mean((rate > 0.0)[clear] == faster[late][clear]) > 0.95
+    assert np.mean((rate < 0.0)[clear] == slower[late][clear]) > 0.95
+
+
+def test_an_order_line_stands_at_its_order_with_its_amplitude() -> None:
+    """Friction beside it is no line; noise alone has no peak."""
+    ripple = 0.01 * np.sin(7.0 * POSITION + 0.3)
+    velocity = 30.0 + 5.0 * np.sin(9.0 * TIME)
+    position = DT * np.cumsum(velocity)
+    steady = order_lines(position, 0.01 * np.sin(7.0 * position + 0.3) + 0.005 * NOISE, velocity)
+    assert steady.turns == pytest.approx(np.ptp(position) / math.tau)
+    assert [k for k, _ in steady.peaks] == [7.0]
+    assert steady.peaks[0][1] == pytest.approx(0.01, rel=0.03)
+    mixed = order_lines(POSITION, ripple + FRICTION + 0.005 * NOISE, VELOCITY)
+    # A motion that repeats itself ties angle to velocity: a part of the line goes with the velocity.
+    assert mixed.peaks[0][0] == 7.0 and mixed.peaks[0][1] == pytest.approx(0.01, rel=0.2)
+    for seed in range(5):
+        noise = np.random.default_rng(seed).standard_normal(N)
+        assert order_lines(position, noise, velocity).peaks == []
+    assert len(order_lines(0.01 * POSITION[:100], NOISE[:100], VELOCITY[:100]).order) == 0
+
+
+def test_reversals_are_averaged_in_the_new_direction() -> None:
+    found = reversal_averages(VELOCITY, FRICTION, np.repeat([0.1, 0.5], N // 2), DT)
+    assert set(found.groups) == {"small torque", "large torque"}
+    assert sum(count for *_, count in found.groups.values()) in (10, 11)
+    for mean, spread, w, _ in found.groups.values():
+        assert len(mean) == len(found.time) == 101
+        np.testing.assert_allclose(mean[:45], 0.05, atol=1e-12)
+        np.testing.assert_allclose(mean[56:], -0.05, atol=1e-12)
+        assert spread.max() < 0.06 and w[0] < 0.0 < w[-1]
+    assert np.ptp(found.groups["large torque"][2]) > 3.0 * np.ptp(found.groups["small torque"][2])
+    assert reversal_averages(30.0 + VELOCITY[:900], FRICTION[:900], FRICTION[:900], DT).groups == {}
+    one = reversal_averages(VELOCITY[:500], FRICTION[:500], FRICTION[:500], DT)
+    assert [count for *_, count in one.groups.values()] == [1]
+
+
+def test_white_noise_stands_at_its_floor_and_a_hum_at_its_frequency() -> None:
+    found = spectrum(0.2 * NOISE + 0.5 * np.sin(2.0 * math.pi * 50.0 * TIME), DT)
+    assert found.frequency[int(np.argmax(found.density))] == pytest.approx(50.0, abs=2.0)
+    quiet = np.abs(found.frequency - 50.0) > 10.0
+    assert np.median(found.density[quiet]) == pytest.approx(0.2 * math.sqrt(2.0 * DT), rel=0.1)
+
+
+def test_torque_against_velocity_draws_both_branches_and_the_named_curve() -> None:
+    grid = np.linspace(-60.0, 60.0, 50)
+    figure = plot_torque_velocity(
+        VELOCITY, FRICTION + 0.01 * NOISE, DT, std=0.01, curve=(grid, -0.05 * np.sign(grid), "Coulomb friction")
+    )
+    (ax,) = figure.axes
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert sorted(labels) == sorted(["+-2 std", "accelerating", "decelerating", "Coulomb friction", "mean +- sd"])
+    assert ax.get_ylabel() == "missing torque [N m]" and ax.get_xlabel() == "velocity [rad/s]"
+    rendered(figure)
+    linear = plot_torque_velocity(VELOCITY, FRICTION, DT, axis="linear").axes[0]
+    assert linear.get_ylabel() == "missing force [N]" and linear.get_xlabel() == "velocity [m/s]"
+    with pytest.raises(SettingsError, match="axis is 'round'"):
+        plot_torque_velocity(VELOCITY, FRICTION, DT, axis="round")
+
+
+def test_orders_reversals_and_residual_render() -> None:
+    lines = plot_orders(POSITION, 0.02 * np.sin(6.0 * POSITION), VELOCITY)
+    assert "6" in [text.get_text() for text in lines.axes[0].texts]
+    rendered(lines)
+    few = plot_orders(0.001 * POSITION, NOISE, VELOCITY)
+    assert "too few" in few.axes[0].texts[0].get_text()
+    rendered(few)
+    rendered(plot_reversals(VELOCITY, FRICTION, np.repeat([0.1, 0.5], N // 2), DT))
+    none = plot_reversals(80.0 + VELOCITY, FRICTION, FRICTION, DT)
+    assert none.axes[0].texts[0].get_text() == "the velocity never reverses"
+    rendered(none)
+    residual = plot_residual(TIME, 0.3 * NOISE, 0.3, after=0.1 * NOISE)
+    floor = [line for line in residual.axes[1].lines if line.get_label() == "white noise floor"]
+    assert floor[0].get_ydata()[0] == pytest.approx(0.3 * math.sqrt(2.0 * DT))
+    rendered(residual)
+
+
+def test_the_evidence_at_a_glance() -> None:
+    before = {"velocity": VELOCITY.copy(), "dhat": FRICTION + 0.005 * NOISE}
+    simulated = VELOCITY + 0.5 * np.sin(30.0 * TIME)
+    figure = plot_evidence(
+        TIME, VELOCITY, simulated, before["dhat"], POSITION, 2.0 * FRICTION, 0.1, std=0.01, extended=VELOCITY + 0.1 * NOISE,
+        title="Test drive: explained",
+    )  # fmt: skip
+    assert len(figure.axes) == 6 and figure.get_suptitle() == "Test drive: explained"
+    heads = [ax.get_title(loc="left") for ax in figure.axes]
+    assert [head[0] for head in heads] == list("abcdef")
+    residual = next(ax for ax in figure.axes if ax.get_title(loc="left").startswith("c"))
+    drawn = {line.get_label(): line.get_ydata() for line in residual.lines}
+    np.testing.assert_allclose(drawn["linear model"], VELOCITY - simulated)
+    rendered(figure)
+    np.testing.assert_array_equal(VELOCITY, before["velocity"])
+    rendered(plot_evidence(TIME, VELOCITY, simulated, FRICTION, POSITION, FRICTION, 0.1))
+
+
+def test_a_motionless_and_a_long_record_render() -> None:
+    still = np.zeros(300)
+    noise = 0.01 * NOISE[:300]
+    rendered(plot_evidence(TIME[:300], still, noise, noise, still, still, 0.01))
+    long = 100_000
+    t, w = DT * np.arange(long), np.tile(VELOCITY, long // N)
+    figure = plot_evidence(t, w, w + 0.1, np.tile(FRICTION, long // N), DT * np.cumsum(w), np.tile(FRICTION, long // N), 0.1)
+    assert max(len(line.get_xdata()) for ax in figure.axes for line in ax.lines) < 30_000
+    rendered(figure)

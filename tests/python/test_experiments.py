@@ -1,0 +1,122 @@
+"""Proposed experiments keep to the drive's limits and trigger what they are meant to trigger."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from gaident.diagnosis.excitation import excitation
+from gaident.diagnosis.experiments import Limits, candidate_commands, first_experiment, separation
+from gaident.errors import SettingsError
+
+DT = 1e-3
+MASS = ga.OneMass(J=2e-4, D=3e-3)
+GAINS = {"kp": 0.02, "ki": 0.5}
+CASES = [
+    (Limits(100.0, 1.5, math.inf, 3.5), {}),
+    (Limits(100.0, 1.5, 20.0, 3.5), {"inertia": 2e-4, "kp": 0.02}),
+    (Limits(300.0, 3.0, 1.0, 2.0), {}),
+    (Limits(300.0, 3.0, 1.0, 2.0), {"inertia": 2e-4, "kp": 0.02}),
+    (Limits(100.0, 0.5, 3.0, 20.0), {"inertia": 5e-3, "kp": 0.02}),
+]
+EFFECTS = {
+    *("coulomb_friction", "stribeck_friction", "asymmetric_friction", "presliding_friction", "quadratic_drag", "load_torque"),
+    *("unbalance", "cogging", "friction_drift", "backlash", "hardening_stiffness", "torque_saturation", "torque_dead_band"),
+    *("transport_delay", "torque_lag", "integrator_clamp", "command_rate_limit", "velocity_filter", "velocity_ripple"),
+    "extra_resonance",
+}
+
+
+def everything(limits: Limits, known: dict[str, float]) -> list[tuple[str, np.ndarray]]:
+    items = [(item.name, item.command) for item in candidate_commands(DT, limits, **known)]
+    return [("first", first_experiment(DT, limits, **known).command), *items]
+
+
+@pytest.mark.parametrize(("limits", "known"), CASES)
+def test_every_command_keeps_to_the_limits(limits: Limits, known: dict[str, float]) -> None:
+    for name, command in everything(limits, known):
+        angle = DT * np.concatenate([[0.0], np.cumsum(command)])
+        assert np.abs(command).max() <= 0.9 * limits.speed * (1 + 1e-12), name
+        assert np.ptp(angle) <= 0.9 * limits.travel * (1 + 1e-9), name
+        assert len(command) * DT <= limits.duration * (1 + 1e-9), name
+        assert command[-1] == 0.0 and abs(angle[-1]) <= 1e-9 * max(np.ptp(angle), 1.0), name
+        assert len(command) > 100 and np.abs(command).max() > 0.0, name
+
+
+def test_a_simulated_drive_keeps_to_them_too_and_ramps_stay_within_the_torque() -> None:
+    limits, known = Limits(100.0, 1.5, 20.0, 3.5), {"inertia": 2e-4, "kp": 0.02}
+    for name, command in everything(limits, known):
+        still = ga.Record(DT, command, 0.0 * command)
+        done = ga.run(MASS, still, ga.PI(**GAINS, torque_limit=limits.torque))
+        assert np.abs(done.velocity).max() <= limits.speed, name
+        assert np.ptp(done.position) <= limits.travel, name
+        free = ga.run(MASS, still, ga.PI(**GAINS))
+        if name in ("speeds mixed in time", "repeated segment", "triangle across zero", "holds up and down"):
+            assert np.abs(free.torque).max() <= limits.torque, name
+
+
+def test_the_first_experiment_triggers_the_whole_library() -> None:
+    proposal = first_experiment(DT, Limits(100.0, 1.5, math.inf, 3.5), kp=0.02)
+    assert set(proposal.separates) == EFFECTS
+    assert math.isnan(proposal.margin) and proposal.reason
+    low, high = proposal.reach
+    assert low >= -0.01 and high > math.tau
+    still = ga.Record(DT, proposal.command, 0.0 * proposal.command)
+    done = ga.run(MASS, still, ga.PI(**GAINS))
+    found = excitation(ga.Record(DT, proposal.command, done.velocity, torque=done.torque), ga.PI(**GAINS))
+    assert dict(found.not_testable) == {}
+    assert len(found.steps) >= 5 and found.reversals > 20 and found.repeated
+    # The largest step asks for more torque than there is, the smallest does not.
+    assert found.highest_torque > 1.5
+
+
+def test_menu_items_say_what_they_are_for() -> None:
+    items = candidate_commands(DT, Limits(100.0, 1.5, 50.0, 4.0))
+    assert len({item.name for item in items}) == len(items) >= 11
+    assert {effect for item in items for effect in item.separates} == EFFECTS
+    assert all(item.reason.endswith(".") and len(item.reason) < 120 for item in items)
+    asked = items[0].proposal(["stribeck_friction", "presliding_friction"], 87.0)
+    assert asked.margin == 87.0 and asked.separates == ("stribeck_friction", "presliding_friction")
+    again = candidate_commands(DT, Limits(100.0, 1.5, 50.0, 4.0))
+    assert all(np.array_equal(a.command, b.command) for a, b in zip(items, again, strict=True))
+
+
+def test_separation_counts_what_a_rival_leaves() -> None:
+    command = np.linspace(0.0, 10.0, 50)
+    left = separation(command, lambda r: 2.0 * r, lambda r, w: np.full_like(r, w.mean()), noise=0.5)
+    assert left == pytest.approx(50 * np.var(2.0 * command) / 0.25)
+    assert separation(command, lambda r: r, lambda r, w: w, noise=0.5) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: Limits(0.0, 1.0, 1.0, 1.0), "speed is 0: give one number > 0"),
+        (lambda: Limits(1.0, 1.0, -2.0, 1.0), "travel is -2"),
+        (lambda: Limits(1.0, 1.0, 1.0, math.inf), "duration is inf"),
+        (lambda: Limits("fast", 1.0, 1.0, 1.0), "speed is 'fast'"),
+        (lambda: first_experiment(DT, Limits(1.0, 1.0, 1.0, 0.1)), "duration is 0.1 s, 100 samples: give 0.4 s or more"),
+        (lambda: first_experiment(-DT, Limits(1.0, 1.0)), "dt is -0.001"),
+        (lambda: candidate_commands(DT, (1.0, 2.0)), r"give gaident.Limits"),
+        (lambda: candidate_commands(DT, Limits(1.0, 1.0), inertia=0.0), "inertia is 0"),
+    ],
+)
+def test_impossible_limits_are_refused(wrong: object, message: str) -> None:
+    with pytest.raises(SettingsError, match=message):
+        wrong()  # type: ignore[operator]
+
+
+def test_limits_of_records_are_what_the_records_did() -> None:
+    command = np.repeat([30.0, -20.0], 300)
+    done = ga.run(MASS, ga.Record(DT, command, 0.0 * command), ga.PI(**GAINS))
+    rec = ga.Record(DT, command, done.velocity, torque=done.torque)
+    limits = Limits.of(rec, ga.PI(**GAINS))
+    assert limits.speed == pytest.approx(30.0 / 0.9) and limits.torque == np.abs(done.torque).max()
+    assert limits.travel == math.inf and limits.duration == pytest.approx(0.6)  # more than a turn: it turns freely
+    short = Limits.of([rec[:60], rec[:100]], ga.PI(**GAINS, torque_limit=2.0))
+    assert short.torque == 2.0 and short.travel == pytest.approx(np.ptp(done.position[:100]) / 0.9, rel=1e-3)
+    with pytest.raises(SettingsError, match="speed is 0"):
+        Limits.of(ga.Record(DT, 0.0 * command, 0.0 * command), ga.PI(**GAINS))
