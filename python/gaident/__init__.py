@@ -12,8 +12,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from gaident.data import Record, differentiate, read, read_columns
+from gaident.diagnosis import Diagnosis, Finding, Limits, Proposal, diagnose, first_experiment
 from gaident.errors import GaidentError
-from gaident.identification import Estimate, Identification, SearchSpace, Settings, identify, load
+from gaident.identification import Estimate, Identification, SearchSpace, Settings, identify
 from gaident.models import (
     PI,
     Discrete,
@@ -31,27 +32,34 @@ from gaident.models import (
     simulate,
     simulate_many,
 )
+from gaident.store import load
 
 if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
     "PI",
+    "Diagnosis",
     "Discrete",
     "Effect",
     "Estimate",
+    "Finding",
     "GaidentError",
     "Identification",
+    "Limits",
     "Model",
     "OneMass",
+    "Proposal",
     "Record",
     "Run",
     "SearchSpace",
     "Settings",
     "TwoMass",
+    "diagnose",
     "differentiate",
     "effects",
     "factor_parameters",
+    "first_experiment",
     "identify",
     "initial_state",
     "load",

@@ -19,12 +19,13 @@ import numpy as np
 
 from gaident import demo as demonstration
 from gaident.cli_options import PICTURES, drive_of, in_options, parser_of
-from gaident.cli_output import Progress, csv_targets, csv_text, naming, target_of, write
+from gaident.cli_output import Progress, csv_targets, csv_text, naming, proposal_csv, target_of, write
 from gaident.data.record import Record
+from gaident.diagnosis.diagnose import diagnose
 from gaident.drive_file import Drive
 from gaident.errors import GaidentError, SettingsError
 from gaident.identification.identify import identify
-from gaident.identification.result import Identification, json_text, load
+from gaident.identification.result import Identification, json_text
 from gaident.identification.settings import Settings
 from gaident.identification.starts import starts_moving
 from gaident.models import effects
@@ -32,6 +33,7 @@ from gaident.models.controller import PI
 from gaident.models.mechanics import mechanics_from_dict
 from gaident.models.model import Model
 from gaident.models.simulate import AnyModel, Run, initial_state, run
+from gaident.store import load
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -251,7 +253,10 @@ def _summary(idn: Identification, axis: str) -> str:
 def _draw(idn: Identification, records: Sequence[Record], axis: str, path: Path) -> None:
     from gaident.show.plots import plot_identification
 
-    figure: Figure = plot_identification(idn, records, axis)
+    _save_figure(plot_identification(idn, records, axis), path)
+
+
+def _save_figure(figure: Figure, path: Path) -> None:
     drawn = io.BytesIO()
     figure.savefig(drawn, format=path.suffix[1:].lower())
     write(path, drawn.getvalue())
@@ -276,4 +281,48 @@ def _print_json(data: dict[str, Any]) -> None:
     print(json_text(data))
 
 
-COMMANDS = {"identify": _identify, "simulate": _simulate, "effects": _effects, "demo": _demo}
+def _diagnose(args: argparse.Namespace) -> None:
+    drive = drive_of(args)
+    out = target_of(args.out, args.logs)
+    plot = target_of(args.plot, args.logs, PICTURES)
+    following = target_of(args.next_command, args.logs)
+    controller = drive.controller()
+    records = _read_all(drive, args.logs, controller)
+    validation = _read_all(drive, args.validation, controller) if args.validation else None
+    idn = None
+    if args.model is not None:
+        loaded = load(args.model)
+        if not isinstance(loaded, Identification):
+            raise SettingsError(f"--model {args.model} holds no identification: give what gaident identify --out saved")
+        idn = loaded
+    with Progress(sys.stderr) as progress:
+        dia = diagnose(
+            records,
+            controller,
+            identification=idn,
+            validation=validation,
+            noise=args.noise,
+            bootstrap=args.bootstrap,
+            seed=args.seed,
+            progress=progress,
+        )
+    written = []
+    if out is not None:
+        with naming(out):
+            dia.save(out)
+        written.append(out)
+    if plot is not None:
+        _save_figure(dia.plot(axis=drive.axis), plot)
+        written.append(plot)
+    if following is not None and dia.next_experiment is not None:
+        write(following, proposal_csv(dia.next_experiment, drive.axis).encode())
+        written.append(following)
+    if args.json:
+        _print_json(dia.to_dict())
+        return
+    print(dia.summary(drive.axis))
+    if written:
+        print(f"\nwritten: {', '.join(map(str, written))}")
+
+
+COMMANDS = {"identify": _identify, "diagnose": _diagnose, "simulate": _simulate, "effects": _effects, "demo": _demo}

@@ -79,6 +79,20 @@ examples:
 """
 EFFECTS_HELP = """Lists the effects: place in the loop, parameters with units, one line of meaning."""
 
+DIAGNOSE_HELP = """\
+Shows what the simulation of an axis gets wrong, names the physical cause where the data allow it (dry
+friction, backlash, saturation, delay, cogging, ...), extends the model with it and measures the gain on data
+that no parameter was fitted to. Where two causes cannot be told apart it says so, and proposes the next
+experiment. Identifies the linear model first, unless --model brings one.
+"""
+DIAGNOSE_EXAMPLES = """\
+examples:
+  gaident diagnose run1.csv --drive drive.toml
+  gaident diagnose run1.csv run2.csv --validation run3.csv --drive drive.toml --plot run.png --out run.json
+  gaident diagnose run1.csv --kp 0.0232 --ki 1.367 --bootstrap 99 --next-command next.csv
+
+exit codes: 0 done (whatever the verdict), 1 the work failed, 2 wrong use, 130 interrupted
+"""
 DEMO_HELP = """\
 The main job: identifies a two-mass drive (the paper's robot arm, Table III) from a noisy velocity step
 through its PI loop, and compares the result with the truth. Where the environment variable GAIDENT_DATA
@@ -122,6 +136,22 @@ def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], None]]) -> a
     g = sub.add_argument_group("results")
     g.add_argument("--out", metavar="FILE", help="save the identification (JSON)")
     g.add_argument("--plot", metavar="FILE", help=f"draw measured against simulated ({', '.join(PICTURES)})")
+    g.add_argument("--json", action="store_true", help="print what --out saves instead of the summary")
+
+    sub = command("diagnose", "LOG... ", "log -> what the model gets wrong, its cause, the gain", DIAGNOSE_HELP, DIAGNOSE_EXAMPLES)
+    sub.add_argument("logs", nargs="+", metavar="LOG", help="log file; several are judged together")
+    sub.add_argument("--validation", nargs="+", metavar="LOG", help="logs that no parameter is fitted to (default: the last 30 %% of each log)")
+    sub.add_argument("--model", metavar="FILE", help="the identification to diagnose, as identify --out saved it")
+    _add_log_options(sub)
+    _add_controller_options(sub)
+    g = sub.add_argument_group("the diagnosis")
+    g.add_argument("--noise", type=float, metavar="X", help="standard deviation of the velocity noise, where it is known [rad/s]")
+    g.add_argument("--bootstrap", type=int, default=0, metavar="N", help="simulated records for the p-value of the first finding (default 0: none)")
+    g.add_argument("--seed", type=int, default=0, metavar="N", help="same seed, same result (default 0)")
+    g = sub.add_argument_group("results")
+    g.add_argument("--out", metavar="FILE", help="save the diagnosis (JSON)")
+    g.add_argument("--plot", metavar="FILE", help=f"draw what is wrong and what is left ({', '.join(PICTURES)})")
+    g.add_argument("--next-command", metavar="FILE", help="write the proposed experiment's command (CSV)")
     g.add_argument("--json", action="store_true", help="print what --out saves instead of the summary")
 
     sub = command(

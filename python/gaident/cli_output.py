@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import TextIO
 
 from gaident.data.record import Record
+from gaident.diagnosis.experiments import Proposal
 from gaident.errors import SettingsError
 from gaident.models.simulate import Run
 
-__all__ = ["Progress", "csv_targets", "csv_text", "naming", "target_of", "write"]
+__all__ = ["Progress", "csv_targets", "csv_text", "naming", "proposal_csv", "target_of", "write"]
 
 
 class Progress:
@@ -67,6 +68,14 @@ def csv_text(rec: Record, result: Run | None, axis: str) -> str:
         columns[f"torque [{unit('N m', axis)}]"] = torque
     rows = (",".join(f"{x:.12g}" for x in row) for row in zip(*columns.values(), strict=True))
     return "\n".join([",".join(columns), *rows, ""])
+
+
+def proposal_csv(proposal: Proposal, axis: str) -> str:
+    """A proposed command as a log that a drive's signal generator takes: time and command."""
+    from gaident.show.wording import velocity_unit
+
+    rows = (f"{n * proposal.dt:.9g},{r:.9g}" for n, r in enumerate(proposal.command.tolist()))
+    return "\n".join([f"time [s],command [{velocity_unit(axis)}]", *rows, ""])
 
 
 def target_of(path: str | None, logs: Sequence[str], suffixes: Sequence[str] = ()) -> Path | None:

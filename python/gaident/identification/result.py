@@ -28,7 +28,7 @@ from gaident.models.simulate import initial_state, simulate
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Identification", "Rival", "TrialOutcome", "load"]
+__all__ = ["Identification", "Rival", "TrialOutcome", "decoded", "json_text"]
 
 SCHEMA = "gaident/identification"
 SCHEMA_VERSION = 1
@@ -245,27 +245,6 @@ class Identification:
             temporary.unlink(missing_ok=True)
 
 
-def load(path: str | os.PathLike[str]) -> Identification:
-    """Reads what `Identification.save` wrote.
-
-    Raises GaidentError naming the file where it is missing, no JSON, or not a saved identification.
-    """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError, TypeError) as error:
-        raise GaidentError(f"{path}: cannot be read ({error}); give a file that save() wrote") from error
-    try:
-        data = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise GaidentError(f"{path}: line {error.lineno} is not JSON ({error.msg}); give a file that save() wrote") from error
-    if not isinstance(data, dict):
-        raise GaidentError(f"{path}: holds no saved identification; give a file that save() wrote")
-    try:
-        return Identification.from_dict(_decoded(data))
-    except GaidentError as error:
-        raise GaidentError(f"{path}: {error}") from error
-
-
 def json_text(data: Mapping[str, Any]) -> str:
     """JSON of plain data; nan and inf, which JSON lacks, become objects {"number": "nan"}."""
     return json.dumps(_encoded(dict(data)), indent=1, allow_nan=False)
@@ -284,11 +263,12 @@ def _encoded(x: Any) -> Any:
     return x
 
 
-def _decoded(x: Any) -> Any:
+def decoded(x: Any) -> Any:
+    """What json_text had to encode, back as numbers."""
     if isinstance(x, dict):
         if set(x) == {"number"} and x["number"] in _WORDS:
             return _WORDS[x["number"]]
-        return {k: _decoded(v) for k, v in x.items()}
+        return {k: decoded(v) for k, v in x.items()}
     if isinstance(x, list):
-        return [_decoded(v) for v in x]
+        return [decoded(v) for v in x]
     return x

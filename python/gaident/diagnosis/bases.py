@@ -1,0 +1,108 @@
+"""The linear mechanism that effects are added to: one mass or two.
+
+Lags, delays and filters are linear too, and an identification absorbs them in poles and zeros of no mechanical meaning. A diagnosis starts
+from the mechanism, so that they can be told by name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.diagnosis.candidates import CANDIDATES, FRICTION, Scales
+from gaident.diagnosis.driven import Driven
+from gaident.diagnosis.layout import Layout, described, two_masses
+from gaident.diagnosis.problem import NONE, WORST, Fit, Problem, project_out
+from gaident.diagnosis.screening import Screening
+from gaident.diagnosis.stepwise import THRESHOLD, Search, with_second_mass
+from gaident.models.model import Model
+
+__all__ = ["linear_bases", "without_second_mass"]
+
+Vector = NDArray[np.float64]
+
+
+def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]:
+    """One mass, two masses, or both where only the effects can decide.
+
+    Two alone where nothing on one mass comes near it, else one mass first: a delay or a lag looks like a resonance as long as nothing
+    else is tried, and a load or a saturation hides one.
+    The identified model is a start where it is such a mechanism.
+    """
+    problem, driven = search.problem, search.driven
+    one = _fit(problem, driven, scales, one_mass(driven, identified))
+    starts = [identified] if (identified.p, identified.q) == (1, 2) else []
+    starts += resonant(problem, one)
+    fits = [_fit(problem, driven, scales, m, 6) for m in starts]
+    fits = [f for f in fits if f.cost < WORST]
+    one = problem.settled(one)
+    if not fits:
+        return [one]
+    chosen = sorted(fits, key=lambda f: f.cost)[:1] + (fits[:1] if starts[0] is identified else [])
+    two = min((problem.settled(problem.fit(f.layout, f.x, NONE, 20)) for f in chosen), key=lambda f: f.bic)
+    if one.bic < two.bic:
+        return [one, two]
+    screening = Screening(problem, driven)
+    screening.add(one.layout, one.x, [e for e in search.candidates(one.layout) if e not in (*FRICTION[1:], "extra_resonance")])
+    tried: set[str] = set()
+    for phi in (NONE, two.phi):
+        for s in screening.ranked(phi)[:3]:
+            if s.effect not in tried and problem.judged(problem.fit(s.layout, s.starts[0], phi, 5)).bic < two.bic:
+                return [one, two]
+            tried.add(s.effect)
+    return [two]
+
+
+def _fit(problem: Problem, driven: Driven, scales: Scales, model: Model, iterations: int = 20) -> Fit:
+    layout = Layout.of(model, described(scales, model), driven.moving)
+    x = np.concatenate([layout.base_vector(model), np.zeros(sum(layout.starts))])
+    return problem.fit(layout, x, NONE, iterations)
+
+
+def one_mass(driven: Driven, identified: Model) -> Model:
+    """Inertia and damping from the balance of momentum, w = K int u dt - A int w dt + w(0); or the identified ones."""
+    if (identified.p, identified.q) == (1, 0):
+        return identified
+    gram, right = np.zeros((2, 2)), np.zeros(2)
+    for r in driven.driven:
+        assert r.torque is not None
+        columns = np.vstack([np.cumsum(r.torque), -np.cumsum(r.velocity)]) * r.dt
+        columns = columns - columns.mean(axis=1, keepdims=True)
+        gram += columns @ columns.T
+        right += columns @ (r.velocity - r.velocity.mean())
+    K, a = np.linalg.lstsq(gram, right, rcond=1e-12)[0]
+    slow = 1.0 / max(r.duration for r in driven.records)
+    return Model(float(K) if K != 0.0 else 1.0, [-max(float(a), slow)])
+
+
+def resonant(problem: Problem, one: Fit) -> list[Model]:
+    """Two-mass starts: the resonances that help the one mass most, linearised."""
+    candidate = CANDIDATES["extra_resonance"]
+    layout = one.layout.extended("extra_resonance")
+    rows = np.array(candidate.starts(one.layout.scales))
+    X = np.vstack([one.layout.inserted(one.x, z) for z in rows])
+    _, J, _ = problem.linearised(one.layout, one.x, NONE)
+    E = problem.errors(layout, X)
+    finite = np.all(np.isfinite(E), axis=1)
+    rest = project_out(J, np.where(finite[:, None], E, 0.0))
+    costs = np.where(finite, np.einsum("ij,ij->i", rest, rest), np.inf)
+    return [two_masses(layout, X[i]) for i in np.argsort(costs)[:3]]
+
+
+def without_second_mass(search: Search, final: Fit) -> Fit:
+    """Back to one mass where, with the effects in the model, the second is not worth the threshold."""
+    problem = search.problem
+    if final.layout.masses == 1 or not final.effects or any(CANDIDATES[e].place == "coupling" for e in final.effects):
+        return final
+    K, a, _, e0, _, f0 = final.layout.base_values(final.x[None, :])[0]
+    one = Model(float(K * f0 / e0) if e0 else float(K), [-float(a)])
+    layout = Layout.of(one, replace(final.layout.scales, two_masses=False), [n > 0 for n in final.layout.starts])
+    x = layout.base_vector(one)
+    for e in final.effects:
+        layout = layout.extended(e)
+        x = np.concatenate([x, final.x[final.layout.slot(e)]])
+    x = np.concatenate([x, np.zeros(sum(layout.starts))])
+    less = problem.settled(problem.fit(layout, x, final.phi, 20))
+    return with_second_mass(problem, less) if less.bic - final.bic < THRESHOLD else final

@@ -1,0 +1,355 @@
+"""diagnose(): what the simulation gets wrong, the cause, the extended model, the gain."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.diagnosis.bases import linear_bases, without_second_mass
+from gaident.diagnosis.candidates import CANDIDATES, TWINS, Scales
+from gaident.diagnosis.controller_place import controller_findings
+from gaident.diagnosis.driven import AT_CONTROLLER, Driven
+from gaident.diagnosis.excitation import excitation
+from gaident.diagnosis.gains import Gains, measured_gains
+from gaident.diagnosis.hygiene import cleaned, outliers, quantisation
+from gaident.diagnosis.layout import Layout
+from gaident.diagnosis.leftover import leftover
+from gaident.diagnosis.problem import Fit, Problem
+from gaident.diagnosis.result import Diagnosis, Finding
+from gaident.diagnosis.stepwise import THRESHOLD, Rival, Search, with_second_mass
+from gaident.diagnosis.uncertainty import estimates_of
+from gaident.diagnosis.wording import evidence_of
+from gaident.errors import RecordError, SettingsError
+from gaident.identification.covariance import Estimate
+from gaident.identification.identify import identify
+from gaident.identification.result import Identification
+from gaident.models.controller import PI
+from gaident.version import version
+
+__all__ = ["diagnose"]
+
+Vector = NDArray[np.float64]
+ProgressCallback = Callable[[float, str], None]
+
+SWAP = 2.0  # BIC units by which a rival has to be better to take a finding's seat
+# What a driver of a remaining error is the domain of: a finding there only describes, it does not name.
+DOMAINS: dict[str, str] = {
+    **dict.fromkeys(("coulomb_friction", "stribeck_friction", "asymmetric_friction", "quadratic_drag"), "velocity"),
+    "presliding_friction": "past",
+    "friction_drift": "time",
+    "load_torque": "time",
+    **dict.fromkeys(("unbalance", "cogging", "velocity_ripple"), "position"),
+    **dict.fromkeys(("torque_saturation", "torque_dead_band"), "torque"),
+    **dict.fromkeys(("backlash", "hardening_stiffness"), "past"),
+}
+FRICTION_DOMAIN = {"velocity", "position", "past", "time"}
+
+
+def diagnose(
+    rec: Record | Sequence[Record],
+    controller: PI | None = None,
+    identification: Identification | None = None,
+    validation: Record | Sequence[Record] | None = None,
+    noise: float | Record | None = None,
+    bootstrap: int = 0,
+    seed: int = 0,
+    progress: ProgressCallback | None = None,
+) -> Diagnosis:
+    """Shows what the model of an axis gets wrong, names the physical cause where the data allow it, and measures the gain.
+
+    rec: a Record or a list. controller: the velocity loop's PI; None: open loop, the record's torque drives the model.
+    identification: what identify() found; without it, it is run first. validation: Record or list that no fit sees; without it the
+        last 30 % of each record are held out where they are long enough (see `held_out`).
+    noise: standard deviation of the velocity noise [rad/s], or a Record at standstill; None: from the record itself.
+    bootstrap: simulated records without any effect to calibrate the p-value of the first finding; 0: none.
+    progress: called now and then with (fraction done, message).
+
+    The method: stepwise extension by the effects of `gaident.effects.table()`, base and effects refitted together on whitened errors of a
+    torque-driven simulation, decided by BIC with a calibrated threshold; rivals within 10 units and structural twins make a finding
+    ambiguous; what no effect explains is reported by its driver and not named. See docs/diagnosis.md.
+
+    Raises GaidentError (a ValueError) that names the argument, its value and the remedy.
+    """
+    began = time.perf_counter()
+    note = _Note(progress)
+    records = _records(rec, "rec")
+    held = () if validation is None else _records(validation, "validation")
+    _check(records, held, controller, identification, bootstrap, seed)
+    note(0.02, "identifying the linear model")
+    given = identification is not None
+    idn = identification if identification is not None else identify(list(records), controller, seed=seed)
+    work = _Work(records, held, controller, idn, given, _noise_std(noise), note)
+    work.search()
+    result = work.report(seed, time.perf_counter() - began)
+    if bootstrap:
+        from gaident.diagnosis.bootstrap import with_p_value
+
+        result = with_p_value(result, work.seeker, work.base, work.final, bootstrap, seed, lambda message: note(None, message))
+    object.__setattr__(result, "seconds", time.perf_counter() - began)
+    return result
+
+
+class _Note:
+    """Progress that goes on by itself: each message takes half of what is left."""
+
+    def __init__(self, callback: ProgressCallback | None) -> None:
+        self.callback, self.fraction = callback, 0.0
+
+    def __call__(self, fraction: float | None, message: str) -> None:
+        self.fraction = fraction if fraction is not None else self.fraction + 0.2 * (1.0 - self.fraction)
+        if self.callback is not None:
+            self.callback(min(self.fraction, 1.0), message)
+
+
+@dataclass
+class _Work:
+    """One diagnosis on its way."""
+
+    records: tuple[Record, ...]
+    held: tuple[Record, ...]
+    controller: PI | None
+    idn: Identification
+    given: bool
+    noise: float | None
+    note: _Note
+    findings: list[Finding] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        order = sorted(range(len(self.records)), key=lambda i: (self.records[i].digest, self.records[i].name))
+        self.records = tuple(self.records[i] for i in order)  # sums must not depend on the order given
+        hit = [outliers(r.velocity) for r in self.records]
+        clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
+        self.clean = tuple(clean)
+        self.driven = Driven.of(clean, self.controller)
+        weight = np.ones(sum(self.driven.lengths))
+        at = 0
+        for h, n in zip(hit, self.driven.lengths, strict=True):
+            weight[at + h] = 0.0
+            at += n
+        self.problem = Problem(self.driven.predict, self.driven.measured, self.driven.lengths, weight)
+        self.scales = _scales(self.driven)
+        self.step = quantisation(self.records)
+        self.spoiled = int(sum(len(h) for h in hit))
+        self.excited = excitation(self.clean, self.controller)
+
+    def search(self) -> None:
+        """Base, controller, stepwise extension, rivals, what is left."""
+        found, self.at_controller, notes = controller_findings(self.driven, self.scales)
+        self.controller_steps = found
+        self.notes += notes
+        not_testable = dict(self.excited.not_testable)
+        allowed = [e for e in CANDIDATES if e not in not_testable and e not in self.at_controller.decided]
+        if self.controller is None:
+            allowed = [e for e in allowed if e not in AT_CONTROLLER]
+        self.not_testable = not_testable
+        self.seeker = search = Search(self.problem, self.driven, allowed, lambda message: self.note(None, message))
+        bases = linear_bases(search, self.scales, self.idn.model)
+        ends: list[tuple[Fit, Fit]] = []
+        for base in bases:
+            ends.append((without_second_mass(search, search.run(base)), base))
+            if search.only_noise(ends[-1][0]):
+                break
+        final, self.base = min(ends, key=lambda e: e[0].bic)
+        self.rivals: dict[str, tuple[float, list[Rival]]] = {}
+        for swaps_left in (2, 1, 0):
+            final, again = self.with_rivals(search, final, swaps_left > 0)
+            if not again:
+                break
+        self.final = final
+        self.note(0.85, "looking for what is left")
+        self.left = leftover(self.problem, self.driven, final)
+
+    def with_rivals(self, search: Search, final: Fit, may_swap: bool) -> tuple[Fit, bool]:
+        """Each finding's rivals in the final model; a better one takes the seat, and the round has to be run again."""
+        self.rivals = {}
+        for effect in final.effects:
+            self.note(None, f"rivals of {effect.replace('_', ' ')}")
+            gain, rivals = search.rivals(final, effect)
+            self.rivals[effect] = (gain, rivals)
+            if not rivals:
+                continue
+            contained = effect in CANDIDATES[rivals[0].effect].parents
+            if may_swap and rivals[0].behind < -(THRESHOLD if contained else SWAP):
+                return search.thinned(with_second_mass(self.problem, rivals[0].fit)), True
+        return final, False
+
+    def report(self, seed: int, seconds: float) -> Diagnosis:
+        """Everything the user sees."""
+        self.note(0.9, "measuring the gain")
+        driver = self.left.driver
+        causes = [e for e in self.final.effects if not self._only_describes(e, driver)]
+        estimates = estimates_of(self.problem, self.final)
+        gains = measured_gains(
+            self.clean, self.held, self.controller, self.idn.model, self.final, self.problem, self.noise, self.at_controller.effects
+        )
+        findings = [*self._noise_findings(), *(replace(f, gain=gains.of(f.effect)) for f in self.controller_steps)]
+        for effect in causes:
+            gain, rivals = self.rivals[effect]
+            alternatives = self._alternatives(effect, rivals)
+            findings.append(
+                Finding(
+                    effect=effect,
+                    parameters=estimates[effect],
+                    alternatives=alternatives,
+                    gain=gains.of(effect),
+                    delta_bic=gain,
+                    evidence=evidence_of(effect, estimates[effect], gain, rivals, alternatives),
+                )
+            )
+        findings += self._structural(estimates)
+        model = self.final.layout.model(self.final.x)
+        for name, values in self.at_controller.effects.items():
+            model = model.with_effect(name, **values)
+        real = [f for f in findings if not f.is_noise]
+        if driver is None:
+            verdict = "explained" if real else "adequate"
+        else:
+            verdict = "partly explained" if real else "unexplained"
+            dropped = [e.replace("_", " ") for e in self.final.effects if e not in causes]
+            if dropped:
+                self.notes.append(
+                    f"The closest description is {' and '.join(dropped)}, but it leaves an error that depends on {driver}: "
+                    "no effect of the library fits, so none is named."
+                )
+        ambiguous = [f for f in real if f.alternatives]
+        proposal = None
+        if ambiguous:
+            self.note(0.95, "proposing the next experiment")
+            from gaident.diagnosis.next_experiment import propose
+
+            proposal = propose(ambiguous, self.rivals, self.final, self.driven, self.problem, self.noise_floor())
+        return Diagnosis(
+            verdict=verdict,
+            findings=tuple(findings),
+            not_testable=self.not_testable,
+            model=model,
+            before=gains.before,
+            after=gains.after,
+            driver=driver,
+            next_experiment=proposal,
+            gain_interval=gains.interval,
+            held_out=gains.held_out,
+            base_shift=self._base_shift(),
+            left=self.left.gains,
+            notes=tuple(self.notes),
+            identification=self.idn,
+            controller=self.controller,
+            seed=seed,
+            seconds=seconds,
+            simulations=self.problem.simulations,
+            samples=sum(self.driven.lengths),
+            digests=tuple(r.digest for r in self.records),
+            version=version(),
+            records=self.records,
+        )
+
+    def noise_floor(self) -> float:
+        """Standard deviation of the velocity noise [rad/s]."""
+        return self.noise if self.noise is not None else float(np.sqrt(self.final.cost / self.problem.count))
+
+    def _only_describes(self, effect: str, driver: str | None) -> bool:
+        """Whether a finding stands in the domain of what is left: something there is not in the library."""
+        if driver is None:
+            return False
+        domain = DOMAINS.get(effect)
+        return domain == driver or (domain in FRICTION_DOMAIN and driver in FRICTION_DOMAIN)
+
+    def _alternatives(self, effect: str, rivals: Sequence[Rival]) -> tuple[str, ...]:
+        """Statistical rivals and structural twins."""
+        names = [r.effect for r in rivals]
+        for twins in TWINS:
+            if effect in twins:
+                names += [t for t in sorted(twins) if t != effect]
+        return tuple(dict.fromkeys(names))
+
+    def _noise_findings(self) -> list[Finding]:
+        found = []
+        total = sum(self.driven.lengths)
+        if self.spoiled:
+            fraction = self.spoiled / total
+            text = f"{self.spoiled} of {total} samples leave the signal and come back; they are left out of every fit."
+            found.append(
+                Finding("outliers", {"fraction": Estimate(fraction, float(np.sqrt(self.spoiled) / total), "1")}, evidence=text, is_noise=True)
+            )
+        if self.step > 0.0:
+            text = f"All velocities lie on a lattice of {self.step:.4g} rad/s: the resolution of the encoder or of the log."
+            found.append(Finding("velocity_quantisation", {"step": Estimate(self.step, 0.0, "rad/s")}, evidence=text, is_noise=True))
+        return found
+
+    def _structural(self, estimates: dict[str, dict[str, Estimate]]) -> list[Finding]:
+        """A second mass that the given identification does not have is a finding; one found here is part of the linear model."""
+        return []
+
+    def _base_shift(self) -> dict[str, tuple[float, float]]:
+        """Base parameters before (the linear fit) and after (with the effects)."""
+        if self.base.layout.masses != self.final.layout.masses:
+            return {}
+        names = ("gain", "pole", "pole_pair_e1", "pole_pair_e0", "zero_pair_e1", "zero_pair_e0")
+        before = self.base.layout.base_values(self.base.x[None, :])[0]
+        after = self.final.layout.base_values(self.final.x[None, :])[0]
+        return {n: (float(b), float(a)) for n, b, a in zip(names, before, after, strict=False)}
+
+
+def _scales(driven: Driven) -> Scales:
+    w, u, angle = driven.measured, driven.torque, driven.angle
+    command = driven.command
+    dt = min(r.dt for r in driven.records)
+    steps = 0.0 if command is None else float(np.abs(np.diff(command, prepend=0.0)).max()) / dt
+    integral = float(np.abs(u).max())
+    torque = max(float(np.abs(u).max()), 1e-300)
+    return Scales(
+        dt=dt,
+        duration=max(r.duration for r in driven.records),
+        speed=max(float(np.abs(w).max()), 1e-300),
+        torque=torque,
+        acceleration=steps or float("inf"),
+        travel=float(np.ptp(angle)),
+        friction=0.02 * torque,
+        stiffness=float("nan"),
+        load_inertia=float("nan"),
+        resonance=float("nan"),
+        two_masses=False,
+        integral=integral,
+    )
+
+
+def _records(rec: Record | Sequence[Record], name: str) -> tuple[Record, ...]:
+    given = (rec,) if isinstance(rec, Record) else tuple(rec) if isinstance(rec, Sequence) else ()
+    if not given or not all(isinstance(r, Record) for r in given):
+        raise RecordError(f"{name} is {type(rec).__name__}: give a gaident.Record or a list of them, at least one")
+    return given
+
+
+def _check(
+    records: tuple[Record, ...], held: tuple[Record, ...], controller: PI | None, idn: Identification | None, bootstrap: int, seed: int
+) -> None:
+    if controller is not None and not isinstance(controller, PI):
+        raise SettingsError(f"controller is {controller!r}: give a gaident.PI, or None for a record in open loop")
+    if idn is not None and not isinstance(idn, Identification):
+        raise SettingsError(f"identification is {type(idn).__name__}: give what identify() returned, or None")
+    for r in (*records, *held):
+        if controller is not None and r.command is None:
+            raise RecordError(f"record {r.name or '(without a name)'} has no command: give one, or controller=None for open loop")
+        if controller is None and r.torque is None:
+            raise RecordError(f"record {r.name or '(without a name)'} has no torque: give one, or the controller that makes it")
+    if len({r.dt for r in (*records, *held)}) > 1:
+        raise RecordError("records have different sample times: a diagnosis needs one; diagnose them apart")
+    for name, value, low, high in (("bootstrap", bootstrap, 0, 100_000), ("seed", seed, 0, 2**63 - 1)):
+        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
+            raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
+
+
+def _noise_std(noise: float | Record | None) -> float | None:
+    if noise is None:
+        return None
+    if isinstance(noise, Record):
+        return float(np.std(noise.velocity))
+    if isinstance(noise, bool) or not isinstance(noise, (int, float)) or not 0.0 < float(noise) < float("inf"):
+        raise SettingsError(f"noise is {noise!r}: give the standard deviation of the velocity noise in rad/s, above 0, or a Record at standstill")
+    return float(noise)

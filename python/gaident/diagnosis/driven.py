@@ -1,0 +1,187 @@
+"""The records as the fit sees them: what drove the motor, where it stood, how it began.
+
+A model is driven by the torque that the controller issued: as logged or, without a log, as the controller makes it from the command and the
+*measured* velocity. Noise inside the loop then acts in the model as it did on the drive, and what is left at the truth is the noise
+of the sensor and torques that nobody commanded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.diagnosis.layout import Layout
+from gaident.identification.space import torque_of
+from gaident.identification.starts import noise_std, starts_moving
+from gaident.models.controller import PI
+from gaident.models.simulate import simulate_values
+
+__all__ = ["Driven"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+AT_CONTROLLER = ("integrator_clamp", "command_rate_limit")
+
+
+@dataclass(frozen=True)
+class Driven:
+    """Records with the torque that drove each, and with an angle (measured, or integrated from the measured velocity)."""
+
+    records: tuple[Record, ...]
+    controller: PI | None
+    driven: tuple[Record, ...]
+    moving: tuple[bool, ...]
+
+    @classmethod
+    def of(cls, records: Sequence[Record], controller: PI | None) -> Driven:
+        """The records as driven by their torque."""
+        driven = tuple(_driven(r, torque_of(r, controller)) for r in records)
+        return cls(tuple(records), controller, driven, tuple(starts_moving(r, None) for r in driven))
+
+    @property
+    def torque_logged(self) -> bool:
+        """Whether every record holds the controller's torque."""
+        return all(r.torque is not None for r in self.records)
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Samples of each record."""
+        return tuple(len(r) for r in self.records)
+
+    @property
+    def measured(self) -> Vector:
+        """Velocity, records one after the other [rad/s]."""
+        return np.concatenate([r.velocity for r in self.records])
+
+    @property
+    def torque(self) -> Vector:
+        """Torque, records one after the other [N m]."""
+        return np.concatenate([_torque(r) for r in self.driven])
+
+    @property
+    def angle(self) -> Vector:
+        """Motor angle, records one after the other [rad]."""
+        return np.concatenate([_angle(r) for r in self.driven])
+
+    @property
+    def time(self) -> Vector:
+        """Time since each record's start, records one after the other [s]."""
+        return np.concatenate([r.time for r in self.records])
+
+    @property
+    def command(self) -> Vector | None:
+        """Command, records one after the other [rad/s]; None where one record has none."""
+        commands = [r.command for r in self.records if r.command is not None]
+        return np.concatenate(commands) if len(commands) == len(self.records) else None
+
+    def predict(self, layout: Layout, X: Matrix) -> Matrix:
+        """Simulated velocities of rows of x, (n, samples)."""
+        if layout.looped:
+            names, values = layout.values(X)
+            return np.concatenate(
+                [simulate_values(layout.structure, names, values, r, self.controller) for r in self.records], axis=1
+            )
+        at_controller = [e for e in layout.effects if e in AT_CONTROLLER]
+        if at_controller:
+            return np.vstack([self._predict_one(layout, x, at_controller) for x in X])
+        names, values = layout.values(X)
+        parts = [
+            simulate_values(layout.structure, names, values, r, initial_states=layout.start_values(X, i))
+            for i, r in enumerate(self.driven)
+        ]
+        return np.concatenate(parts, axis=1)
+
+    def _predict_one(self, layout: Layout, x: Vector, at_controller: Sequence[str]) -> Matrix:
+        """With effects of the controller the torque itself depends on x."""
+        limits = {e: float(layout.effect_values(x[None, :], e)[0, 0]) for e in at_controller}
+        names, values = layout.values(x[None, :], at_controller)
+        parts = []
+        for i, r in enumerate(self.records):
+            torque = replayed(r, self.controller, limits)
+            states = layout.start_values(x[None, :], i)
+            parts.append(simulate_values(layout.structure, names, values, _driven(r, torque), initial_states=states))
+        return np.concatenate(parts, axis=1)
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of white noise on the velocity, as its third differences show it [rad/s]."""
+        return float(np.mean([noise_std(r.velocity) for r in self.records]))
+
+    @property
+    def loopable(self) -> bool:
+        """Whether command and controller can drive a model too."""
+        return self.controller is not None and not any(self.moving)
+
+    def response(self, layout: Layout, x: Vector, torques: Matrix) -> Matrix:
+        """Velocity of the linear part of the model x, from rest, under rows of torque held over each sample.
+
+        In the loop the controller answers: G d - T (G d), T the closed loop's response to the command.
+        """
+        from scipy.signal import lfilter
+
+        for e in layout.effects:
+            x, layout = layout.removed(x, e), layout.without(e)
+        linear = layout.model(x)
+        filters = [linear.discrete(layout.scales.dt)]
+        if layout.looped:
+            filters.append(linear.discrete(layout.scales.dt, self.controller))
+        out = np.empty_like(torques)
+        at = 0
+        for n in self.lengths:
+            rows = torques[:, at : at + n]
+            answers = []
+            for d in filters:
+                rows = lfilter(d.alpha, np.concatenate([[1.0], -d.beta]), rows, axis=1)
+                answers.append(rows)
+            out[:, at : at + n] = answers[0] if len(answers) == 1 else answers[0] - answers[1]
+            at += n
+        return out
+
+    def replayed_error(self, limits: dict[str, float]) -> Vector:
+        """Logged torque minus the controller's replay with these limits, records one after the other [N m]."""
+        return np.concatenate([_torque(r) - replayed(r, self.controller, limits) for r in self.records])
+
+
+def replayed(rec: Record, controller: PI | None, limits: dict[str, float]) -> Vector:
+    """What the controller makes of command and measured velocity, with effects of its own [N m]."""
+    assert controller is not None and rec.command is not None
+    command = rec.command
+    if "command_rate_limit" in limits:
+        command = rate_limited(command, limits["command_rate_limit"] * rec.dt)
+    if "integrator_clamp" in limits:
+        clamp = min(limits["integrator_clamp"], controller.limits[1])
+        controller = replace(controller, integrator_limit=clamp)
+    return torque_of(Record(rec.dt, command=command, velocity=rec.velocity), controller)
+
+
+def rate_limited(command: Vector, step: float) -> Vector:
+    """r_lim(n) = r_lim(n-1) + clip(r(n) - r_lim(n-1), +-step), from 0."""
+    out = np.empty_like(command)
+    last = 0.0
+    for n, target in enumerate(command.tolist()):
+        last += min(max(target - last, -step), step)
+        out[n] = last
+    return out
+
+
+def _driven(rec: Record, torque: Vector) -> Record:
+    angle = rec.position
+    if angle is None:
+        w = rec.velocity
+        angle = np.concatenate([[0.0], np.cumsum(0.5 * rec.dt * (w[1:] + w[:-1]))])
+    return Record(rec.dt, velocity=rec.velocity, torque=torque, position=angle, name=rec.name)
+
+
+def _torque(rec: Record) -> Vector:
+    assert rec.torque is not None
+    return rec.torque
+
+
+def _angle(rec: Record) -> Vector:
+    assert rec.position is not None
+    return rec.position

@@ -1,0 +1,153 @@
+"""Before and after: the free-run simulation, linear and extended, on data that no parameter was fitted to.
+
+With validation records these are used whole. Without, parameters are fitted again to the first 70 % of each record and judged on the
+rest of one continuous run, never started anew; where a record is too short for that, the figures are in-sample and say so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.diagnosis.problem import Fit, Problem
+from gaident.diagnosis.result import Fitness
+from gaident.identification.starts import noise_std, starts_moving
+from gaident.models import simulate
+from gaident.models.controller import PI
+from gaident.models.model import Model
+from gaident.models.simulate import initial_state
+
+__all__ = ["Gains", "measured_gains"]
+
+Vector = NDArray[np.float64]
+
+SHARE = 0.7  # of a record that parameters are fitted to
+LEAST = 600  # samples of a record from which a part is held out
+BLOCKS = 200  # bootstrap draws
+
+
+@dataclass(frozen=True)
+class Gains:
+    """before, after, interval of the total fall, how it was held out, and each effect's own fall."""
+
+    before: Fitness
+    after: Fitness
+    interval: tuple[float, float]
+    held_out: str
+    steps: dict[str, float]
+
+    def of(self, effect: str) -> float:
+        """Fall of the error that one effect brought, as a fraction of the error before it."""
+        return self.steps.get(effect, 0.0)
+
+
+def measured_gains(
+    records: Sequence[Record],
+    held: Sequence[Record],
+    controller: PI | None,
+    linear: Model,
+    final: Fit,
+    problem: Problem,
+    noise: float | None,
+    at_controller: dict[str, dict[str, float]],
+) -> Gains:
+    """Errors of the linear model, of each stage and of the extended model."""
+    if held:
+        judged, words, part = [(r, 0) for r in held], "validation records", None
+    elif all(len(r) >= LEAST for r in records):
+        judged = [(r, int(SHARE * len(r))) for r in records]
+        words, part = "the last 30 % of the record, parameters fitted to the first 70 %", SHARE
+    else:
+        judged, words, part = [(r, 0) for r in records], "in-sample", None
+    stages = _stages(final, problem, part)
+    chain = [linear]
+    if at_controller:
+        chain.append(_with(stages[0].layout.model(stages[0].x), at_controller))
+    chain += [_with(f.layout.model(f.x), at_controller) for f in stages[1:]]
+    errors = [_errors(m, judged, controller) for m in chain]
+    levels = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in errors]
+    base = _errors(stages[0].layout.model(stages[0].x), judged, controller)
+    level0 = float(np.sqrt(np.mean(np.concatenate(base) ** 2)))
+    # The linear mechanism, refitted, may be better than the identified model already.
+    previous = min(levels[0], level0) if np.isfinite(level0) else levels[0]
+    steps = {}
+    for effect, level in zip([*at_controller, *final.layout.effects], levels[1:], strict=True):
+        steps[effect] = 1.0 - level / previous if previous > 0.0 else 0.0
+        previous = level
+    if len(errors) == 1:
+        errors.append(errors[0])
+    spread = np.concatenate([r.velocity[first:] for r, first in judged])
+    floor = noise if noise is not None else float(np.mean([noise_std(r.velocity) for r, _ in judged]))
+    size = float(np.sqrt(np.mean((spread - spread.mean()) ** 2)))
+
+    def fitness(parts: list[Vector]) -> Fitness:
+        rmse = float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+        return Fitness(rmse, 100.0 * (1.0 - rmse / size) if size > 0.0 else float("nan"), floor)
+
+    return Gains(fitness(errors[0]), fitness(errors[-1]), _interval(errors[0], errors[-1]), words, steps)
+
+
+def _with(model: Model, effects: dict[str, dict[str, float]]) -> Model:
+    for name, values in effects.items():
+        model = model.with_effect(name, **values)
+    return model
+
+
+def _stages(final: Fit, problem: Problem, part: float | None) -> list[Fit]:
+    """The final model without its effects, with the first, the first two, ...; each refitted to the part that is not held out."""
+    if part is not None:
+        weight = problem.weight.copy()
+        at = 0
+        for n in problem.lengths:
+            weight[at + int(part * n) : at + n] = 0.0
+            at += n
+        problem = Problem(problem.predict, problem.measured, problem.lengths, weight)
+    fits = []
+    layout, x = final.layout, final.x
+    for e in reversed(final.layout.effects):
+        fits.append(problem.fit(layout, x, final.phi, 10) if part is not None or layout is not final.layout else final)
+        x, layout = layout.removed(x, e), layout.without(e)
+    fits.append(problem.fit(layout, x, final.phi, 10))
+    return fits[::-1]
+
+
+def _errors(model: Model, judged: Sequence[tuple[Record, int]], controller: PI | None) -> list[Vector]:
+    errors = []
+    for r, first in judged:
+        state = None
+        if starts_moving(r, controller) and not model.effects and not (controller is not None and controller.limited):
+            state = initial_state(model, r, controller)
+        with np.errstate(over="ignore", invalid="ignore"):
+            e = (r.velocity - simulate(model, r, controller, state))[first:]
+        errors.append(np.where(np.isfinite(e), e, 1e150))
+    return errors
+
+
+def _interval(before: list[Vector], after: list[Vector]) -> tuple[float, float]:
+    """95 % interval of 1 - rmse_after/rmse_before by a paired block bootstrap (blocks beyond the errors' memory)."""
+    b, a = np.concatenate(before), np.concatenate(after)
+    n = len(b)
+    block = max(min(n // 8, 3 * _memory(a)), 1)
+    count = n // block
+    if count < 2:
+        return (float("-inf"), 1.0)
+    sums = np.add.reduceat(np.column_stack([b**2, a**2])[: count * block], np.arange(0, count * block, block), axis=0)
+    rng = np.random.default_rng(0)
+    drawn = sums[rng.integers(0, count, (BLOCKS, count))].sum(axis=1)
+    falls = 1.0 - np.sqrt(drawn[:, 1] / np.maximum(drawn[:, 0], 1e-300))
+    return float(np.quantile(falls, 0.025)), float(np.quantile(falls, 0.975))
+
+
+def _memory(e: Vector) -> int:
+    """Samples until the autocorrelation of e first falls below 0.2."""
+    size = 1 << (2 * len(e) - 1).bit_length()
+    spectrum = np.abs(np.fft.rfft(e - e.mean(), size)) ** 2
+    r = np.fft.irfft(spectrum, size)[: len(e)]
+    below = np.flatnonzero(r < 0.2 * r[0])
+    return int(below[0]) if len(below) else len(e)
+
+

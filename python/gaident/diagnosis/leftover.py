@@ -1,0 +1,157 @@
+"""What the error still depends on, named by its driver and never by a cause.
+
+Each driver is a handful of torques that some function of it could make, without saying which: hats over velocity, torque and position,
+harmonics of the angle, elasto-plastic elements (what depends on the past path), drifts and single frequencies in time. The linear part of
+the model answers to each; what the answers explain of the whitened error, beyond what the model's own parameters could, is the
+driver's gain in BIC units. All share one noise filter, estimated on what all together leave.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.diagnosis.driven import Driven
+from gaident.diagnosis.problem import Fit, Problem, project_out
+
+__all__ = ["LEFT", "Leftover", "leftover"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+LEFT = 12.0
+"""Gain in BIC units from which something counts as left."""
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """Gains [BIC units] by driver, and the strongest where it counts."""
+
+    gains: dict[str, float]
+
+    @property
+    def driver(self) -> str | None:
+        """The driver that explains most, None where nothing significant is left."""
+        name = max(self.gains, key=lambda d: self.gains[d], default=None)
+        return name if name is not None and self.gains[name] > LEFT else None
+
+
+def leftover(problem: Problem, driven: Driven, fit: Fit) -> Leftover:
+    """Every driver's gain over the model."""
+    layout, x = fit.layout, fit.x
+    _, J, error = problem.linearised(layout, x, np.zeros(0))
+    w = problem.measured - error
+    room = max(len(w) // 16, 4)
+    torques: dict[str, Matrix] = {
+        "velocity": _hats_by_sign(w),
+        "position": _of_position(driven.angle, w, driven.lengths),
+        "torque": _hats(driven.torque, 8),
+        "past": _of_path(driven.angle, driven.lengths),
+        "time": _drifts(driven.time, w),
+    }
+    if driven.command is not None:
+        torques["command"] = _hats(driven.command, 8)
+    columns = {d: driven.response(layout, x, rows[:room]) for d, rows in torques.items()}
+    lines = _lines(project_out(J, error[None, :])[0], driven, problem)
+    beyond = np.vstack([J, *columns.values(), *([lines] if len(lines) else [])])
+    phi = problem.filter_of(project_out(beyond[: len(w) // 4], error[None, :])[0])
+    n = problem.count
+    Jw = problem.whitened(J, phi)
+    rest = project_out(Jw, problem.whitened(error[None, :], phi))[0]
+    left = float(rest @ rest)
+    gains = {}
+    for driver, rows in columns.items():
+        gains[driver] = _gain(project_out(Jw, problem.whitened(rows, phi)), rest, left, n, 0)
+    for i in range(0, len(lines), 2):
+        gain = _gain(project_out(Jw, problem.whitened(lines[i : i + 2], phi)), rest, left, n, 1)
+        gains["time"] = max(gains["time"], gain)
+    return Leftover(gains)
+
+
+def _gain(rows: Matrix, rest: Vector, left: float, n: float, searched: int) -> float:
+    sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    rows = rows[sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)]
+    if len(rows) == 0 or left <= 0.0:
+        return -np.inf
+    after = project_out(rows, rest[None, :])[0]
+    rank = np.linalg.matrix_rank(rows @ rows.T / np.outer(*(2 * [np.linalg.norm(rows, axis=1)])), tol=1e-8)
+    return float(n * np.log(left / max(float(after @ after), 1e-300)) - (rank + searched) * np.log(n))
+
+
+def _hats(s: Vector, count: int) -> Matrix:
+    """Piecewise linear functions of s with knots at its quantiles: they sum to 1."""
+    knots = np.unique(np.quantile(s, np.linspace(0.0, 1.0, count)))
+    if len(knots) < 2:
+        return np.ones((1, len(s)))
+    return np.array([np.interp(s, knots, np.eye(len(knots))[i]) for i in range(len(knots))])
+
+
+def _hats_by_sign(w: Vector) -> Matrix:
+    """Functions of velocity that may jump at 0: hats in |w| on either side."""
+    top = float(np.abs(w).max()) or 1.0
+    knots = top * np.array([0.0, 0.01, 0.04, 0.12, 0.3, 0.6, 1.0])
+    hats = np.array([np.interp(np.abs(w), knots, np.eye(len(knots))[i]) for i in range(len(knots))])
+    rows = np.vstack([hats * (w > 0.0), hats * (w < 0.0)])
+    return rows[np.abs(rows).sum(axis=1) > 0.0]
+
+
+def _of_position(angle: Vector, w: Vector, lengths: tuple[int, ...]) -> Matrix:
+    """Slow functions of the angle, with and without the direction of motion; the first turns' harmonics."""
+    turned = float(np.ptp(angle))
+    direction = np.sign(w)
+    shapes = [f(k * angle) for k in (1.0, 2.0) for f in (np.sin, np.cos) if k * turned > 1.0]
+    shapes += list(_hats(angle, 6)[1:])
+    rows = [s * d for s in shapes for d in (np.ones_like(w), direction)]
+    return np.array(rows)
+
+
+def _of_path(angle: Vector, lengths: tuple[int, ...]) -> Matrix:
+    """Elasto-plastic elements: each follows the angle until it yields at its own width, and remembers."""
+    travel = float(np.ptp(angle)) or 1.0
+    widths = travel * np.geomspace(3e-4, 0.3, 6)
+    rows = np.empty((len(widths), len(angle)))
+    at = 0
+    for n in lengths:
+        z = np.zeros(len(widths))
+        steps = np.diff(angle[at : at + n], prepend=angle[at])
+        for k, step in enumerate(steps.tolist()):
+            z = np.clip(z + step, -widths, widths)
+            rows[:, at + k] = z
+        at += n
+    return rows / widths[:, None]
+
+
+def _drifts(t: Vector, w: Vector) -> Matrix:
+    s = t / (float(t.max()) or 1.0)
+    return np.array([s, s * s, s * np.sign(w), s * w])
+
+
+def _lines(error: Vector, driven: Driven, problem: Problem) -> Matrix:
+    """Cosine and sine of the three frequencies that stand highest above the error's spectrum."""
+    longest = max(driven.lengths)
+    if len(driven.lengths) != 1 or longest < 64:
+        return np.zeros((0, len(error)))
+    spectrum = np.abs(np.fft.rfft((error - error.mean()) * np.hanning(longest))) ** 2
+    kernel = np.ones(31) / 31.0
+    level = np.convolve(np.pad(spectrum, 15, mode="reflect"), kernel, mode="valid")
+    height = spectrum / np.maximum(level, 1e-300)
+    height[:4] = 0.0
+    rows = []
+    t = np.arange(longest)
+    for _ in range(3):
+        k = int(np.argmax(height))
+        f = 2.0 * np.pi * _peak(spectrum, k) / longest
+        rows += [np.cos(f * t), np.sin(f * t)]
+        height[max(k - 4, 0) : k + 5] = 0.0
+    return np.array(rows)
+
+
+def _peak(spectrum: Vector, k: int) -> float:
+    """Frequency of a peak between the lines of a Hann-windowed spectrum."""
+    if not 0 < k < len(spectrum) - 1:
+        return float(k)
+    a, b, c = np.log(spectrum[k - 1 : k + 2] + 1e-300)
+    curve = a - 2.0 * b + c
+    return float(k + (0.5 * (a - c) / curve if curve < 0.0 else 0.0))

@@ -1,0 +1,228 @@
+"""The records as a fit sees them, and the fit: least squares of whitened errors over base, effects and start states at once.
+
+A model is driven by the torque that the controller issued, as logged or as the controller makes it from command and *measured* velocity:
+noise inside the loop then acts on the record as it did on the drive, and what is left at the truth is the noise of the sensor alone.
+
+    e(n) = w(n) - w_model(n; x),   v(n) = e(n) - sum_i phi_i e(n-i),   minimise V(x) = sum of v^2 over the samples in use
+
+Every hypothesis is judged with a noise filter phi of its own, which is part of it and charged for:
+
+    BIC = N ln(V / N) + (k + order of phi) ln N
+
+so that no effect is whitened away by a filter that was estimated without it, and none is favoured by one estimated with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.diagnosis.layout import Layout
+from gaident.errors import GaidentError
+from gaident.identification.noise import fit_autoregression
+
+__all__ = ["Fit", "Problem", "project_out"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Predict = Callable[[Layout, Matrix], Matrix]
+
+WORST = 1e300
+HIGHEST = 20  # order of a noise filter
+NONE = np.zeros(0)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A layout with its best x under the noise filter phi: cost V there, and BIC."""
+
+    layout: Layout
+    x: Vector
+    phi: Vector
+    cost: float
+    bic: float
+    converged: bool = False
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects in the model, in the order in which they were added."""
+        return self.layout.effects
+
+
+@dataclass
+class Problem:
+    """Errors of many parameter vectors at once.
+
+    predict(layout, X) -> simulated velocities (n, N), records one after the other; measured: (N,); lengths: samples of each
+    record; weight: (N,), 0 for samples that are left out.
+    """
+
+    predict: Predict
+    measured: Vector
+    lengths: tuple[int, ...]
+    weight: Vector
+    simulations: int = 0
+
+    def errors(self, layout: Layout, X: Matrix) -> Matrix:
+        """Rows of plain errors."""
+        self.simulations += len(X)
+        return self.measured - self.predict(layout, X)
+
+    def whitened(self, E: Matrix, phi: Vector) -> Matrix:
+        """Rows of whitened errors; samples whose past is missing, or not in use, are 0."""
+        V = E.copy()
+        for i, f in enumerate(phi, start=1):
+            V[:, i:] -= f * E[:, :-i]
+        return V * self.usable(len(phi))
+
+    def usable(self, order: int) -> Vector:
+        """1 for samples that count under a filter of this order."""
+        use = self.weight.copy()
+        at = 0
+        for n in self.lengths:
+            use[at : at + self.head] = 0.0
+            at += n
+        if order:
+            for i in np.flatnonzero(self.weight == 0.0):
+                use[i : i + order + 1] = 0.0
+        return use
+
+    @property
+    def head(self) -> int:
+        """Samples at the start of each record that never count, so that filters of all orders are judged on the same ones."""
+        return min(HIGHEST, min(self.lengths) // 12)
+
+    @property
+    def count(self) -> float:
+        """Number of samples that count (those behind a masked one aside)."""
+        return float(self.weight.sum()) - self.head * len(self.lengths)
+
+    def filter_of(self, error: Vector) -> Vector:
+        """Noise filter phi of one row of plain errors, order by BIC."""
+        clean = np.where(self.weight > 0.0, error, 0.0)
+        if not np.all(np.isfinite(clean)) or float(np.abs(clean).max()) > 1e100:
+            return NONE
+        parts = np.split(clean, np.cumsum(self.lengths)[:-1])
+        return fit_autoregression(parts, self.head).phi
+
+    def costs(self, layout: Layout, X: Matrix, phi: Vector) -> Vector:
+        """V of each row; WORST where a model diverges."""
+        V = self.whitened(self.errors(layout, X), phi)
+        return _sums(V)
+
+    def linearised(self, layout: Layout, x: Vector, phi: Vector) -> tuple[Vector, Matrix, Vector]:
+        """(v, J, plain errors) at x: J[j] = dv/dx_j, forward differences; rows of entries that are not moved are 0."""
+        steps = layout.steps()
+        limits = layout.limits()
+        moved = np.flatnonzero(steps > 0.0)
+        h = (3e-3 if layout.looped else 1e-3) * steps  # stops and impacts make the error rough on a small scale
+        h = np.where(x + h > limits[1], -h, h)
+        X = np.repeat(x[None, :], len(moved) + 1, axis=0)
+        X[np.arange(1, len(moved) + 1), moved] += h[moved]
+        E = self.errors(layout, X)
+        V = self.whitened(E, phi)
+        J = np.zeros((layout.size, V.shape[1]))
+        with np.errstate(invalid="ignore", over="ignore"):
+            J[moved] = (V[1:] - V[0]) / h[moved][:, None]
+        return V[0], J, E[0]
+
+    def fit(self, layout: Layout, x: Vector, phi: Vector, iterations: int = 12) -> Fit:
+        """Levenberg-Marquardt from x, eight dampings side by side, bounds by projection."""
+        limits, steps = layout.limits(), layout.steps()
+        x = np.clip(x, *limits)
+        damping, converged = 1e-2, False
+        v, J, _ = self.linearised(layout, x, phi)
+        cost = float(_sums(v[None, :])[0])
+        noise = max(self.count, 1.0)
+        for _ in range(iterations):
+            if cost >= WORST:
+                break
+            A, g = J @ J.T, J @ v
+            diagonal = np.diag(A).copy()
+            usable = (diagonal > 0.0) & (steps > 0.0) & np.isfinite(diagonal)
+            # At a bound with the descent pointing outward: not moved in this step.
+            usable &= ~(((x <= limits[0]) & (g > 0.0)) | ((x >= limits[1]) & (g < 0.0)))
+            if not usable.any():
+                break
+            index = np.flatnonzero(usable)
+            sub, gradient, scale = A[np.ix_(index, index)], g[index], diagonal[index]
+            factors = damping * 10.0 ** np.arange(-3.0, 5.0)
+            X = np.repeat(x[None, :], len(factors), axis=0)
+            for row, factor in zip(X, factors, strict=True):
+                M = sub + np.diag(factor * scale + 1e-12 * scale.max() * 1e-6)
+                try:
+                    row[index] -= np.linalg.solve(M, gradient)
+                except np.linalg.LinAlgError:
+                    continue
+            X = np.clip(X, *limits)
+            costs = self.costs(layout, X, phi)
+            best = int(np.argmin(costs))
+            if not costs[best] < cost:
+                if damping > 1e5:
+                    converged = True
+                    break
+                damping *= 1e5
+                continue
+            fall = cost - float(costs[best])
+            x, cost = X[best], float(costs[best])
+            damping = float(np.clip(damping * 10.0 ** (best - 3.0), 1e-9, 1e9))
+            # In units of the noise a fall of 0.02 changes no decision.
+            if fall < 0.02 * cost / noise:
+                converged = True
+                break
+            v, J, _ = self.linearised(layout, x, phi)
+        return self._scored(layout, x, phi, cost, converged)
+
+    def settled(self, fit: Fit, iterations: int = 6) -> Fit:
+        """The fit under the filter of what it leaves itself (two rounds of generalised least squares)."""
+        if fit.cost >= WORST:
+            return fit
+        best = fit
+        for n in (iterations, max(iterations // 2, 2)):
+            phi = self.filter_of(self.errors(fit.layout, fit.x[None, :])[0])
+            fit = self.fit(fit.layout, fit.x, phi, n)
+            if fit.bic < best.bic:
+                best = fit
+        return best
+
+    def judged(self, fit: Fit) -> Fit:
+        """The same x under the filter of what it leaves."""
+        if fit.cost >= WORST:
+            return fit
+        error = self.errors(fit.layout, fit.x[None, :])
+        phi = self.filter_of(error[0])
+        return self._scored(fit.layout, fit.x, phi, float(_sums(self.whitened(error, phi))[0]), fit.converged)
+
+    def _scored(self, layout: Layout, x: Vector, phi: Vector, cost: float, converged: bool) -> Fit:
+        n = self.count
+        bic = n * np.log(max(cost, 1e-300) / n) + (layout.size + len(phi)) * np.log(n)
+        return Fit(layout, x, phi, cost, float(bic) if cost < WORST else np.inf, converged)
+
+
+def _sums(V: Matrix) -> Vector:
+    with np.errstate(invalid="ignore", over="ignore"):
+        sums = np.einsum("ij,ij->i", V, V)
+    return np.where(np.isfinite(sums), np.minimum(sums, WORST), WORST)
+
+
+def project_out(J: Matrix, V: Matrix) -> Matrix:
+    """Rows of V without what the rows of J can explain."""
+    sizes = np.sqrt(np.einsum("ij,ij->i", J, J))
+    keep = (sizes > 0.0) & np.isfinite(sizes)
+    if not keep.any():
+        return V
+    rows = J[keep] / sizes[keep][:, None]
+    values, vectors = np.linalg.eigh(rows @ rows.T)
+    known = values > 1e-10 * values[-1]
+    basis = (vectors[:, known] / np.sqrt(values[known])).T @ rows
+    return np.asarray(V - (V @ basis.T) @ basis)
+
+
+def split(rows: Sequence[Vector], lengths: Sequence[int]) -> list[Vector]:
+    """One row, cut into records."""
+    if len(rows) == 0:
+        raise GaidentError("no samples")
+    return np.split(np.asarray(rows), np.cumsum(lengths)[:-1])

@@ -1,0 +1,181 @@
+"""Which candidates are worth a fit: each one's starts simulated once, with what the present model could absorb taken out.
+
+With v the whitened error of the present model, v_c that of a start row and P the projection beyond the present model's sensitivities,
+
+    d = P (v_c - v),   V_c = |P v|^2 - max(0, -d'P v)^2 / |d|^2,
+
+the cost after a linearised refit of everything else and of the size of the change. Harmonics of the angle need no grid: their two
+components are linear, order by order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.diagnosis.candidates import CANDIDATES
+from gaident.diagnosis.driven import Driven
+from gaident.diagnosis.layout import Layout
+from gaident.diagnosis.problem import Problem, project_out
+
+__all__ = ["Screened", "Screening"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+HIGHEST_ORDER = 64
+
+
+@dataclass(frozen=True)
+class Screened:
+    """One candidate: layout, start vectors from the best on, and the BIC that the best of them promises."""
+
+    effect: str
+    layout: Layout
+    starts: tuple[Vector, ...]
+    bic: float
+
+
+@dataclass(frozen=True)
+class _Trial:
+    effect: str
+    layout: Layout
+    rows: Matrix  # start coordinates; for harmonics the orders
+    errors: Matrix  # plain errors; for harmonics the two columns of each order, what the error loses per unit
+    base: _Base
+    columns: bool
+
+
+@dataclass(frozen=True)
+class _Base:
+    """The model that candidates extend: x, plain error and sensitivities."""
+
+    layout: Layout
+    x: Vector
+    error: Vector
+    J: Matrix
+
+
+class Screening:
+    """All candidates against one model; noise filters can be changed without a new simulation."""
+
+    def __init__(self, problem: Problem, driven: Driven) -> None:
+        self.problem, self.driven = problem, driven
+        self.trials: list[_Trial] = []
+
+    def add(self, layout: Layout, x: Vector, effects: Sequence[str]) -> None:
+        """Candidates as extensions of the model x."""
+        _, J, error = self.problem.linearised(layout, x, np.zeros(0))
+        base = _Base(layout, x, error, J)
+        coupled = [e for e in effects if CANDIDATES[e].place == "coupling"]
+        if coupled and self.driven.loopable and not layout.looped:
+            self.add(replace(layout, looped=True), x, coupled)
+            effects = [e for e in effects if e not in coupled]
+        for effect in effects:
+            candidate = CANDIDATES[effect]
+            longer = layout.extended(effect)
+            if candidate.harmonic:
+                orders, columns = self._columns(layout, x, effect, error)
+                if len(orders):
+                    self.trials.append(_Trial(effect, longer, orders[:, None], columns, base, True))
+                continue
+            rows = np.array(candidate.starts(layout.scales))
+            if rows.size == 0:
+                continue
+            low, high = np.array(candidate.limits(layout.scales)).T
+            rows = np.clip(rows, low, high)
+            X = np.vstack([layout.inserted(x, z) for z in rows])
+            self.trials.append(_Trial(effect, longer, rows, self.problem.errors(longer, X), base, False))
+
+    def _columns(self, layout: Layout, x: Vector, effect: str, error: Vector) -> tuple[Vector, Matrix]:
+        """(orders, columns): what the plain error loses per unit of the two components, pairs of rows per order."""
+        candidate = CANDIDATES[effect]
+        angle = self.driven.angle
+        orders = np.array([1.0]) if effect == "unbalance" else np.arange(1.0 if candidate.harmonic == "velocity" else 2.0, HIGHEST_ORDER + 1.0)
+        turned = np.ptp(angle)
+        # Seen is what passes at least once, and slowly enough for the sampling at the speeds that matter.
+        speed = float(np.median(np.abs(self.problem.measured)) + 1e-12)
+        orders = orders[(orders * turned > np.pi) & (orders * speed * layout.scales.dt < 2.5)]
+        if len(orders) == 0:
+            return orders, np.zeros((0, len(error)))
+        phase = orders[:, None] * angle[None, :]
+        sine, cosine = np.sin(phase), np.cos(phase)
+        if candidate.harmonic == "torque":
+            pairs = np.stack([-sine, -cosine], axis=1).reshape(-1, len(angle))
+            return orders, self.driven.response(layout, x, pairs)
+        w = (self.problem.measured - error) * orders[:, None]
+        return orders, np.stack([w * cosine, -w * sine], axis=1).reshape(-1, len(angle))
+
+    def filter_beyond(self) -> Vector:
+        """Noise filter of what nothing in the library explains, to first order: no effect is whitened away as noise."""
+        first = self.trials[0].base
+        directions = [first.J]
+        for t in self.trials:
+            if t.columns:
+                rest = project_out(t.base.J, t.base.error[None, :])[0]
+                best = np.argsort(_pair_worth(project_out(t.base.J, t.errors), rest))[::-1][:2]
+                directions += [t.errors[2 * i : 2 * i + 2] for i in best]
+            else:
+                finite = np.all(np.isfinite(t.errors), axis=1)
+                if finite.any():
+                    rest = project_out(t.base.J, t.base.error[None, :])[0]
+                    best = np.argmin(_along(project_out(t.base.J, t.errors[finite]) - rest, rest))
+                    directions.append((t.errors[finite][best] - first.error)[None, :])
+        D = np.vstack(directions)[: max(len(first.error) // 8, 1)]
+        return self.problem.filter_of(project_out(D, first.error[None, :])[0])
+
+    def ranked(self, phi: Vector) -> list[Screened]:
+        """Candidates from the most to the least promising, by the cost that each promises."""
+        n = self.problem.count
+        cache: dict[int, tuple[Matrix, Vector]] = {}
+        result = []
+        for t in self.trials:
+            key = id(t.base)
+            if key not in cache:
+                J = self.problem.whitened(t.base.J, phi)
+                cache[key] = (J, project_out(J, self.problem.whitened(t.base.error[None, :], phi))[0])
+            J, rest = cache[key]
+            V = self.problem.whitened(t.errors, phi)
+            finite = np.all(np.isfinite(V), axis=1)
+            V = project_out(J, np.where(finite[:, None], V, 0.0))
+            size = CANDIDATES[t.effect].size
+            if t.columns:
+                worth = _pair_worth(V, rest)
+                order = np.argsort(worth)[::-1][:2]
+                costs = np.maximum(float(rest @ rest) - worth[order], 1e-300)
+                starts = tuple(_harmonic_start(t, V, rest, int(i)) for i in order)
+            else:
+                costs = np.where(finite, _along(V - rest, rest), np.inf)
+                order = np.argsort(costs)
+                starts, costs = tuple(t.base.layout.inserted(t.base.x, t.rows[i]) for i in order[:3]), costs[order]
+            bic = n * np.log(max(float(costs[0]), 1e-300) / n) + (t.base.layout.size + size) * np.log(n)
+            result.append(Screened(t.effect, t.layout, starts, float(bic)))
+        return sorted(result, key=lambda s: s.bic)
+
+
+def _along(D: Matrix, rest: Vector) -> Vector:
+    """|rest|^2 after the best step forward along each row of D."""
+    sizes = np.einsum("ij,ij->i", D, D)
+    forward = np.maximum(-(D @ rest), 0.0)
+    return np.asarray(float(rest @ rest) - forward**2 / np.maximum(sizes, 1e-300))
+
+
+def _pair_worth(V: Matrix, rest: Vector) -> Vector:
+    """Fall of |rest|^2 by each pair of rows of V."""
+    A, B = V[0::2], V[1::2]
+    aa, bb, ab = (np.einsum("ij,ij->i", *p) for p in ((A, A), (B, B), (A, B)))
+    ra, rb = A @ rest, B @ rest
+    det = aa * bb - ab**2
+    good = det > 1e-9 * aa * bb
+    det = np.where(good, det, 1.0)
+    worth = (bb * ra**2 - 2.0 * ab * ra * rb + aa * rb**2) / det
+    return np.where(good, worth, 0.0)
+
+
+def _harmonic_start(t: _Trial, V: Matrix, rest: Vector, i: int) -> Vector:
+    z = np.linalg.lstsq(V[2 * i : 2 * i + 2].T, rest, rcond=None)[0]
+    coordinates = z if t.effect == "unbalance" else np.concatenate([z, t.rows[i]])
+    return t.base.layout.inserted(t.base.x, coordinates)

@@ -1,0 +1,230 @@
+"""Stepwise extension: one effect after the other, everything refitted with each.
+
+A candidate is worth the fall of the BIC that it brings, each hypothesis with a noise filter of its own; the best is taken while it is
+worth more than THRESHOLD. The friction family is one seat: a generalisation takes the place of dry friction, and only where it is
+worth more than the simpler one by the threshold again. After each step every member has to show that it is still needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.diagnosis.candidates import CANDIDATES, FRICTION
+from gaident.diagnosis.driven import Driven
+from gaident.diagnosis.layout import Layout, described, two_masses
+from gaident.diagnosis.problem import NONE, WORST, Fit, Problem
+from gaident.diagnosis.screening import Screened, Screening
+
+__all__ = ["HINT", "MARGIN", "THRESHOLD", "Rival", "Search", "with_second_mass"]
+
+Vector = NDArray[np.float64]
+
+THRESHOLD = 12.0
+"""Gain in BIC units from which an extension counts; see the calibration table in the docs."""
+
+MARGIN = 10.0
+"""Rivals closer than this many BIC units cannot be told apart."""
+
+HINT = 8.0
+"""Fall of N ln V from which a generalisation is no longer ruled out by the simpler effect it contains."""
+
+MOST = 4  # effects in one model
+FITTED = 6  # candidates that each of the two rankings sends into a short fit
+FINISHED = 5  # of these, how many are fitted to the end
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another effect in the place of one: how much worse (BIC units) the whole model is with it."""
+
+    effect: str
+    behind: float
+    fit: Fit
+
+
+class Search:
+    """The stepwise search over one problem."""
+
+    def __init__(self, problem: Problem, driven: Driven, allowed: Sequence[str], note: Callable[[str], None]) -> None:
+        self.problem, self.driven, self.allowed, self.note = problem, driven, tuple(allowed), note
+        self.known: dict[tuple[int, frozenset[str]], list[Fit]] = {}
+
+    def run(self, base: Fit) -> Fit:
+        """The extended model; its effects stand in the order in which they were found."""
+        best = base
+        while len(best.effects) < MOST:
+            beyond = ", ".join(e.replace("_", " ") for e in best.effects)
+            self.note(f"looking beyond {beyond or 'the linear model'}")
+            found = self.best_extension(best)
+            if found is None or best.bic - found.bic < THRESHOLD:
+                break
+            best = self.polished(self.thinned(with_second_mass(self.problem, found)))
+        return best
+
+    def polished(self, fit: Fit) -> Fit:
+        """Where more than noise is left: every effect once more from all of its starts, with the rest as it stands.
+
+        The cost has many valleys (a stop or an impact more or less), and the first fit began far from the rest's final values.
+        """
+        for effect in fit.effects[::-1]:
+            rows = CANDIDATES[effect].starts(fit.layout.scales)
+            if self.only_noise(fit) or len(rows) == 0:
+                continue
+            limits = np.array(CANDIDATES[effect].limits(fit.layout.scales)).T
+            X = np.repeat(fit.x[None, :], len(rows), axis=0)
+            X[:, fit.layout.slot(effect)] = np.clip(np.array(rows), *limits)
+            order = np.argsort(self.problem.costs(fit.layout, X, fit.phi))[:4]
+            tries = [self.problem.judged(self.problem.fit(fit.layout, X[i], NONE, 8)) for i in order]
+            best = min(tries, key=lambda f: f.bic)
+            fit = min((fit, self.problem.settled(self.problem.fit(best.layout, best.x, NONE, 12))), key=lambda f: f.bic)
+        return fit
+
+    def best_gain(self, now: Fit) -> float:
+        """What the best extension is worth, in BIC units."""
+        found = self.best_extension(now)
+        return -np.inf if found is None else now.bic - found.bic
+
+    def best_extension(self, now: Fit) -> Fit | None:
+        """The best model with one effect more (or one of the friction family in place of another)."""
+        fits = self.extensions(now)
+        if not fits:
+            return None
+        return self.simplest(fits[0], fits)
+
+    def extensions(self, now: Fit) -> list[Fit]:
+        """Settled fits of the promising extensions, best first; what was worked out once is remembered."""
+        key = (now.layout.masses, frozenset(now.effects))
+        if key not in self.known:
+            self.known[key] = self.worked_out(now)
+        return self.known[key]
+
+    def worked_out(self, now: Fit) -> list[Fit]:
+        """The extensions of one model.
+
+        All promising candidates get a short fit; the best of these under filters of their own are fitted to the end.
+        """
+        screening = Screening(self.problem, self.driven)
+        layout, x = now.layout, now.x
+        screening.add(layout, x, [e for e in self.candidates(layout) if e not in FRICTION[1:]])
+        beyond = screening.filter_beyond()
+        seat = next((e for e in layout.effects if e in FRICTION), None)
+        fits: list[Fit] = []
+        if seat is not None:
+            self.add_generalisations(screening, now, seat)
+        elif "coulomb_friction" in self.candidates(layout):
+            # Dry friction first: its generalisations are tried at its level.
+            start = next(s for s in screening.ranked(NONE) if s.effect == "coulomb_friction")
+            fits.append(self.problem.settled(self.problem.fit(start.layout, start.starts[0], NONE, 8)))
+            self.add_generalisations(screening, fits[0], "coulomb_friction")
+        if self.only_noise(now):
+            # Where nothing but noise is left the linearised gains are upper bounds, near enough.
+            fall = max((now.bic - self.promised(s, phi) for phi in (now.phi, beyond) for s in screening.ranked(phi)[:1]), default=0.0)
+            if fall < 0.5 * THRESHOLD:
+                return fits
+        # Two views: plainly, and through a filter of what the library cannot explain; each misses what the other one sees.
+        short: dict[str, Fit] = {}
+        for phi in (NONE, beyond):
+            for s in screening.ranked(phi)[:FITTED]:
+                for start in s.starts[:2]:
+                    if s.effect == "coulomb_friction" and fits:
+                        continue
+                    fit = self.problem.judged(self.problem.fit(s.layout, start, phi, 3))
+                    if s.effect not in short or fit.bic < short[s.effect].bic:
+                        short[s.effect] = fit
+        best = sorted(short.values(), key=lambda f: f.bic)[:FINISHED]
+        fits += [self.finished(f) for f in best]
+        fits = [f for f in fits if f.cost < WORST]
+        return sorted(fits, key=lambda f: f.bic)
+
+    def promised(self, s: Screened, phi: Vector) -> float:
+        """The BIC that a screened candidate promises under a filter."""
+        return s.bic + len(phi) * np.log(self.problem.count)
+
+    def finished(self, fit: Fit) -> Fit:
+        """A short fit taken to the end, under the filter of what it leaves itself."""
+        return self.problem.settled(fit if fit.converged else self.problem.fit(fit.layout, fit.x, fit.phi, 8))
+
+    def only_noise(self, fit: Fit) -> bool:
+        """Whether a fit leaves no more than the noise that the measured velocity itself shows."""
+        return bool(np.sqrt(fit.cost / self.problem.count) < 1.1 * self.driven.noise)
+
+    def add_generalisations(self, screening: Screening, source: Fit, seat: str) -> None:
+        """The rest of the friction family in the seat's place, at its level."""
+        level = abs(float(source.x[source.layout.slot(seat)][0]))
+        layout = source.layout.without(seat)
+        layout = replace(layout, scales=replace(layout.scales, friction=max(level, 1e-4 * layout.scales.torque)))
+        x = source.layout.removed(source.x, seat)
+        wanted = [e for e in FRICTION[1:] if e in self.allowed and e != seat]
+        if seat != "coulomb_friction":
+            wanted = [e for e in wanted if seat in CANDIDATES[e].parents]
+        screening.add(layout, x, wanted)
+
+    def candidates(self, layout: Layout) -> list[str]:
+        """What may be added to a model."""
+        blocked = set(layout.effects)
+        if blocked & set(FRICTION):
+            blocked |= set(FRICTION)
+        if "extra_resonance" in layout.effects:
+            blocked |= {"backlash", "hardening_stiffness"}
+        if {"backlash", "hardening_stiffness"} & set(layout.effects):
+            blocked.add("extra_resonance")
+        return [e for e in self.allowed if e not in blocked and (layout.masses == 2 or CANDIDATES[e].place != "coupling")]
+
+    def simplest(self, best: Fit, fits: Sequence[Fit]) -> Fit:
+        """A parent of the winner's newest effect, where the winner is not worth THRESHOLD more."""
+        for parent in CANDIDATES[best.effects[-1]].parents:
+            for f in fits:
+                if f.effects[-1] == parent and f.bic - best.bic < THRESHOLD:
+                    return f
+        return best
+
+    def thinned(self, best: Fit) -> Fit:
+        """Without the members whose removal costs less than the threshold."""
+        for effect in best.effects[:-1]:
+            less = self.without(best, effect)
+            if less.bic - best.bic < THRESHOLD:
+                best = less
+        return best
+
+    def without(self, fit: Fit, effect: str) -> Fit:
+        """The model refitted without one of its effects."""
+        layout = fit.layout.without(effect)
+        return self.problem.settled(self.problem.fit(layout, fit.layout.removed(fit.x, effect), fit.phi, 8))
+
+    def rivals(self, final: Fit, effect: str) -> tuple[float, list[Rival]]:
+        """(gain of `effect` in the final model, other effects in its place that come within reach)."""
+        less = self.without(final, effect)
+        found = []
+        for f in self.extensions(less):
+            name = f.effects[-1]
+            if name == effect or name in final.effects:
+                continue
+            behind = f.bic - final.bic
+            if effect in CANDIDATES[name].parents:
+                # A generalisation is never worse by more than its parameters: only a hint of what it adds counts.
+                plain = behind - (CANDIDATES[name].size - CANDIDATES[effect].size) * np.log(self.problem.count)
+                if plain > -HINT:
+                    continue
+            if behind < MARGIN:
+                found.append(Rival(name, behind, f))
+        return less.bic - final.bic, found
+
+
+def with_second_mass(problem: Problem, fit: Fit) -> Fit:
+    """One mass with an extra resonance is a drive of two masses: part of the linear model, not an effect."""
+    layout, x = fit.layout, fit.x
+    if layout.masses == 2 or "extra_resonance" not in layout.effects:
+        return fit
+    model = two_masses(layout, x)
+    longer = Layout.of(model, described(layout.scales, model), [n > 0 for n in layout.starts])
+    y = longer.base_vector(model)
+    for e in layout.effects:
+        if e != "extra_resonance":
+            longer = longer.extended(e)
+            y = np.concatenate([y, x[layout.slot(e)]])
+    y = np.concatenate([y, np.zeros(sum(longer.starts))])
+    return problem.settled(problem.fit(longer, y, fit.phi, 8))

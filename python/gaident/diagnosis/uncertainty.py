@@ -1,0 +1,64 @@
+"""Standard deviations of the parameters of an extended model.
+
+Whitened, least squares has the covariance s^2 (J J')^-1 over x; parameters in the table's own units follow to first order.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.diagnosis.candidates import CANDIDATES
+from gaident.diagnosis.problem import Fit, Problem
+from gaident.identification.covariance import Estimate
+from gaident.models.effects import table
+
+__all__ = ["covariance_of", "estimates_of"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+def covariance_of(problem: Problem, fit: Fit) -> Matrix:
+    """Covariance of x; infinite where the record says nothing, 0 for entries that were not moved."""
+    v, J, _ = problem.linearised(fit.layout, fit.x, fit.phi)
+    moved = np.flatnonzero(fit.layout.steps() > 0.0)
+    sizes = np.sqrt(np.einsum("ij,ij->i", J, J))
+    cov = np.zeros((len(fit.x), len(fit.x)))
+    seen = [i for i in moved if sizes[i] > 0.0 and np.isfinite(sizes[i])]
+    for i in moved:
+        cov[i, i] = np.inf
+    if seen:
+        rows = J[seen] / sizes[seen][:, None]
+        dof = max(problem.count - len(moved), 1.0)
+        small = float(v @ v) / dof * np.linalg.pinv(rows @ rows.T, rcond=1e-12, hermitian=True)
+        cov[np.ix_(seen, seen)] = small / np.outer(sizes[seen], sizes[seen])
+    return cov
+
+
+def estimates_of(problem: Problem, fit: Fit) -> dict[str, dict[str, Estimate]]:
+    """Effect -> parameter -> Estimate."""
+    cov = covariance_of(problem, fit)
+    limits = fit.layout.limits()
+    result: dict[str, dict[str, Estimate]] = {}
+    for effect in fit.layout.effects:
+        slot = fit.layout.slot(effect)
+        z, part = fit.x[slot], cov[slot, slot]
+        values = CANDIDATES[effect].natural(z[None, :])[0]
+        h = 1e-6 * np.maximum(np.abs(z), np.array(CANDIDATES[effect].steps(fit.layout.scales)))
+        h[h == 0.0] = 1.0
+        slopes = np.array([(CANDIDATES[effect].natural((z + h * unit)[None, :])[0] - values) / h[i] for i, unit in enumerate(np.eye(len(z)))])
+        finite = np.where(np.isfinite(part), part, 0.0)
+        variances = np.einsum("ij,ik,kj->j", slopes, finite, slopes)
+        lost = np.any((np.abs(slopes) > 0.0) & ~np.isfinite(np.diag(part))[:, None], axis=0)
+        span = np.maximum(limits[1, slot] - limits[0, slot], 1e-300)
+        near = (z <= limits[0, slot] + 1e-6 * span) | (z >= limits[1, slot] - 1e-6 * span)
+        bound = np.any((np.abs(slopes) > 0.0) & near[:, None], axis=0)
+        row = next(r for r in table() if r.name == effect)
+        result[effect] = {}
+        for i, (name, unit) in enumerate((p.name, p.unit) for p in row.parameters):
+            std = float("inf") if lost[i] else float(np.sqrt(max(variances[i], 0.0)))
+            value = float(values[i])
+            known = std < abs(value) if value != 0.0 else np.isfinite(std)
+            result[effect][name] = Estimate(value, std, unit, bool(bound[i]), bool(known))
+    return result
