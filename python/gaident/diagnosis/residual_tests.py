@@ -93,8 +93,8 @@ class ResidualTests:
             what.append("different at the record's start and end")
         kind = f", {', '.join(what)}" if what else ""
         return (
-            f"Something is left in the residual{kind}: {100 * self.power_share:.0f} % of its power goes with command and "
-            f"motion (whitened {100 * self.linear_share:.0f} % linear, {100 * self.nonlinear_share:.0f} % more by torques of the motion)."
+            f"Something is left in the residual{kind}: {100 * self.power_share:.0f} % of its power goes with command and motion "
+            f"(whitened {100 * self.linear_share:.0f} % linear, {100 * self.nonlinear_share:.0f} % more by torques)."
         )
 
 
