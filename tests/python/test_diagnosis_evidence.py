@@ -330,7 +330,7 @@ def test_friction_is_nonlinear_and_shows_in_its_own_direction() -> None:
     assert found.alarms and found.nonlinear_share > max(0.2, found.linear_share)
     assert min(found.directed, key=found.directed.__getitem__) in ("sign of velocity", "slow motion", "time")
     assert found.directed["sign of velocity"] < 1e-20 < 1e-3 < found.directed["twice per turn"]
-    assert "nonlinear" in found.sentence
+    assert "nonlinear" in found.sentence and found.power_share > 0.5
     load = residual_tests(ONE_MASS.model(), drive(load=0.03), CONTROLLER)
     assert load.directed["constant"] == min(load.directed.values()) < 1e-6
 

@@ -54,6 +54,7 @@ class ResidualTests:
     directed       kind of missing torque -> nothing of its shape is left, see `directed.torque_columns`
     linear_share   of the whitened residual's power that a linear model of the command explains (model error model)
     nonlinear_share  what the torques of `directed` explain beyond that
+    power_share    of the residual's own power, not whitened, that goes with command and motion (some does by chance)
     noise          the noise model, its deviation in rad/s
     """
 
@@ -65,6 +66,7 @@ class ResidualTests:
     directed: Mapping[str, float]
     linear_share: float
     nonlinear_share: float
+    power_share: float
     noise: Autoregression
 
     @property
@@ -89,10 +91,11 @@ class ResidualTests:
             what.append(f"with {' and '.join(kinds)} powers of the command")
         if self.stationary < LEVEL:
             what.append("different at the record's start and end")
-        shares = (
-            f"{100 * self.linear_share:.0f} % linear, {100 * self.nonlinear_share:.0f} % more by torques that depend on motion"
+        kind = f", {', '.join(what)}" if what else ""
+        return (
+            f"Something is left in the residual{kind}: {100 * self.power_share:.0f} % of its power goes with command and motion "
+            f"(whitened {100 * self.linear_share:.0f} % linear, {100 * self.nonlinear_share:.0f} % more by torques)."
         )
-        return f"Something is left in the residual, {', '.join(what) or 'small but significant'} ({shares})."
 
 
 def residual_tests(
@@ -145,6 +148,8 @@ def residual_tests(
         return float(v @ v)
 
     total, line = left(own), left(with_command)
+    plain, rest = (_rest(error, rows) for rows in (own, np.vstack([with_command, *directed.values()])))
+    power = float(plain @ plain)
     more = left(np.vstack([with_command, *(directed[name] for name in best)]))
     v = _split(_rest(_white(error[None], noise, lengths)[0], _white(own, noise, lengths)), lengths)
     return ResidualTests(
@@ -156,6 +161,7 @@ def residual_tests(
         directed=p_directed,
         linear_share=1.0 - line / total if total > 0.0 else 0.0,
         nonlinear_share=(line - more) / total if total > 0.0 else 0.0,
+        power_share=1.0 - float(rest @ rest) / power if power > 0.0 else 0.0,
         noise=noise,
     )
 
