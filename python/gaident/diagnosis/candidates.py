@@ -59,6 +59,7 @@ class Candidate:
     steps: Callable[[Scales], tuple[float, ...]]
     parents: tuple[str, ...] = ()
     harmonic: str = ""  # "torque" or "velocity": phase and size follow from two columns per order
+    rough: bool = False  # a stop or an impact more or less leads a torque-driven simulation astray: fitted in the loop first
 
     @property
     def size(self) -> int:
@@ -106,6 +107,7 @@ def _single(
     low: Callable[[Scales], float],
     high: Callable[[Scales], float],
     starts: Callable[[Scales], tuple[float, ...]],
+    rough: bool = False,
 ) -> Candidate:
     """An effect of one positive number of unknown size, moved by its logarithm."""
     return Candidate(
@@ -116,6 +118,7 @@ def _single(
         lambda s: [(float(np.log(low(s))), float(np.log(high(s))))],
         lambda s: [(float(np.log(v)),) for v in starts(s) if low(s) < v < high(s)],
         lambda s: (1.0,),
+        rough=rough,
     )
 
 
@@ -209,6 +212,7 @@ CANDIDATES: dict[str, Candidate] = {
             lambda s: _grid((s.friction,), (0.3, 1.0), _ln(0.005 * s.speed, 0.02 * s.speed, 0.06 * s.speed)),
             lambda s: (_friction_steps(s), 0.3, 0.3),
             parents=("coulomb_friction",),
+            rough=True,
         ),
         Candidate(
             "asymmetric_friction",
@@ -248,9 +252,9 @@ CANDIDATES: dict[str, Candidate] = {
         _harmonic("cogging", "shaft", 2, True, "torque"),
         _harmonic("velocity_ripple", "sensor", 1, True, "velocity"),
         _single("backlash", "coupling", "gap", lambda s: 1e-4 * s.torque / s.stiffness, lambda s: 100.0 * s.torque / s.stiffness,
-                lambda s: tuple(s.torque / s.stiffness * np.geomspace(1e-3, 2.0, 16))),
+                lambda s: tuple(s.torque / s.stiffness * np.geomspace(1e-3, 2.0, 16)), rough=True),
         _single("hardening_stiffness", "coupling", "cubic_stiffness", lambda s: 1e-3 * s.stiffness**3 / s.torque**2,
-                lambda s: 1e5 * s.stiffness**3 / s.torque**2, lambda s: tuple(s.stiffness**3 / s.torque**2 * np.geomspace(0.05, 500.0, 6))),
+                lambda s: 1e5 * s.stiffness**3 / s.torque**2, lambda s: tuple(s.stiffness**3 / s.torque**2 * np.geomspace(0.05, 500.0, 6)), rough=True),
         _single("torque_saturation", "actuator", "limit", lambda s: 0.01 * s.torque, lambda s: 1.0 * s.torque,
                 lambda s: tuple(s.torque * np.array([0.97, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2]))),
         _single("torque_dead_band", "actuator", "width", lambda s: 1e-4 * s.torque, lambda s: 0.7 * s.torque,

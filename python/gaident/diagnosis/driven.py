@@ -115,7 +115,7 @@ class Driven:
     @property
     def loopable(self) -> bool:
         """Whether command and controller can drive a model too."""
-        return self.controller is not None and not any(self.moving)
+        return self.controller is not None and self.command is not None and not any(self.moving)
 
     def response(self, layout: Layout, x: Vector, torques: Matrix) -> Matrix:
         """Velocity of the linear part of the model x, from rest, under rows of torque held over each sample.

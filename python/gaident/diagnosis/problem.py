@@ -106,7 +106,7 @@ class Problem:
         if not np.all(np.isfinite(clean)) or float(np.abs(clean).max()) > 1e100:
             return NONE
         parts = np.split(clean, np.cumsum(self.lengths)[:-1])
-        return fit_autoregression(parts, self.head).phi
+        return least_squares_filter(parts, fit_autoregression(parts, self.head).order)
 
     def costs(self, layout: Layout, X: Matrix, phi: Vector) -> Vector:
         """V of each row; WORST where a model diverges."""
@@ -206,6 +206,18 @@ def _sums(V: Matrix) -> Vector:
     with np.errstate(invalid="ignore", over="ignore"):
         sums = np.einsum("ij,ij->i", V, V)
     return np.where(np.isfinite(sums), np.minimum(sums, WORST), WORST)
+
+
+def least_squares_filter(parts: list[Vector], order: int) -> Vector:
+    """The autoregression of this order by least squares: of strong colour the biased autocovariance takes too little."""
+    if order == 0:
+        return NONE
+    gram, right = np.zeros((order, order)), np.zeros(order)
+    for e in parts:
+        rows = np.lib.stride_tricks.sliding_window_view(e[:-1], order)[:, ::-1]
+        gram += rows.T @ rows
+        right += rows.T @ e[order:]
+    return np.linalg.lstsq(gram, right, rcond=1e-13)[0]
 
 
 def project_out(J: Matrix, V: Matrix) -> Matrix:

@@ -70,10 +70,10 @@ class Screening:
         """Candidates as extensions of the model x."""
         _, J, error = self.problem.linearised(layout, x, np.zeros(0))
         base = _Base(layout, x, error, J)
-        coupled = [e for e in effects if CANDIDATES[e].place == "coupling"]
-        if coupled and self.driven.loopable and not layout.looped:
-            self.add(replace(layout, looped=True), x, coupled)
-            effects = [e for e in effects if e not in coupled]
+        rough = [e for e in effects if CANDIDATES[e].rough]
+        if rough and self.driven.loopable and not layout.looped:
+            self.add(replace(layout, looped=True), x, rough)
+            effects = [e for e in effects if CANDIDATES[e].place != "coupling"]
         for effect in effects:
             candidate = CANDIDATES[effect]
             longer = layout.extended(effect)

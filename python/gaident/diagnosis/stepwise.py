@@ -146,7 +146,12 @@ class Search:
 
     def finished(self, fit: Fit) -> Fit:
         """A short fit taken to the end, under the filter of what it leaves itself."""
-        return self.problem.settled(fit if fit.converged else self.problem.fit(fit.layout, fit.x, fit.phi, 8))
+        fit = self.problem.settled(fit if fit.converged else self.problem.fit(fit.layout, fit.x, fit.phi, 8))
+        if not fit.layout.looped:
+            return fit
+        # Found in the loop's grip, the parameters may be good enough for the torque to drive the model, which sees more.
+        driven = replace(fit.layout, looped=False)
+        return min((fit, self.problem.settled(self.problem.fit(driven, fit.x, NONE, 8))), key=lambda f: f.bic)
 
     def only_noise(self, fit: Fit) -> bool:
         """Whether a fit leaves no more than the noise that the measured velocity itself shows."""
