@@ -159,7 +159,7 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
     if (model.effects.has(presliding_friction) && g.structure.p == 1)
         wanted = std::max(wanted, std::sqrt(std::abs(g.gain * model.of(presliding_friction)[1])) * Ts / 0.3);
     if (loop.kind == LoopKind::continuous && g.structure.p == 1)
-        wanted = std::max({wanted, 8.0, std::abs(g.gain * loop.kp) * Ts / 0.06});
+        wanted = std::max({wanted, model.effects.has(torque_dead_band) ? 16.0 : 8.0, std::abs(g.gain * loop.kp) * Ts / 0.06});
     int m = 1;
     while (m < wanted && m < 16) m *= 2;
     return m;
