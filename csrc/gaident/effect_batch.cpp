@@ -123,7 +123,7 @@ private:
         for (std::size_t lane = 0; lane < group.size(); ++lane) {
             double* const out = row(to, group[lane]);
             for (std::size_t k = 0; k < samples_; ++k) {
-                const double v = from[k * width + lane];
+                const double v = from[k * width + lane] + 0.0;  // at rest 0, not -0
                 out[k] = write == Write::set ? v : write == Write::add ? out[k] + v : out[k] - v;
             }
         }
