@@ -65,7 +65,8 @@ void row(const char* what, EffectJob job, std::span<const EffectModel> models, b
 
 void effect_rows(bool quick) {
     std::vector<double> input(samples);
-    for (std::size_t k = 0; k < samples; ++k) input[k] = (k / 175 % 2 == 0 ? 1.0 : -1.0) * static_cast<double>((k / 350 * 7) % 30 + 1);
+    for (std::size_t k = 0; k < samples; ++k)
+        input[k] = (k / 175 % 2 == 0 ? 1.0 : -1.0) * static_cast<double>((k / 350 * 7) % 30 + 1);
     EffectJob job;
     job.record = {input, {}, 0.444e-3, 0.0, 30.0};
     job.loop.kind = LoopKind::sampled;

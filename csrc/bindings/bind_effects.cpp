@@ -95,8 +95,8 @@ struct PyRecord {
     RealArray input, position, velocity;
     EffectJob job;
 
-    PyRecord(double sample_time, RealArray in, RealArray measured_position, const RealArray& measured_velocity, double start_angle,
-             const std::string& loop, double kp, double ki, double torque_limit, double integrator_limit)
+    PyRecord(double sample_time, RealArray in, RealArray measured_position, const RealArray& measured_velocity,
+             double start_angle, const std::string& loop, double kp, double ki, double torque_limit, double integrator_limit)
         : dt(sample_time), input(std::move(in)), position(std::move(measured_position)), velocity(measured_velocity) {
         if (position.size() != 0 && position.size() != input.size())
             throw std::invalid_argument("position: as many samples as the input are needed");
@@ -111,8 +111,8 @@ struct PyRecord {
     }
 };
 
-py::tuple simulate_models(const PyRecord& record, const std::vector<EffectModel>& models, const RealArray& initial_states, int substeps,
-                          int workers, bool all, const std::string& kernel, bool lanes) {
+py::tuple simulate_models(const PyRecord& record, const std::vector<EffectModel>& models, const RealArray& initial_states,
+                          int substeps, int workers, bool all, const std::string& kernel, bool lanes) {
     EffectJob job = record.job;
     if (substeps < 0 || substeps > max_substeps) throw std::invalid_argument("substeps: 0 (as needed) to 64");
     job.substeps = substeps;
@@ -140,7 +140,8 @@ py::tuple simulate_models(const PyRecord& record, const std::vector<EffectModel>
             if (m.linear.structure.p < 1)
                 throw std::invalid_argument("poles: a model without more poles than zeros exists only in the continuous loop");
     const std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(count), static_cast<py::ssize_t>(samples)};
-    RealArray velocity(shape), torque(all ? shape : std::vector<py::ssize_t>{0, 0}), angle(all ? shape : std::vector<py::ssize_t>{0, 0});
+    RealArray velocity(shape), torque(all ? shape : std::vector<py::ssize_t>{0, 0}),
+        angle(all ? shape : std::vector<py::ssize_t>{0, 0});
     const EffectOutputs out{velocity.mutable_data(), all ? torque.mutable_data() : nullptr, all ? angle.mutable_data() : nullptr};
     {
         const py::gil_scoped_release release;
@@ -152,6 +153,10 @@ py::tuple simulate_models(const PyRecord& record, const std::vector<EffectModel>
 py::array simulate_values(const PyRecord& record, const RealArray& values, const std::tuple<int, int, int, int>& structure,
                           const std::vector<std::string>& effects, const RealArray& initial_states, int substeps, int workers) {
     const auto [real_poles, pole_pairs, real_zeros, zero_pairs] = structure;
+    const int poles = real_poles + 2 * pole_pairs, zeros = real_zeros + 2 * zero_pairs;
+    if (std::min({real_poles, pole_pairs, real_zeros, zero_pairs}) < 0 || poles > max_plant_order || zeros > max_plant_order / 2 ||
+        zeros > poles)
+        throw std::invalid_argument("structure: at most 14 poles and 7 zeros, and no more zeros than poles");
     const int factors = 1 + real_poles + 2 * pole_pairs + real_zeros + 2 * zero_pairs;
     std::vector<Effect> chosen;
     int columns = factors;
@@ -183,7 +188,8 @@ void bind_effects(py::module_& m) {
     py::class_<EffectModel>(m, "EffectModel")
         .def(py::init(&make_model), py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("effects"));
     py::class_<PyRecord>(m, "EffectRecord")
-        .def(py::init<double, RealArray, RealArray, const RealArray&, double, const std::string&, double, double, double, double>(),
+        .def(py::init<double, RealArray, RealArray, const RealArray&, double, const std::string&, double, double, double,
+                      double>(),
              py::arg("dt"), py::arg("input"), py::arg("position"), py::arg("velocity"), py::arg("start_angle"), py::arg("loop"),
              py::arg("kp"), py::arg("ki"), py::arg("torque_limit"), py::arg("integrator_limit"))
         .def("simulate", &simulate_models, py::arg("models"), py::arg("initial_states"), py::arg("substeps"), py::arg("workers"),

@@ -23,13 +23,15 @@ struct Planned {
 
 class Job {
 public:
-    Job(const EffectJob& job, std::span<const EffectModel> models, std::span<const double* const> starts, const EffectOutputs& out)
+    Job(const EffectJob& job, std::span<const EffectModel> models, std::span<const double* const> starts,
+        const EffectOutputs& out)
         : job_(job), out_(out), samples_(job.record.input.size()), planned_(models.size()), order_(models.size()) {
         for (std::size_t i = 0; i < models.size(); ++i) {
             Planned& p = planned_[i];
             p.model = reduced(models[i]);
             p.start = starts.empty() ? nullptr : starts[i];
-            if (p.model.effects.bits != 0) p.substeps = job.substeps > 0 ? job.substeps : substeps_for(p.model, job.record, job.loop);
+            if (p.model.effects.bits != 0)
+                p.substeps = job.substeps > 0 ? job.substeps : substeps_for(p.model, job.record, job.loop);
         }
         std::iota(order_.begin(), order_.end(), std::size_t{0});
         std::stable_sort(order_.begin(), order_.end(),
@@ -107,19 +109,21 @@ private:
         const auto& kernels = kernels_named(job_.kernel->name)->in_double;
         std::vector<double> y(samples_ * DoubleGroup::width);
         if (job_.loop.limited()) {
-            kernels.stepped_outputs(lanes, Controller<double>(job_.loop, job_.record.sample_time), record.input.data(), samples_, y.data());
+            kernels.stepped_outputs(lanes, Controller<double>(job_.loop, job_.record.sample_time), record.input.data(), samples_,
+                                    y.data());
         } else {
             kernels.outputs(lanes, record.input.data(), samples_, y.data());
         }
         spread(group, y, out_.velocity, DoubleGroup::width, Write::set);
     }
 
-    void spread(std::span<const std::size_t> group, const std::vector<double>& from, double* to, std::size_t width, Write write) const {
+    void spread(std::span<const std::size_t> group, const std::vector<double>& from, double* to, std::size_t width,
+                Write write) const {
         if (to == nullptr) return;
         for (std::size_t lane = 0; lane < group.size(); ++lane) {
             double* const out = row(to, group[lane]);
             for (std::size_t k = 0; k < samples_; ++k) {
-                const double v = from[k * width + lane];
+                const double v = from[k * width + lane] + 0.0;  // at rest 0, not -0
                 out[k] = write == Write::set ? v : write == Write::add ? out[k] + v : out[k] - v;
             }
         }

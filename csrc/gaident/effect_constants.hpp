@@ -53,7 +53,8 @@ template <class R>
 EffectConstants<R> load_constants(const double* interleaved) {
     static_assert(std::is_trivially_copyable_v<EffectConstants<R>> && sizeof(EffectConstants<R>) == effect_constants * sizeof(R));
     R all[effect_constants];
-    for (std::size_t i = 0; i < effect_constants; ++i) all[i] = Pack<R>::load(interleaved + i * static_cast<std::size_t>(Pack<R>::width));
+    for (std::size_t i = 0; i < effect_constants; ++i)
+        all[i] = Pack<R>::load(interleaved + i * static_cast<std::size_t>(Pack<R>::width));
     EffectConstants<R> c;
     std::memcpy(&c, all, sizeof c);
     return c;

@@ -21,9 +21,9 @@ struct EffectRun {
     Loop loop;
     double sample_time = 0.0;
     int substeps = 1;
-    int order = 0;              // of the plant in observer form
-    bool two_masses = false;    // the coupling is not linear
-    bool moving = false;        // the record does not start at rest
+    int order = 0;                     // of the plant in observer form
+    bool two_masses = false;           // the coupling is not linear
+    bool moving = false;               // the record does not start at rest
     std::span<const double> input;     // command, or torque in open loop
     std::span<const double> position;  // measured, or empty
     double start_angle = 0.0;
@@ -49,7 +49,8 @@ public:
         if (continuous) pi_ = Controller<R>(run.loop, h_);
         if (set_.has(integrator_clamp)) pi_.integrator_limit = minimum(pi_.integrator_limit, c_.integrator_limit);
         pi_.s = c_.stored;
-        friction_ = set_.has_any(coulomb_friction, stribeck_friction, asymmetric_friction, presliding_friction, quadratic_drag, friction_drift);
+        friction_ = set_.has_any(coulomb_friction, stribeck_friction, asymmetric_friction, presliding_friction, quadratic_drag,
+                                 friction_drift);
         steep_ = set_.has_any(asymmetric_friction, quadratic_drag);
         actuator_in_time_ = set_.has_any(transport_delay, torque_lag);
         turning_ = set_.has_any(unbalance, cogging, velocity_ripple);
@@ -62,7 +63,6 @@ public:
         filtered_ = filter_input_ = plant_.velocity();
         limited_command_ = R(run.moving && !run.input.empty() ? run.input[0] : 0.0);
         w_before_ = plant_.velocity();
-        torque_before_ = c_.before;
         if (set_.has(transport_delay))
             for (std::size_t i = 0; i <= run.history_mask; ++i) Pack<R>::store(c_.before, run.history + i * width);
         // Friction that would push is no friction: such a candidate is as good as diverged.
@@ -169,7 +169,8 @@ private:
     }
 
     [[gnu::always_inline]] R control(R r, R y) {
-        if (set_.has(Effect::command_rate_limit)) r = limited_command_ = CommandRateLimit::follow(c_.rate_step, r, limited_command_);
+        if (set_.has(Effect::command_rate_limit))
+            r = limited_command_ = CommandRateLimit::follow(c_.rate_step, r, limited_command_);
         return pi_.step(r - y);
     }
 
@@ -213,7 +214,7 @@ private:
         const R w_free = plant_.free_velocity(T, friction_torque_);
         R w_next = w_free;
         if (friction_) {
-            w_next = under_friction(w, w_free, T, t);
+            w_next = under_friction(w, w_free, t);
             friction_torque_ = (w_free - w_next) * per_beta_;
             T = T - friction_torque_;
         }
@@ -221,7 +222,7 @@ private:
         angle_ = angle_ + (w + w_next) * R(0.5 * h_);
     }
 
-    [[gnu::always_inline]] R under_friction(R w, R w_free, R T, double t) {
+    [[gnu::always_inline]] R under_friction(R w, R w_free, double t) {
         using enum Effect;
         FrictionLaw<R> law = c_.law;
         R beta = plant_.beta();
@@ -234,15 +235,13 @@ private:
         }
         if (set_.has(stribeck_friction)) {
             // The level at the mean velocity, which is foreseen, but never beyond a stop: at rest the static level holds.
-            // The change of torque is added, which the velocity does not know yet.
-            const R zero = R(0.0), foreseen = w + ((w - w_before_) + plant_.beta() * (T - torque_before_)) * R(0.5);
+            const R zero = R(0.0), foreseen = w + (w - w_before_) * R(0.5);
             const R middle = greater(w * foreseen, zero, foreseen, zero);
             const R level = StribeckFriction::level(c_.stribeck_torque, c_.stribeck_static, c_.stribeck_slowness, middle);
             law.level_positive = law.level_positive + level;
             law.level_negative = law.level_negative + level;
             law.more_at_rest = c_.stribeck_static - level;
             w_before_ = w;
-            torque_before_ = T;
         }
         const R w_next = velocity_under_friction(law, w, w_free, beta, steep_);
         if (bristle) {
@@ -265,7 +264,7 @@ private:
     R filtered_, filter_input_;
     R limited_command_;
     R friction_torque_ = R(0.0), per_beta_;
-    R w_before_, torque_before_, other_friction_ = R(0.0);
+    R w_before_, other_friction_ = R(0.0);
     Bristle<R> bristle_;
     std::size_t issued_ = 0;
 };

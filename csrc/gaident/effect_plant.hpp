@@ -46,7 +46,8 @@ struct TwoMassPlant {
     R x[3];  // w_M, w_L, psi
     R correction = R(0.0);
 
-    TwoMassPlant(const EffectConstants<R>& c, int) : KG(c.KG), DG(c.DG), per_scale(c.per_scale), half_gap(c.half_gap), cubic(c.cubic) {
+    TwoMassPlant(const EffectConstants<R>& c, int)
+        : KG(c.KG), DG(c.DG), per_scale(c.per_scale), half_gap(c.half_gap), cubic(c.cubic) {
         for (int i = 0; i < 3; ++i) {
             for (int j = 0; j < 3; ++j) phi[i][j] = c.phi[i][j];
             motor[i] = c.motor[i];

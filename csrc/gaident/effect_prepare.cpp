@@ -24,8 +24,8 @@ double resonance(const Pair<double>& f) { return f.e1 * f.e1 < 4.0 * f.e0 ? std:
 // The state of a plant at the substep that continues as `start` does at the sample time. Both are compared by what they do under the
 // constant torque u: the differences y, dy, d2y, ... over whole samples. G and H take the state over one sample: dx = G x + H u.
 template <std::size_t n_max>
-bool same_motion(int n, const double (&G)[n_max][n_max], const double (&H)[n_max], const Delta<double>& plant, const double* start,
-                 double u, double* x) {
+bool same_motion(int n, const double (&G)[n_max][n_max], const double (&H)[n_max], const Delta<double>& plant,
+                 const double* start, double u, double* x) {
     double wanted[n_max], z[max_loop_order] = {};
     wanted[0] = start[0] + plant.b[0] * u;
     for (int i = 0; i < n; ++i) z[i] = ((i + 1 < n ? start[i + 1] : 0.0) + plant.b[i + 1] * u) - plant.a[i] * wanted[0];
@@ -117,7 +117,8 @@ void two_masses(const EffectModel& model, double h, double sample_time, const De
     // The nonlinear coupling carries the same torque: K x + k3 x^3 = K x_linear beyond the gap.
     const double linear = c.x[2] / sample.scale;
     double x = linear;
-    for (int i = 0; i < 50 && c.cubic > 0.0; ++i) x -= (m.KG * (x - linear) + c.cubic * x * x * x) / (m.KG + 3.0 * c.cubic * x * x);
+    for (int i = 0; i < 50 && c.cubic > 0.0; ++i)
+        x -= (m.KG * (x - linear) + c.cubic * x * x * x) / (m.KG + 3.0 * c.cubic * x * x);
     if (linear != 0.0) c.x[2] = (x + std::copysign(c.half_gap, linear)) * step.scale;
 }
 
@@ -148,16 +149,17 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
         double fastest = 0.0;
         for (int i = 0; i < g.structure.pole_pairs(); ++i) fastest = std::max(fastest, resonance(g.pole_pair[i]));
         for (int i = 0; i < g.structure.zero_pairs(); ++i) fastest = std::max(fastest, resonance(g.zero_pair[i]));
-        // A nonlinear coupling is part of the resonance itself and needs finer steps.
-        const bool coupling = model.effects.has_any(backlash, hardening_stiffness);
-        wanted = std::max({wanted, coupling ? 4.0 : 2.0, fastest * Ts / (coupling ? 0.0215 : 0.045)});
+        // A nonlinear coupling is part of the resonance itself, and a friction that falls with speed drives it: both need finer steps.
+        const bool finer = model.effects.has_any(backlash, hardening_stiffness, stribeck_friction);
+        wanted = std::max({wanted, finer ? 4.0 : 2.0, fastest * Ts / (finer ? 0.0215 : 0.045)});
     }
     const auto turning = [&](double order) { wanted = std::max(wanted, order * record.top_speed * Ts / 0.3); };
     if (model.effects.has(unbalance)) turning(1.0);
     if (model.effects.has(cogging)) turning(model.of(cogging)[1]);
     if (model.effects.has(presliding_friction) && g.structure.p == 1)
         wanted = std::max(wanted, std::sqrt(std::abs(g.gain * model.of(presliding_friction)[1])) * Ts / 0.3);
-    if (loop.kind == LoopKind::continuous && g.structure.p == 1) wanted = std::max({wanted, 8.0, std::abs(g.gain * loop.kp) * Ts / 0.06});
+    if (loop.kind == LoopKind::continuous && g.structure.p == 1)
+        wanted = std::max({wanted, model.effects.has(torque_dead_band) ? 16.0 : 8.0, std::abs(g.gain * loop.kp) * Ts / 0.06});
     int m = 1;
     while (m < wanted && m < 16) m *= 2;
     return m;
@@ -225,7 +227,8 @@ void prepare_effects(const EffectModel& model, const EffectRecord& record, const
     const double delay = model.effects.has(transport_delay) ? model.of(transport_delay)[0] : 0.0;
     const bool usable = delay >= 0.0 && delay <= longest_delay;
     const int steps = continuous ? 1 : substeps;
-    for (int j = 0; j < steps; ++j) TransportDelay::mean(usable ? delay : 0.0, hold, j, steps, out.delay.back[j], out.delay.share[j]);
+    for (int j = 0; j < steps; ++j)
+        TransportDelay::mean(usable ? delay : 0.0, hold, j, steps, out.delay.back[j], out.delay.share[j]);
     if (!usable) c.x[0] = any_value;
 }
 

@@ -43,10 +43,10 @@ inline bool two_masses_of(const Factors<double>& g, TwoMasses& m) {
 }
 
 struct TwoMassStep {
-    double phi[3][3];  // e^(A h) - 1 over (w_M, w_L, psi)
-    double motor[3];   // response to a unit motor torque
+    double phi[3][3];    // e^(A h) - 1 over (w_M, w_L, psi)
+    double motor[3];     // response to a unit motor torque
     double coupling[3];  // response to a unit correction of the coupling torque
-    double scale;      // psi = twist * scale
+    double scale;        // psi = twist * scale
 };
 
 inline TwoMassStep two_mass_step(const TwoMasses& m, double h) {

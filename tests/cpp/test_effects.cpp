@@ -4,6 +4,7 @@
 
 #include "check.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <string>
@@ -193,20 +194,24 @@ TEST_CASE("lanes equal the scalar loop bit for bit, with every effect, loop and 
 }
 
 TEST_CASE("friction holds exactly: no creep, no ringing, and lets go above its level") {
-    std::vector<double> torque(400);
-    for (std::size_t k = 0; k < torque.size(); ++k) torque[k] = k < 30 ? 0.3 : k < 300 ? 0.049 * std::sin(0.1 * static_cast<double>(k)) : 0.051;
+    constexpr std::size_t n = 2000, release = 1900;
+    std::vector<double> torque(n);
+    for (std::size_t k = 0; k < n; ++k)
+        torque[k] = k < 30 ? 0.3 : k < release ? 0.049 * std::sin(0.1 * static_cast<double>(k)) : 0.051;
     const EffectJob job = job_of(torque, LoopKind::open);
     for (const Factors<double>& g : {one_mass(), table_three()}) {
-        const std::vector<double> w = velocity_of(job, model_with(g, Effect::coulomb_friction, {0.05}));
-        CHECK(w[31] > 1.0);
-        for (std::size_t k = 250; k <= 300; ++k) CHECK(w[k] == 0.0);
-        CHECK(w[301] > 0.0);
+        const std::vector<double> w =
+            velocity_of(job, model_with(g, Effect::coulomb_friction, {g.structure.q == 0 ? 0.05 : 0.0501}));
+        CHECK(*std::max_element(w.begin(), w.end()) > 5.0);
+        // Two masses: the load has to swing out first.
+        for (std::size_t k = g.structure.q == 0 ? 250 : release - 50; k <= release; ++k) CHECK(w[k] == 0.0);
+        CHECK(w[release + 1] > 0.0);
     }
     // With a static level the stop holds although the sliding level lies below the torque; once it moves there is less friction.
     const std::vector<double> w = velocity_of(job, model_with(one_mass(), Effect::coulomb_friction, {0.05}));
-    const std::vector<double> s = velocity_of(job, model_with(one_mass(), Effect::stribeck_friction, {0.03, 0.0505, 2.0}));
-    for (std::size_t k = 250; k <= 300; ++k) CHECK(s[k] == 0.0);
-    CHECK(s[399] > w[399]);
+    const std::vector<double> s = velocity_of(job, model_with(one_mass(), Effect::stribeck_friction, {0.03, 0.0505, 0.02}));
+    for (std::size_t k = 250; k <= release; ++k) CHECK(s[k] == 0.0);
+    CHECK(s[n - 1] > w[n - 1]);
 }
 
 TEST_CASE("a stiff bristle does not ring, even in one step per sample") {
@@ -293,7 +298,8 @@ TEST_CASE("a record that starts in motion continues the linear loop's own state"
         std::vector<double> linear(r.size()), w(r.size());
         const EffectModel plain{table_three(), {}};
         simulate_effects(job, {&plain, 1}, {&start, 1}, {linear.data()});
-        for (const EffectModel& m : {model_with(table_three(), Effect::load_torque, {1e-14}), model_with(table_three(), Effect::backlash, {1e-15})}) {
+        for (const EffectModel& m :
+             {model_with(table_three(), Effect::load_torque, {1e-14}), model_with(table_three(), Effect::backlash, {1e-15})}) {
             simulate_effects(job, {&m, 1}, {&start, 1}, {w.data()});
             const double scale = kind == LoopKind::open ? 1e3 : 1e2;  // the torque of the open loop is the staircase itself
             for (std::size_t k = 0; k < w.size(); ++k) CHECK_NEAR(w[k], linear[k], 1e-10 * scale);

@@ -1,9 +1,9 @@
 """A drive with effects, integrated finely: what the core is compared with. It shares no code with the package.
 
-Every case is one column, and all cases advance together: explicit steps of a hundredth of a sample or less, twist
-after velocity (symplectic), friction by clipping the velocity that the other torques would bring (Moreau), delay by a
-buffer of fine steps, filters by the midpoint rule, the bristle by Heun. The equations are those of the public table
-of effects.
+Every case is one column, and all cases advance together: explicit steps of a hundredth of a sample or less, the
+twist half before and half after the velocity (leapfrog), friction by clipping the velocity that the other torques
+would bring (Moreau), delay by a buffer of fine steps, filters by the midpoint rule, the bristle by Heun, an analog
+controller's torque extrapolated by half a step. The equations are those of the public table of effects.
 """
 
 from __future__ import annotations
@@ -129,6 +129,7 @@ def integrate(cases: list[FineCase], fine: int = 100) -> FineRun:
     # A lag in steps of h by the midpoint rule; without a time constant it follows at once.
     share_u = np.where(tau_u > 0.0, h / (np.where(tau_u > 0.0, tau_u, 1.0) + 0.5 * h), 1.0)
     share_y = np.where(tau_y > 0.0, h / (np.where(tau_y > 0.0, tau_y, 1.0) + 0.5 * h), 1.0)
+    damp, damp_L = 0.5 * h * DM / JM, 0.5 * h * DL / JL
     ring = np.zeros((int(np.max(delay)) + 3, count))
     whole = np.floor(delay).astype(int)
     part = delay - whole
@@ -162,8 +163,9 @@ def integrate(cases: list[FineCase], fine: int = 100) -> FineRun:
         u = np.where(is_open, target, u)
         out.velocity[n], out.torque[n], out.angle[n] = sensed(), u, angle
         for j in range(fine):
+            last = u
             control(before + (target - before) * (j / fine), analog)
-            v = np.clip(u, -limit, limit)
+            v = np.clip(np.where(analog, 1.5 * u - 0.5 * last, u), -limit, limit)
             v = np.sign(v) * np.maximum(np.abs(v) - width, 0.0)
             # The torque at the middle of the fine step, `delay` steps ago.
             ring[k % len(ring)] = v
@@ -182,6 +184,7 @@ def integrate(cases: list[FineCase], fine: int = 100) -> FineRun:
 
             theta = angle + 0.5 * h * w
             T = T - load - Au * np.sin(theta + pu) - Ac * np.sin(nc * theta + pc)
+            twist = twist + 0.5 * h * (w - wL)
             x = np.sign(twist) * np.maximum(np.abs(twist) - half_gap, 0.0)
             inside = np.abs(twist) < half_gap
             coupling = K * x + k3 * x**3 + np.where(inside, 0.0, D * (w - wL))
@@ -189,15 +192,21 @@ def integrate(cases: list[FineCase], fine: int = 100) -> FineRun:
             dz = w - np.abs(w) * z * per_zc
             force = s0 * (z + 0.5 * h * dz)
             z = z + h * (w - np.abs(w) * (z + 0.5 * h * dz) * per_zc)
-            smooth = DM * w + drag * w * np.abs(w) + np.where(w > 0.0, bp, bn) * w + force
-            free = w + h / JM * (T - coupling - smooth)
+            smooth = drag * w * np.abs(w) + np.where(w > 0.0, bp, bn) * w + force
+            free = ((1.0 - damp) * w + h / JM * (T - coupling - smooth)) / (1.0 + damp)
             t = np.maximum((n + (j + 0.5) / fine - analog) * dt, 0.0)
-            level = Tc + T0 + (T1 - T0) * np.exp(-((w / vs) ** 2)) + Td * (1.0 + rate * t) + np.where(free > 0.0, Tp, Tn)
+            level = (
+                Tc
+                + T0
+                + (T1 - T0) * np.exp(-((0.5 * (w + free) / vs) ** 2))
+                + Td * (1.0 + rate * t)
+                + np.where(free > 0.0, Tp, Tn)
+            )
             new = np.sign(free) * np.maximum(np.abs(free) - h / JM * level, 0.0)
-            wL = wL + h / JL * (coupling - DL * wL)
+            wL = ((1.0 - damp_L) * wL + h / JL * coupling) / (1.0 + damp_L)
             angle = angle + 0.5 * h * (w + new)
             w = new
-            twist = twist + h * (w - wL)
+            twist = twist + 0.5 * h * (w - wL)
             seen = w * (1.0 + ar * nr * np.cos(nr * angle + pr))
             filtered = np.where(tau_y > 0.0, filtered + share_y * (seen - filtered), seen)
             k += 1

@@ -1,6 +1,7 @@
 // The command is followed with at most this slope: r'(n) = r'(n-1) + clip(r(n) - r'(n-1), -rate T, rate T).
 #pragma once
 
+#include "../elementary.hpp"
 #include "effect.hpp"
 
 namespace gaident {

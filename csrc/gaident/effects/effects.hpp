@@ -55,10 +55,11 @@ enum class Effect : std::uint8_t {
 };
 
 inline constexpr std::array effect_table{
-    CoulombFriction::info,  StribeckFriction::info,     AsymmetricFriction::info, PreslidingFriction::info, QuadraticDrag::info,
-    LoadTorque::info,       Unbalance::info,            Cogging::info,            FrictionDrift::info,      Backlash::info,
-    HardeningStiffness::info, TorqueSaturation::info,   TorqueDeadBand::info,     TransportDelay::info,     TorqueLag::info,
-    IntegratorClamp::info,  CommandRateLimit::info,     VelocityFilter::info,     VelocityRipple::info,     VelocityQuantisation::info,
+    CoulombFriction::info,  StribeckFriction::info, AsymmetricFriction::info, PreslidingFriction::info,
+    QuadraticDrag::info,    LoadTorque::info,       Unbalance::info,          Cogging::info,
+    FrictionDrift::info,    Backlash::info,         HardeningStiffness::info, TorqueSaturation::info,
+    TorqueDeadBand::info,   TransportDelay::info,   TorqueLag::info,          IntegratorClamp::info,
+    CommandRateLimit::info, VelocityFilter::info,   VelocityRipple::info,     VelocityQuantisation::info,
     ExtraResonance::info,   Outliers::info,
 };
 inline constexpr int effect_count = static_cast<int>(effect_table.size());
@@ -87,7 +88,8 @@ struct EffectModel {
     const double* of(Effect e) const { return parameter[static_cast<int>(e)]; }
     void add(Effect e, const double* values) {
         effects.add(e);
-        for (int i = 0; i < effect_table[static_cast<std::size_t>(e)].parameters(); ++i) parameter[static_cast<int>(e)][i] = values[i];
+        for (int i = 0; i < effect_table[static_cast<std::size_t>(e)].parameters(); ++i)
+            parameter[static_cast<int>(e)][i] = values[i];
     }
 };
 

@@ -11,7 +11,9 @@ struct StribeckFriction {
         .name = "stribeck_friction",
         .place = Place::shaft,
         .meaning = "dry friction, larger at standstill and falling as motion begins",
-        .parameter = {{"torque", "N m", 0.0, 0.0}, {"static_torque", "N m", 0.0, 0.0}, {"stribeck_velocity", "rad/s", any_value, 0.0, infinite, true}},
+        .parameter = {{"torque", "N m", 0.0, 0.0},
+                      {"static_torque", "N m", 0.0, 0.0},
+                      {"stribeck_velocity", "rad/s", any_value, 0.0, infinite, true}},
         .allowed = [](const double* p) { return p[1] >= p[0]; },
         .relation = "static_torque must be at least torque",
     };

@@ -1,6 +1,7 @@
 // Small torques do nothing: 0 for abs(u) <= width, else u - width sign(u) = u - clip(u, -width, width).
 #pragma once
 
+#include "../elementary.hpp"
 #include "effect.hpp"
 
 namespace gaident {

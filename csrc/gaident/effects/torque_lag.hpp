@@ -8,8 +8,10 @@
 namespace gaident {
 
 struct TorqueLag {
-    static constexpr EffectInfo info{
-        "torque_lag", Place::actuator, "the torque follows its command with a first-order lag", {{"time_constant", "s", 0.0, 0.0}}};
+    static constexpr EffectInfo info{"torque_lag",
+                                     Place::actuator,
+                                     "the torque follows its command with a first-order lag",
+                                     {{"time_constant", "s", 0.0, 0.0}}};
 
     // Returns the mean; `decay` = e^-x, `mean` = (1 - e^-x)/x.
     template <class R>
