@@ -36,6 +36,7 @@ __all__ = ["diagnose"]
 Vector = NDArray[np.float64]
 ProgressCallback = Callable[[float, str], None]
 
+GATE = 1.2  # times the noise of the measured velocity: what an explained record may leave, whitened
 SWAP = 2.0  # BIC units by which a rival has to be better to take a finding's seat
 # What a driver of a remaining error is the domain of: a finding there only describes, it does not name.
 DOMAINS: dict[str, str] = {
@@ -161,7 +162,12 @@ class _Work:
             final, again = self.with_rivals(search, final, swaps_left > 0)
             if not again:
                 break
+        final = search.thinned(final, every=True)
+        for effect in final.effects:
+            if effect not in self.rivals or again:
+                self.rivals[effect] = search.rivals(final, effect)
         self.final = final
+        self.adequate = search.only_noise(final, GATE)
         self.note(0.85, "looking for what is left")
         self.left = leftover(self.problem, self.driven, final)
 
@@ -182,7 +188,7 @@ class _Work:
     def report(self, seed: int, seconds: float) -> Diagnosis:
         """Everything the user sees."""
         self.note(0.9, "measuring the gain")
-        driver = self.left.driver
+        driver = self.left.driver if self.adequate else self.left.strongest
         causes = [e for e in self.final.effects if not self._only_describes(e, driver)]
         estimates = estimates_of(self.problem, self.final)
         gains = measured_gains(

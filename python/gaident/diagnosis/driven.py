@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
+from gaident.diagnosis.hygiene import quantisation
 from gaident.diagnosis.layout import Layout
 from gaident.identification.space import torque_of
 from gaident.identification.starts import noise_std, starts_moving
@@ -30,18 +32,28 @@ AT_CONTROLLER = ("integrator_clamp", "command_rate_limit")
 
 @dataclass(frozen=True)
 class Driven:
-    """Records with the torque that drove each, and with an angle (measured, or integrated from the measured velocity)."""
+    """Records, each also as driven by its torque (`driven`), both with an angle: measured, or integrated from the measured velocity
+    (`turned`: the record itself with that angle; `free`: torque-driven, without an angle that was not measured)."""
 
     records: tuple[Record, ...]
     controller: PI | None
     driven: tuple[Record, ...]
+    turned: tuple[Record, ...]
+    free: tuple[Record, ...]
     moving: tuple[bool, ...]
 
     @classmethod
     def of(cls, records: Sequence[Record], controller: PI | None) -> Driven:
         """The records as driven by their torque."""
         driven = tuple(_driven(r, torque_of(r, controller)) for r in records)
-        return cls(tuple(records), controller, driven, tuple(starts_moving(r, None) for r in driven))
+        turned = tuple(_with_angle(r, _angle(a)) for r, a in zip(records, driven, strict=True))
+        free = tuple(a if r.position is not None else _with_angle(a, None) for r, a in zip(records, driven, strict=True))
+        return cls(tuple(records), controller, driven, turned, free, tuple(starts_moving(r, None) for r in driven))
+
+    @property
+    def angle_logged(self) -> bool:
+        """Whether every record holds the angle."""
+        return all(r.position is not None for r in self.records)
 
     @property
     def torque_logged(self) -> bool:
@@ -83,16 +95,15 @@ class Driven:
         """Simulated velocities of rows of x, (n, samples)."""
         if layout.looped:
             names, values = layout.values(X)
-            return np.concatenate(
-                [simulate_values(layout.structure, names, values, r, self.controller) for r in self.records], axis=1
-            )
+            source = self.records if layout.own_angle else self.turned
+            return np.concatenate([simulate_values(layout.structure, names, values, r, self.controller) for r in source], axis=1)
         at_controller = [e for e in layout.effects if e in AT_CONTROLLER]
         if at_controller:
             return np.vstack([self._predict_one(layout, x, at_controller) for x in X])
         names, values = layout.values(X)
         parts = [
             simulate_values(layout.structure, names, values, r, initial_states=layout.start_values(X, i))
-            for i, r in enumerate(self.driven)
+            for i, r in enumerate(self.free if layout.own_angle else self.driven)
         ]
         return np.concatenate(parts, axis=1)
 
@@ -107,10 +118,11 @@ class Driven:
             parts.append(simulate_values(layout.structure, names, values, _driven(r, torque), initial_states=states))
         return np.concatenate(parts, axis=1)
 
-    @property
+    @cached_property
     def noise(self) -> float:
         """Standard deviation of white noise on the velocity, as its third differences show it [rad/s]."""
-        return float(np.mean([noise_std(r.velocity) for r in self.records]))
+        rounding = quantisation(self.records) / np.sqrt(12.0)
+        return max(float(np.mean([noise_std(r.velocity) for r in self.records])), rounding)
 
     @property
     def loopable(self) -> bool:
@@ -167,6 +179,10 @@ def rate_limited(command: Vector, step: float) -> Vector:
         last += min(max(target - last, -step), step)
         out[n] = last
     return out
+
+
+def _with_angle(rec: Record, angle: Vector | None) -> Record:
+    return Record(rec.dt, rec.command, rec.velocity, rec.torque, angle, rec.name)
 
 
 def _driven(rec: Record, torque: Vector) -> Record:

@@ -74,6 +74,7 @@ class Layout:
     starts: tuple[int, ...]
     scales: Scales
     looped: bool = False
+    own_angle: bool = False
 
     @classmethod
     def of(cls, model: Model, scales: Scales, moving: Sequence[bool]) -> Layout:

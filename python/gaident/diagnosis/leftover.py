@@ -32,9 +32,14 @@ class Leftover:
     gains: dict[str, float]
 
     @property
+    def strongest(self) -> str | None:
+        """The driver that explains most, whether or not it counts."""
+        return max(self.gains, key=lambda d: self.gains[d], default=None)
+
+    @property
     def driver(self) -> str | None:
         """The driver that explains most, None where nothing significant is left."""
-        name = max(self.gains, key=lambda d: self.gains[d], default=None)
+        name = self.strongest
         return name if name is not None and self.gains[name] > LEFT else None
 
 

@@ -32,6 +32,8 @@ MARGIN = 10.0
 HINT = 8.0
 """Fall of N ln V from which a generalisation is no longer ruled out by the simpler effect it contains."""
 
+OF_ANGLE = ("unbalance", "cogging", "velocity_ripple")
+
 MOST = 4  # effects in one model
 FITTED = 6  # candidates that each of the two rankings sends into a short fit
 FINISHED = 5  # of these, how many are fitted to the end
@@ -63,25 +65,68 @@ class Search:
             if found is None or best.bic - found.bic < THRESHOLD:
                 break
             best = self.polished(self.thinned(with_second_mass(self.problem, found)))
+        return best if self.only_noise(best) else self.rescued(best, base)
+
+    def rescued(self, best: Fit, base: Fit) -> Fit:
+        """Where more than noise is left at the end: a global search for each rough effect alone, which no slope may have led to."""
+        for effect in (e for e in self.candidates(base.layout) if CANDIDATES[e].rough and e not in best.effects):
+            layout = replace(base.layout.extended(effect), looped=self.driven.loopable)
+            rows = np.array(CANDIDATES[effect].starts(layout.scales))
+            X = np.vstack([base.layout.inserted(base.x, z) for z in rows])
+            x = X[int(np.argmin(self.problem.costs(layout, X, NONE)))]
+            fit = self.searched(self.problem.judged(self.problem.fit(layout, x, NONE, 5)))
+            if best.bic - fit.bic > THRESHOLD:
+                best = fit
         return best
 
     def polished(self, fit: Fit) -> Fit:
-        """Where more than noise is left: every effect once more from all of its starts, with the rest as it stands.
-
-        The cost has many valleys (a stop or an impact more or less), and the first fit began far from the rest's final values.
-        """
+        """Where more than noise is left: every effect once more from all of its starts, and rough ones by a global search nearby."""
         for effect in fit.effects[::-1]:
-            rows = CANDIDATES[effect].starts(fit.layout.scales)
-            if self.only_noise(fit) or len(rows) == 0:
-                continue
-            limits = np.array(CANDIDATES[effect].limits(fit.layout.scales)).T
-            X = np.repeat(fit.x[None, :], len(rows), axis=0)
-            X[:, fit.layout.slot(effect)] = np.clip(np.array(rows), *limits)
-            order = np.argsort(self.problem.costs(fit.layout, X, fit.phi))[:4]
-            tries = [self.problem.judged(self.problem.fit(fit.layout, X[i], NONE, 8)) for i in order]
-            best = min(tries, key=lambda f: f.bic)
-            fit = min((fit, self.problem.settled(self.problem.fit(best.layout, best.x, NONE, 12))), key=lambda f: f.bic)
+            if self.only_noise(fit):
+                break
+            fit = min((fit, self.restarted(fit, effect)), key=lambda f: f.bic)
+            if CANDIDATES[effect].rough and not self.only_noise(fit):
+                fit = min((fit, self.searched(fit)), key=lambda f: f.bic)
         return fit
+
+    def restarted(self, fit: Fit, effect: str) -> Fit:
+        """The best fit from an effect's starts, with the rest as it stands: the first fit began far from the rest's final values."""
+        rows = CANDIDATES[effect].starts(fit.layout.scales)
+        if len(rows) == 0:
+            return fit
+        limits = np.array(CANDIDATES[effect].limits(fit.layout.scales)).T
+        X = np.repeat(fit.x[None, :], len(rows), axis=0)
+        X[:, fit.layout.slot(effect)] = np.clip(np.array(rows), *limits)
+        order = np.argsort(self.problem.costs(fit.layout, X, fit.phi))[:3]
+        tries = [self.problem.judged(self.problem.fit(fit.layout, X[i], NONE, 8)) for i in order]
+        best = min(tries, key=lambda f: f.bic)
+        return self.problem.settled(self.problem.fit(best.layout, best.x, NONE, 12))
+
+    def searched(self, fit: Fit) -> Fit:
+        """Differential evolution around a fit: a stop or an impact more or less makes valleys that no slope leads out of."""
+        from scipy.optimize import differential_evolution
+
+        layout = replace(fit.layout, looped=self.driven.loopable)
+        limits, steps = layout.limits(), layout.steps()
+        reach = np.where(np.arange(layout.size) < layout.base, 0.15 * np.maximum(np.abs(fit.x), 0.3), 0.7 * steps)
+        reach[0] = 0.15
+        moved = np.flatnonzero(steps > 0.0)
+        low, high = np.maximum(fit.x - reach, limits[0])[moved], np.minimum(fit.x + reach, limits[1])[moved]
+        if np.any(low >= high):
+            return fit
+
+        def costs(columns: NDArray[np.float64]) -> Vector:
+            X = np.repeat(fit.x[None, :], columns.shape[1], axis=0)
+            X[:, moved] = columns.T
+            return np.log(self.problem.costs(layout, X, NONE))
+
+        found = differential_evolution(
+            costs, list(zip(low, high, strict=True)), popsize=6, maxiter=50, x0=fit.x[moved], rng=0, vectorized=True,
+            updating="deferred", polish=False, tol=1e-4, mutation=(0.4, 0.9), recombination=0.9,
+        )  # fmt: skip
+        x = fit.x.copy()
+        x[moved] = found.x
+        return self.finished(self.problem.fit(layout, x, NONE, 15))
 
     def best_gain(self, now: Fit) -> float:
         """What the best extension is worth, in BIC units."""
@@ -147,15 +192,16 @@ class Search:
     def finished(self, fit: Fit) -> Fit:
         """A short fit taken to the end, under the filter of what it leaves itself."""
         fit = self.problem.settled(fit if fit.converged else self.problem.fit(fit.layout, fit.x, fit.phi, 8))
-        if not fit.layout.looped:
-            return fit
-        # Found in the loop's grip, the parameters may be good enough for the torque to drive the model, which sees more.
-        driven = replace(fit.layout, looped=False)
-        return min((fit, self.problem.settled(self.problem.fit(driven, fit.x, NONE, 8))), key=lambda f: f.bic)
+        # Found in the loop's grip or with the measured angle, the parameters may be good enough for a view that sees more.
+        views = [replace(fit.layout, looped=False)] if fit.layout.looped else []
+        if not fit.layout.own_angle and not self.driven.angle_logged and set(fit.effects) & set(OF_ANGLE):
+            views.append(replace(fit.layout, own_angle=True))
+        tries = [self.problem.settled(self.problem.fit(view, fit.x, NONE, 8)) for view in views]
+        return min((fit, *tries), key=lambda f: f.bic)
 
-    def only_noise(self, fit: Fit) -> bool:
-        """Whether a fit leaves no more than the noise that the measured velocity itself shows."""
-        return bool(np.sqrt(fit.cost / self.problem.count) < 1.1 * self.driven.noise)
+    def only_noise(self, fit: Fit, slack: float = 1.1) -> bool:
+        """Whether a fit leaves, whitened, no more than `slack` times the noise that the measured velocity itself shows."""
+        return bool(np.sqrt(fit.cost / self.problem.count) < slack * self.driven.noise)
 
     def add_generalisations(self, screening: Screening, source: Fit, seat: str) -> None:
         """The rest of the friction family in the seat's place, at its level."""
@@ -187,9 +233,9 @@ class Search:
                     return f
         return best
 
-    def thinned(self, best: Fit) -> Fit:
-        """Without the members whose removal costs less than the threshold."""
-        for effect in best.effects[:-1]:
+    def thinned(self, best: Fit, every: bool = False) -> Fit:
+        """Without the members (of all, or of all but the newest) whose removal costs less than the threshold."""
+        for effect in best.effects if every else best.effects[:-1]:
             less = self.without(best, effect)
             if less.bic - best.bic < THRESHOLD:
                 best = less
