@@ -211,8 +211,16 @@ def rivals(truth: Truth, torque: Array) -> dict[str, list[dict[str, Values]]]:
                             for w in (500.0, 1100.0)],
     }  # fmt: skip
     names = [rival for rival in NEAR[name] if truth.plant.two_masses or rival not in COUPLING]
+    # From sizes like the truth's own, or a small effect is not found from afar.
+    size_like = {*SCALES, "cubic_stiffness", "amplitude"} - {"yield_twist"}
+
+    def start(rival: str, values: Values) -> dict[str, Values]:
+        if rival in ("command_rate_limit", "torque_saturation", "integrator_clamp"):
+            return {rival: values}
+        return {rival: {name: v * min(1.0, truth.factor) if name in size_like else v for name, v in values.items()}}
+
     listed: dict[str, list[dict[str, Values]]] = {"none": [{}]}
-    listed.update({rival: [{rival: values} for values in starts[rival]] for rival in names})
+    listed.update({rival: [start(rival, values) for values in starts[rival]] for rival in names})
     return listed
 
 
@@ -227,7 +235,7 @@ class Limit:
     rival: str
 
 
-def separability(truth: Truth, only: Sequence[str] | None = None, evaluations: int = 10) -> dict[str, float]:
+def separability(truth: Truth, only: Sequence[str] | None = None, evaluations: int = 15) -> dict[str, float]:
     """chi2 that each rival leaves of the noise-free record of a case after its refit."""
     log = run_drive(truth.plant, truth.command, truth.effects)
     left: dict[str, float] = {}

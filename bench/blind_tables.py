@@ -145,12 +145,18 @@ def limits_of(lines: list[Line]) -> dict[tuple[str, str], float]:
     return {(x["effect"], x["plant"]): float(x["limit"]["size"]) for x in lines if "limit" in x}
 
 
+def limit_for(known: dict[tuple[str, str], float], effect: str, plant: str) -> float:
+    """The limit on this plant; where that was not computed, the largest of the effect; without any, the typical size."""
+    others = [size for (name, _), size in known.items() if name == effect]
+    return known.get((effect, plant), max(others, default=1.0))
+
+
 def curve_table(lines: list[Line], limits: list[Line]) -> str:
     """Detection against size over separability limit, per effect and in all; without limits against the size itself."""
     known = limits_of(limits)
     edges = [0, 0.5, 1, 2, 4, np.inf]
     bins = [f"{a:g}-{b:g}" for a, b in pairwise(edges)]
-    above = [x["factor"] / known.get((x["cell"]["effects"][0], x["plant"]), 1.0) for x in lines]
+    above = [x["factor"] / limit_for(known, x["cell"]["effects"][0], x["plant"]) for x in lines]
     rows = []
     for effect in (*EFFECTS, "all"):
         row: list[object] = [effect]

@@ -193,11 +193,13 @@ def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:
 
 
 def substeps_for(values: Mapping[str, float], dt: float, least: int) -> int:
-    """So many substeps that the bristle, the stiffest state, stays well inside the step's stability."""
-    fastest = values["dahl_stiffness"] * 150 / values["dahl"] if values["dahl"] else 0.0
+    """So many substeps that the fastest state stays well inside the step's stability and accuracy: bristle, lag or filter."""
+    rates = [values["dahl_stiffness"] * 150 / values["dahl"] if values["dahl"] else 0.0]
+    rates += [1 / values[name] for name in ("lag", "filter") if values[name] > 0]
+    fastest = max(rates)
     needed = int(np.ceil(dt * fastest / 0.5))
     if needed > MOST_SUBSTEPS:
-        raise RanAwayError(f"a bristle this stiff needs {needed} substeps; give a softer or stronger one")
+        raise RanAwayError(f"a bristle, lag or filter this fast needs {needed} substeps a sample; give a slower one or none")
     return max(least, needed)
 
 
