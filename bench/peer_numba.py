@@ -1,8 +1,8 @@
 """The same problem compiled by numba: error sums for the peers, and a whole genetic algorithm.
 
 Everything is in delta form (delta = z - 1), as in the core; `fastmath` and the machine's own vector width, which the core
-does without or chooses at run time. The genetic algorithm keeps its 194 bits as 21 integer fields, draws random bits by the word and
-mutations by their gaps, and simulates candidates of one order side by side.
+does without or chooses at run time. The genetic algorithm keeps its 194 bits as 21 integer fields, draws random bits by the
+word and mutations by their gaps, and simulates candidates of one order side by side.
 """
 
 from __future__ import annotations
@@ -86,7 +86,10 @@ def times(c, degree, k2, k1, k0):
 
 @njit(fastmath=True, error_model="numpy")
 def close(p, K, poles, pole_pairs, single_pole, zeros, zero_pairs, single_zero, loop, a, b, A, B):
-    """Coefficients of the closed loop, A and B being scratch; poles, zeros: rows (e1, e0) of s^2 + e1 s + e0, a single root behind them. Returns N."""
+    """Coefficients of the closed loop into a and b; returns its order. A and B are scratch.
+
+    poles, zeros: rows (e1, e0) of s^2 + e1 s + e0, behind them a row for the single root.
+    """
     Ts, kp, ki = loop
     h = 0.5 * Ts
     A[0] = 1.0
@@ -287,9 +290,10 @@ def contest(state, costs):
 
 @njit(error_model="numpy")
 def genetic(seed, population, generations, structure, ranges, logarithmic, loop, command, output, best_fields):
-    """The paper's run: tournament of 2, multi-point crossover 0.9, bit mutation 0.01, no elite. Continues `population` (rows of fields).
+    """The paper's run: tournament of 2, multi-point crossover 0.9, bit mutation 0.01, no elite.
 
-    structure: (p, q) to keep, or (-1, -1). Writes the best fields seen; returns the best cost and whence to continue.
+    population: rows of fields, replaced by the last generation. structure: (p, q) to keep, or (-1, -1). Writes the best fields
+    seen and returns their cost.
     """
     count = len(population)
     state = np.array([np.uint64(seed) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(1)])

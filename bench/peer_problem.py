@@ -159,7 +159,7 @@ def independent_error(case: success.Case, output: Array, K: float, A: Roots, B: 
     return float(np.sum((output - y[:, 0]) ** 2))
 
 
-class Reached(Exception):
+class Reached(Exception):  # noqa: N818 - no error
     """The optimum was found, or the time is over."""
 
 

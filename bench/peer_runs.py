@@ -154,7 +154,7 @@ def numbers_pymoo(fitness: Fitness, seed: int) -> None:
     """Its differential evolution, 300 generations a start."""
     from pymoo.algorithms.soo.nonconvex.de import DE
 
-    _pymoo(fitness, DE(pop_size=POPULATION, variant="DE/best/1/bin", CR=0.9), NUMBERS, 300, seed)
+    _pymoo(fitness, DE(pop_size=POPULATION, variant="DE/rand/1/bin", CR=0.9), NUMBERS, 300, seed)
 
 
 class _Pygmo:

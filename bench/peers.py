@@ -3,16 +3,15 @@
     pip install .[peers]
     python bench/peers.py [--quick] [--seeds 10] [--limit 20] [--only NAME ...]
 
-Every row asserts its answer: the error sum that a peer reports for its best candidate is the one that SciPy computes independently,
-in state space. What the peers are given stands in peer_problem.py, how each is called in peer_runs.py.
+Every row asserts its answer: the error sum that a peer reports for its best candidate is the one that SciPy computes
+independently, in state space. What the peers are given stands in peer_problem.py, how each is called in peer_runs.py.
 """
 
 from __future__ import annotations
 
 import os
 
-for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ[name] = "1"
+os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import argparse
 import importlib.metadata
@@ -280,10 +279,10 @@ def optimum_row(who: str, run: Callable[[Problem, int], Outcome], record: str, s
 
 def optimum_table(options: argparse.Namespace, record: str) -> None:
     p = problem(record, 0)
-    s = p.space
+    K, re, im = p.ranges()
     print(
-        f"\nTime to the optimum, record {record!r}: K {s.gain[0]:.4g}..{s.gain[1]:.4g}, real parts {p.ranges()[1][0]:.4g}..{s.real[1]:.4g}, "
-        f"imaginary parts {p.ranges()[2][0]:.4g}..{s.imaginary[1]:.4g} rad/s; {options.seeds} seeds, at most {options.limit:g} s each"
+        f"\nTime to the optimum, record {record!r}: K {K[0]:.4g}..{K[1]:.4g}, real parts {re[0]:.4g}..{re[1]:.4g}, "
+        f"imaginary parts {im[0]:.4g}..{im[1]:.4g} rad/s; {options.seeds} seeds, at most {options.limit:g} s each"
     )
     print("\n| who | right | ms, median [min, max] | evaluations |\n|---|---|---|---|", flush=True)
     optimum_row("gaident.identify, structure searched", lambda p, k: our_run(p, k, False), record, options.seeds)
