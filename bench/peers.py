@@ -149,7 +149,7 @@ def generation_table(options: argparse.Namespace) -> None:
     p = problem(RECORDS[0], 0)
     repeats, slow, fast = (3, 5, 200) if options.quick else (9, 20, 2000)
     print(
-        f"\nTime per generation: population {POPULATION}, 250 samples, everything included; us, median [min, max] of {repeats} runs"
+        f"\nTime per generation: population {POPULATION}, 250 samples, everything included; median [min, max] of {repeats} runs"
     )
     print("\n| who | candidate | fitness | us per generation |\n|---|---|---|---|", flush=True)
     for arithmetic in ("double", "float"):
