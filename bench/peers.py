@@ -262,9 +262,9 @@ def our_run(p: Problem, seed: int, structure_given: bool) -> Outcome:
     return Outcome((idn.p, idn.q) == (1, 2) and deviation < p.case.limit * p.case.noise, seconds)
 
 
-def optimum_row(who: str, run: Callable[[Problem, int], Outcome], record: str, seeds: int) -> None:
-    run(problem(record, 999), 999)  # warm
-    found = [run(problem(record, k), k) for k in range(seeds)]
+def optimum_row(who: str, run: Callable[[Problem, int, float], Outcome], record: str, seeds: int, limit: float) -> None:
+    run(problem(record, 999), 999, 0.2)  # warm: compiles, imports
+    found = [run(problem(record, k), k, limit) for k in range(seeds)]
     right = [o for o in found if o.right]
     times = [1e3 * (o.seconds if o.right else np.inf) for o in found]
     middle, low, high = float(np.median(times)), min(times), max(times)
@@ -278,30 +278,30 @@ def optimum_row(who: str, run: Callable[[Problem, int], Outcome], record: str, s
 
 
 def optimum_table(options: argparse.Namespace, record: str) -> None:
-    p = problem(record, 0)
+    p, how = problem(record, 0), (options.seeds, options.limit)
     K, re, im = p.ranges()
     print(
         f"\nTime to the optimum, record {record!r}: K {K[0]:.4g}..{K[1]:.4g}, real parts {re[0]:.4g}..{re[1]:.4g}, "
         f"imaginary parts {im[0]:.4g}..{im[1]:.4g} rad/s; {options.seeds} seeds, at most {options.limit:g} s each"
     )
     print("\n| who | right | ms, median [min, max] | evaluations |\n|---|---|---|---|", flush=True)
-    optimum_row("gaident.identify, structure searched", lambda p, k: our_run(p, k, False), record, options.seeds)
-    optimum_row("gaident.identify, structure given", lambda p, k: our_run(p, k, True), record, options.seeds)
-    runs: dict[str, Callable[[Problem, int], Outcome]] = {
-        "whole GA in numba": lambda p, k: numba_run(p, k, options.limit),
-        "SciPy least squares, many starts": lambda p, k: peer_run(
-            lambda f, seed: least_squares_starts(f, seed, p), p, k, options.limit
+    optimum_row("gaident.identify, structure searched", lambda p, k, _: our_run(p, k, False), record, *how)
+    optimum_row("gaident.identify, structure given", lambda p, k, _: our_run(p, k, True), record, *how)
+    runs: dict[str, Callable[[Problem, int, float], Outcome]] = {
+        "whole GA in numba": numba_run,
+        "SciPy least squares, many starts": lambda p, k, limit: peer_run(
+            lambda f, seed: least_squares_starts(f, seed, p), p, k, limit
         ),
     }
     for name, call in peer_runs.ON_NUMBERS.items():
-        runs[name] = lambda p, k, call=call: peer_run(call, p, k, options.limit)
+        runs[name] = lambda p, k, limit, call=call: peer_run(call, p, k, limit)
     for name, run in runs.items():
         if not wanted(options, name):
             continue
         if label(name) is None:
             print(f"| {name} | not installed (`pip install .[peers]`; pygmo has wheels for Linux only) | | |")
             continue
-        optimum_row(label(name), run, record, options.seeds)
+        optimum_row(label(name), run, record, *how)
 
 
 def wanted(options: argparse.Namespace, name: str) -> bool:
