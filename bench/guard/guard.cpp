@@ -162,10 +162,10 @@ void judge(guard::Ratios& ratios, const std::string& name, auto&& measure) {
     const double limit = stored * (own ? least_share : least_share_elsewhere);
     double best = 0.0;
     for (int i = 0; i < attempts && (i == 0 || best < limit); ++i) best = std::max(best, measure());
-    const bool bad = best < limit;
+    const bool bad = best < limit || stored == 0.0;
     lost = lost || bad;
     std::printf("%-28s %6.2f times the frozen code; stored %6.2f, limit %6.2f%s\n", name.c_str(), best, stored, limit,
-                bad ? "  LOST" : "");
+                stored == 0.0 ? "  NOT STORED" : (bad ? "  LOST" : ""));
 }
 
 void rows(guard::Ratios& ratios) {
