@@ -44,12 +44,14 @@ double median(std::vector<double> x) {
     return *middle;
 }
 
-// The two-mass record of the paper, without noise.
+// The two-mass record of the paper, without noise: its step, or a staircase where the record is longer, so that a fast path for steps does
+// not hide a loss elsewhere.
 struct Data {
     std::vector<double> input, output;
     Experiment experiment;
 
     Data(LoopKind kind, const Kernels& kernels, std::size_t samples) : input(samples, 43.6), output(samples) {
+        for (std::size_t i = 250; i < samples; ++i) input[i] = 43.6 * static_cast<double>((i / 250) % 3) - 20.0;
         const std::complex<double> poles[] = {-15.41, {-10.30, 150.9}, {-10.30, -150.9}};
         const std::complex<double> zeros[] = {{-4.26, 93.98}, {-4.26, -93.98}};
         experiment.loop.kind = kind;
@@ -164,8 +166,9 @@ void judge(guard::Ratios& ratios, const std::string& name, auto&& measure) {
     for (int i = 0; i < attempts && (i == 0 || best < limit); ++i) best = std::max(best, measure());
     const bool bad = best < limit || stored == 0.0;
     lost = lost || bad;
-    std::printf("%-28s %6.2f times the frozen code; stored %6.2f, limit %6.2f%s\n", name.c_str(), best, stored, limit,
-                stored == 0.0 ? "  NOT STORED" : (bad ? "  LOST" : ""));
+    std::printf(
+        "%-28s %6.2f times the frozen code; stored %6.2f, limit %6.2f%s\n", name.c_str(), best, stored, limit,
+        stored == 0.0 ? "  NOT STORED" : (bad ? "  LOST" : (own && best > 1.3 * stored ? "  faster: renew the ratios" : "")));
 }
 
 void rows(guard::Ratios& ratios) {
