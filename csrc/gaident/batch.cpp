@@ -109,14 +109,38 @@ void load_group(const Experiment& experiment, const Record& record, std::span<co
     }
 }
 
+namespace {
+
+bool settles(const Record& r, const Loop& loop) {
+    return loop.kind != LoopKind::open && !loop.limited() &&
+           std::all_of(r.input.begin(), r.input.end(), [&](double v) { return v == r.input[0]; });
+}
+
+}  // namespace
+
 Batch::Batch(const Experiment& experiment, std::size_t capacity, bool in_float)
     : experiment_(experiment), in_float_(in_float && !experiment.loop.limited()), order_(capacity), sorted_(capacity) {
-    if (!in_float_) return;
-    inputs_.reserve(experiment.samples());
-    outputs_.reserve(experiment.samples());
+    std::size_t constant = 0;
     for (const Record& r : experiment.records) {
-        for (double v : r.input) inputs_.push_back(static_cast<float>(v));
-        for (double v : r.output) outputs_.push_back(static_cast<float>(v));
+        settling_.push_back(settles(r, experiment.loop) ? 1 : 0);
+        if (settling_.back() != 0) constant += r.size();
+    }
+    deviations_.reserve(constant);  // views point into it
+    for (std::size_t i = 0; i < experiment.records.size(); ++i) {
+        const Record& r = experiment.records[i];
+        views_.push_back({r.input, r.output});
+        if (settling_[i] == 0) continue;
+        const std::size_t first = deviations_.size();
+        for (const double y : r.output) deviations_.push_back(y - r.input[0]);
+        views_.back().output = std::span(deviations_).subspan(first);
+    }
+    if (!in_float_) return;
+    floats_.reserve(2 * experiment.samples());
+    for (const View<double>& v : views_) {
+        const std::size_t first = floats_.size(), n = v.output.size();
+        for (const auto& signal : {v.input, v.output})
+            for (const double x : signal) floats_.push_back(static_cast<float>(x));
+        float_views_.push_back({std::span(floats_).subspan(first, n), std::span(floats_).subspan(first + n, n)});
     }
 }
 
@@ -131,6 +155,19 @@ std::size_t Batch::group_end(std::size_t first, std::size_t count) const {
 
 namespace {
 
+constexpr std::size_t none = ~std::size_t{0};
+
+// Under a constant command r a PI loop rests at y = r: its a[N-1] is its b[N], so it has no steady error. The deviations from that
+// rest, y - r and x[i] - x_rest[i] with x_rest[0] = r - b[0] r, x_rest[i] = a[i-1] r - b[i] r, obey the recurrence without input, which
+// is nearly half the work.
+void settle(DoubleGroup& g, double r) {
+    for (int i = 0; i < g.order; ++i)
+        for (int lane = 0; lane < DoubleGroup::width; ++lane) {
+            const double at_rest = i == 0 ? 1.0 - g.b[0][lane] : g.a[i - 1][lane] - g.b[i][lane];
+            g.x[i][lane] -= at_rest * r;
+        }
+}
+
 void narrow(const DoubleGroup& from, int offset, FloatGroup& to) {
     for (int k = 0; k <= to.order; ++k)
         for (int lane = 0; lane < DoubleGroup::width; ++lane) {
@@ -143,73 +180,76 @@ void narrow(const DoubleGroup& from, int offset, FloatGroup& to) {
 
 }  // namespace
 
-// Advances a group over a record, chunk by chunk; adds each lane's squared errors.
-template <class G, class T, class Errors>
-void Batch::advance(Errors&& errors, G& group, std::span<const T> in, std::span<const T> out, double* sums) const {
-    for (std::size_t i = 0; i < in.size(); i += chunk_samples) {
-        const std::size_t n = std::min(chunk_samples, in.size() - i);
-        T part[G::width];
-        errors(group, in.data() + i, out.data() + i, n, part);
-        for (std::size_t lane = 0; lane < G::width; ++lane) sums[lane] += static_cast<double>(part[lane]);
+// Advances groups over a record, chunk by chunk; adds each lane's squared errors.
+template <class T, class G>
+void Batch::advance(const View<T>& view, const Record& record, G* groups, int lanes, double* sums) const {
+    const bool settling = settling_[static_cast<std::size_t>(&record - experiment_.records.data())] != 0;
+    const Controller<double> controller(experiment_.loop, record.sample_time);
+    for (std::size_t i = 0; i < view.output.size(); i += chunk_samples) {
+        const std::size_t n = std::min(chunk_samples, view.output.size() - i);
+        const T *const in = view.input.data() + i, *const out = view.output.data() + i;
+        T part[static_cast<std::size_t>(bank_groups) * DoubleGroup::width];
+        const auto each = [&](auto&& errors) {
+            for (int g = 0; g * G::width < lanes; ++g) errors(groups[g], part + g * G::width);
+        };
+        if constexpr (std::same_as<T, float>) {
+            const auto& kernels = experiment_.kernels->in_float;
+            if (settling) kernels.settling_errors(groups, lanes, out, n, part);
+            else each([&](G& g, T* sum) { kernels.errors(g, in, out, n, sum); });
+        } else {
+            const auto& kernels = experiment_.kernels->in_double;
+            if (settling) kernels.settling_errors(groups, lanes, out, n, part);
+            else if (experiment_.loop.limited())
+                each([&](G& g, T* sum) { kernels.stepped_errors(g, controller, in, out, n, sum); });
+            else each([&](G& g, T* sum) { kernels.errors(g, in, out, n, sum); });
+        }
+        for (int lane = 0; lane < lanes; ++lane) sums[lane] += static_cast<double>(part[lane]);
         experiment_.stop_if_asked();
     }
 }
 
-void Batch::advance_double(DoubleGroup& group, const Record& record, double* sums) const {
-    const auto& kernels = experiment_.kernels->in_double;
-    if (!experiment_.loop.limited()) return advance(kernels.errors, group, record.input, record.output, sums);
-    const Controller<double> controller(experiment_.loop, record.sample_time);
-    const auto stepped = [&](DoubleGroup& g, const double* in, const double* out, std::size_t n, double* part) {
-        kernels.stepped_errors(g, controller, in, out, n, part);
-    };
-    advance(stepped, group, record.input, record.output, sums);
-}
-
-// The next candidates from `first` on that share a group; returns the first that does not.
-std::size_t Batch::load(const Record& record, std::size_t first, std::size_t count, DoubleGroup& group) const {
-    const std::size_t end = group_end(first, count);
-    load_group(experiment_, record, std::span(sorted_).subspan(first, end - first), {}, group);
-    return end;
-}
-
-void Batch::run_double(const Record& record, std::size_t count, double* sums) {
+void Batch::run(std::size_t r, std::size_t count, double* sums) {
+    constexpr std::size_t W = DoubleGroup::width;
+    const Record& record = experiment_.records[r];
     for (std::size_t first = 0; first < count;) {
-        const std::size_t end = load(record, first, count, halves_[0]);
-        double part[DoubleGroup::width] = {};
-        advance_double(halves_[0], record, part);
-        for (std::size_t i = first; i < end; ++i) sums[order_[i]] += part[i - first];
-        first = end;
-    }
-}
-
-// Two groups of eight side by side; a lane that 24 bits cannot hold takes its sum from a run of its eight in double.
-void Batch::run_float(const Record& record, std::span<const float> in, std::span<const float> out, std::size_t count,
-                      double* sums) {
-    for (std::size_t first = 0; first < count;) {
-        const std::size_t middle = load(record, first, count, halves_[0]);
-        const std::size_t end = middle < count ? load(record, middle, count, halves_[1]) : middle;
-        if (middle == count) halves_[1] = halves_[0];
-        float_group_.order = std::max(halves_[0].order, halves_[1].order);
-        narrow(halves_[0], 0, float_group_);
-        narrow(halves_[1], DoubleGroup::width, float_group_);
-        double part[FloatGroup::width] = {};
-        advance(experiment_.kernels->in_float.errors, float_group_, in, out, part);
-
-        const std::size_t starts[] = {first, middle, end};
-        for (std::size_t h = 0; h < 2; ++h) {
-            DoubleGroup& half = halves_[h];
-            const std::size_t used = starts[h + 1] - starts[h];
-            const auto suffices = [&](std::size_t lane) {
-                return float_suffices(half.order, [&](int i) { return half.a[i][lane]; });
-            };
-            bool in_float[DoubleGroup::width], all = true;
-            for (std::size_t lane = 0; lane < used; ++lane) all = (in_float[lane] = suffices(lane)) && all;
-            double exact[DoubleGroup::width] = {};
-            if (!all) advance_double(half, record, exact);
-            for (std::size_t lane = 0; lane < used; ++lane)
-                sums[order_[starts[h] + lane]] += in_float[lane] ? part[h * DoubleGroup::width + lane] : exact[lane];
+        // Which candidate sits in which lane of the bank; behind a hold a group can end early and leave lanes empty.
+        std::size_t candidate[bank_groups * W], lanes = 0;
+        for (int g = 0; g < bank_groups && first < count; ++g) {
+            const std::size_t end = group_end(first, count);
+            load_group(experiment_, record, std::span(sorted_).subspan(first, end - first), {}, bank_[g]);
+            if (settling_[r] != 0) settle(bank_[g], record.input[0]);
+            lanes = static_cast<std::size_t>(g) * W;
+            for (std::size_t lane = 0; lane < W; ++lane)
+                candidate[lanes + lane] = lane < end - first ? order_[first + lane] : none;
+            lanes += end - first;
+            first = end;
         }
-        first = end;
+        double part[bank_groups * W] = {};
+        if (!in_float_) {
+            advance(views_[r], record, bank_, static_cast<int>(lanes), part);
+        } else {
+            // Two groups side by side; a group with a lane that 24 bits cannot hold is run in double as well, for that lane.
+            const std::size_t groups = (lanes + W - 1) / W;
+            for (std::size_t g = 0; g < groups; g += 2) {
+                const DoubleGroup& second = bank_[g + 1 < groups ? g + 1 : g];
+                float_bank_[g / 2].order = std::max(bank_[g].order, second.order);
+                narrow(bank_[g], 0, float_bank_[g / 2]);
+                narrow(second, W, float_bank_[g / 2]);
+            }
+            advance(float_views_[r], record, float_bank_, static_cast<int>(lanes), part);
+            for (std::size_t g = 0; g < groups; ++g) {
+                bool in_float[W], all = true;
+                for (std::size_t lane = 0; lane < W; ++lane)
+                    all = (in_float[lane] = float_suffices(bank_[g].order, [&](int i) { return bank_[g].a[i][lane]; })) && all;
+                if (all) continue;
+                double exact[W] = {};
+                advance(views_[r], record, bank_ + g, W, exact);
+                for (std::size_t lane = 0; lane < W; ++lane)
+                    if (!in_float[lane]) part[g * W + lane] = exact[lane];
+            }
+        }
+        for (std::size_t lane = 0; lane < lanes; ++lane)
+            if (candidate[lane] != none) sums[candidate[lane]] += part[lane];
     }
 }
 
@@ -229,17 +269,7 @@ void Batch::errors(std::span<const Factors<double>> candidates, std::span<double
     }
 
     std::fill(sums.begin(), sums.begin() + static_cast<std::ptrdiff_t>(count), 0.0);
-    std::size_t offset = 0;
-    for (const Record& record : experiment_.records) {
-        if (in_float_) {
-            const std::span<const float> in(inputs_.data() + offset, record.size());
-            const std::span<const float> out(outputs_.data() + offset, record.size());
-            run_float(record, in, out, count, sums.data());
-        } else {
-            run_double(record, count, sums.data());
-        }
-        offset += record.size();
-    }
+    for (std::size_t r = 0; r < experiment_.records.size(); ++r) run(r, count, sums.data());
     for (std::size_t i = 0; i < count; ++i) sums[i] = sane(sums[i]);
 }
 

@@ -38,7 +38,7 @@ public:
 private:
     const Genome& genome_;
     Settings settings_;
-    Random random_;
+    WordStream random_;
     Mutation mutation_;
     Batch batch_;
     Population now_, next_;

@@ -34,13 +34,18 @@ Delta<R> close_loop(const Delta<R>& plant, double kp, double ki, double sample_t
 //     x[i](n+1)  = x[i](n) + x[i+1](n) + b[i+1] r(n) - a[i] y(n),   x[N] = 0
 //
 // y enters last: what does not depend on it is ready before it is, which shortens the chain from one sample to the next.
-// `N` is the order when known at compile time, so that the state lives in registers; -1 otherwise.
-template <class R, int N>
+// `N` is the order when known at compile time, so that the state lives in registers; -1 otherwise. Without input (r = 0) the terms in b
+// are left out.
+template <class R, int N, bool driven = true>
 [[gnu::always_inline]] inline R recurrence_step(int order, const R* a, const R* b, R* x, R r) {
     const int n = N >= 0 ? N : order;
-    const R y = x[0] + b[0] * r;
-    for (int i = 0; i + 1 < n; ++i) x[i] = ((x[i] + x[i + 1]) + b[i + 1] * r) - a[i] * y;
-    if (n > 0) x[n - 1] = (x[n - 1] + b[n] * r) - a[n - 1] * y;
+    const auto with_input = [&](const R& sum, int i) [[gnu::always_inline]] {
+        if constexpr (driven) return sum + b[i] * r;
+        else return sum;
+    };
+    const R y = with_input(x[0], 0);
+    for (int i = 0; i + 1 < n; ++i) x[i] = with_input(x[i] + x[i + 1], i + 1) - a[i] * y;
+    if (n > 0) x[n - 1] = with_input(x[n - 1], n) - a[n - 1] * y;
     return y;
 }
 

@@ -42,6 +42,17 @@ struct KernelSource {
         for (int i = 0; i <= h.order; ++i) h.b[i].store(out.b[i]);
     }
 
+    static void words(std::uint64_t base, std::uint64_t* out, std::size_t n) {
+        constexpr std::size_t W = Isa::register_bytes / sizeof(std::uint64_t);
+        using L = Lanes<std::uint64_t, static_cast<int>(W), Isa>;
+        std::uint64_t counters[W];
+        for (std::size_t lane = 0; lane < W; ++lane) counters[lane] = base + lane * golden_gamma;
+        L counter = L::load(counters);
+        std::size_t i = 0;
+        for (; i + W <= n; i += W, counter = counter + L::all(W * golden_gamma)) mix(counter).store(out + i);
+        for (; i < n; ++i) out[i] = mix(base + i * golden_gamma);
+    }
+
     template <class T, int W, int N>
     struct Bank {  // a group in registers
         using L = Lanes<T, W, Isa>;
@@ -78,6 +89,40 @@ struct KernelSource {
             Bank<T, W, N> k(g);
             for (std::size_t i = 0; i < n; ++i) recurrence_step<L, N>(k.order, k.a, k.b, k.x, L::all(input[i])).store(y + i * W);
             k.save(g);
+        }
+    };
+
+    // S registers of candidates of one order side by side, from register `first` of the array of groups on: while one waits for the
+    // sample before, the others compute.
+    template <class T, int W, int N>
+    struct Settling {
+        using L = Lanes<T, static_cast<int>(Isa::register_bytes / sizeof(T)), Isa>;
+        static constexpr int per_group = W / L::per_register;
+        template <int S>
+        static void errors(Group<T, W>* groups, int first, const T* output, std::size_t n, T* sums) {
+            constexpr int capacity = N >= 0 ? (N > 0 ? N : 1) : max_loop_order;
+            const int order = N >= 0 ? N : groups[first / per_group].order;
+            L a[S][capacity], x[S][capacity], sum[S];
+            const auto row = [&](auto& rows, int s, int i) { return rows[i] + (first + s) % per_group * L::per_register; };
+            for (int s = 0; s < S; ++s) {
+                Group<T, W>& g = groups[(first + s) / per_group];
+                for (int i = 0; i < order; ++i) a[s][i] = L::load(row(g.a, s, i));
+                for (int i = 0; i < order; ++i) x[s][i] = L::load(row(g.x, s, i));
+                if (order == 0) x[s][0] = L(0.0);
+                sum[s] = L(0.0);
+            }
+            for (std::size_t i = 0; i < n; ++i) {
+                const L wanted = L::all(output[i]);
+                for (int s = 0; s < S; ++s) {
+                    const L e = wanted - recurrence_step<L, N, false>(order, a[s], nullptr, x[s], wanted);
+                    sum[s] = sum[s] + e * e;
+                }
+            }
+            for (int s = 0; s < S; ++s) {
+                Group<T, W>& g = groups[(first + s) / per_group];
+                for (int i = 0; i < order; ++i) x[s][i].store(row(g.x, s, i));
+                sum[s].store(sums + (first + s) * L::per_register);
+            }
         }
     };
 
@@ -137,6 +182,20 @@ struct KernelSource {
         by_order<Linear, T, W>(g.order, [&](auto form) { form.errors(g, in, out, n, sums); });
     }
     template <class T, int W>
+    static void settling_errors(Group<T, W>* groups, int lanes, const T* output, std::size_t n, T* sums) {
+        constexpr int per_register = static_cast<int>(Isa::register_bytes / sizeof(T)), S = Isa::side_by_side;
+        const int registers = (lanes + per_register - 1) / per_register;
+        const auto order = [&](int r) { return groups[r * per_register / W].order; };
+        for (int r = 0; r < registers;) {
+            const bool full = r + S <= registers && order(r) == order(r + S - 1);
+            by_order<Settling, T, W>(order(r), [&](auto form) {
+                if (full) form.template errors<S>(groups, r, output, n, sums);
+                else form.template errors<1>(groups, r, output, n, sums);
+            });
+            r += full ? S : 1;
+        }
+    }
+    template <class T, int W>
     static void outputs(Group<T, W>& g, const T* in, std::size_t n, T* y) {
         by_order<Linear, T, W>(g.order, [&](auto form) { form.outputs(g, in, n, y); });
     }
@@ -151,11 +210,12 @@ struct KernelSource {
 
     template <class T, int W>
     static constexpr KernelSet<Group<T, W>, T> set() {
-        return {errors<T, W>, outputs<T, W>};
+        return {errors<T, W>, settling_errors<T, W>, outputs<T, W>};
     }
     static Kernels all(const char* name) {
         return {name,
                 coefficients,
+                words,
                 {set<double, double_lanes>(), stepped_errors<double, double_lanes>, stepped_outputs<double, double_lanes>},
                 set<float, float_lanes>()};
     }
