@@ -56,57 +56,93 @@ Prepared prepare(const Factors<double>& g, const Record& record, const Loop& loo
 
 namespace {
 
-void place(FactorGroup& group, std::size_t lane, const Factors<double>& g) {
-    const Structure s = g.structure;
-    const Counts& most = group.counts;
-    group.gain[lane] = g.gain;
-    for (int i = 0; i < most.pole_pairs; ++i) {
-        const Pair<double> f = i < s.pole_pairs() ? g.pole_pair[i] : Pair<double>{0.0, 0.0};
-        group.pole_e1[i][lane] = f.e1;
-        group.pole_e0[i][lane] = f.e0;
+// Candidates as a group takes them in: at hand as factors, or as chromosomes.
+struct FactorList {
+    const Factors<double>* const* all;
+
+    Structure structure(std::size_t i) const { return all[i]->structure; }
+    const Factors<double>& factors(std::size_t i) const { return *all[i]; }
+    void place(std::size_t i, FactorGroup& group, std::size_t lane) const {
+        const Factors<double>& g = *all[i];
+        const Structure s = g.structure;
+        const Counts& most = group.counts;
+        group.gain[lane] = g.gain;
+        for (int k = 0; k < most.pole_pairs; ++k) {
+            const Pair<double> f = k < s.pole_pairs() ? g.pole_pair[k] : Pair<double>{0.0, 0.0};
+            group.pole_e1[k][lane] = f.e1;
+            group.pole_e0[k][lane] = f.e0;
+        }
+        for (int k = 0; k < most.zero_pairs; ++k) {
+            const Pair<double> f = k < s.zero_pairs() ? g.zero_pair[k] : Pair<double>{0.0, 0.0};
+            group.zero_e1[k][lane] = f.e1;
+            group.zero_e0[k][lane] = f.e0;
+        }
+        group.pole[lane] = s.single_pole() ? g.pole : 0.0;
+        group.zero[lane] = s.single_zero() ? g.zero : 0.0;
+        for (int k = 0; k < most.p; ++k) group.excess[k][lane] = k < s.p ? 1.0 : 0.0;
     }
-    for (int i = 0; i < most.zero_pairs; ++i) {
-        const Pair<double> f = i < s.zero_pairs() ? g.zero_pair[i] : Pair<double>{0.0, 0.0};
-        group.zero_e1[i][lane] = f.e1;
-        group.zero_e0[i][lane] = f.e0;
+};
+
+struct ChromosomeList {
+    const Population& all;
+    const Decoder& decoder;
+
+    Structure structure(std::size_t i) const { return decoder.structure(all[i]); }
+    Factors<double> factors(std::size_t i) const { return decode(all[i], decoder.genome()); }
+    void place(std::size_t i, FactorGroup& group, std::size_t lane) const { decoder.place(all[i], group, lane, group.counts); }
+};
+
+// largest_root() of the lane where it is largest.
+double largest_root(const FactorGroup& g) {
+    double direct = 0.0, square = 0.0;
+    const auto take = [](double& most, const double* row) {
+        for (int lane = 0; lane < FactorGroup::width; ++lane) most = std::max(most, std::abs(row[lane]));
+    };
+    for (int i = 0; i < g.counts.pole_pairs; ++i) take(direct, g.pole_e1[i]), take(square, g.pole_e0[i]);
+    for (int i = 0; i < g.counts.zero_pairs; ++i) take(direct, g.zero_e1[i]), take(square, g.zero_e0[i]);
+    take(direct, g.pole);
+    take(direct, g.zero);
+    return std::max(direct, std::sqrt(square));
+}
+
+// Candidates index[0], index[1], ... index[count - 1] into the lanes of a group.
+template <class Candidates>
+void load_lanes(const Experiment& experiment, const Record& record, const Candidates& candidates, const std::size_t* index,
+                std::size_t count, std::span<const double* const> starts, DoubleGroup& group) {
+    const Loop& loop = experiment.loop;
+    const bool closed = loop.kind != LoopKind::open && !loop.limited();
+    FactorGroup factors;
+    factors.structure = candidates.structure(index[0]);
+    for (std::size_t lane = 0; lane < count; ++lane) {
+        const Structure s = candidates.structure(index[lane]);
+        Counts& most = factors.counts;
+        most = {std::max(most.order, s.poles()),           std::max(most.p, s.p),
+                std::max(most.pole_pairs, s.pole_pairs()), std::max(most.zero_pairs, s.zero_pairs()),
+                most.single_pole || s.single_pole(),       most.single_zero || s.single_zero()};
     }
-    group.pole[lane] = s.single_pole() ? g.pole : 0.0;
-    group.zero[lane] = s.single_zero() ? g.zero : 0.0;
-    for (int i = 0; i < most.p; ++i) group.excess[i][lane] = i < s.p ? 1.0 : 0.0;
+    for (std::size_t lane = 0; lane < FactorGroup::width; ++lane)
+        candidates.place(index[std::min(lane, count - 1)], factors, lane);
+    if (loop.kind != LoopKind::continuous) factors.doublings = held_doublings(largest_root(factors), record.sample_time);
+    experiment.kernels->coefficients(factors, loop, record.sample_time, closed, group);
+
+    for (int k = 0; k < group.order; ++k) std::fill(group.x[k], group.x[k] + DoubleGroup::width, 0.0);
+    std::fill(group.s, group.s + DoubleGroup::width, 0.0);
+    if (starts.empty() && record.start == Start::rest) return;
+    for (std::size_t lane = 0; lane < DoubleGroup::width; ++lane) {
+        const std::size_t i = std::min(lane, count - 1);
+        const Prepared c = prepare(candidates.factors(index[i]), record, loop, starts.empty() ? nullptr : starts[i]);
+        for (int k = 0; k < c.response.order; ++k) group.x[k][lane] = c.x[k];
+        group.s[lane] = c.s;
+    }
 }
 
 }  // namespace
 
 void load_group(const Experiment& experiment, const Record& record, std::span<const Factors<double>* const> candidates,
                 std::span<const double* const> starts, DoubleGroup& group) {
-    const Loop& loop = experiment.loop;
-    const bool closed = loop.kind != LoopKind::open && !loop.limited();
-    FactorGroup factors;
-    factors.structure = candidates[0]->structure;
-    double fastest = 0.0;
-    for (const Factors<double>* g : candidates) {
-        const Counts c = g->counts();
-        Counts& most = factors.counts;
-        most = {std::max(most.order, c.order),           std::max(most.p, c.p),
-                std::max(most.pole_pairs, c.pole_pairs), std::max(most.zero_pairs, c.zero_pairs),
-                most.single_pole || c.single_pole,       most.single_zero || c.single_zero};
-        if (loop.kind != LoopKind::continuous) fastest = std::max(fastest, largest_root(*g));
-    }
-    if (loop.kind != LoopKind::continuous) factors.doublings = held_doublings(fastest, record.sample_time);
-    for (std::size_t lane = 0; lane < FactorGroup::width; ++lane)
-        place(factors, lane, *candidates[std::min(lane, candidates.size() - 1)]);
-    experiment.kernels->coefficients(factors, loop, record.sample_time, closed, group);
-
-    for (std::size_t lane = 0; lane < FactorGroup::width; ++lane) {
-        const std::size_t i = std::min(lane, candidates.size() - 1);
-        const double* const start = starts.empty() ? nullptr : starts[i];
-        for (int k = 0; k < group.order; ++k) group.x[k][lane] = 0.0;
-        group.s[lane] = 0.0;
-        if (start == nullptr && record.start == Start::rest) continue;
-        const Prepared c = prepare(*candidates[i], record, loop, start);
-        for (int k = 0; k < c.response.order; ++k) group.x[k][lane] = c.x[k];
-        group.s[lane] = c.s;
-    }
+    std::size_t index[DoubleGroup::width];
+    std::iota(index, index + DoubleGroup::width, std::size_t{0});
+    load_lanes(experiment, record, FactorList{candidates.data()}, index, candidates.size(), starts, group);
 }
 
 namespace {
@@ -119,7 +155,11 @@ bool settles(const Record& r, const Loop& loop) {
 }  // namespace
 
 Batch::Batch(const Experiment& experiment, std::size_t capacity, bool in_float)
-    : experiment_(experiment), in_float_(in_float && !experiment.loop.limited()), order_(capacity), sorted_(capacity) {
+    : experiment_(experiment),
+      in_float_(in_float && !experiment.loop.limited()),
+      order_(capacity),
+      sorted_(capacity),
+      list_(capacity) {
     std::size_t constant = 0;
     for (const Record& r : experiment.records) {
         settling_.push_back(settles(r, experiment.loop) ? 1 : 0);
@@ -149,7 +189,7 @@ std::size_t Batch::group_end(std::size_t first, std::size_t count) const {
     std::size_t end = std::min<std::size_t>(first + DoubleGroup::width, count);
     if (experiment_.loop.kind == LoopKind::continuous) return end;
     for (std::size_t i = first + 1; i < end; ++i)
-        if (!(sorted_[i]->structure == sorted_[first]->structure)) end = i;
+        if (!(sorted_[i] == sorted_[first])) end = i;
     return end;
 }
 
@@ -208,7 +248,8 @@ void Batch::advance(const View<T>& view, const Record& record, G* groups, int la
     }
 }
 
-void Batch::run(std::size_t r, std::size_t count, double* sums) {
+template <class Candidates>
+void Batch::run(std::size_t r, const Candidates& candidates, std::size_t count, double* sums) {
     constexpr std::size_t W = DoubleGroup::width;
     const Record& record = experiment_.records[r];
     for (std::size_t first = 0; first < count;) {
@@ -216,7 +257,7 @@ void Batch::run(std::size_t r, std::size_t count, double* sums) {
         std::size_t candidate[bank_groups * W], lanes = 0;
         for (int g = 0; g < bank_groups && first < count; ++g) {
             const std::size_t end = group_end(first, count);
-            load_group(experiment_, record, std::span(sorted_).subspan(first, end - first), {}, bank_[g]);
+            load_lanes(experiment_, record, candidates, order_.data() + first, end - first, {}, bank_[g]);
             if (settling_[r] != 0) settle(bank_[g], record.input[0]);
             lanes = static_cast<std::size_t>(g) * W;
             for (std::size_t lane = 0; lane < W; ++lane)
@@ -253,24 +294,33 @@ void Batch::run(std::size_t r, std::size_t count, double* sums) {
     }
 }
 
-void Batch::errors(std::span<const Factors<double>> candidates, std::span<double> sums) {
-    const std::size_t count = candidates.size();
+template <class Candidates>
+void Batch::errors_of(const Candidates& candidates, std::size_t count, double* sums) {
     // Candidates of one order share their lanes: sorting by order keeps the sum of group orders small; within an order by q, so that
     // structures stay together.
     constexpr std::size_t keys = (max_plant_order + 1) * (max_plant_order / 2 + 1);
     std::size_t at[keys + 1] = {};
     const auto key = [](Structure s) { return static_cast<std::size_t>(s.poles() * (max_plant_order / 2 + 1) + s.q); };
-    for (const auto& g : candidates) ++at[key(g.structure) + 1];
+    for (std::size_t i = 0; i < count; ++i) ++at[key(candidates.structure(i)) + 1];
     for (std::size_t i = 1; i <= keys; ++i) at[i] += at[i - 1];
     for (std::size_t i = 0; i < count; ++i) {
-        const std::size_t place = at[key(candidates[i].structure)]++;
+        const Structure s = candidates.structure(i);
+        const std::size_t place = at[key(s)]++;
         order_[place] = i;
-        sorted_[place] = &candidates[i];
+        sorted_[place] = s;
     }
-
-    std::fill(sums.begin(), sums.begin() + static_cast<std::ptrdiff_t>(count), 0.0);
-    for (std::size_t r = 0; r < experiment_.records.size(); ++r) run(r, count, sums.data());
+    std::fill(sums, sums + count, 0.0);
+    for (std::size_t r = 0; r < experiment_.records.size(); ++r) run(r, candidates, count, sums);
     for (std::size_t i = 0; i < count; ++i) sums[i] = sane(sums[i]);
+}
+
+void Batch::errors(std::span<const Factors<double>> candidates, std::span<double> sums) {
+    for (std::size_t i = 0; i < candidates.size(); ++i) list_[i] = &candidates[i];
+    errors_of(FactorList{list_.data()}, candidates.size(), sums.data());
+}
+
+void Batch::errors(const Population& candidates, const Decoder& decoder, std::span<double> sums) {
+    errors_of(ChromosomeList{candidates, decoder}, candidates.size(), sums.data());
 }
 
 }  // namespace gaident

@@ -1,6 +1,7 @@
 // The centre of the core: simulate many candidates against the records.
 #pragma once
 
+#include "decoder.hpp"
 #include "fitness.hpp"
 #include "kernels/kernels.hpp"
 #include "loop.hpp"
@@ -64,6 +65,7 @@ public:
 
     // sums[i] = sum over records and samples of (output - y_i)^2; worst_fitness where a candidate diverges.
     void errors(std::span<const Factors<double>> candidates, std::span<double> sums);
+    void errors(const Population& candidates, const Decoder& decoder, std::span<double> sums);
 
 private:
     static constexpr int bank_groups = 8;  // so many groups at once
@@ -74,15 +76,19 @@ private:
         std::span<const T> input, output;  // output: of the settling loop, its deviation from the command
     };
 
+    template <class Candidates>
+    void errors_of(const Candidates& candidates, std::size_t count, double* sums);
+    template <class Candidates>
+    void run(std::size_t record, const Candidates& candidates, std::size_t count, double* sums);
     std::size_t group_end(std::size_t first, std::size_t count) const;
-    void run(std::size_t record, std::size_t count, double* sums);
     template <class T, class G>
     void advance(const View<T>& view, const Record& record, G* groups, int lanes, double* sums) const;
 
     const Experiment& experiment_;
     bool in_float_;
     std::vector<std::size_t> order_;  // candidates sorted by order, stable
-    std::vector<const Factors<double>*> sorted_;
+    std::vector<Structure> sorted_;   // their structures
+    std::vector<const Factors<double>*> list_;
     std::vector<char> settling_;      // per record: a constant command in a PI loop without limits
     std::vector<double> deviations_;  // output minus command of the records that settle
     std::vector<float> floats_;       // inputs and outputs of the records in float

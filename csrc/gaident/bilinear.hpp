@@ -28,14 +28,14 @@ Delta<R> bilinear_plant(const Plant& g, double sample_time) {
     Polynomial<R> denominator(one), numerator(one);
     for (int i = 0; i < s.pole_pairs; ++i) {
         const R e1 = g.pole_pair[i].e1 * h, e0 = (g.pole_pair[i].e0 * h) * h;
-        const R lead = (one + e1) + e0;
-        denominator.times(one, (two * e1 + four * e0) / lead, (four * e0) / lead);
-        gain = gain / lead;
+        const R scale = one / ((one + e1) + e0);
+        denominator.times(one, (two * e1 + four * e0) * scale, (four * e0) * scale);
+        gain = gain * scale;
     }
     if (s.single_pole) {
-        const R a = g.pole * h, lead = one + a;
-        denominator.times(one, (two * a) / lead);
-        gain = gain / lead;
+        const R a = g.pole * h, scale = one / (one + a);
+        denominator.times(one, (two * a) * scale);
+        gain = gain * scale;
     }
     for (int i = 0; i < s.zero_pairs; ++i) {
         const R e1 = g.zero_pair[i].e1 * h, e0 = (g.zero_pair[i].e0 * h) * h;

@@ -1,7 +1,5 @@
 #include "breeder.hpp"
 
-#include "decode.hpp"
-
 #include <algorithm>
 #include <numeric>
 
@@ -9,13 +7,13 @@ namespace gaident {
 
 Breeder::Breeder(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random)
     : genome_(genome),
+      decoder_(genome),
       settings_(settings),
       random_(random, experiment.kernels->words),
       mutation_(settings.mutation, random_),
       batch_(experiment, static_cast<std::size_t>(settings.population), settings.in_float),
       now_(static_cast<std::size_t>(settings.population), genome.words()),
       next_(now_),
-      candidates_(now_.size()),
       costs_(now_.size(), worst_fitness),
       ranking_(now_.size()),
       spare_(static_cast<std::size_t>(genome.words())) {}
@@ -30,9 +28,8 @@ void Breeder::set_structure(std::size_t first, std::size_t count, Structure s) {
 }
 
 void Breeder::evaluate() {
-    for (std::size_t i = 0; i < now_.size(); ++i) candidates_[i] = decode(now_[i], genome_);
-    batch_.errors(candidates_, costs_);
-    for (std::size_t i = 0; i < now_.size(); ++i) costs_[i] = fitness(costs_[i], candidates_[i].structure, settings_.weights);
+    batch_.errors(now_, decoder_, costs_);
+    for (std::size_t i = 0; i < now_.size(); ++i) costs_[i] = fitness(costs_[i], decoder_.structure(now_[i]), settings_.weights);
     evaluations_ += now_.size();
 }
 

@@ -32,17 +32,17 @@ public:
     Word* operator[](std::size_t i) { return now_[i]; }
     const Population& population() const { return now_; }
     double cost(std::size_t i) const { return costs_[i]; }
-    Factors<double> candidate(std::size_t i) const { return candidates_[i]; }
+    Factors<double> candidate(std::size_t i) const { return decode(now_[i], genome_); }
     std::size_t evaluations() const { return evaluations_; }
 
 private:
     const Genome& genome_;
+    Decoder decoder_;
     Settings settings_;
     WordStream random_;
     Mutation mutation_;
     Batch batch_;
     Population now_, next_;
-    std::vector<Factors<double>> candidates_;
     std::vector<double> costs_;
     std::vector<std::size_t> ranking_;
     std::vector<Word> spare_;  // the second child when a group's size is odd

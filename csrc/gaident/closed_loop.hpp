@@ -23,8 +23,9 @@ Delta<R> close_loop(const Delta<R>& plant, double kp, double ki, double sample_t
         const R d = i == 0 ? R(1.0) : (i <= n ? plant.a[i - 1] : R(0.0));
         sum[i] = d + numerator[i];
     }
-    for (int i = 0; i <= n; ++i) loop.a[i] = sum[i + 1] / sum[0];
-    for (int i = 0; i <= n + 1; ++i) loop.b[i] = numerator[i] / sum[0];
+    const R scale = R(1.0) / sum[0];
+    for (int i = 0; i <= n; ++i) loop.a[i] = sum[i + 1] * scale;
+    for (int i = 0; i <= n + 1; ++i) loop.b[i] = numerator[i] * scale;
     return loop;
 }
 

@@ -1,0 +1,117 @@
+// decode() (decode.hpp) for many chromosomes, straight into the lanes of a group: the same values bit for bit, but every field's value is
+// looked up by its code, and where a structure's genes lie is found once per structure.
+#pragma once
+
+#include "decode.hpp"
+
+#include <vector>
+
+namespace gaident {
+
+class Decoder {
+public:
+    explicit Decoder(const Genome& genome) : genome_(&genome), structure_bits_(2 * genome.structure_bits()) {
+        gain_ = values(genome.field(Role::gain, Part::whole, 0));
+        real_ = values(genome.field(Role::pole1, Part::real, 0));  // every A and B has the same ranges
+        imaginary_ = values(genome.field(Role::pole1, Part::imaginary, 0));
+        gain_slot_ = slot({Role::gain, 0}, Part::whole);
+        for (Word code = 0; code < Word{1} << structure_bits_; ++code) {
+            const Word c = code << (word_bits - structure_bits_);
+            structures_.push_back({genome.structure(&c, Role::p), genome.structure(&c, Role::q)});
+            plans_.push_back(plan(structures_.back()));
+        }
+    }
+
+    const Genome& genome() const { return *genome_; }
+    Structure structure(const Word* c) const { return structures_[code(c)]; }
+
+    // Writes one chromosome's factors into a lane; `most` counts the group's factors, those that the lane lacks are set to zero.
+    template <class Group>
+    void place(const Word* c, Group& group, std::size_t lane, const Counts& most) const {
+        const Plan& plan = plans_[code(c)];
+        group.gain[lane] = gain_[field(c, gain_slot_)] * plan.gain_unit;
+        for (int i = 0; i < most.pole_pairs; ++i)
+            put(i < plan.pole_pairs, c, plan.pole[i], group.pole_e1[i][lane], group.pole_e0[i][lane]);
+        for (int i = 0; i < most.zero_pairs; ++i)
+            put(i < plan.zero_pairs, c, plan.zero[i], group.zero_e1[i][lane], group.zero_e0[i][lane]);
+        group.pole[lane] = plan.with_single_pole ? real_[field(c, plan.single_pole)] : 0.0;
+        group.zero[lane] = plan.with_single_zero ? real_[field(c, plan.single_zero)] : 0.0;
+        for (int i = 0; i < most.p; ++i) group.excess[i][lane] = i < plan.p ? 1.0 : 0.0;
+    }
+
+private:
+    // A field of bits: word * 2^up, filled from the next word where it straddles two, then its top `width` bits.
+    struct Slot {
+        std::uint8_t word = 0, next = 0, up = 0, drop = 0;
+    };
+    struct PairSlots {
+        Slot real1, real2, imaginary1, conjugate;
+    };
+    struct Plan {
+        double gain_unit = 1.0;
+        int p = 0, pole_pairs = 0, zero_pairs = 0;
+        bool with_single_pole = false, with_single_zero = false;
+        PairSlots pole[max_pairs], zero[max_pairs];
+        Slot single_pole, single_zero;
+    };
+
+    static Word field(const Word* c, Slot s) {
+        return (c[s.word] << s.up | (c[s.next] >> 1) >> (word_bits - 1 - s.up)) >> s.drop;
+    }
+    std::size_t code(const Word* c) const { return static_cast<std::size_t>(c[0] >> (word_bits - structure_bits_)); }
+
+    void put(bool present, const Word* c, const PairSlots& s, double& e1, double& e0) const {
+        if (!present) {
+            e1 = e0 = 0.0;
+            return;
+        }
+        const double a = real_[field(c, s.real1)], b = real_[field(c, s.real2)], im = imaginary_[field(c, s.imaginary1)];
+        const Pair<double> complex = conjugate_pair(a, im), two = real_pair(a, b);
+        const bool conjugate = field(c, s.conjugate) != 0;
+        e1 = conjugate ? complex.e1 : two.e1;
+        e0 = conjugate ? complex.e0 : two.e0;
+    }
+
+    static Slot slot_of(int first, int width) {
+        const int word = first / word_bits, up = first % word_bits;
+        const int next = up + width > word_bits ? word + 1 : word;
+        return {static_cast<std::uint8_t>(word), static_cast<std::uint8_t>(next), static_cast<std::uint8_t>(up),
+                static_cast<std::uint8_t>(word_bits - width)};
+    }
+    Slot slot(Locus a, Part part) const {
+        const Field& f = genome_->field(a.role, part, a.index);
+        return slot_of(f.first, f.width);
+    }
+    PairSlots pair(Locus a, Locus b) const {
+        const Slot top = slot_of(genome_->field(b.role, Part::imaginary, b.index).first, 1);
+        return {slot(a, Part::real), slot(b, Part::real), slot(a, Part::imaginary), top};
+    }
+    Plan plan(Structure s) const {
+        Plan made;
+        made.gain_unit = genome_->ranges().gain_unit(s.p);
+        made.p = s.p;
+        made.with_single_pole = s.single_pole();
+        made.with_single_zero = s.single_zero();
+        visit_poles(
+            s, [&](Locus a, Locus b) { made.pole[made.pole_pairs++] = pair(a, b); },
+            [&](Locus a) { made.single_pole = slot(a, Part::real); });
+        visit_zeros(
+            s, [&](Locus a, Locus b) { made.zero[made.zero_pairs++] = pair(a, b); },
+            [&](Locus a) { made.single_zero = slot(a, Part::real); });
+        return made;
+    }
+    std::vector<double> values(const Field& f) const {
+        std::vector<double> all;
+        for (Word raw = 0; raw < Word{1} << f.width; ++raw) all.push_back(genome_->value_of(static_cast<std::uint32_t>(raw), f));
+        return all;
+    }
+
+    const Genome* genome_;
+    int structure_bits_;
+    std::vector<double> gain_, real_, imaginary_;  // by the bits of a field
+    Slot gain_slot_;
+    std::vector<Structure> structures_;  // by the bits of p and q
+    std::vector<Plan> plans_;
+};
+
+}  // namespace gaident
