@@ -23,6 +23,20 @@ template <class L>
 
 template <class Isa>
 struct KernelSource {
+    // Behind a hold most of the work is in matrices of the plant's order: orders up to 6 (p, q <= 3) are unrolled.
+    template <class L>
+    static Delta<L> held(const LaneFactors<L>& g, double sample_time, int doublings) {
+        switch (g.counts().order) {
+            case 1: return held_plant<L, 1>(g, sample_time, doublings);
+            case 2: return held_plant<L, 2>(g, sample_time, doublings);
+            case 3: return held_plant<L, 3>(g, sample_time, doublings);
+            case 4: return held_plant<L, 4>(g, sample_time, doublings);
+            case 5: return held_plant<L, 5>(g, sample_time, doublings);
+            case 6: return held_plant<L, 6>(g, sample_time, doublings);
+            default: return held_plant<L, -1>(g, sample_time, doublings);
+        }
+    }
+
     static void coefficients(const FactorGroup& f, const Loop& loop, double sample_time, bool closed, DoubleGroup& out) {
         using L = Lanes<double, double_lanes, Isa>;
         LaneFactors<L> g;
@@ -35,7 +49,7 @@ struct KernelSource {
         if (f.counts.single_zero) g.zero = L::load(f.zero);
         for (int i = 0; i < f.counts.p; ++i) g.has_excess[i] = L::load(f.excess[i]);
         Delta<L> h =
-            loop.kind == LoopKind::continuous ? bilinear_plant<L>(g, sample_time) : held_plant<L>(g, sample_time, f.doublings);
+            loop.kind == LoopKind::continuous ? bilinear_plant<L>(g, sample_time) : held(g, sample_time, f.doublings);
         if (closed) h = close_loop(h, loop.kp, loop.ki, sample_time);
         out.order = h.order;
         for (int i = 0; i < h.order; ++i) h.a[i].store(out.a[i]);
