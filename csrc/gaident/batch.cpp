@@ -105,21 +105,17 @@ double largest_root(const FactorGroup& g) {
     return std::max(direct, std::sqrt(square));
 }
 
-// Candidates index[0], index[1], ... index[count - 1] into the lanes of a group.
+// Candidates index[0], index[1], ... index[count - 1], of structures s[0], s[1], ..., into the lanes of a group.
 template <class Candidates>
 void load_lanes(const Experiment& experiment, const Record& record, const Candidates& candidates, const std::size_t* index,
-                std::size_t count, std::span<const double* const> starts, DoubleGroup& group) {
+                const Structure* s, std::size_t count, std::span<const double* const> starts, DoubleGroup& group) {
     const Loop& loop = experiment.loop;
     const bool closed = loop.kind != LoopKind::open && !loop.limited();
     FactorGroup factors;
-    factors.structure = candidates.structure(index[0]);
-    for (std::size_t lane = 0; lane < count; ++lane) {
-        const Structure s = candidates.structure(index[lane]);
-        Counts& most = factors.counts;
-        most = {std::max(most.order, s.poles()),           std::max(most.p, s.p),
-                std::max(most.pole_pairs, s.pole_pairs()), std::max(most.zero_pairs, s.zero_pairs()),
-                most.single_pole || s.single_pole(),       most.single_zero || s.single_zero()};
-    }
+    factors.structure = s[0];
+    factors.counts = Counts(s[0]);
+    for (std::size_t lane = 1; lane < count; ++lane)
+        if (!(s[lane] == s[lane - 1])) factors.counts.cover(Counts(s[lane]));
     for (std::size_t lane = 0; lane < FactorGroup::width; ++lane)
         candidates.place(index[std::min(lane, count - 1)], factors, lane);
     if (loop.kind != LoopKind::continuous) factors.doublings = held_doublings(largest_root(factors), record.sample_time);
@@ -141,8 +137,12 @@ void load_lanes(const Experiment& experiment, const Record& record, const Candid
 void load_group(const Experiment& experiment, const Record& record, std::span<const Factors<double>* const> candidates,
                 std::span<const double* const> starts, DoubleGroup& group) {
     std::size_t index[DoubleGroup::width];
-    std::iota(index, index + DoubleGroup::width, std::size_t{0});
-    load_lanes(experiment, record, FactorList{candidates.data()}, index, candidates.size(), starts, group);
+    Structure s[DoubleGroup::width];
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+        index[i] = i;
+        s[i] = candidates[i]->structure;
+    }
+    load_lanes(experiment, record, FactorList{candidates.data()}, index, s, candidates.size(), starts, group);
 }
 
 namespace {
@@ -159,6 +159,7 @@ Batch::Batch(const Experiment& experiment, std::size_t capacity, bool in_float)
       in_float_(in_float && !experiment.loop.limited()),
       order_(capacity),
       sorted_(capacity),
+      keys_(capacity),
       list_(capacity) {
     std::size_t constant = 0;
     for (const Record& r : experiment.records) {
@@ -257,7 +258,7 @@ void Batch::run(std::size_t r, const Candidates& candidates, std::size_t count, 
         std::size_t candidate[bank_groups * W], lanes = 0;
         for (int g = 0; g < bank_groups && first < count; ++g) {
             const std::size_t end = group_end(first, count);
-            load_lanes(experiment_, record, candidates, order_.data() + first, end - first, {}, bank_[g]);
+            load_lanes(experiment_, record, candidates, order_.data() + first, sorted_.data() + first, end - first, {}, bank_[g]);
             if (settling_[r] != 0) settle(bank_[g], record.input[0]);
             lanes = static_cast<std::size_t>(g) * W;
             for (std::size_t lane = 0; lane < W; ++lane)
@@ -298,16 +299,22 @@ template <class Candidates>
 void Batch::errors_of(const Candidates& candidates, std::size_t count, double* sums) {
     // Candidates of one order share their lanes: sorting by order keeps the sum of group orders small; within an order by q, so that
     // structures stay together.
-    constexpr std::size_t keys = (max_plant_order + 1) * (max_plant_order / 2 + 1);
-    std::size_t at[keys + 1] = {};
-    const auto key = [](Structure s) { return static_cast<std::size_t>(s.poles() * (max_plant_order / 2 + 1) + s.q); };
-    for (std::size_t i = 0; i < count; ++i) ++at[key(candidates.structure(i)) + 1];
-    for (std::size_t i = 1; i <= keys; ++i) at[i] += at[i - 1];
+    constexpr std::size_t most_q = max_plant_order / 2, keys = (max_plant_order + 1) * (most_q + 1);
+    std::uint32_t at[keys + 1] = {};
+    std::size_t largest = 0;
     for (std::size_t i = 0; i < count; ++i) {
         const Structure s = candidates.structure(i);
-        const std::size_t place = at[key(s)]++;
+        const std::size_t key = static_cast<std::size_t>(s.poles()) * (most_q + 1) + static_cast<std::size_t>(s.q);
+        keys_[i] = static_cast<std::uint8_t>(key);
+        ++at[key + 1];
+        largest = std::max(largest, key);
+    }
+    for (std::size_t k = 1; k <= largest; ++k) at[k] += at[k - 1];
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t place = at[keys_[i]]++;
+        const int poles = keys_[i] / static_cast<int>(most_q + 1), q = keys_[i] % static_cast<int>(most_q + 1);
         order_[place] = i;
-        sorted_[place] = s;
+        sorted_[place] = {poles - q, q};
     }
     std::fill(sums, sums + count, 0.0);
     for (std::size_t r = 0; r < experiment_.records.size(); ++r) run(r, candidates, count, sums);

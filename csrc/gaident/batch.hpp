@@ -88,6 +88,7 @@ private:
     bool in_float_;
     std::vector<std::size_t> order_;  // candidates sorted by order, stable
     std::vector<Structure> sorted_;   // their structures
+    std::vector<std::uint8_t> keys_;
     std::vector<const Factors<double>*> list_;
     std::vector<char> settling_;      // per record: a constant command in a PI loop without limits
     std::vector<double> deviations_;  // output minus command of the records that settle

@@ -10,22 +10,19 @@
 
 namespace gaident {
 
-template <class R>
-Delta<R> close_loop(const Delta<R>& plant, double kp, double ki, double sample_time) {
+template <class R, int N>
+Delta<R, N < 0 ? -1 : N + 1> close_loop(const Delta<R, N>& plant, double kp, double ki, double sample_time) {
     const R c1 = R(kp + 0.5 * ki * sample_time), c0 = R(ki * sample_time);
-    Delta<R> loop;
-    const int n = plant.order;
+    const int n = N >= 0 ? N : plant.order;
+    Delta<R, N < 0 ? -1 : N + 1> loop;
     loop.order = n + 1;
-    R numerator[max_loop_order + 1], sum[max_loop_order + 1];
+    const R scale = R(1.0) / (R(1.0) + c1 * plant.b[0]);
     for (int i = 0; i <= n + 1; ++i) {
         const R head = i <= n ? c1 * plant.b[i] : R(0.0);
-        numerator[i] = i > 0 ? head + c0 * plant.b[i - 1] : head;
-        const R d = i == 0 ? R(1.0) : (i <= n ? plant.a[i - 1] : R(0.0));
-        sum[i] = d + numerator[i];
+        const R numerator = i > 0 ? head + c0 * plant.b[i - 1] : head;
+        loop.b[i] = numerator * scale;
+        if (i > 0) loop.a[i - 1] = ((i <= n ? plant.a[i - 1] : R(0.0)) + numerator) * scale;
     }
-    const R scale = R(1.0) / sum[0];
-    for (int i = 0; i <= n; ++i) loop.a[i] = sum[i + 1] * scale;
-    for (int i = 0; i <= n + 1; ++i) loop.b[i] = numerator[i] * scale;
     return loop;
 }
 

@@ -17,13 +17,12 @@ public:
         gain_slot_ = slot({Role::gain, 0}, Part::whole);
         for (Word code = 0; code < Word{1} << structure_bits_; ++code) {
             const Word c = code << (word_bits - structure_bits_);
-            structures_.push_back({genome.structure(&c, Role::p), genome.structure(&c, Role::q)});
-            plans_.push_back(plan(structures_.back()));
+            plans_.push_back(plan({genome.structure(&c, Role::p), genome.structure(&c, Role::q)}));
         }
     }
 
     const Genome& genome() const { return *genome_; }
-    Structure structure(const Word* c) const { return structures_[code(c)]; }
+    Structure structure(const Word* c) const { return plans_[code(c)].structure; }
 
     // Writes one chromosome's factors into a lane; `most` counts the group's factors, those that the lane lacks are set to zero.
     template <class Group>
@@ -36,7 +35,7 @@ public:
             put(i < plan.zero_pairs, c, plan.zero[i], group.zero_e1[i][lane], group.zero_e0[i][lane]);
         group.pole[lane] = plan.with_single_pole ? real_[field(c, plan.single_pole)] : 0.0;
         group.zero[lane] = plan.with_single_zero ? real_[field(c, plan.single_zero)] : 0.0;
-        for (int i = 0; i < most.p; ++i) group.excess[i][lane] = i < plan.p ? 1.0 : 0.0;
+        for (int i = 0; i < most.p; ++i) group.excess[i][lane] = i < plan.structure.p ? 1.0 : 0.0;
     }
 
 private:
@@ -48,8 +47,9 @@ private:
         Slot real1, real2, imaginary1, conjugate;
     };
     struct Plan {
+        Structure structure;
         double gain_unit = 1.0;
-        int p = 0, pole_pairs = 0, zero_pairs = 0;
+        int pole_pairs = 0, zero_pairs = 0;
         bool with_single_pole = false, with_single_zero = false;
         PairSlots pole[max_pairs], zero[max_pairs];
         Slot single_pole, single_zero;
@@ -89,7 +89,7 @@ private:
     Plan plan(Structure s) const {
         Plan made;
         made.gain_unit = genome_->ranges().gain_unit(s.p);
-        made.p = s.p;
+        made.structure = s;
         made.with_single_pole = s.single_pole();
         made.with_single_zero = s.single_zero();
         visit_poles(
@@ -110,8 +110,7 @@ private:
     int structure_bits_;
     std::vector<double> gain_, real_, imaginary_;  // by the bits of a field
     Slot gain_slot_;
-    std::vector<Structure> structures_;  // by the bits of p and q
-    std::vector<Plan> plans_;
+    std::vector<Plan> plans_;  // by the bits of p and q
 };
 
 }  // namespace gaident

@@ -98,7 +98,7 @@ inline double largest_root(const Factors<double>& g) {
 // Needs p >= 1: a plant that passes its torque straight through has no held form. `N`: the plant's order when known at compile time, so that
 // the loops over its states unroll; -1 otherwise.
 template <class R, int N, class Plant>
-Delta<R> held_plant(const Plant& g, double sample_time, int doublings) {
+Delta<R, N> held_plant(const Plant& g, double sample_time, int doublings) {
     using Matrix = detail::Hessenberg<R, N + 1>;
     const Counts s = g.counts();
     const int n = N >= 0 ? N : s.order;
@@ -150,7 +150,7 @@ Delta<R> held_plant(const Plant& g, double sample_time, int doublings) {
 
     const Matrix F = detail::expm1(M, doublings);
 
-    Polynomial<R> denominator(one);
+    Polynomial<R, N> denominator(one, n);
     for (int i = 0; i < pairs; ++i) {
         const int k = 1 + 2 * i;
         const R f11 = F.m[k][k], f12 = F.m[k][k + 1], f21 = F.m[k + 1][k], f22 = F.m[k + 1][k + 1];
@@ -176,7 +176,7 @@ Delta<R> held_plant(const Plant& g, double sample_time, int doublings) {
         for (int i = 1; i <= n; ++i) x[i] = next[i];
     }
 
-    Delta<R> d;
+    Delta<R, N> d;
     d.order = n;
     for (int i = 0; i < n; ++i) d.a[i] = denominator.c[i + 1];
     d.b[0] = zero;

@@ -25,7 +25,8 @@ TEST_CASE("decoder: a lane holds what decode() gives, bit for bit, for any genom
                         const Structure s = f.structure;
                         CHECK(decoder.structure(c.data()) == s);
                         Counts most = f.counts();  // or of a larger structure beside it
-                        if (repeat % 2 == 0) most = {max_plant_order, 7, max_pairs, 3, true, true};
+                        if (repeat % 2 == 0) most = Counts(Structure{7, 7});
+                        most.single_pole = most.single_zero = true;
                         FactorGroup group;
                         const std::size_t lane = random.below(FactorGroup::width);
                         decoder.place(c.data(), group, lane, most);

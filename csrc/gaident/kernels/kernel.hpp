@@ -9,9 +9,10 @@ namespace gaident {
 
 // The factors of a group in registers.
 template <class L>
-struct LaneFactors : Factors<L> {
-    Counts sizes{};
-    L has_excess[max_plant_order];
+struct LaneFactors {
+    Counts sizes;
+    L gain, pole, zero, has_excess[max_plant_order];
+    Pair<L> pole_pair[max_pairs], zero_pair[max_pairs];
 
     Counts counts() const { return sizes; }
 };
@@ -23,24 +24,18 @@ template <class L>
 
 template <class Isa>
 struct KernelSource {
-    // Behind a hold most of the work is in matrices of the plant's order: orders up to 6 (p, q <= 3) are unrolled.
-    template <class L>
-    static Delta<L> held(const LaneFactors<L>& g, double sample_time, int doublings) {
-        switch (g.counts().order) {
-            case 1: return held_plant<L, 1>(g, sample_time, doublings);
-            case 2: return held_plant<L, 2>(g, sample_time, doublings);
-            case 3: return held_plant<L, 3>(g, sample_time, doublings);
-            case 4: return held_plant<L, 4>(g, sample_time, doublings);
-            case 5: return held_plant<L, 5>(g, sample_time, doublings);
-            case 6: return held_plant<L, 6>(g, sample_time, doublings);
-            default: return held_plant<L, -1>(g, sample_time, doublings);
-        }
+    // Calls call(std::integral_constant<int, n>) for orders up to `most`, so that everything of that order unrolls and stays in registers;
+    // with -1 for larger ones.
+    template <int most, int n = 0, class Call>
+    static void by_order(int order, Call&& call) {
+        if constexpr (n > most) return call(std::integral_constant<int, -1>{});
+        else if (order == n) return call(std::integral_constant<int, n>{});
+        else return by_order<most, n + 1>(order, call);
     }
 
     static void coefficients(const FactorGroup& f, const Loop& loop, double sample_time, bool closed, DoubleGroup& out) {
         using L = Lanes<double, double_lanes, Isa>;
         LaneFactors<L> g;
-        g.structure = f.structure;
         g.sizes = f.counts;
         g.gain = L::load(f.gain);
         for (int i = 0; i < f.counts.pole_pairs; ++i) g.pole_pair[i] = {L::load(f.pole_e1[i]), L::load(f.pole_e0[i])};
@@ -48,12 +43,20 @@ struct KernelSource {
         if (f.counts.single_pole) g.pole = L::load(f.pole);
         if (f.counts.single_zero) g.zero = L::load(f.zero);
         for (int i = 0; i < f.counts.p; ++i) g.has_excess[i] = L::load(f.excess[i]);
-        Delta<L> h =
-            loop.kind == LoopKind::continuous ? bilinear_plant<L>(g, sample_time) : held(g, sample_time, f.doublings);
-        if (closed) h = close_loop(h, loop.kp, loop.ki, sample_time);
-        out.order = h.order;
-        for (int i = 0; i < h.order; ++i) h.a[i].store(out.a[i]);
-        for (int i = 0; i <= h.order; ++i) h.b[i].store(out.b[i]);
+        const auto store = [&](const auto& h, int order) {
+            out.order = order;
+            for (int i = 0; i < order; ++i) h.a[i].store(out.a[i]);
+            for (int i = 0; i <= order; ++i) h.b[i].store(out.b[i]);
+        };
+        by_order<6>(f.counts.order, [&](auto constant) {
+            constexpr int N = constant;
+            const int n = N >= 0 ? N : f.counts.order;
+            Delta<L, N> plant;
+            if (loop.kind == LoopKind::continuous) plant = bilinear_plant<L, N>(g, sample_time);
+            else if constexpr (N != 0) plant = held_plant<L, N>(g, sample_time, f.doublings);
+            if (closed) store(close_loop(plant, loop.kp, loop.ki, sample_time), n + 1);
+            else store(plant, n);
+        });
     }
 
     static void words(std::uint64_t base, std::uint64_t* out, std::size_t n) {
@@ -174,26 +177,9 @@ struct KernelSource {
         }
     };
 
-    // Orders up to 8 have a loop of their own, with the states in registers.
-    template <template <class, int, int> class Form, class T, int W, class Call>
-    static void by_order(int order, Call&& call) {
-        switch (order) {
-            case 0: return call(Form<T, W, 0>{});
-            case 1: return call(Form<T, W, 1>{});
-            case 2: return call(Form<T, W, 2>{});
-            case 3: return call(Form<T, W, 3>{});
-            case 4: return call(Form<T, W, 4>{});
-            case 5: return call(Form<T, W, 5>{});
-            case 6: return call(Form<T, W, 6>{});
-            case 7: return call(Form<T, W, 7>{});
-            case 8: return call(Form<T, W, 8>{});
-            default: return call(Form<T, W, -1>{});
-        }
-    }
-
     template <class T, int W>
     static void errors(Group<T, W>& g, const T* in, const T* out, std::size_t n, T* sums) {
-        by_order<Linear, T, W>(g.order, [&](auto form) { form.errors(g, in, out, n, sums); });
+        by_order<8>(g.order, [&](auto N) { Linear<T, W, N>::errors(g, in, out, n, sums); });
     }
     template <class T, int W>
     static void settling_errors(Group<T, W>* groups, int lanes, const T* output, std::size_t n, T* sums) {
@@ -202,24 +188,24 @@ struct KernelSource {
         const auto order = [&](int r) { return groups[r * per_register / W].order; };
         for (int r = 0; r < registers;) {
             const bool full = r + S <= registers && order(r) == order(r + S - 1);
-            by_order<Settling, T, W>(order(r), [&](auto form) {
-                if (full) form.template errors<S>(groups, r, output, n, sums);
-                else form.template errors<1>(groups, r, output, n, sums);
+            by_order<8>(order(r), [&](auto N) {
+                if (full) Settling<T, W, N>::template errors<S>(groups, r, output, n, sums);
+                else Settling<T, W, N>::template errors<1>(groups, r, output, n, sums);
             });
             r += full ? S : 1;
         }
     }
     template <class T, int W>
     static void outputs(Group<T, W>& g, const T* in, std::size_t n, T* y) {
-        by_order<Linear, T, W>(g.order, [&](auto form) { form.outputs(g, in, n, y); });
+        by_order<8>(g.order, [&](auto N) { Linear<T, W, N>::outputs(g, in, n, y); });
     }
     template <class T, int W>
     static void stepped_errors(Group<T, W>& g, const Controller<T>& c, const T* in, const T* out, std::size_t n, T* sums) {
-        by_order<Stepped, T, W>(g.order, [&](auto form) { form.errors(g, c, in, out, n, sums); });
+        by_order<8>(g.order, [&](auto N) { Stepped<T, W, N>::errors(g, c, in, out, n, sums); });
     }
     template <class T, int W>
     static void stepped_outputs(Group<T, W>& g, const Controller<T>& c, const T* in, std::size_t n, T* y) {
-        by_order<Stepped, T, W>(g.order, [&](auto form) { form.outputs(g, c, in, n, y); });
+        by_order<8>(g.order, [&](auto N) { Stepped<T, W, N>::outputs(g, c, in, n, y); });
     }
 
     template <class T, int W>
