@@ -183,16 +183,19 @@ struct KernelSource {
     }
     template <class T, int W>
     static void settling_errors(Group<T, W>* groups, int lanes, const T* output, std::size_t n, T* sums) {
-        constexpr int per_register = static_cast<int>(Isa::register_bytes / sizeof(T)), S = Isa::side_by_side;
+        constexpr int per_register = static_cast<int>(Isa::register_bytes / sizeof(T));
         const int registers = (lanes + per_register - 1) / per_register;
         const auto order = [&](int r) { return groups[r * per_register / W].order; };
         for (int r = 0; r < registers;) {
-            const bool full = r + S <= registers && order(r) == order(r + S - 1);
+            int same = 1;  // registers of one order from here on
+            while (r + same < registers && order(r + same) == order(r)) ++same;
+            const int s = same <= 3 ? same : (same == 4 ? 2 : Isa::side_by_side);  // none stays alone that need not
             by_order<8>(order(r), [&](auto N) {
-                if (full) Settling<T, W, N>::template errors<S>(groups, r, output, n, sums);
+                if (s == 3) Settling<T, W, N>::template errors<3>(groups, r, output, n, sums);
+                else if (s == 2) Settling<T, W, N>::template errors<2>(groups, r, output, n, sums);
                 else Settling<T, W, N>::template errors<1>(groups, r, output, n, sums);
             });
-            r += full ? S : 1;
+            r += s;
         }
     }
     template <class T, int W>
