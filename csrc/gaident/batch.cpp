@@ -62,8 +62,12 @@ struct FactorList {
 
     Structure structure(std::size_t i) const { return all[i]->structure; }
     const Factors<double>& factors(std::size_t i) const { return *all[i]; }
-    void place(std::size_t i, FactorGroup& group, std::size_t lane) const {
-        const Factors<double>& g = *all[i];
+    void place(const std::size_t* index, std::size_t first, std::size_t last, FactorGroup& group) const {
+        for (std::size_t lane = first; lane < last; ++lane) place(*all[index[lane]], group, lane);
+    }
+
+private:
+    static void place(const Factors<double>& g, FactorGroup& group, std::size_t lane) {
         const Structure s = g.structure;
         const Counts& most = group.counts;
         group.gain[lane] = g.gain;
@@ -89,7 +93,9 @@ struct ChromosomeList {
 
     Structure structure(std::size_t i) const { return decoder.structure(all[i]); }
     Factors<double> factors(std::size_t i) const { return decode(all[i], decoder.genome()); }
-    void place(std::size_t i, FactorGroup& group, std::size_t lane) const { decoder.place(all[i], group, lane, group.counts); }
+    void place(const std::size_t* index, std::size_t first, std::size_t last, FactorGroup& group) const {
+        decoder.place(all, index, first, last, group, group.counts);
+    }
 };
 
 // largest_root() of the lane where it is largest.
@@ -116,8 +122,14 @@ void load_lanes(const Experiment& experiment, const Record& record, const Candid
     factors.counts = Counts(s[0]);
     for (std::size_t lane = 1; lane < count; ++lane)
         if (!(s[lane] == s[lane - 1])) factors.counts.cover(Counts(s[lane]));
-    for (std::size_t lane = 0; lane < FactorGroup::width; ++lane)
-        candidates.place(index[std::min(lane, count - 1)], factors, lane);
+    std::size_t of_lane[FactorGroup::width];
+    for (std::size_t lane = 0; lane < FactorGroup::width; ++lane) of_lane[lane] = index[std::min(lane, count - 1)];
+    for (std::size_t first = 0; first < count;) {
+        std::size_t last = first + 1;
+        while (last < count && s[last] == s[first]) ++last;
+        candidates.place(of_lane, first, last < count ? last : FactorGroup::width, factors);
+        first = last;
+    }
     if (loop.kind != LoopKind::continuous) factors.doublings = held_doublings(largest_root(factors), record.sample_time);
     experiment.kernels->coefficients(factors, loop, record.sample_time, closed, group);
 

@@ -24,18 +24,34 @@ public:
     const Genome& genome() const { return *genome_; }
     Structure structure(const Word* c) const { return plans_[code(c)].structure; }
 
-    // Writes one chromosome's factors into a lane; `most` counts the group's factors, those that the lane lacks are set to zero.
+    // Writes chromosomes all[index[first]], ..., all[index[last - 1]], of one structure, into lanes first..last-1. `most` counts the group's
+    // factors; those that these lanes lack are set to zero.
     template <class Group>
-    void place(const Word* c, Group& group, std::size_t lane, const Counts& most) const {
-        const Plan& plan = plans_[code(c)];
-        group.gain[lane] = gain_[field(c, gain_slot_)] * plan.gain_unit;
-        for (int i = 0; i < most.pole_pairs; ++i)
-            put(i < plan.pole_pairs, c, plan.pole[i], group.pole_e1[i][lane], group.pole_e0[i][lane]);
-        for (int i = 0; i < most.zero_pairs; ++i)
-            put(i < plan.zero_pairs, c, plan.zero[i], group.zero_e1[i][lane], group.zero_e0[i][lane]);
-        group.pole[lane] = plan.with_single_pole ? real_[field(c, plan.single_pole)] : 0.0;
-        group.zero[lane] = plan.with_single_zero ? real_[field(c, plan.single_zero)] : 0.0;
-        for (int i = 0; i < most.p; ++i) group.excess[i][lane] = i < plan.structure.p ? 1.0 : 0.0;
+    void place(const Population& all, const std::size_t* index, std::size_t first, std::size_t last, Group& group,
+               const Counts& most) const {
+        const Plan& plan = plans_[code(all[index[first]])];
+        const Structure s = plan.structure;
+        const auto each = [&](auto&& write) {
+            for (std::size_t lane = first; lane < last; ++lane) write(all[index[lane]], lane);
+        };
+        const auto value = [&](bool present, const std::vector<double>& table, Slot slot, double scale, double* row) {
+            if (present) each([&](const Word* c, std::size_t lane) { row[lane] = table[field(c, slot)] * scale; });
+            else std::fill(row + first, row + last, 0.0);
+        };
+        const auto pair = [&](bool present, const PairSlots& slots, double* e1, double* e0) {
+            if (present) {
+                each([&](const Word* c, std::size_t lane) { put(c, slots, e1[lane], e0[lane]); });
+            } else {
+                std::fill(e1 + first, e1 + last, 0.0);
+                std::fill(e0 + first, e0 + last, 0.0);
+            }
+        };
+        value(true, gain_, gain_slot_, plan.gain_unit, group.gain);
+        for (int i = 0; i < most.pole_pairs; ++i) pair(i < s.pole_pairs(), plan.pole[i], group.pole_e1[i], group.pole_e0[i]);
+        for (int i = 0; i < most.zero_pairs; ++i) pair(i < s.zero_pairs(), plan.zero[i], group.zero_e1[i], group.zero_e0[i]);
+        value(s.single_pole(), real_, plan.single_pole, 1.0, group.pole);
+        value(s.single_zero(), real_, plan.single_zero, 1.0, group.zero);
+        for (int i = 0; i < most.p; ++i) std::fill(group.excess[i] + first, group.excess[i] + last, i < s.p ? 1.0 : 0.0);
     }
 
 private:
@@ -49,8 +65,6 @@ private:
     struct Plan {
         Structure structure;
         double gain_unit = 1.0;
-        int pole_pairs = 0, zero_pairs = 0;
-        bool with_single_pole = false, with_single_zero = false;
         PairSlots pole[max_pairs], zero[max_pairs];
         Slot single_pole, single_zero;
     };
@@ -60,11 +74,7 @@ private:
     }
     std::size_t code(const Word* c) const { return static_cast<std::size_t>(c[0] >> (word_bits - structure_bits_)); }
 
-    void put(bool present, const Word* c, const PairSlots& s, double& e1, double& e0) const {
-        if (!present) {
-            e1 = e0 = 0.0;
-            return;
-        }
+    void put(const Word* c, const PairSlots& s, double& e1, double& e0) const {
         const double a = real_[field(c, s.real1)], b = real_[field(c, s.real2)], im = imaginary_[field(c, s.imaginary1)];
         const Pair<double> complex = conjugate_pair(a, im), two = real_pair(a, b);
         const bool conjugate = field(c, s.conjugate) != 0;
@@ -90,13 +100,12 @@ private:
         Plan made;
         made.gain_unit = genome_->ranges().gain_unit(s.p);
         made.structure = s;
-        made.with_single_pole = s.single_pole();
-        made.with_single_zero = s.single_zero();
+        int pole_pairs = 0, zero_pairs = 0;
         visit_poles(
-            s, [&](Locus a, Locus b) { made.pole[made.pole_pairs++] = pair(a, b); },
+            s, [&](Locus a, Locus b) { made.pole[pole_pairs++] = pair(a, b); },
             [&](Locus a) { made.single_pole = slot(a, Part::real); });
         visit_zeros(
-            s, [&](Locus a, Locus b) { made.zero[made.zero_pairs++] = pair(a, b); },
+            s, [&](Locus a, Locus b) { made.zero[zero_pairs++] = pair(a, b); },
             [&](Locus a) { made.single_zero = slot(a, Part::real); });
         return made;
     }

@@ -19,17 +19,20 @@ TEST_CASE("decoder: a lane holds what decode() gives, bit for bit, for any genom
                     const Genome genome(ranges, code, scale);
                     const Decoder decoder(genome);
                     for (int repeat = 0; repeat < 200; ++repeat) {
-                        std::vector<Word> c(static_cast<std::size_t>(genome.words()));
-                        random.words(c.data(), c.size());
-                        const Factors<double> f = decode(c.data(), genome);
+                        Population all(5, genome.words());
+                        random.words(all.flat().data(), all.flat().size());
+                        const std::size_t chosen = random.below(5);
+                        const Factors<double> f = decode(all[chosen], genome);
                         const Structure s = f.structure;
-                        CHECK(decoder.structure(c.data()) == s);
+                        CHECK(decoder.structure(all[chosen]) == s);
                         Counts most = f.counts();  // or of a larger structure beside it
                         if (repeat % 2 == 0) most = Counts(Structure{7, 7});
                         most.single_pole = most.single_zero = true;
                         FactorGroup group;
+                        std::size_t index[FactorGroup::width] = {};
                         const std::size_t lane = random.below(FactorGroup::width);
-                        decoder.place(c.data(), group, lane, most);
+                        index[lane] = chosen;
+                        decoder.place(all, index, lane, lane + 1, group, most);
                         CHECK(group.gain[lane] == f.gain);
                         for (int i = 0; i < most.pole_pairs; ++i) {
                             CHECK(group.pole_e1[i][lane] == (i < s.pole_pairs() ? f.pole_pair[i].e1 : 0.0));
