@@ -242,19 +242,17 @@ void Batch::advance(const View<T>& view, const Record& record, G* groups, int la
         const std::size_t n = std::min(chunk_samples, view.output.size() - i);
         const T *const in = view.input.data() + i, *const out = view.output.data() + i;
         T part[static_cast<std::size_t>(bank_groups) * DoubleGroup::width];
-        const auto each = [&](auto&& errors) {
-            for (int g = 0; g * G::width < lanes; ++g) errors(groups[g], part + g * G::width);
+        const auto run = [&](const auto& kernels) {
+            if (settling) kernels.settling_errors(groups, lanes, out, n, part);
+            else kernels.many_errors(groups, lanes, in, out, n, part);
         };
         if constexpr (std::same_as<T, float>) {
-            const auto& kernels = experiment_.kernels->in_float;
-            if (settling) kernels.settling_errors(groups, lanes, out, n, part);
-            else each([&](G& g, T* sum) { kernels.errors(g, in, out, n, sum); });
+            run(experiment_.kernels->in_float);
+        } else if (experiment_.loop.limited()) {
+            for (int g = 0; g * G::width < lanes; ++g)
+                experiment_.kernels->in_double.stepped_errors(groups[g], controller, in, out, n, part + g * G::width);
         } else {
-            const auto& kernels = experiment_.kernels->in_double;
-            if (settling) kernels.settling_errors(groups, lanes, out, n, part);
-            else if (experiment_.loop.limited())
-                each([&](G& g, T* sum) { kernels.stepped_errors(g, controller, in, out, n, sum); });
-            else each([&](G& g, T* sum) { kernels.errors(g, in, out, n, sum); });
+            run(experiment_.kernels->in_double);
         }
         for (int lane = 0; lane < lanes; ++lane) sums[lane] += static_cast<double>(part[lane]);
         experiment_.stop_if_asked();

@@ -90,17 +90,6 @@ struct KernelSource {
 
     template <class T, int W, int N>
     struct Linear {
-        static void errors(Group<T, W>& g, const T* input, const T* output, std::size_t n, T* sums) {
-            using L = Lanes<T, W, Isa>;
-            Bank<T, W, N> k(g);
-            L sum(0.0);
-            for (std::size_t i = 0; i < n; ++i) {
-                const L e = L::all(output[i]) - recurrence_step<L, N>(k.order, k.a, k.b, k.x, L::all(input[i]));
-                sum = sum + e * e;
-            }
-            k.save(g);
-            sum.store(sums);
-        }
         static void outputs(Group<T, W>& g, const T* input, std::size_t n, T* y) {
             using L = Lanes<T, W, Isa>;
             Bank<T, W, N> k(g);
@@ -109,29 +98,30 @@ struct KernelSource {
         }
     };
 
-    // S registers of candidates of one order side by side, from register `first` of the array of groups on: while one waits for the
-    // sample before, the others compute.
-    template <class T, int W, int N>
-    struct Settling {
+    // Squared errors of S registers of candidates of one order side by side, from register `first` of the array of groups on: while one
+    // waits for the sample before, the others compute. `driven` false: without input, outputs being deviations from rest.
+    template <class T, int W, int N, bool driven>
+    struct SideBySide {
         using L = Lanes<T, static_cast<int>(Isa::register_bytes / sizeof(T)), Isa>;
-        static constexpr int per_group = W / L::per_register;
+        static constexpr int per_group = W / L::per_register, capacity = room_for(N);
         template <int S>
-        static void errors(Group<T, W>* groups, int first, const T* output, std::size_t n, T* sums) {
-            constexpr int capacity = N >= 0 ? (N > 0 ? N : 1) : max_loop_order;
+        static void errors(Group<T, W>* groups, int first, const T* input, const T* output, std::size_t n, T* sums) {
             const int order = N >= 0 ? N : groups[first / per_group].order;
-            L a[S][capacity], x[S][capacity], sum[S];
+            L a[S][capacity], b[S][capacity + 1], x[S][capacity], sum[S];
             const auto row = [&](auto& rows, int s, int i) { return rows[i] + (first + s) % per_group * L::per_register; };
             for (int s = 0; s < S; ++s) {
                 Group<T, W>& g = groups[(first + s) / per_group];
                 for (int i = 0; i < order; ++i) a[s][i] = L::load(row(g.a, s, i));
                 for (int i = 0; i < order; ++i) x[s][i] = L::load(row(g.x, s, i));
                 if (order == 0) x[s][0] = L(0.0);
+                if constexpr (driven)
+                    for (int i = 0; i <= order; ++i) b[s][i] = L::load(row(g.b, s, i));
                 sum[s] = L(0.0);
             }
             for (std::size_t i = 0; i < n; ++i) {
-                const L wanted = L::all(output[i]);
+                const L wanted = L::all(output[i]), r = driven ? L::all(input[i]) : L(0.0);
                 for (int s = 0; s < S; ++s) {
-                    const L e = wanted - recurrence_step<L, N, false>(order, a[s], nullptr, x[s], wanted);
+                    const L e = wanted - recurrence_step<L, N, driven>(order, a[s], b[s], x[s], r);
                     sum[s] = sum[s] + e * e;
                 }
             }
@@ -177,12 +167,8 @@ struct KernelSource {
         }
     };
 
-    template <class T, int W>
-    static void errors(Group<T, W>& g, const T* in, const T* out, std::size_t n, T* sums) {
-        by_order<8>(g.order, [&](auto N) { Linear<T, W, N>::errors(g, in, out, n, sums); });
-    }
-    template <class T, int W>
-    static void settling_errors(Group<T, W>* groups, int lanes, const T* output, std::size_t n, T* sums) {
+    template <class T, int W, bool driven>
+    static void side_by_side(Group<T, W>* groups, int lanes, const T* input, const T* output, std::size_t n, T* sums) {
         constexpr int per_register = static_cast<int>(Isa::register_bytes / sizeof(T));
         const int registers = (lanes + per_register - 1) / per_register;
         const auto order = [&](int r) { return groups[r * per_register / W].order; };
@@ -191,12 +177,25 @@ struct KernelSource {
             while (r + same < registers && order(r + same) == order(r)) ++same;
             const int s = same <= 3 ? same : (same == 4 ? 2 : Isa::side_by_side);  // none stays alone that need not
             by_order<8>(order(r), [&](auto N) {
-                if (s == 3) Settling<T, W, N>::template errors<3>(groups, r, output, n, sums);
-                else if (s == 2) Settling<T, W, N>::template errors<2>(groups, r, output, n, sums);
-                else Settling<T, W, N>::template errors<1>(groups, r, output, n, sums);
+                using Form = SideBySide<T, W, N, driven>;
+                if (s == 3) Form::template errors<3>(groups, r, input, output, n, sums);
+                else if (s == 2) Form::template errors<2>(groups, r, input, output, n, sums);
+                else Form::template errors<1>(groups, r, input, output, n, sums);
             });
             r += s;
         }
+    }
+    template <class T, int W>
+    static void errors(Group<T, W>* groups, int lanes, const T* input, const T* output, std::size_t n, T* sums) {
+        side_by_side<T, W, true>(groups, lanes, input, output, n, sums);
+    }
+    template <class T, int W>
+    static void settling_errors(Group<T, W>* groups, int lanes, const T* output, std::size_t n, T* sums) {
+        side_by_side<T, W, false>(groups, lanes, nullptr, output, n, sums);
+    }
+    template <class T, int W>
+    static void group_errors(Group<T, W>& g, const T* input, const T* output, std::size_t n, T* sums) {
+        errors<T, W>(&g, W, input, output, n, sums);
     }
     template <class T, int W>
     static void outputs(Group<T, W>& g, const T* in, std::size_t n, T* y) {
@@ -213,7 +212,7 @@ struct KernelSource {
 
     template <class T, int W>
     static constexpr KernelSet<Group<T, W>, T> set() {
-        return {errors<T, W>, settling_errors<T, W>, outputs<T, W>};
+        return {group_errors<T, W>, errors<T, W>, settling_errors<T, W>, outputs<T, W>};
     }
     static Kernels all(const char* name) {
         return {name,

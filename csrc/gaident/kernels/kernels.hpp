@@ -41,8 +41,9 @@ template <class G, class T>
 struct KernelSet {
     // sums[lane] = sum over n samples of (output - y)^2
     void (*errors)(G&, const T* input, const T* output, std::size_t n, T* sums);
-    // The same where the command is constant, for the first `lanes` lanes of an array of groups, sorted by order: states and output are
-    // deviations from rest (batch.cpp).
+    // The same for the first `lanes` lanes of an array of groups, sorted by order, several registers side by side.
+    void (*many_errors)(G* groups, int lanes, const T* input, const T* output, std::size_t n, T* sums);
+    // The same where the command is constant: states and output are deviations from rest (batch.cpp).
     void (*settling_errors)(G* groups, int lanes, const T* output, std::size_t n, T* sums);
     // y[sample][lane]
     void (*outputs)(G&, const T* input, std::size_t n, T* y);
