@@ -95,7 +95,7 @@ public:
 
 private:
     static constexpr std::uint64_t never = std::uint64_t{1} << 62;
-    static constexpr int top_bits = 10;
+    static constexpr int top_bits = 12;                // so that a look-up is mostly all there is to do
     std::array<Word, 256> tails_{};                    // tails_[k] = (1-m)^(k+1) * 2^64
     std::array<std::uint8_t, 1 << top_bits> first_{};  // by the top bits of a word: the first k it can stand for
     std::uint64_t gap_ = 0;
