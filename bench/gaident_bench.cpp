@@ -1,16 +1,18 @@
-// Times the core without Python: ns per candidate and sample, us per candidate, us per generation; per arithmetic, instruction set,
-// population, record length and loop. Every row first checks its answer against the referee. `--quick` runs fewer repetitions.
+// Times the core without Python: us per generation beside the bound that the machine sets, ns per candidate and sample, us per candidate;
+// per arithmetic, instruction set, population, record length and loop. Every row first checks its answer against the referee. Times are
+// of this process's own processor time, which on a shared machine is steadier than the clock on the wall. `--quick`: fewer repetitions.
 #include "../csrc/gaident/decode.hpp"
 #include "../csrc/gaident/denormals.hpp"
 #include "../csrc/gaident/breeder.hpp"
 #include "../csrc/gaident/reference/cascade.hpp"
 #include "../csrc/gaident/simulate.hpp"
+#include "issue_rate.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 
 using namespace gaident;
 
@@ -25,24 +27,33 @@ struct Figures {
     double median, lowest, highest;
 };
 
+Figures figures(std::vector<double> runs) {
+    std::sort(runs.begin(), runs.end());
+    return {runs[runs.size() / 2], runs.front(), runs.back()};
+}
+
+double seconds_of(std::clock_t ticks) { return static_cast<double>(ticks) / CLOCKS_PER_SEC; }
+
+int repetitions() { return quick ? 3 : 11; }
+
 // Seconds per call: median, minimum and maximum over repetitions of about 20 ms each.
 template <class F>
 Figures time_of(F&& call) {
-    using Clock = std::chrono::steady_clock;
-    const auto seconds = [](auto d) { return std::chrono::duration<double>(d).count(); };
     call();
-    const auto begin = Clock::now();
-    call();
-    const double one = std::max(seconds(Clock::now() - begin), 1e-7);
-    const auto count = std::max<std::size_t>(1, static_cast<std::size_t>((quick ? 2e-3 : 2e-2) / one));
-    std::vector<double> runs;
-    for (int r = 0; r < (quick ? 3 : 11); ++r) {
-        const auto start = Clock::now();
-        for (std::size_t i = 0; i < count; ++i) call();
-        runs.push_back(seconds(Clock::now() - start) / static_cast<double>(count));
+    const std::clock_t begin = std::clock();
+    std::size_t calls = 0;
+    while (std::clock() - begin < CLOCKS_PER_SEC / 500) {
+        call();
+        ++calls;
     }
-    std::sort(runs.begin(), runs.end());
-    return {runs[runs.size() / 2], runs.front(), runs.back()};
+    const std::size_t count = quick ? calls : 10 * calls;
+    std::vector<double> runs;
+    for (int r = 0; r < repetitions(); ++r) {
+        const std::clock_t start = std::clock();
+        for (std::size_t i = 0; i < count; ++i) call();
+        runs.push_back(seconds_of(std::clock() - start) / static_cast<double>(count));
+    }
+    return figures(std::move(runs));
 }
 
 void require(bool right, const char* what) {
@@ -53,23 +64,31 @@ void require(bool right, const char* what) {
 
 SearchRanges paper_ranges() { return {}; }
 
-// A two-mass record as in the paper, or a staircase for longer ones.
+// A two-mass record as in the paper: a step; a staircase, which is neither constant nor at rest; or the step in two records.
+enum class Task { step, staircase, two_records };
+constexpr const char* task_names[] = {"step", "staircase", "two records"};
+
 struct Data {
     std::vector<double> input, output;
     Experiment experiment;
 
-    Data(std::size_t samples, LoopKind kind) : input(samples), output(samples) {
-        for (std::size_t i = 0; i < samples; ++i) input[i] = samples <= 250 ? 43.6 : 43.6 * static_cast<double>((i / 250) % 3) - 20.0;
+    Data(std::size_t samples, LoopKind kind, Task task) : input(samples), output(samples) {
+        for (std::size_t i = 0; i < samples; ++i)
+            input[i] = task == Task::staircase ? 43.6 * static_cast<double>(1 + (4 * i / samples) % 3) - 20.0 : 43.6;
         const std::complex<double> poles[] = {-15.41, {-10.30, 150.9}, {-10.30, -150.9}};
         const std::complex<double> zeros[] = {{-4.26, 93.98}, {-4.26, -93.98}};
         experiment.loop.kind = kind;
         experiment.loop.kp = kp;
         experiment.loop.ki = ki;
-        std::vector<double> torque(samples);
-        simulate<double>(factors_from_roots(6545.29, poles, zeros), input, Ts, experiment.loop, nullptr, output, torque);
+        const std::size_t parts = task == Task::two_records ? 2 : 1, n = samples / parts;
         Random random(1);
-        for (double& y : output) y += 0.6 * (random.uniform() + random.uniform() + random.uniform() - 1.5);
-        experiment.records.push_back({input, output, Ts, Start::rest, 0.0});
+        for (std::size_t part = 0; part < parts; ++part) {
+            const std::span<double> in = std::span(input).subspan(part * n, n), out = std::span(output).subspan(part * n, n);
+            std::vector<double> torque(n);
+            simulate<double>(factors_from_roots(6545.29, poles, zeros), in, Ts, experiment.loop, nullptr, out, torque);
+            for (double& y : out) y += 0.6 * (random.uniform() + random.uniform() + random.uniform() - 1.5);
+            experiment.records.push_back({in, out, Ts, Start::rest, 0.0});
+        }
     }
 };
 
@@ -108,14 +127,17 @@ reference::System<double> chain_of(const Factors<double>& g) {
 }
 
 // The error sums of a batch are the referee's.
-void check_batch(const Data& data, std::span<const Factors<double>> all, std::span<const double> sums, double tolerance, const char* what) {
+void check_batch(const Data& data, std::span<const Factors<double>> all, std::span<const double> sums, double tolerance,
+                 const char* what) {
     if (data.input.size() > 25000) return;  // the referee takes its time; shorter rows have checked the same code
     for (std::size_t i = 0; i < all.size(); i += all.size() / 7 + 1) {
-        const std::vector<double> y = reference::run(chain_of(all[i]), data.input, Ts, data.experiment.loop).velocity;
         double sum = 0.0, size = 0.0;
-        for (std::size_t k = 0; k < y.size(); ++k) {
-            sum += (data.output[k] - y[k]) * (data.output[k] - y[k]);
-            size += data.output[k] * data.output[k] + y[k] * y[k];
+        for (const Record& r : data.experiment.records) {
+            const std::vector<double> y = reference::run(chain_of(all[i]), r.input, Ts, data.experiment.loop).velocity;
+            for (std::size_t k = 0; k < y.size(); ++k) {
+                sum += (r.output[k] - y[k]) * (r.output[k] - y[k]);
+                size += r.output[k] * r.output[k] + y[k] * y[k];
+            }
         }
         if (sum < 1e10) require(std::abs(sums[i] - sum) <= tolerance * size, what);  // not where it diverges
     }
@@ -123,14 +145,15 @@ void check_batch(const Data& data, std::span<const Factors<double>> all, std::sp
 
 void simulation_rows() {
     std::printf("\nSimulation of a batch (decode excluded, coefficients included), 48 candidates of one structure\n");
-    std::printf("%-9s %-7s %-11s %5s %8s | ns/candidate/sample: median [min, max] | us/candidate\n", "set", "number", "loop", "order", "samples");
+    std::printf("%-9s %-7s %-11s %5s %8s | ns/candidate/sample: median [min, max] | us/candidate\n", "set", "number", "loop",
+                "order", "samples");
     for (const char* set : {"baseline", "avx2", "avx512"}) {
         const Kernels* kernels = kernels_named(set);
         if (kernels == nullptr) continue;
         for (const bool in_float : {false, true})
             for (const LoopKind kind : {LoopKind::continuous, LoopKind::sampled})
                 for (const auto& [p, q] : {std::pair{1, 0}, {1, 2}, {3, 3}}) {
-                    Data data(250, kind);
+                    Data data(250, kind, Task::step);
                     data.experiment.kernels = kernels;
                     const auto all = candidates(48, p, q);
                     std::vector<double> sums(all.size());
@@ -140,61 +163,151 @@ void simulation_rows() {
                     const Figures t = time_of([&] { batch.errors(all, sums); });
                     const double each = 1e9 / (48.0 * 250.0);
                     std::printf("%-9s %-7s %-11s %5d %8d | %8.3f [%.3f, %.3f] | %8.3f\n", set, in_float ? "float" : "double",
-                                kind == LoopKind::continuous ? "continuous" : "sampled", 1 + p + q, 250, t.median * each, t.lowest * each,
-                                t.highest * each, t.median * 1e6 / 48.0);
+                                kind == LoopKind::continuous ? "continuous" : "sampled", 1 + p + q, 250, t.median * each,
+                                t.lowest * each, t.highest * each, t.median * 1e6 / 48.0);
                 }
     }
 }
 
 void referee_row() {
-    Data data(250, LoopKind::continuous);
+    Data data(250, LoopKind::continuous, Task::step);
     const auto all = candidates(8, 3, 3);
     std::vector<double> y(250), u(250), r(250);
     const Figures t = time_of([&] { simulate<double>(all[0], data.input, Ts, data.experiment.loop, nullptr, y, u); });
-    std::printf("\nOne candidate, scalar, order 7, with torque: %.3f ns per sample [%.3f, %.3f]\n", t.median * 4e6, t.lowest * 4e6, t.highest * 4e6);
+    std::printf("\nOne candidate, scalar, order 7, with torque: %.3f ns per sample [%.3f, %.3f]\n", t.median * 4e6,
+                t.lowest * 4e6, t.highest * 4e6);
 }
 
-void generation_row(const Kernels& kernels, bool in_float, int population, std::size_t samples, LoopKind kind) {
-    Data data(samples, kind);
-    data.experiment.kernels = &kernels;
+// What the sample loop of one generation has to do, in operations per number: a register of W candidates of largest order N costs, per
+// sample, N + 1 multiplications and 2 N + 1 additions (constant command) or 2 N + 2 and 3 N + 2 (any). Sorted by order, as they are run.
+struct Work {
+    double multiply = 0.0, add = 0.0;
+    // Seconds at the machine's issue rate: the additions alone, the multiplications alone, or all of them.
+    double bound(const IssueRate& r) const { return std::max({add / r.add, multiply / r.multiply, (add + multiply) / r.both}); }
+};
+
+Work work_of(const Breeder& breeder, const Data& data, std::size_t lanes, bool constant) {
+    std::vector<int> orders;
+    for (std::size_t i = 0; i < breeder.population().size(); ++i) orders.push_back(1 + breeder.candidate(i).structure.poles());
+    std::sort(orders.begin(), orders.end());
+    Work w;
+    const double numbers = static_cast<double>(lanes * data.input.size());
+    for (std::size_t last = lanes - 1; last < orders.size() + lanes - 1; last += lanes) {
+        const double N = orders[std::min(last, orders.size() - 1)];
+        w.multiply += numbers * (constant ? N + 1 : 2 * N + 2);
+        w.add += numbers * (constant ? 2 * N + 1 : 3 * N + 2);
+    }
+    return w;
+}
+
+struct Instructions {
+    const Kernels* kernels;
+    std::size_t register_bytes;
+    IssueRate in_double, in_float;
+};
+
+// The instruction sets that this machine can run.
+std::vector<Instructions> instruction_sets() {
+    std::vector<Instructions> all;
+    all.push_back({&baseline_kernels(), 16, issue_rate_baseline(false), issue_rate_baseline(true)});
+#ifdef GAIDENT_HAVE_X86_KERNELS
+    if (const Kernels* k = kernels_named("avx2")) all.push_back({k, 32, issue_rate_avx2(false), issue_rate_avx2(true)});
+    if (const Kernels* k = kernels_named("avx512")) all.push_back({k, 64, issue_rate_avx512(false), issue_rate_avx512(true)});
+#endif
+    return all;
+}
+
+// Runs of `generations` from a random population, as the paper runs 1000; the time of one generation. A short run holds every
+// structure p, q <= 3, a long one mostly the winner's.
+void generation_row(const Instructions& set, bool in_float, int population, std::size_t samples, LoopKind kind, Task task,
+                    int generations) {
+    Data data(samples, kind, task);
+    data.experiment.kernels = set.kernels;
     SearchRanges ranges = paper_ranges();
     if (kind != LoopKind::continuous) ranges.p_min = 1;
     const Genome genome(ranges, Code::binary, Scale::linear);
     Settings settings;
     settings.population = population;
     settings.in_float = in_float;
-    Breeder breeder(data.experiment, genome, settings, Random(3));
     const auto n = static_cast<std::size_t>(population);
     const Breeder::Group all[] = {{0, static_cast<std::uint32_t>(population), 0, false}};
-    breeder.randomise(0, n);
-    breeder.evaluate();
+    const auto start = [&](int run) {
+        Breeder breeder(data.experiment, genome, settings, Random(static_cast<std::uint64_t>(3 + run)));
+        breeder.randomise(0, n);
+        breeder.evaluate();
+        return breeder;
+    };
+
+    // What there is to do, over one run, and whether it is done right.
+    Breeder first = start(0);
     std::vector<Factors<double>> now;
     std::vector<double> sums(n);
     for (std::size_t i = 0; i < n; ++i) {
-        now.push_back(breeder.candidate(i));
-        sums[i] = breeder.cost(i) - 2.0 * (now[i].structure.p + now[i].structure.q);
+        now.push_back(first.candidate(i));
+        sums[i] = first.cost(i) - 2.0 * now[i].structure.poles();
     }
     check_batch(data, now, sums, in_float ? 1e-4 : 1e-9, "generation");
-    const Figures t = time_of([&] { breeder.generation(all); });
-    std::printf("%-9s %-7s %-11s %10d %8zu | %10.2f [%.2f, %.2f] | %8.1f\n", kernels.name, in_float ? "float" : "double",
-                kind == LoopKind::continuous ? "continuous" : "sampled", population, samples, t.median * 1e6, t.lowest * 1e6,
-                t.highest * 1e6, t.median * 1e12 / (static_cast<double>(population) * static_cast<double>(samples)));
+    const std::size_t lanes = set.register_bytes / (in_float ? sizeof(float) : sizeof(double));
+    double bound = 0.0, order = 0.0;
+    for (int g = 0; g < generations; ++g) {
+        first.generation(all);
+        bound +=
+            work_of(first, data, lanes, task != Task::staircase).bound(in_float ? set.in_float : set.in_double) / generations;
+        for (std::size_t i = 0; i < n; ++i)
+            order += (1 + first.candidate(i).structure.poles()) / static_cast<double>(n) / generations;
+    }
+
+    std::vector<double> runs;
+    const int at_once =
+        std::max(1, (quick ? 200 : 2000) / generations / (1 + population / 100) / (1 + static_cast<int>(samples / 500)));
+    for (int r = 0; r < repetitions(); ++r) {
+        double seconds = 0.0;
+        for (int k = 0; k < at_once; ++k) {
+            Breeder breeder = start(k);
+            const std::clock_t begin = std::clock();
+            for (int g = 0; g < generations; ++g) breeder.generation(all);
+            seconds += seconds_of(std::clock() - begin);
+        }
+        runs.push_back(seconds / at_once / generations);
+    }
+    const Figures t = figures(std::move(runs));
+    std::printf("%-9s %-7s %-11s %-12s %6d %8zu %6d | %9.2f [%.2f, %.2f] | %6.1f | %5.2f | %8.2f | %5.2f\n", set.kernels->name,
+                in_float ? "float" : "double", kind == LoopKind::continuous ? "continuous" : "sampled",
+                task_names[static_cast<int>(task)], population, samples, generations, t.median * 1e6, t.lowest * 1e6,
+                t.highest * 1e6, t.median * 1e12 / (static_cast<double>(population) * static_cast<double>(samples)), order,
+                bound * 1e6, t.median / bound);
 }
 
 void generation_rows() {
-    std::printf("\nA whole generation (decode, simulate, select, cross, mutate), 194 bits, orders 1 to 7 mixed\n");
-    std::printf("%-9s %-7s %-11s %10s %8s | us/generation: median [min, max] | ps/candidate/sample\n", "set", "number", "loop", "population", "samples");
-    for (const char* set : {"baseline", "avx2", "avx512"}) {
-        const Kernels* kernels = kernels_named(set);
-        if (kernels == nullptr) continue;
+    const std::vector<Instructions> sets = instruction_sets();
+    std::printf("\nIssue rates, 1e9 per second: multiplications, additions, half and half\n");
+    for (const Instructions& s : sets)
+        std::printf("%-9s double %.1f, %.1f, %.1f   float %.1f, %.1f, %.1f\n", s.kernels->name, s.in_double.multiply * 1e-9,
+                    s.in_double.add * 1e-9, s.in_double.both * 1e-9, s.in_float.multiply * 1e-9, s.in_float.add * 1e-9,
+                    s.in_float.both * 1e-9);
+    std::printf(
+        "\nA whole generation (decode, discretise, simulate, select, cross, mutate), 194 bits; bound: the sample loop's "
+        "operations at those rates\n");
+    std::printf(
+        "%-9s %-7s %-11s %-12s %6s %8s %6s | us/generation: median [min, max] | ps/candidate/sample | mean order | bound us | "
+        "ratio\n",
+        "set", "number", "loop", "command", "people", "samples", "run");
+    const auto row = [](const Instructions& s, bool in_float, LoopKind kind, Task task, int generations) {
+        generation_row(s, in_float, 50, 250, kind, task, generations);
+    };
+    for (const Instructions& s : sets)
         for (const bool in_float : {false, true}) {
-            generation_row(*kernels, in_float, 50, 250, LoopKind::continuous);
-            generation_row(*kernels, in_float, 50, 250, LoopKind::sampled);
+            row(s, in_float, LoopKind::continuous, Task::step, 1000);
+            row(s, in_float, LoopKind::continuous, Task::step, 20);
+            row(s, in_float, LoopKind::continuous, Task::staircase, 20);
+            row(s, in_float, LoopKind::continuous, Task::two_records, 20);
+            row(s, in_float, LoopKind::sampled, Task::step, 20);
+            row(s, in_float, LoopKind::sampled, Task::staircase, 20);
         }
-    }
-    for (const int population : {500, 5000}) generation_row(best_kernels(), false, population, 250, LoopKind::continuous);
+    for (const int population : {500, 5000})
+        generation_row(sets.back(), false, population, 250, LoopKind::continuous, Task::step, 20);
     for (const std::size_t samples : {2500UL, 25000UL, 250000UL})
-        if (!quick || samples < 10000) generation_row(best_kernels(), false, 50, samples, LoopKind::continuous);
+        if (!quick || samples < 10000) generation_row(sets.back(), false, 50, samples, LoopKind::continuous, Task::step, 20);
 }
 
 }  // namespace
@@ -210,9 +323,9 @@ int main(int argc, char** argv) {
     }
     const FlushDenormals flush;
     std::printf("gaident_bench: best kernels here: %s; one thread\n", best_kernels().name);
+    generation_rows();
     referee_row();
     simulation_rows();
-    generation_rows();
     effect_rows(quick);
     return 0;
 }

@@ -56,67 +56,144 @@ Prepared prepare(const Factors<double>& g, const Record& record, const Loop& loo
 
 namespace {
 
-void place(FactorGroup& group, std::size_t lane, const Factors<double>& g) {
-    const Structure s = g.structure;
-    const Counts& most = group.counts;
-    group.gain[lane] = g.gain;
-    for (int i = 0; i < most.pole_pairs; ++i) {
-        const Pair<double> f = i < s.pole_pairs() ? g.pole_pair[i] : Pair<double>{0.0, 0.0};
-        group.pole_e1[i][lane] = f.e1;
-        group.pole_e0[i][lane] = f.e0;
+// Candidates as a group takes them in: at hand as factors, or as chromosomes.
+struct FactorList {
+    const Factors<double>* const* all;
+
+    Structure structure(std::size_t i) const { return all[i]->structure; }
+    const Factors<double>& factors(std::size_t i) const { return *all[i]; }
+    void place(const std::size_t* index, std::size_t first, std::size_t last, FactorGroup& group) const {
+        for (std::size_t lane = first; lane < last; ++lane) place(*all[index[lane]], group, lane);
     }
-    for (int i = 0; i < most.zero_pairs; ++i) {
-        const Pair<double> f = i < s.zero_pairs() ? g.zero_pair[i] : Pair<double>{0.0, 0.0};
-        group.zero_e1[i][lane] = f.e1;
-        group.zero_e0[i][lane] = f.e0;
+
+private:
+    static void place(const Factors<double>& g, FactorGroup& group, std::size_t lane) {
+        const Structure s = g.structure;
+        const Counts& most = group.counts;
+        group.gain[lane] = g.gain;
+        for (int k = 0; k < most.pole_pairs; ++k) {
+            const Pair<double> f = k < s.pole_pairs() ? g.pole_pair[k] : Pair<double>{0.0, 0.0};
+            group.pole_e1[k][lane] = f.e1;
+            group.pole_e0[k][lane] = f.e0;
+        }
+        for (int k = 0; k < most.zero_pairs; ++k) {
+            const Pair<double> f = k < s.zero_pairs() ? g.zero_pair[k] : Pair<double>{0.0, 0.0};
+            group.zero_e1[k][lane] = f.e1;
+            group.zero_e0[k][lane] = f.e0;
+        }
+        group.pole[lane] = s.single_pole() ? g.pole : 0.0;
+        group.zero[lane] = s.single_zero() ? g.zero : 0.0;
+        for (int k = 0; k < most.p; ++k) group.excess[k][lane] = k < s.p ? 1.0 : 0.0;
     }
-    group.pole[lane] = s.single_pole() ? g.pole : 0.0;
-    group.zero[lane] = s.single_zero() ? g.zero : 0.0;
-    for (int i = 0; i < most.p; ++i) group.excess[i][lane] = i < s.p ? 1.0 : 0.0;
+};
+
+struct ChromosomeList {
+    const Population& all;
+    const Decoder& decoder;
+
+    Structure structure(std::size_t i) const { return decoder.structure(all[i]); }
+    Factors<double> factors(std::size_t i) const { return decode(all[i], decoder.genome()); }
+    void place(const std::size_t* index, std::size_t first, std::size_t last, FactorGroup& group) const {
+        decoder.place(all, index, first, last, group, group.counts);
+    }
+};
+
+// largest_root() of the lane where it is largest.
+double largest_root(const FactorGroup& g) {
+    double direct = 0.0, square = 0.0;
+    const auto take = [](double& most, const double* row) {
+        for (int lane = 0; lane < FactorGroup::width; ++lane) most = std::max(most, std::abs(row[lane]));
+    };
+    for (int i = 0; i < g.counts.pole_pairs; ++i) take(direct, g.pole_e1[i]), take(square, g.pole_e0[i]);
+    for (int i = 0; i < g.counts.zero_pairs; ++i) take(direct, g.zero_e1[i]), take(square, g.zero_e0[i]);
+    take(direct, g.pole);
+    take(direct, g.zero);
+    return std::max(direct, std::sqrt(square));
+}
+
+// Candidates index[0], index[1], ... index[count - 1], of structures s[0], s[1], ..., into the lanes of a group.
+template <class Candidates>
+void load_lanes(const Experiment& experiment, const Record& record, const Candidates& candidates, const std::size_t* index,
+                const Structure* s, std::size_t count, std::span<const double* const> starts, DoubleGroup& group) {
+    const Loop& loop = experiment.loop;
+    const bool closed = loop.kind != LoopKind::open && !loop.limited();
+    FactorGroup factors;
+    factors.structure = s[0];
+    factors.counts = Counts(s[0]);
+    for (std::size_t lane = 1; lane < count; ++lane)
+        if (!(s[lane] == s[lane - 1])) factors.counts.cover(Counts(s[lane]));
+    std::size_t of_lane[FactorGroup::width];
+    for (std::size_t lane = 0; lane < FactorGroup::width; ++lane) of_lane[lane] = index[std::min(lane, count - 1)];
+    for (std::size_t first = 0; first < count;) {
+        std::size_t last = first + 1;
+        while (last < count && s[last] == s[first]) ++last;
+        candidates.place(of_lane, first, last < count ? last : FactorGroup::width, factors);
+        first = last;
+    }
+    if (loop.kind != LoopKind::continuous) factors.doublings = held_doublings(largest_root(factors), record.sample_time);
+    experiment.kernels->coefficients(factors, loop, record.sample_time, closed, group);
+
+    for (int k = 0; k < group.order; ++k) std::fill(group.x[k], group.x[k] + DoubleGroup::width, 0.0);
+    std::fill(group.s, group.s + DoubleGroup::width, 0.0);
+    if (starts.empty() && record.start == Start::rest) return;
+    for (std::size_t lane = 0; lane < DoubleGroup::width; ++lane) {
+        const std::size_t i = std::min(lane, count - 1);
+        const Prepared c = prepare(candidates.factors(index[i]), record, loop, starts.empty() ? nullptr : starts[i]);
+        for (int k = 0; k < c.response.order; ++k) group.x[k][lane] = c.x[k];
+        group.s[lane] = c.s;
+    }
 }
 
 }  // namespace
 
 void load_group(const Experiment& experiment, const Record& record, std::span<const Factors<double>* const> candidates,
                 std::span<const double* const> starts, DoubleGroup& group) {
-    const Loop& loop = experiment.loop;
-    const bool closed = loop.kind != LoopKind::open && !loop.limited();
-    FactorGroup factors;
-    factors.structure = candidates[0]->structure;
-    double fastest = 0.0;
-    for (const Factors<double>* g : candidates) {
-        const Counts c = g->counts();
-        Counts& most = factors.counts;
-        most = {std::max(most.order, c.order),           std::max(most.p, c.p),
-                std::max(most.pole_pairs, c.pole_pairs), std::max(most.zero_pairs, c.zero_pairs),
-                most.single_pole || c.single_pole,       most.single_zero || c.single_zero};
-        if (loop.kind != LoopKind::continuous) fastest = std::max(fastest, largest_root(*g));
+    std::size_t index[DoubleGroup::width];
+    Structure s[DoubleGroup::width];
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+        index[i] = i;
+        s[i] = candidates[i]->structure;
     }
-    if (loop.kind != LoopKind::continuous) factors.doublings = held_doublings(fastest, record.sample_time);
-    for (std::size_t lane = 0; lane < FactorGroup::width; ++lane)
-        place(factors, lane, *candidates[std::min(lane, candidates.size() - 1)]);
-    experiment.kernels->coefficients(factors, loop, record.sample_time, closed, group);
-
-    for (std::size_t lane = 0; lane < FactorGroup::width; ++lane) {
-        const std::size_t i = std::min(lane, candidates.size() - 1);
-        const double* const start = starts.empty() ? nullptr : starts[i];
-        for (int k = 0; k < group.order; ++k) group.x[k][lane] = 0.0;
-        group.s[lane] = 0.0;
-        if (start == nullptr && record.start == Start::rest) continue;
-        const Prepared c = prepare(*candidates[i], record, loop, start);
-        for (int k = 0; k < c.response.order; ++k) group.x[k][lane] = c.x[k];
-        group.s[lane] = c.s;
-    }
+    load_lanes(experiment, record, FactorList{candidates.data()}, index, s, candidates.size(), starts, group);
 }
 
+namespace {
+
+bool settles(const Record& r, const Loop& loop) {
+    return loop.kind != LoopKind::open && !loop.limited() &&
+           std::all_of(r.input.begin(), r.input.end(), [&](double v) { return v == r.input[0]; });
+}
+
+}  // namespace
+
 Batch::Batch(const Experiment& experiment, std::size_t capacity, bool in_float)
-    : experiment_(experiment), in_float_(in_float && !experiment.loop.limited()), order_(capacity), sorted_(capacity) {
-    if (!in_float_) return;
-    inputs_.reserve(experiment.samples());
-    outputs_.reserve(experiment.samples());
+    : experiment_(experiment),
+      in_float_(in_float && !experiment.loop.limited()),
+      order_(capacity),
+      sorted_(capacity),
+      keys_(capacity),
+      list_(capacity) {
+    std::size_t constant = 0;
     for (const Record& r : experiment.records) {
-        for (double v : r.input) inputs_.push_back(static_cast<float>(v));
-        for (double v : r.output) outputs_.push_back(static_cast<float>(v));
+        settling_.push_back(settles(r, experiment.loop) ? 1 : 0);
+        if (settling_.back() != 0) constant += r.size();
+    }
+    deviations_.reserve(constant);  // views point into it
+    for (std::size_t i = 0; i < experiment.records.size(); ++i) {
+        const Record& r = experiment.records[i];
+        views_.push_back({r.input, r.output});
+        if (settling_[i] == 0) continue;
+        const std::size_t first = deviations_.size();
+        for (const double y : r.output) deviations_.push_back(y - r.input[0]);
+        views_.back().output = std::span(deviations_).subspan(first);
+    }
+    if (!in_float_) return;
+    floats_.reserve(2 * experiment.samples());
+    for (const View<double>& v : views_) {
+        const std::size_t first = floats_.size(), n = v.output.size();
+        for (const auto& signal : {v.input, v.output})
+            for (const double x : signal) floats_.push_back(static_cast<float>(x));
+        float_views_.push_back({std::span(floats_).subspan(first, n), std::span(floats_).subspan(first + n, n)});
     }
 }
 
@@ -125,11 +202,24 @@ std::size_t Batch::group_end(std::size_t first, std::size_t count) const {
     std::size_t end = std::min<std::size_t>(first + DoubleGroup::width, count);
     if (experiment_.loop.kind == LoopKind::continuous) return end;
     for (std::size_t i = first + 1; i < end; ++i)
-        if (!(sorted_[i]->structure == sorted_[first]->structure)) end = i;
+        if (!(sorted_[i] == sorted_[first])) end = i;
     return end;
 }
 
 namespace {
+
+constexpr std::size_t none = ~std::size_t{0};
+
+// Under a constant command r a PI loop rests at y = r: its a[N-1] is its b[N], so it has no steady error. The deviations from that
+// rest, y - r and x[i] - x_rest[i] with x_rest[0] = r - b[0] r, x_rest[i] = a[i-1] r - b[i] r, obey the recurrence without input, which
+// is nearly half the work.
+void settle(DoubleGroup& g, double r) {
+    for (int i = 0; i < g.order; ++i)
+        for (int lane = 0; lane < DoubleGroup::width; ++lane) {
+            const double at_rest = i == 0 ? 1.0 - g.b[0][lane] : g.a[i - 1][lane] - g.b[i][lane];
+            g.x[i][lane] -= at_rest * r;
+        }
+}
 
 void narrow(const DoubleGroup& from, int offset, FloatGroup& to) {
     for (int k = 0; k <= to.order; ++k)
@@ -143,104 +233,111 @@ void narrow(const DoubleGroup& from, int offset, FloatGroup& to) {
 
 }  // namespace
 
-// Advances a group over a record, chunk by chunk; adds each lane's squared errors.
-template <class G, class T, class Errors>
-void Batch::advance(Errors&& errors, G& group, std::span<const T> in, std::span<const T> out, double* sums) const {
-    for (std::size_t i = 0; i < in.size(); i += chunk_samples) {
-        const std::size_t n = std::min(chunk_samples, in.size() - i);
-        T part[G::width];
-        errors(group, in.data() + i, out.data() + i, n, part);
-        for (std::size_t lane = 0; lane < G::width; ++lane) sums[lane] += static_cast<double>(part[lane]);
+// Advances groups over a record, chunk by chunk; adds each lane's squared errors.
+template <class T, class G>
+void Batch::advance(const View<T>& view, const Record& record, G* groups, int lanes, double* sums) const {
+    const bool settling = settling_[static_cast<std::size_t>(&record - experiment_.records.data())] != 0;
+    const Controller<double> controller(experiment_.loop, record.sample_time);
+    for (std::size_t i = 0; i < view.output.size(); i += chunk_samples) {
+        const std::size_t n = std::min(chunk_samples, view.output.size() - i);
+        const T *const in = view.input.data() + i, *const out = view.output.data() + i;
+        T part[static_cast<std::size_t>(bank_groups) * DoubleGroup::width];
+        const auto run = [&](const auto& kernels) {
+            if (settling) kernels.settling_errors(groups, lanes, out, n, part);
+            else kernels.many_errors(groups, lanes, in, out, n, part);
+        };
+        if constexpr (std::same_as<T, float>) {
+            run(experiment_.kernels->in_float);
+        } else if (experiment_.loop.limited()) {
+            for (int g = 0; g * G::width < lanes; ++g)
+                experiment_.kernels->in_double.stepped_errors(groups[g], controller, in, out, n, part + g * G::width);
+        } else {
+            run(experiment_.kernels->in_double);
+        }
+        for (int lane = 0; lane < lanes; ++lane) sums[lane] += static_cast<double>(part[lane]);
         experiment_.stop_if_asked();
     }
 }
 
-void Batch::advance_double(DoubleGroup& group, const Record& record, double* sums) const {
-    const auto& kernels = experiment_.kernels->in_double;
-    if (!experiment_.loop.limited()) return advance(kernels.errors, group, record.input, record.output, sums);
-    const Controller<double> controller(experiment_.loop, record.sample_time);
-    const auto stepped = [&](DoubleGroup& g, const double* in, const double* out, std::size_t n, double* part) {
-        kernels.stepped_errors(g, controller, in, out, n, part);
-    };
-    advance(stepped, group, record.input, record.output, sums);
-}
-
-// The next candidates from `first` on that share a group; returns the first that does not.
-std::size_t Batch::load(const Record& record, std::size_t first, std::size_t count, DoubleGroup& group) const {
-    const std::size_t end = group_end(first, count);
-    load_group(experiment_, record, std::span(sorted_).subspan(first, end - first), {}, group);
-    return end;
-}
-
-void Batch::run_double(const Record& record, std::size_t count, double* sums) {
+template <class Candidates>
+void Batch::run(std::size_t r, const Candidates& candidates, std::size_t count, double* sums) {
+    constexpr std::size_t W = DoubleGroup::width;
+    const Record& record = experiment_.records[r];
     for (std::size_t first = 0; first < count;) {
-        const std::size_t end = load(record, first, count, halves_[0]);
-        double part[DoubleGroup::width] = {};
-        advance_double(halves_[0], record, part);
-        for (std::size_t i = first; i < end; ++i) sums[order_[i]] += part[i - first];
-        first = end;
-    }
-}
-
-// Two groups of eight side by side; a lane that 24 bits cannot hold takes its sum from a run of its eight in double.
-void Batch::run_float(const Record& record, std::span<const float> in, std::span<const float> out, std::size_t count,
-                      double* sums) {
-    for (std::size_t first = 0; first < count;) {
-        const std::size_t middle = load(record, first, count, halves_[0]);
-        const std::size_t end = middle < count ? load(record, middle, count, halves_[1]) : middle;
-        if (middle == count) halves_[1] = halves_[0];
-        float_group_.order = std::max(halves_[0].order, halves_[1].order);
-        narrow(halves_[0], 0, float_group_);
-        narrow(halves_[1], DoubleGroup::width, float_group_);
-        double part[FloatGroup::width] = {};
-        advance(experiment_.kernels->in_float.errors, float_group_, in, out, part);
-
-        const std::size_t starts[] = {first, middle, end};
-        for (std::size_t h = 0; h < 2; ++h) {
-            DoubleGroup& half = halves_[h];
-            const std::size_t used = starts[h + 1] - starts[h];
-            const auto suffices = [&](std::size_t lane) {
-                return float_suffices(half.order, [&](int i) { return half.a[i][lane]; });
-            };
-            bool in_float[DoubleGroup::width], all = true;
-            for (std::size_t lane = 0; lane < used; ++lane) all = (in_float[lane] = suffices(lane)) && all;
-            double exact[DoubleGroup::width] = {};
-            if (!all) advance_double(half, record, exact);
-            for (std::size_t lane = 0; lane < used; ++lane)
-                sums[order_[starts[h] + lane]] += in_float[lane] ? part[h * DoubleGroup::width + lane] : exact[lane];
+        // Which candidate sits in which lane of the bank; behind a hold a group can end early and leave lanes empty.
+        std::size_t candidate[bank_groups * W], lanes = 0;
+        for (int g = 0; g < bank_groups && first < count; ++g) {
+            const std::size_t end = group_end(first, count);
+            load_lanes(experiment_, record, candidates, order_.data() + first, sorted_.data() + first, end - first, {}, bank_[g]);
+            if (settling_[r] != 0) settle(bank_[g], record.input[0]);
+            lanes = static_cast<std::size_t>(g) * W;
+            for (std::size_t lane = 0; lane < W; ++lane)
+                candidate[lanes + lane] = lane < end - first ? order_[first + lane] : none;
+            lanes += end - first;
+            first = end;
         }
-        first = end;
+        double part[bank_groups * W] = {};
+        if (!in_float_) {
+            advance(views_[r], record, bank_, static_cast<int>(lanes), part);
+        } else {
+            // Two groups side by side; a group with a lane that 24 bits cannot hold is run in double as well, for that lane.
+            const std::size_t groups = (lanes + W - 1) / W;
+            for (std::size_t g = 0; g < groups; g += 2) {
+                const DoubleGroup& second = bank_[g + 1 < groups ? g + 1 : g];
+                float_bank_[g / 2].order = std::max(bank_[g].order, second.order);
+                narrow(bank_[g], 0, float_bank_[g / 2]);
+                narrow(second, W, float_bank_[g / 2]);
+            }
+            advance(float_views_[r], record, float_bank_, static_cast<int>(lanes), part);
+            for (std::size_t g = 0; g < groups; ++g) {
+                bool in_float[W], all = true;
+                for (std::size_t lane = 0; lane < W; ++lane)
+                    all = (in_float[lane] = float_suffices(bank_[g].order, [&](int i) { return bank_[g].a[i][lane]; })) && all;
+                if (all) continue;
+                double exact[W] = {};
+                advance(views_[r], record, bank_ + g, W, exact);
+                for (std::size_t lane = 0; lane < W; ++lane)
+                    if (!in_float[lane]) part[g * W + lane] = exact[lane];
+            }
+        }
+        for (std::size_t lane = 0; lane < lanes; ++lane)
+            if (candidate[lane] != none) sums[candidate[lane]] += part[lane];
     }
+}
+
+template <class Candidates>
+void Batch::errors_of(const Candidates& candidates, std::size_t count, double* sums) {
+    // Candidates of one order share their lanes: sorting by order keeps the sum of group orders small; within an order by q, so that
+    // structures stay together.
+    constexpr std::size_t most_q = max_plant_order / 2, keys = (max_plant_order + 1) * (most_q + 1);
+    std::uint32_t at[keys + 1] = {};
+    std::size_t largest = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        const Structure s = candidates.structure(i);
+        const std::size_t key = static_cast<std::size_t>(s.poles()) * (most_q + 1) + static_cast<std::size_t>(s.q);
+        keys_[i] = static_cast<std::uint8_t>(key);
+        ++at[key + 1];
+        largest = std::max(largest, key);
+    }
+    for (std::size_t k = 1; k <= largest; ++k) at[k] += at[k - 1];
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t place = at[keys_[i]]++;
+        const int poles = keys_[i] / static_cast<int>(most_q + 1), q = keys_[i] % static_cast<int>(most_q + 1);
+        order_[place] = i;
+        sorted_[place] = {poles - q, q};
+    }
+    std::fill(sums, sums + count, 0.0);
+    for (std::size_t r = 0; r < experiment_.records.size(); ++r) run(r, candidates, count, sums);
+    for (std::size_t i = 0; i < count; ++i) sums[i] = sane(sums[i]);
 }
 
 void Batch::errors(std::span<const Factors<double>> candidates, std::span<double> sums) {
-    const std::size_t count = candidates.size();
-    // Candidates of one order share their lanes: sorting by order keeps the sum of group orders small; within an order by q, so that
-    // structures stay together.
-    constexpr std::size_t keys = (max_plant_order + 1) * (max_plant_order / 2 + 1);
-    std::size_t at[keys + 1] = {};
-    const auto key = [](Structure s) { return static_cast<std::size_t>(s.poles() * (max_plant_order / 2 + 1) + s.q); };
-    for (const auto& g : candidates) ++at[key(g.structure) + 1];
-    for (std::size_t i = 1; i <= keys; ++i) at[i] += at[i - 1];
-    for (std::size_t i = 0; i < count; ++i) {
-        const std::size_t place = at[key(candidates[i].structure)]++;
-        order_[place] = i;
-        sorted_[place] = &candidates[i];
-    }
+    for (std::size_t i = 0; i < candidates.size(); ++i) list_[i] = &candidates[i];
+    errors_of(FactorList{list_.data()}, candidates.size(), sums.data());
+}
 
-    std::fill(sums.begin(), sums.begin() + static_cast<std::ptrdiff_t>(count), 0.0);
-    std::size_t offset = 0;
-    for (const Record& record : experiment_.records) {
-        if (in_float_) {
-            const std::span<const float> in(inputs_.data() + offset, record.size());
-            const std::span<const float> out(outputs_.data() + offset, record.size());
-            run_float(record, in, out, count, sums.data());
-        } else {
-            run_double(record, count, sums.data());
-        }
-        offset += record.size();
-    }
-    for (std::size_t i = 0; i < count; ++i) sums[i] = sane(sums[i]);
+void Batch::errors(const Population& candidates, const Decoder& decoder, std::span<double> sums) {
+    errors_of(ChromosomeList{candidates, decoder}, candidates.size(), sums.data());
 }
 
 }  // namespace gaident

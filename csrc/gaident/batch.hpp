@@ -1,6 +1,7 @@
 // The centre of the core: simulate many candidates against the records.
 #pragma once
 
+#include "decoder.hpp"
 #include "fitness.hpp"
 #include "kernels/kernels.hpp"
 #include "loop.hpp"
@@ -64,23 +65,38 @@ public:
 
     // sums[i] = sum over records and samples of (output - y_i)^2; worst_fitness where a candidate diverges.
     void errors(std::span<const Factors<double>> candidates, std::span<double> sums);
+    void errors(const Population& candidates, const Decoder& decoder, std::span<double> sums);
 
 private:
+    static constexpr int bank_groups = 8;  // so many groups at once
+
+    // What a record looks like to the sample loops.
+    template <class T>
+    struct View {
+        std::span<const T> input, output;  // output: of the settling loop, its deviation from the command
+    };
+
+    template <class Candidates>
+    void errors_of(const Candidates& candidates, std::size_t count, double* sums);
+    template <class Candidates>
+    void run(std::size_t record, const Candidates& candidates, std::size_t count, double* sums);
     std::size_t group_end(std::size_t first, std::size_t count) const;
-    std::size_t load(const Record& record, std::size_t first, std::size_t count, DoubleGroup& group) const;
-    template <class G, class T, class Errors>
-    void advance(Errors&& errors, G& group, std::span<const T> in, std::span<const T> out, double* sums) const;
-    void advance_double(DoubleGroup& group, const Record& record, double* sums) const;
-    void run_double(const Record& record, std::size_t count, double* sums);
-    void run_float(const Record& record, std::span<const float> in, std::span<const float> out, std::size_t count, double* sums);
+    template <class T, class G>
+    void advance(const View<T>& view, const Record& record, G* groups, int lanes, double* sums) const;
 
     const Experiment& experiment_;
     bool in_float_;
     std::vector<std::size_t> order_;  // candidates sorted by order, stable
-    std::vector<const Factors<double>*> sorted_;
-    std::vector<float> inputs_, outputs_;  // the records in float, one after the other
-    DoubleGroup halves_[2];
-    FloatGroup float_group_;
+    std::vector<Structure> sorted_;   // their structures
+    std::vector<std::uint8_t> keys_;
+    std::vector<const Factors<double>*> list_;
+    std::vector<char> settling_;      // per record: a constant command in a PI loop without limits
+    std::vector<double> deviations_;  // output minus command of the records that settle
+    std::vector<float> floats_;       // inputs and outputs of the records in float
+    std::vector<View<double>> views_;
+    std::vector<View<float>> float_views_;
+    DoubleGroup bank_[bank_groups];
+    FloatGroup float_bank_[bank_groups / 2];
 };
 
 }  // namespace gaident

@@ -17,25 +17,27 @@ R excess(const Factors<R>&, int, R factor, R) {
     return factor;
 }
 
-template <class R, class Plant>
-Delta<R> bilinear_plant(const Plant& g, double sample_time) {
+// `N`: the plant's order when known at compile time, so that the loops over coefficients unroll; -1 otherwise.
+template <class R, int N, class Plant>
+Delta<R, N> bilinear_plant(const Plant& g, double sample_time) {
     const Counts s = g.counts();
+    const int n = N >= 0 ? N : s.order;
     const R h = R(0.5 * sample_time), one = R(1.0), two = R(2.0), four = R(4.0);
 
     R gain = g.gain;
     for (int i = 0; i < s.p; ++i) gain = gain * excess(g, i, h, one);
 
-    Polynomial<R> denominator(one), numerator(one);
+    Polynomial<R, N> denominator(one, n), numerator(one, n);
     for (int i = 0; i < s.pole_pairs; ++i) {
         const R e1 = g.pole_pair[i].e1 * h, e0 = (g.pole_pair[i].e0 * h) * h;
-        const R lead = (one + e1) + e0;
-        denominator.times(one, (two * e1 + four * e0) / lead, (four * e0) / lead);
-        gain = gain / lead;
+        const R scale = one / ((one + e1) + e0);
+        denominator.times(one, (two * e1 + four * e0) * scale, (four * e0) * scale);
+        gain = gain * scale;
     }
     if (s.single_pole) {
-        const R a = g.pole * h, lead = one + a;
-        denominator.times(one, (two * a) / lead);
-        gain = gain / lead;
+        const R a = g.pole * h, scale = one / (one + a);
+        denominator.times(one, (two * a) * scale);
+        gain = gain * scale;
     }
     for (int i = 0; i < s.zero_pairs; ++i) {
         const R e1 = g.zero_pair[i].e1 * h, e0 = (g.zero_pair[i].e0 * h) * h;
@@ -47,16 +49,16 @@ Delta<R> bilinear_plant(const Plant& g, double sample_time) {
     }
     for (int i = 0; i < s.p; ++i) numerator.times(one, excess(g, i, two, R(0.0)));
     // Both have the plant's order, and are aligned at their leading coefficients.
-    Delta<R> plant;
-    plant.order = s.order;
-    for (int i = 0; i < s.order; ++i) plant.a[i] = denominator.c[i + 1];
-    for (int i = 0; i <= s.order; ++i) plant.b[i] = numerator.c[i] * gain;
+    Delta<R, N> plant;
+    plant.order = n;
+    for (int i = 0; i < n; ++i) plant.a[i] = denominator.c[i + 1];
+    for (int i = 0; i <= n; ++i) plant.b[i] = numerator.c[i] * gain;
     return plant;
 }
 
 template <class R>
 Delta<R> bilinear_plant(const Factors<R>& g, double sample_time) {
-    return bilinear_plant<R, Factors<R>>(g, sample_time);
+    return bilinear_plant<R, -1>(g, sample_time);
 }
 
 }  // namespace gaident

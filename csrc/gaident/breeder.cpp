@@ -1,22 +1,26 @@
 #include "breeder.hpp"
 
-#include "decode.hpp"
-
 #include <algorithm>
 #include <numeric>
 
 namespace gaident {
 
 Breeder::Breeder(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random)
-    : genome_(genome), settings_(settings), random_(random), mutation_(settings.mutation, random_),
+    : genome_(genome),
+      decoder_(genome),
+      settings_(settings),
+      random_(random, experiment.kernels->words),
+      mutation_(settings.mutation, random_),
       batch_(experiment, static_cast<std::size_t>(settings.population), settings.in_float),
-      now_(static_cast<std::size_t>(settings.population), genome.words()), next_(now_),
-      candidates_(now_.size()), costs_(now_.size(), worst_fitness), ranking_(now_.size()),
+      now_(static_cast<std::size_t>(settings.population), genome.words()),
+      next_(now_),
+      costs_(now_.size(), worst_fitness),
+      ranking_(now_.size()),
       spare_(static_cast<std::size_t>(genome.words())) {}
 
 void Breeder::randomise(std::size_t first, std::size_t count) {
     for (std::size_t i = first; i < first + count; ++i)
-        random_.words(now_[i], static_cast<std::size_t>(now_.words()));
+        for (int w = 0; w < now_.words(); ++w) now_[i][w] = random_.word();
 }
 
 void Breeder::set_structure(std::size_t first, std::size_t count, Structure s) {
@@ -24,9 +28,8 @@ void Breeder::set_structure(std::size_t first, std::size_t count, Structure s) {
 }
 
 void Breeder::evaluate() {
-    for (std::size_t i = 0; i < now_.size(); ++i) candidates_[i] = decode(now_[i], genome_);
-    batch_.errors(candidates_, costs_);
-    for (std::size_t i = 0; i < now_.size(); ++i) costs_[i] = fitness(costs_[i], candidates_[i].structure, settings_.weights);
+    batch_.errors(now_, decoder_, costs_);
+    for (std::size_t i = 0; i < now_.size(); ++i) costs_[i] = fitness(costs_[i], decoder_.structure(now_[i]), settings_.weights);
     evaluations_ += now_.size();
 }
 
@@ -45,10 +48,9 @@ void Breeder::breed(std::span<const Group> groups) {
         const auto elites = std::min(static_cast<std::size_t>(g.elites), static_cast<std::size_t>(g.count));
         if (elites > 0) {
             std::iota(ranking_.begin(), ranking_.begin() + g.count, g.first);
-            std::partial_sort(ranking_.begin(), ranking_.begin() + static_cast<std::ptrdiff_t>(elites), ranking_.begin() + g.count,
-                              [&](std::size_t i, std::size_t j) {
-                                  return costs_[i] < costs_[j] || (costs_[i] == costs_[j] && i < j);
-                              });
+            std::partial_sort(
+                ranking_.begin(), ranking_.begin() + static_cast<std::ptrdiff_t>(elites), ranking_.begin() + g.count,
+                [&](std::size_t i, std::size_t j) { return costs_[i] < costs_[j] || (costs_[i] == costs_[j] && i < j); });
             for (std::size_t k = 0; k < elites; ++k) copy(now_[ranking_[k]], next_[g.first + k]);
         }
         for (std::size_t k = elites; k < g.count; k += 2) {
@@ -62,11 +64,10 @@ void Breeder::breed(std::span<const Group> groups) {
                 copy(mother, child1);
                 copy(father, child2);
             }
-            // Parents of one species carry the same structure bits, so only mutation could change them.
-            const int first_bit = g.fixed_structure ? 2 * genome_.structure_bits() : 0;
-            mutation_.apply(random_, child1, first_bit, genome_.bits());
-            if (child2 != spare_.data()) mutation_.apply(random_, child2, first_bit, genome_.bits());
         }
+        // Parents of one species carry the same structure bits, so only mutation could change them.
+        const int first_bit = g.fixed_structure ? 2 * genome_.structure_bits() : 0;
+        mutation_.apply(random_, next_[g.first + elites], words, g.count - elites, first_bit, genome_.bits());
     }
     now_.swap(next_);
 }

@@ -22,6 +22,8 @@ public:
     void randomise(std::size_t first, std::size_t count);
     void set_structure(std::size_t first, std::size_t count, Structure s);
     void evaluate();
+    // The order in which random words are drawn is part of the definition: group by group, first for every two children the mother's
+    // tournament, the father's, the chance of crossover and its cuts; then the mutations of all the group's children in one piece.
     void breed(std::span<const Group> groups);
     void generation(std::span<const Group> groups) {
         breed(groups);
@@ -32,17 +34,17 @@ public:
     Word* operator[](std::size_t i) { return now_[i]; }
     const Population& population() const { return now_; }
     double cost(std::size_t i) const { return costs_[i]; }
-    Factors<double> candidate(std::size_t i) const { return candidates_[i]; }
+    Factors<double> candidate(std::size_t i) const { return decode(now_[i], genome_); }
     std::size_t evaluations() const { return evaluations_; }
 
 private:
     const Genome& genome_;
+    Decoder decoder_;
     Settings settings_;
-    Random random_;
+    WordStream random_;
     Mutation mutation_;
     Batch batch_;
     Population now_, next_;
-    std::vector<Factors<double>> candidates_;
     std::vector<double> costs_;
     std::vector<std::size_t> ranking_;
     std::vector<Word> spare_;  // the second child when a group's size is odd

@@ -10,21 +10,19 @@
 
 namespace gaident {
 
-template <class R>
-Delta<R> close_loop(const Delta<R>& plant, double kp, double ki, double sample_time) {
+template <class R, int N>
+Delta<R, N < 0 ? -1 : N + 1> close_loop(const Delta<R, N>& plant, double kp, double ki, double sample_time) {
     const R c1 = R(kp + 0.5 * ki * sample_time), c0 = R(ki * sample_time);
-    Delta<R> loop;
-    const int n = plant.order;
+    const int n = N >= 0 ? N : plant.order;
+    Delta<R, N < 0 ? -1 : N + 1> loop;
     loop.order = n + 1;
-    R numerator[max_loop_order + 1], sum[max_loop_order + 1];
+    const R scale = R(1.0) / (R(1.0) + c1 * plant.b[0]);
     for (int i = 0; i <= n + 1; ++i) {
         const R head = i <= n ? c1 * plant.b[i] : R(0.0);
-        numerator[i] = i > 0 ? head + c0 * plant.b[i - 1] : head;
-        const R d = i == 0 ? R(1.0) : (i <= n ? plant.a[i - 1] : R(0.0));
-        sum[i] = d + numerator[i];
+        const R numerator = i > 0 ? head + c0 * plant.b[i - 1] : head;
+        loop.b[i] = numerator * scale;
+        if (i > 0) loop.a[i - 1] = ((i <= n ? plant.a[i - 1] : R(0.0)) + numerator) * scale;
     }
-    for (int i = 0; i <= n; ++i) loop.a[i] = sum[i + 1] / sum[0];
-    for (int i = 0; i <= n + 1; ++i) loop.b[i] = numerator[i] / sum[0];
     return loop;
 }
 
@@ -34,13 +32,18 @@ Delta<R> close_loop(const Delta<R>& plant, double kp, double ki, double sample_t
 //     x[i](n+1)  = x[i](n) + x[i+1](n) + b[i+1] r(n) - a[i] y(n),   x[N] = 0
 //
 // y enters last: what does not depend on it is ready before it is, which shortens the chain from one sample to the next.
-// `N` is the order when known at compile time, so that the state lives in registers; -1 otherwise.
-template <class R, int N>
+// `N` is the order when known at compile time, so that the state lives in registers; -1 otherwise. Without input (r = 0) the terms in b
+// are left out.
+template <class R, int N, bool driven = true>
 [[gnu::always_inline]] inline R recurrence_step(int order, const R* a, const R* b, R* x, R r) {
     const int n = N >= 0 ? N : order;
-    const R y = x[0] + b[0] * r;
-    for (int i = 0; i + 1 < n; ++i) x[i] = ((x[i] + x[i + 1]) + b[i + 1] * r) - a[i] * y;
-    if (n > 0) x[n - 1] = (x[n - 1] + b[n] * r) - a[n - 1] * y;
+    const auto with_input = [&](const R& sum, int i) [[gnu::always_inline]] {
+        if constexpr (driven) return sum + b[i] * r;
+        else return sum;
+    };
+    const R y = with_input(x[0], 0);
+    for (int i = 0; i + 1 < n; ++i) x[i] = with_input(x[i] + x[i + 1], i + 1) - a[i] * y;
+    if (n > 0) x[n - 1] = with_input(x[n - 1], n) - a[n - 1] * y;
     return y;
 }
 

@@ -12,11 +12,14 @@ namespace gaident {
 
 inline constexpr int max_loop_order = max_plant_order + 1;
 
-template <class R>
+// Room for coefficients of an order known at compile time, or of any (N = -1).
+constexpr int room_for(int N) { return N < 0 ? max_loop_order : (N == 0 ? 1 : N); }
+
+template <class R, int N = -1>
 struct Delta {
     int order = 0;
-    R a[max_loop_order]{};
-    R b[max_loop_order + 1]{};
+    R a[room_for(N)]{};
+    R b[room_for(N) + 1]{};
 };
 
 // Whether 24 bits hold the polynomial delta^N + a[0] delta^(N-1) + ...: rounding a[i] moves it, where |z| = 1 and so |delta| <= 2, by up to
@@ -34,37 +37,30 @@ bool float_suffices(int order, A&& a) {
     return k <= 1.75;
 }
 
-// A polynomial c[0] x^n + ... + c[n], grown factor by factor.
-template <class R>
+// The leading coefficients c[0] x^n + c[1] x^(n-1) + ... + c[terms - 1] ... of a product, factor by factor. (Those beyond are not
+// needed: a numerator of lanes of different structures has more.)
+template <class R, int N = -1>
 struct Polynomial {
-    int degree = 0;
-    R c[max_loop_order + 1]{};
+    int terms;
+    R c[room_for(N) + 1];
 
-    explicit Polynomial(R leading) { c[0] = leading; }
+    Polynomial(R leading, int order) : terms((N >= 0 ? N : order) + 1) {
+        c[0] = leading;
+        for (int i = 1; i < size(); ++i) c[i] = R(0.0);
+    }
+    int size() const { return N >= 0 ? N + 1 : terms; }
 
     // times (k1 x + k0)
     void times(R k1, R k0) {
-        R previous = R(0.0);
-        for (int i = 0; i <= degree; ++i) {
-            const R here = c[i];
-            c[i] = k1 * here + k0 * previous;
-            previous = here;
-        }
-        c[++degree] = k0 * previous;
+        for (int i = size() - 1; i > 0; --i) c[i] = k1 * c[i] + k0 * c[i - 1];
+        c[0] = k1 * c[0];
     }
 
     // times (k2 x^2 + k1 x + k0)
     void times(R k2, R k1, R k0) {
-        R first = R(0.0), second = R(0.0);
-        for (int i = 0; i <= degree; ++i) {
-            const R here = c[i];
-            c[i] = (k2 * here + k1 * first) + k0 * second;
-            second = first;
-            first = here;
-        }
-        c[degree + 1] = k1 * first + k0 * second;
-        c[degree + 2] = k0 * first;
-        degree += 2;
+        for (int i = size() - 1; i > 1; --i) c[i] = (k2 * c[i] + k1 * c[i - 1]) + k0 * c[i - 2];
+        if (size() > 1) c[1] = k2 * c[1] + k1 * c[0];
+        c[0] = k2 * c[0];
     }
 };
 

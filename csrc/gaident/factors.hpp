@@ -38,8 +38,23 @@ struct Pair {
 
 // How many factors of each kind a product takes in.
 struct Counts {
-    int order, p, pole_pairs, zero_pairs;
-    bool single_pole, single_zero;
+    int order = 0, p = 0, pole_pairs = 0, zero_pairs = 0;
+    bool single_pole = false, single_zero = false;
+
+    Counts() = default;
+    explicit Counts(Structure s)
+        : order(s.poles()), p(s.p), pole_pairs(s.pole_pairs()), zero_pairs(s.zero_pairs()), single_pole(s.single_pole()),
+          single_zero(s.single_zero()) {}
+
+    // Room for both.
+    void cover(const Counts& c) {
+        order = std::max(order, c.order);
+        p = std::max(p, c.p);
+        pole_pairs = std::max(pole_pairs, c.pole_pairs);
+        zero_pairs = std::max(zero_pairs, c.zero_pairs);
+        single_pole = single_pole || c.single_pole;
+        single_zero = single_zero || c.single_zero;
+    }
 };
 
 template <class R>
@@ -51,10 +66,7 @@ struct Factors {
     Pair<R> zero_pair[max_pairs]{};
     R zero{};
 
-    Counts counts() const {
-        const Structure& s = structure;
-        return {s.poles(), s.p, s.pole_pairs(), s.zero_pairs(), s.single_pole(), s.single_zero()};
-    }
+    Counts counts() const { return Counts(structure); }
 };
 
 // A conjugate pair -re +- i im, or two real roots -a1, -a2, as s^2 + e1 s + e0.

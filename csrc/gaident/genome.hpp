@@ -93,13 +93,13 @@ public:
 
     const Field& field(Role role, Part part, int index) const { return fields_[slot(role, part, index)]; }
 
-    std::uint32_t code_of(const Word* c, const Field& f) const {
-        const std::uint32_t raw = get_field(c, f.first, f.width);
-        return code_ == Code::gray ? from_gray(raw) : raw;
-    }
+    std::uint32_t code_of(const Word* c, const Field& f) const { return number_of(get_field(c, f.first, f.width)); }
 
-    double value(const Word* c, const Field& f) const {
-        const double t = static_cast<double>(code_of(c, f)) / static_cast<double>((1U << f.width) - 1U);
+    double value(const Word* c, const Field& f) const { return value_of(get_field(c, f.first, f.width), f); }
+
+    // Of a field's bits, as they stand in the chromosome.
+    double value_of(std::uint32_t raw, const Field& f) const {
+        const double t = static_cast<double>(number_of(raw)) / static_cast<double>((1U << f.width) - 1U);
         if (f.scale == Scale::linear) return f.range.lo + (f.range.hi - f.range.lo) * t;
         return f.range.lo * std::exp(t * std::log(f.range.hi / f.range.lo));
     }
@@ -134,9 +134,12 @@ public:
     }
 
 private:
+    std::uint32_t number_of(std::uint32_t raw) const { return code_ == Code::gray ? from_gray(raw) : raw; }
+
     static void check(const SearchRanges& s) {
         for (const Range r : {s.gain, s.real, s.imaginary})
-            if (!std::isfinite(r.lo) || !std::isfinite(r.hi)) throw std::invalid_argument("SearchRanges: the ends of all ranges must be finite");
+            if (!std::isfinite(r.lo) || !std::isfinite(r.hi))
+                throw std::invalid_argument("SearchRanges: the ends of all ranges must be finite");
         const auto bad = [](const std::string& what) { throw std::invalid_argument("SearchRanges: " + what); };
         if (!(s.gain.lo > 0.0 && s.gain.hi > s.gain.lo)) bad("gain needs 0 < lo < hi (it is coded logarithmically)");
         if (!(s.gain_scale > 0.0)) bad("gain_scale must be positive");

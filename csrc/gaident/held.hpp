@@ -17,22 +17,26 @@ namespace detail {
 
 inline constexpr int held_states = max_plant_order + 1;  // the torque and the plant's states
 
-// Block lower triangular: entry (i, j) may be nonzero only for j <= i + 1.
-template <class R>
+// Block lower triangular: entry (i, j) may be nonzero only for j <= i + 1. `size`: rows when known at compile time, -1 otherwise.
+template <class R, int size>
 struct Hessenberg {
-    int n = 0;
-    R m[held_states][held_states]{};
+    static constexpr int capacity = size > 0 ? size : held_states;
+    int runtime_rows;
+    R m[capacity][capacity];
 
+    explicit Hessenberg(int n) : runtime_rows(n) {}
+    int rows() const { return size > 0 ? size : runtime_rows; }
     static int last(int row, int n) { return row + 1 < n ? row + 1 : n - 1; }
 
     friend Hessenberg product(const Hessenberg& x, const Hessenberg& y) {
-        Hessenberg r;
-        r.n = x.n;
+        const int n = x.rows();
+        Hessenberg r(n);
         // The blocks of x and y are aligned, so the product keeps their shape.
-        for (int i = 0; i < x.n; ++i)
-            for (int j = 0; j <= last(i, x.n); ++j) {
-                R sum = R(0.0);
-                for (int k = j > 0 ? j - 1 : 0; k <= last(i, x.n); ++k) sum = sum + x.m[i][k] * y.m[k][j];
+        for (int i = 0; i < n; ++i)
+            for (int j = 0; j <= last(i, n); ++j) {
+                const int first = j > 0 ? j - 1 : 0;
+                R sum = x.m[i][first] * y.m[first][j];
+                for (int k = first + 1; k <= last(i, n); ++k) sum = sum + x.m[i][k] * y.m[k][j];
                 r.m[i][j] = sum;
             }
         return r;
@@ -40,6 +44,7 @@ struct Hessenberg {
 
     template <class F>
     void each(F&& f) {
+        const int n = rows();
         for (int i = 0; i < n; ++i)
             for (int j = 0; j <= last(i, n); ++j) f(m[i][j], i, j);
     }
@@ -47,20 +52,20 @@ struct Hessenberg {
 
 inline constexpr int taylor_terms = 11;  // (1/8)^12 / 12! is below one unit in the last place of a double
 
-template <class R>
-Hessenberg<R> expm1(Hessenberg<R> x, int doublings) {
+template <class R, int size>
+Hessenberg<R, size> expm1(Hessenberg<R, size> x, int doublings) {
     double scale = 1.0;
     for (int i = 0; i < doublings; ++i) scale *= 0.5;
     x.each([&](R& e, int, int) { e = e * R(scale); });
     // Horner: x (1 + x/2 (1 + x/3 (...)))
-    Hessenberg<R> f = x;
+    Hessenberg<R, size> f = x;
     for (int k = taylor_terms; k >= 2; --k) {
         f.each([&](R& e, int, int) { e = e * R(1.0 / k); });
-        Hessenberg<R> xf = product(x, f);
+        const Hessenberg<R, size> xf = product(x, f);
         f.each([&](R& e, int i, int j) { e = x.m[i][j] + xf.m[i][j]; });
     }
     for (int d = 0; d < doublings; ++d) {
-        Hessenberg<R> ff = product(f, f);
+        const Hessenberg<R, size> ff = product(f, f);
         f.each([&](R& e, int i, int j) { e = (e + e) + ff.m[i][j]; });
     }
     return f;
@@ -90,11 +95,13 @@ inline double largest_root(const Factors<double>& g) {
     return r;
 }
 
-// Needs p >= 1: a plant that passes its torque straight through has no held form.
-template <class R, class Plant>
-Delta<R> held_plant(const Plant& g, double sample_time, int doublings) {
+// Needs p >= 1: a plant that passes its torque straight through has no held form. `N`: the plant's order when known at compile time, so that
+// the loops over its states unroll; -1 otherwise.
+template <class R, int N, class Plant>
+Delta<R, N> held_plant(const Plant& g, double sample_time, int doublings) {
+    using Matrix = detail::Hessenberg<R, N + 1>;
     const Counts s = g.counts();
-    const int n = s.order;
+    const int n = N >= 0 ? N : s.order;
     const R Ts = R(sample_time), zero = R(0.0), one = R(1.0);
 
     // Output of the cascade so far, as a row over [torque, states].
@@ -102,12 +109,13 @@ Delta<R> held_plant(const Plant& g, double sample_time, int doublings) {
     for (R& r : row) r = zero;
     row[0] = one;
 
-    detail::Hessenberg<R> M;
-    M.n = n + 1;
+    Matrix M(n + 1);
+    M.each([&](R& e, int, int) { e = zero; });
     int state = 1;
     int zeros_left = s.zero_pairs;
     bool single_zero_left = s.single_zero;
-    const int pairs = s.pole_pairs;
+    const int pairs = n / 2;
+    const bool single_pole = n % 2 != 0;
     for (int i = 0; i < pairs; ++i) {
         // x1' = x2, x2' = -e0 x1 - e1 x2 + v;   y = n2 v + (n0 - n2 e0) x1 + (n1 - n2 e1) x2
         const R e1 = g.pole_pair[i].e1 * Ts, e0 = (g.pole_pair[i].e0 * Ts) * Ts;
@@ -120,7 +128,7 @@ Delta<R> held_plant(const Plant& g, double sample_time, int doublings) {
             row[state] = (g.zero_pair[zeros_left].e0 * Ts) * Ts - e0;
             row[state + 1] = g.zero_pair[zeros_left].e1 * Ts - e1;
         } else {
-            const bool with_zero = single_zero_left && !s.single_pole;
+            const bool with_zero = single_zero_left && !single_pole;
             for (int j = 0; j < state; ++j) row[j] = zero;
             row[state] = with_zero ? g.zero * Ts : one;
             row[state + 1] = with_zero ? one : zero;
@@ -128,7 +136,7 @@ Delta<R> held_plant(const Plant& g, double sample_time, int doublings) {
         }
         state += 2;
     }
-    if (s.single_pole) {
+    if (single_pole) {
         const R a = g.pole * Ts;
         for (int j = 0; j < state; ++j) M.m[state][j] = row[j];
         M.m[state][state] = -a;
@@ -140,15 +148,15 @@ Delta<R> held_plant(const Plant& g, double sample_time, int doublings) {
         }
     }
 
-    const detail::Hessenberg<R> F = detail::expm1(M, doublings);
+    const Matrix F = detail::expm1(M, doublings);
 
-    Polynomial<R> denominator(one);
+    Polynomial<R, N> denominator(one, n);
     for (int i = 0; i < pairs; ++i) {
         const int k = 1 + 2 * i;
         const R f11 = F.m[k][k], f12 = F.m[k][k + 1], f21 = F.m[k + 1][k], f22 = F.m[k + 1][k + 1];
         denominator.times(one, -(f11 + f22), f11 * f22 - f12 * f21);
     }
-    if (s.single_pole) denominator.times(one, -F.m[n][n]);
+    if (single_pole) denominator.times(one, -F.m[n][n]);
 
     R gain = g.gain;
     for (int i = 0; i < s.p; ++i) gain = gain * Ts;
@@ -162,13 +170,13 @@ Delta<R> held_plant(const Plant& g, double sample_time, int doublings) {
         markov[k] = gain * h;
         for (int i = 1; i <= n; ++i) {
             R sum = zero;
-            for (int j = 1; j <= detail::Hessenberg<R>::last(i, n + 1); ++j) sum = sum + F.m[i][j] * x[j];
+            for (int j = 1; j <= Matrix::last(i, n + 1); ++j) sum = sum + F.m[i][j] * x[j];
             next[i] = sum;
         }
         for (int i = 1; i <= n; ++i) x[i] = next[i];
     }
 
-    Delta<R> d;
+    Delta<R, N> d;
     d.order = n;
     for (int i = 0; i < n; ++i) d.a[i] = denominator.c[i + 1];
     d.b[0] = zero;
@@ -182,7 +190,7 @@ Delta<R> held_plant(const Plant& g, double sample_time, int doublings) {
 
 template <class R>
 Delta<R> held_plant(const Factors<R>& g, double sample_time, int doublings) {
-    return held_plant<R, Factors<R>>(g, sample_time, doublings);
+    return held_plant<R, -1>(g, sample_time, doublings);
 }
 
 }  // namespace gaident

@@ -50,6 +50,16 @@ struct Lanes {
     [[gnu::always_inline]] friend inline Lanes operator-(const Lanes& a) {
         return each([&](int i) { return -a.v[i]; });
     }
+    // For words of bits.
+    [[gnu::always_inline]] friend inline Lanes operator^(const Lanes& a, const Lanes& b) {
+        return each([&](int i) { return a.v[i] ^ b.v[i]; });
+    }
+    [[gnu::always_inline]] friend inline Lanes operator>>(const Lanes& a, int bits) {
+        return each([&](int i) { return a.v[i] >> bits; });
+    }
+    [[gnu::always_inline]] friend inline Lanes operator*(const Lanes& a, T b) {
+        return each([&](int i) { return a.v[i] * b; });
+    }
     [[gnu::always_inline]] friend inline Lanes clamp(const Lanes& x, const Lanes& lo, const Lanes& hi) {
         return each([&](int i) {
             const Register low = x.v[i] < lo.v[i] ? lo.v[i] : x.v[i];

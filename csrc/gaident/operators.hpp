@@ -12,11 +12,12 @@ namespace gaident {
 
 // Tournament: `size` contestants drawn with replacement from [first, first + count), one word each; the lowest cost wins, the
 // earlier drawn on a tie.
-inline std::size_t tournament(Random& random, const double* cost, std::size_t first, std::uint32_t count, int size) {
-    std::size_t winner = first + random.below(count);
+template <class Source>
+std::size_t tournament(Source& random, const double* cost, std::size_t first, std::uint32_t count, int size) {
+    std::size_t winner = first + below(random.word(), count);
     for (int k = 1; k < size; ++k) {
-        const std::size_t rival = first + random.below(count);
-        if (cost[rival] < cost[winner]) winner = rival;
+        const std::size_t rival = first + below(random.word(), count);
+        winner = cost[rival] < cost[winner] ? rival : winner;
     }
     return winner;
 }
@@ -30,12 +31,13 @@ constexpr Word running_parity(Word x) {
 // Multi-point crossover, each field on its own: between any two bits of a field is a cut with probability 1/4, and each field
 // starts from either parent with probability 1/2. One child takes its bits from a until a cut, from b until the next, and so on; the
 // other child takes the rest. Draws two words r1, r2 per word: cut = r1 & (r2 | start of field).
-inline void crossover(Random& random, const Word* starts, int words, const Word* a, const Word* b, Word* child_a, Word* child_b) {
+template <class Source>
+void crossover(Source& random, const Word* starts, int words, const Word* a, const Word* b, Word* child_a, Word* child_b) {
     Word carried = 0;  // all ones while the segment that reaches over the word's edge comes from the other parent
     for (int w = 0; w < words; ++w) {
         const Word r1 = random.word(), r2 = random.word();
         const Word other = running_parity(r1 & (r2 | starts[w])) ^ carried;
-        carried = (other & 1) != 0 ? ~Word{0} : Word{0};
+        carried = Word{0} - (other & 1);
         const Word swap = (a[w] ^ b[w]) & other;
         child_a[w] = a[w] ^ swap;
         child_b[w] = b[w] ^ swap;
@@ -46,47 +48,56 @@ inline void crossover(Random& random, const Word* starts, int words, const Word*
 // P(gap >= k) = (1-m)^k: one word per flip instead of one per bit. The gap runs on from one chromosome to the next.
 class Mutation {
 public:
-    Mutation(double probability, Random& random) {
+    template <class Source>
+    Mutation(double probability, Source& random) {
         double tail = 1.0;
         for (auto& t : tails_) {
             tail *= 1.0 - probability;
             t = threshold(tail);
         }
+        std::size_t k = tails_.size() - 1;
+        for (std::size_t top = 0; top < first_.size(); ++top) {
+            const Word largest = ((Word{top} + 1) << (word_bits - top_bits)) - 1;
+            while (k > 0 && largest >= tails_[k - 1]) --k;
+            first_[top] = static_cast<std::uint8_t>(k);
+        }
         gap_ = draw(random);
     }
 
-    // Flips bits of [first, last) of one chromosome.
-    void apply(Random& random, Word* c, int first, int last) {
-        const auto length = static_cast<std::uint64_t>(last - first);
+    // Flips bits of [first, last) in each of `count` chromosomes of `words` words, one after the other.
+    template <class Source>
+    void apply(Source& random, Word* c, int words, std::size_t count, int first, int last) {
+        // 32 bits, which divide faster, hold every place in a population.
+        const auto length = static_cast<std::uint32_t>(last - first);
+        const std::uint64_t total = std::uint64_t{length} * count;
         std::uint64_t at = gap_;
-        while (at < length) {
-            const int i = first + static_cast<int>(at);
-            c[i / word_bits] ^= bit_mask(i);
+        while (at < total) {
+            const std::uint32_t chromosome = static_cast<std::uint32_t>(at) / length;
+            const int i = first + static_cast<int>(static_cast<std::uint32_t>(at) - chromosome * length);
+            c[std::size_t{chromosome} * static_cast<std::size_t>(words) + static_cast<std::size_t>(i / word_bits)] ^= bit_mask(i);
             at += 1 + draw(random);
         }
-        gap_ = at - length;
+        gap_ = at - total;
     }
 
     // Bits to skip before the next flip: the k with tail(k) > word >= tail(k+1); beyond the table's end memory starts anew.
-    std::uint64_t draw(Random& random) const {
+    template <class Source>
+    std::uint64_t draw(Source& random) const {
         if (tails_.back() == ~Word{0}) return never;  // m = 0
         for (std::uint64_t skipped = 0;; skipped += tails_.size()) {
             const Word u = random.word();
-            if (u >= tails_.back()) {
-                std::size_t lo = 0, hi = tails_.size() - 1;  // the first k with u >= tails_[k]
-                while (lo < hi) {
-                    const std::size_t mid = (lo + hi) / 2;
-                    if (u >= tails_[mid]) hi = mid;
-                    else lo = mid + 1;
-                }
-                return skipped + lo;
-            }
+            if (u < tails_.back()) continue;
+            std::size_t k = first_[u >> (word_bits - top_bits)];
+            while (u < tails_[k]) ++k;
+            return skipped + k;
         }
     }
 
 private:
     static constexpr std::uint64_t never = std::uint64_t{1} << 62;
-    std::array<Word, 256> tails_{};  // tails_[k] = (1-m)^(k+1) * 2^64
+    static constexpr int top_bits = 12;                // so that a look-up is mostly all there is to do
+    std::array<Word, 256> tails_{};                    // tails_[k] = (1-m)^(k+1) * 2^64
+    std::array<std::uint8_t, 1 << top_bits> first_{};  // by the top bits of a word: the first k it can stand for
     std::uint64_t gap_ = 0;
 };
 

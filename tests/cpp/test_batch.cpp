@@ -1,5 +1,5 @@
 #include "check.hpp"
-#include "gaident/batch.hpp"
+#include "gaident/simulate.hpp"
 #include "gaident/reference/drives.hpp"
 
 using namespace gaident;
@@ -234,6 +234,65 @@ TEST_CASE("batch: every kernel set gives the same sums, and neighbours do not ma
                 CHECK(alone[0] == first[0]);
             }
         }
+}
+
+TEST_CASE(
+    "batch: a constant command, which has a loop of its own, gives the referee's sums in every instruction set, from rest and in "
+    "motion") {
+    Random random(98);
+    for (const LoopKind kind : {LoopKind::continuous, LoopKind::sampled}) {
+        Setup setup(random, paper_loop(kind), {250, 700, 90}, 0.444e-3);
+        for (double& r : setup.inputs[0]) r = 43.6;
+        for (double& r : setup.inputs[1]) r = -7.0;  // longer than a chunk
+        const auto plants = candidates(random, 43, kind == LoopKind::continuous ? 0 : 1);
+        std::vector<Factors<double>> factors;
+        for (const auto& g : plants) factors.push_back(reference::factors_of(g));
+        for (const bool in_float : {false, true}) {
+            std::vector<double> first;
+            for (const Kernels* k : available()) {
+                setup.experiment.kernels = k;
+                std::vector<double> sums(43), alone(1);
+                Batch batch(setup.experiment, 43, in_float);
+                batch.errors(factors, sums);
+                if (first.empty()) first = sums;
+                CHECK(sums == first);
+                batch.errors(std::span(factors).subspan(30, 1), alone);
+                if (kind == LoopKind::continuous) CHECK(alone[0] == sums[30]);
+            }
+            double worst = 0.0;
+            for (std::size_t i = 0; i < plants.size(); ++i) {
+                double scale;
+                const double exact = setup.sum(plants[i], &scale);
+                if (exact < 1e10) worst = std::max(worst, std::abs(first[i] - exact) / scale);
+            }
+            std::printf("loop %d, float %d: %.2g\n", static_cast<int>(kind), in_float ? 1 : 0, worst);
+            CHECK(worst < (in_float ? 1e-4 : 1e-9));
+        }
+        // A start in motion: the same model as a driven record (a last sample that differs rules the short cut out).
+        std::vector<double> driven = setup.inputs[0];
+        driven.back() += 1.0;
+        Experiment one = setup.experiment, other = setup.experiment;
+        for (Experiment* e : {&one, &other}) {
+            e->records.resize(1);
+            e->records[0].start = Start::steady;
+            e->records[0].velocity0 = 20.0;
+        }
+        other.records[0].input = driven;
+        std::vector<double> a(43), b(43);
+        Batch(one, 43, false).errors(factors, a);
+        Batch(other, 43, false).errors(factors, b);
+        for (std::size_t i = 0; i < 43; ++i) {
+            std::vector<double> y(250), u(250);
+            if (a[i] > 1e10) continue;
+            double start[max_loop_order + 1] = {};
+            steady_start(plant_of(factors[i], one.loop, 0.444e-3), one.records[0], one.loop, start);
+            simulate<double>(factors[i], setup.inputs[0], 0.444e-3, one.loop, start, y, u);
+            const double d = setup.outputs[0][249] - y[249];
+            simulate<double>(factors[i], driven, 0.444e-3, one.loop, start, y, u);
+            const double e = setup.outputs[0][249] - y[249];
+            CHECK_NEAR(a[i] - d * d, b[i] - e * e, 1e-9 * (a[i] + 1.0));
+        }
+    }
 }
 
 TEST_CASE("batch: a candidate that diverges is the worst, never NaN") {

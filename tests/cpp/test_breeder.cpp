@@ -118,21 +118,18 @@ TEST_CASE("breeder: generations equal the referee's bit for bit; odd groups, eli
                         taken[best] = true;
                         next[child] = now[best];
                     }
+                    const std::size_t first_child = child;
                     while (child < last) {
-                        const auto mother =
-                            now[reference::tournament(random, cost, group.first, group.count, plan.tournament)];
-                        const auto father =
-                            now[reference::tournament(random, cost, group.first, group.count, plan.tournament)];
+                        const auto mother = now[reference::tournament(random, cost, group.first, group.count, plan.tournament)];
+                        const auto father = now[reference::tournament(random, cost, group.first, group.count, plan.tournament)];
                         reference::Bits first = mother, second = father;
                         if (random.word() < threshold(plan.crossover))
                             reference::crossover(random, genome.fields(), mother, father, first, second);
-                        const std::size_t from = group.fixed_structure ? 4 : 0;
-                        mutation.apply(random, first, from, first.size());
                         next[child++] = first;
-                        if (child == last) break;
-                        mutation.apply(random, second, from, second.size());
-                        next[child++] = second;
+                        if (child < last) next[child++] = second;
                     }
+                    const std::size_t from = group.fixed_structure ? 4 : 0;
+                    for (std::size_t i = first_child; i < last; ++i) mutation.apply(random, next[i], from, next[i].size());
                 }
                 now = next;
             }

@@ -298,3 +298,83 @@ TEST_CASE("kernels: groups are loaded as prepare() does it, bit for bit, structu
         }
     }
 }
+
+namespace {
+
+// Many groups in one call, of rising order, the last one partly used: the sums of each group on its own, and of the scalar recurrence.
+template <class T>
+void compare_many() {
+    using Group = typename In<T>::Group;
+    constexpr int W = Group::width;
+    Random random(84);
+    const auto number = [&](double size) { return static_cast<T>(size * (random.uniform() - 0.5)); };
+    for (int repeat = 0; repeat < 40; ++repeat) {
+        const int count = 1 + static_cast<int>(random.below(6));
+        const int lanes = (count - 1) * W + 1 + static_cast<int>(random.below(W));
+        std::vector<Group> groups(static_cast<std::size_t>(count));
+        int order = static_cast<int>(random.below(3));
+        for (Group& g : groups) {
+            g.order = order;
+            for (int lane = 0; lane < W; ++lane) {
+                for (int i = 0; i < order; ++i) g.a[i][lane] = number(0.3 / (1 + i)), g.x[i][lane] = number(2.0);
+                for (int i = 0; i <= order; ++i) g.b[i][lane] = number(0.5);
+            }
+            if (random.below(2) == 0) order = std::min(order + static_cast<int>(random.below(6)), max_loop_order);
+        }
+        std::vector<T> input(90), output(90);
+        for (T& v : input) v = number(10.0);
+        for (T& v : output) v = number(10.0);
+        std::vector<T> driven, settling;
+        for (const Kernels* k : available()) {
+            const auto& set = In<T>::set(*k);
+            std::vector<T> sums(static_cast<std::size_t>(count * W)), free(sums.size());
+            auto again = groups, third = groups;
+            set.many_errors(again.data(), lanes, input.data(), output.data(), 50, sums.data());
+            set.settling_errors(third.data(), lanes, output.data(), 90, free.data());
+            for (int lane = 0; lane < lanes; ++lane) {
+                const auto at = static_cast<std::size_t>(lane);
+                Group g = groups[at / W];
+                T own[W];
+                set.errors(g, input.data(), output.data(), 50, own);
+                CHECK(own[at % W] == sums[at]);
+                for (int i = 0; i < g.order; ++i) CHECK(again[at / W].x[i][at % W] == g.x[i][at % W]);
+
+                T a[max_loop_order], x[max_loop_order], sum = 0;
+                for (int i = 0; i < g.order; ++i) a[i] = g.a[i][at % W], x[i] = groups[at / W].x[i][at % W];
+                if (g.order == 0) x[0] = 0;
+                for (const T y : output) {
+                    const T e = y - recurrence_step<T, -1, false>(g.order, a, nullptr, x, T(0));
+                    sum += e * e;
+                }
+                CHECK(sum == free[at]);
+            }
+            sums.resize(static_cast<std::size_t>(lanes));
+            free.resize(static_cast<std::size_t>(lanes));
+            if (driven.empty()) driven = sums, settling = free;
+            CHECK(same_bits(driven, sums) && same_bits(settling, free));
+        }
+    }
+}
+
+}  // namespace
+
+TEST_CASE("kernels: many groups side by side, driven and settling, give every lane its own sum, bit for bit") {
+    compare_many<double>();
+    compare_many<float>();
+}
+
+TEST_CASE("kernels: random words in bulk are the generator's, in every instruction set and any number") {
+    for (const Kernels* k : available())
+        for (std::size_t n = 0; n < 40; ++n) {
+            Random bulk(5), single(5);
+            bulk.words(std::vector<Word>(n + 1).data(), n);  // somewhere in the sequence
+            for (std::size_t i = 0; i < n; ++i) single.word();
+            std::vector<Word> words(n + 1, 7);
+            k->words(bulk.skip(n), words.data(), n);
+            for (std::size_t i = 0; i < n; ++i) CHECK(words[i] == single.word());
+            CHECK(words[n] == 7 && bulk.word() == single.word());
+            WordStream stream(Random(9), k->words);
+            Random plain(9);
+            for (int i = 0; i < 600; ++i) CHECK(stream.word() == plain.word());
+        }
+}

@@ -116,9 +116,7 @@ TEST_CASE("operators: a cut inside a field with probability 1/4, and a field sta
             before = now;
         }
     }
-    const auto near = [&](int count, double p) {
-        CHECK_NEAR(count, repeats * p, 5.0 * std::sqrt(repeats * p * (1.0 - p)));
-    };
+    const auto near = [&](int count, double p) { CHECK_NEAR(count, repeats * p, 5.0 * std::sqrt(repeats * p * (1.0 - p))); };
     for (int i = 0; i < 194; ++i) {
         near(cuts[static_cast<std::size_t>(i)], get_bit(g.starts(), i) ? 0.5 : 0.25);
         near(from_father[static_cast<std::size_t>(i)], 0.5);
@@ -136,7 +134,7 @@ TEST_CASE("operators: mutation equals the referee bit for bit, over whole popula
                 std::vector<Word> c = random_words(setup, g.words());
                 reference::Bits bits = reference::unpack(c.data(), g.bits());
                 const int first = setup.below(2) == 0 ? 0 : 2 * g.structure_bits();
-                mutation.apply(fast, c.data(), first, g.bits());
+                mutation.apply(fast, c.data(), 4, 1, first, g.bits());
                 referee.apply(slow, bits, static_cast<std::size_t>(first), bits.size());
                 CHECK(reference::unpack(c.data(), g.bits()) == bits);
             }
@@ -153,7 +151,7 @@ TEST_CASE("operators: mutation flips every bit with the same probability") {
         double total = 0.0, pairs = 0.0;
         for (int repeat = 0; repeat < repeats; ++repeat) {
             Word c[4] = {};
-            mutation.apply(r, c, 0, bits);
+            mutation.apply(r, c, 4, 1, 0, bits);
             total += count_bits(c, 4);
             bool before = false;
             for (int i = 0; i < bits; ++i) {
@@ -175,9 +173,9 @@ TEST_CASE("operators: mutation with probability 0 changes nothing, with 1 every 
     Mutation never(0.0, r), always(1.0, r);
     for (int i = 0; i < 100; ++i) {
         Word c[4] = {};
-        never.apply(r, c, 0, 194);
+        never.apply(r, c, 4, 1, 0, 194);
         CHECK(count_bits(c, 4) == 0);
-        always.apply(r, c, 4, 194);
+        always.apply(r, c, 4, 1, 4, 194);
         CHECK(count_bits(c, 4) == 190);
         CHECK(c[0] == ~Word{0} >> 4);
         CHECK(c[3] == 0xC000000000000000ULL);

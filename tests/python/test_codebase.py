@@ -21,7 +21,7 @@ PACKAGE = ROOT / "python" / "gaident"
 
 # The core, lowest first: a file includes only what stands above it. Files of one folder share its place.
 CORE_ORDER = [
-    *("rng", "arithmetic", "float_pair", "lanes", "denormals", "chromosome", "genome", "factors", "decode", "parameters"),
+    *("rng", "arithmetic", "float_pair", "lanes", "denormals", "chromosome", "genome", "factors", "decode", "decoder", "parameters"),
     *("delta", "bilinear", "held", "controller", "closed_loop", "loop", "record", "fitness", "kernels/"),
     *("elementary", "effects/", "friction", "two_mass", "effect_constants", "effect_plant", "effect_loop", "effect_kernels/"),
     *("batch", "simulate", "linear", "refine", "settings", "operators", "breeder", "parallel", "species", "engine", "reference/"),

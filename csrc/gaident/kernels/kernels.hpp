@@ -5,6 +5,7 @@
 #pragma once
 
 #include "../controller.hpp"
+#include "../rng.hpp"
 
 namespace gaident {
 
@@ -40,6 +41,10 @@ template <class G, class T>
 struct KernelSet {
     // sums[lane] = sum over n samples of (output - y)^2
     void (*errors)(G&, const T* input, const T* output, std::size_t n, T* sums);
+    // The same for the first `lanes` lanes of an array of groups, sorted by order, several registers side by side.
+    void (*many_errors)(G* groups, int lanes, const T* input, const T* output, std::size_t n, T* sums);
+    // The same where the command is constant: states and output are deviations from rest (batch.cpp).
+    void (*settling_errors)(G* groups, int lanes, const T* output, std::size_t n, T* sums);
     // y[sample][lane]
     void (*outputs)(G&, const T* input, std::size_t n, T* y);
 };
@@ -55,6 +60,8 @@ struct Kernels {
     const char* name;
     // Coefficients of the plants (`closed` false) or of the closed loops into the group's a, b and order; its states are left alone.
     void (*coefficients)(const FactorGroup&, const Loop&, double sample_time, bool closed, DoubleGroup&);
+    // Random words: out[i] = mix(base + i * golden_gamma).
+    WordStream::Fill words;
     SteppedKernelSet in_double;
     KernelSet<FloatGroup, float> in_float;
 };
