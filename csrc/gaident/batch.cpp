@@ -1,5 +1,7 @@
 #include "batch.hpp"
 
+#include "advance.hpp"
+
 #include <algorithm>
 #include <numeric>
 
@@ -156,13 +158,11 @@ void Batch::advance(Errors&& errors, G& group, std::span<const T> in, std::span<
 }
 
 void Batch::advance_double(DoubleGroup& group, const Record& record, double* sums) const {
-    const auto& kernels = experiment_.kernels->in_double;
-    if (!experiment_.loop.limited()) return advance(kernels.errors, group, record.input, record.output, sums);
     const Controller<double> controller(experiment_.loop, record.sample_time);
-    const auto stepped = [&](DoubleGroup& g, const double* in, const double* out, std::size_t n, double* part) {
-        kernels.stepped_errors(g, controller, in, out, n, part);
+    const auto errors = [&](DoubleGroup& g, const double* in, const double* out, std::size_t n, double* part) {
+        advance_errors(*experiment_.kernels, experiment_.loop, controller, g, in, out, n, part);
     };
-    advance(stepped, group, record.input, record.output, sums);
+    advance(errors, group, record.input, record.output, sums);
 }
 
 // The next candidates from `first` on that share a group; returns the first that does not.

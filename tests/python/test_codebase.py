@@ -23,7 +23,7 @@ PACKAGE = ROOT / "python" / "gaident"
 CORE_ORDER = [
     *("rng", "arithmetic", "float_pair", "lanes", "denormals", "chromosome", "genome", "factors", "decode", "parameters"),
     *("delta", "bilinear", "held", "controller", "closed_loop", "loop", "record", "fitness", "kernels/"),
-    *("batch", "simulate", "linear", "refine", "settings", "operators", "breeder", "parallel", "species", "engine", "reference/"),
+    *("advance", "batch", "simulate", "linear", "sweep", "refine", "settings", "operators", "breeder", "parallel", "species", "engine", "reference/"),
 ]
 
 # Python: what each room may import of gaident, beside itself, and what inside a function only. A room is a

@@ -4,6 +4,7 @@
 #include "../lanes.hpp"
 #include "../loop.hpp"
 #include "kernels.hpp"
+#include "products.hpp"
 
 namespace gaident {
 
@@ -154,10 +155,14 @@ struct KernelSource {
         return {errors<T, W>, outputs<T, W>};
     }
     static Kernels all(const char* name) {
+        using Products = ProductSource<Isa>;
         return {name,
                 coefficients,
                 {set<double, double_lanes>(), stepped_errors<double, double_lanes>, stepped_outputs<double, double_lanes>},
-                set<float, float_lanes>()};
+                set<float, float_lanes>(),
+                Products::gram,
+                Products::whiten,
+                Products::colour};
     }
 };
 

@@ -57,6 +57,10 @@ struct Kernels {
     void (*coefficients)(const FactorGroup&, const Loop&, double sample_time, bool closed, DoubleGroup&);
     SteppedKernelSet in_double;
     KernelSet<FloatGroup, float> in_float;
+    // Rows of double_lanes numbers, see products.hpp.
+    void (*gram)(const double* a, const double* b, std::size_t n, double* sums);
+    void (*whiten)(const double* phi, std::size_t order, const double* in, std::size_t n, double* out);
+    void (*colour)(const double* phi, std::size_t order, const double* in, std::size_t n, double* z);
 };
 
 const Kernels& baseline_kernels();
