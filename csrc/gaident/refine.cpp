@@ -127,16 +127,23 @@ void Descent::trials(const Vector& x, const Normal& m, double damping, Vector& t
 }  // namespace
 
 Refined Refiner::fit(const Factors<double>& g, const std::vector<double>& starts, int max_iterations) const {
+    Refined from;
+    from.factors = g;
+    from.starts = starts.empty() ? Unknowns(experiment_, g.structure).steady_starts(experiment_, g) : starts;
+    return go_on(from, max_iterations);
+}
+
+Refined Refiner::go_on(const Refined& from, int max_iterations) const {
     const FlushDenormals flush;
-    const Structure s = g.structure;
+    const Structure s = from.factors.structure;
     const Unknowns unknowns(experiment_, s);
-    Vector x = pack(g, starts.empty() ? unknowns.steady_starts(experiment_, g) : starts);
+    Vector x = pack(from.factors, from.starts);
     if (x.size() != unknowns.count) throw std::invalid_argument("starts: wrong number of start states for these records");
     if (options_.bounded) project(x, s, options_.ranges);
     Refined result;
     Descent descent(experiment_, options_, unknowns);
     Vector trial;
-    double damping = 1e-2, costs[W];
+    double damping = from.damping, costs[W];
     int unchanged = 0;
     if (max_iterations == 0) {
         for (std::size_t l = 0; l < W; ++l) trial.insert(trial.end(), x.begin(), x.end());
@@ -172,6 +179,8 @@ Refined Refiner::fit(const Factors<double>& g, const std::vector<double>& starts
     result.factors = unpack(x, s);
     result.starts.assign(x.begin() + s.parameters(), x.end());
     result.cost = sane(m.cost);
+    result.damping = damping;
+    result.iterations += from.iterations;
     if (options_.bounded) result.at_bound = at_bounds(x, s, options_.ranges);
     else result.at_bound.assign(static_cast<std::size_t>(s.parameters()), false);
     return result;

@@ -23,6 +23,7 @@ struct Refined {
     Factors<double> factors;
     std::vector<double> starts;  // start_states() numbers per record with Start::free, in record order
     double cost = worst_fitness;
+    double damping = 1e-2;  // where a fit that goes on begins
     int iterations = 0;
     bool converged = false;
     std::vector<bool> at_bound;  // per parameter of x, starts excluded
@@ -35,6 +36,8 @@ public:
     // `starts` may be empty: then steady motion at each record's velocity0.
     Refined fit(const Factors<double>& g, const std::vector<double>& starts, int max_iterations) const;
     Refined fit(const Factors<double>& g) const { return fit(g, {}, options_.max_iterations); }
+    // Up to so many iterations more.
+    Refined go_on(const Refined& from, int max_iterations) const;
 
     // J at many points at once.
     std::vector<double> costs(std::span<const Factors<double>> candidates) const;

@@ -3,6 +3,7 @@
 #include "gaident/engine.hpp"
 #include "gaident/parameters.hpp"
 #include "gaident/reference/drives.hpp"
+#include "gaident/neighbours.hpp"
 #include "gaident/species.hpp"
 
 using namespace gaident;
