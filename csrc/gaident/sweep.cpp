@@ -115,6 +115,25 @@ void Sweep::linearise(std::span<const double> x, const Unknowns& unknowns, std::
     }
 }
 
+void Sweep::outputs(std::span<const double> x, const Unknowns& unknowns, const OnOutputs& on_outputs) {
+    DoubleGroup group;
+    std::vector<double> rows(chunk_samples * W), y(chunk_samples);
+    const double* const points[] = {x.data()};
+    for (std::size_t r = 0; r < experiment_.records.size(); ++r) {
+        const Record& record = experiment_.records[r];
+        const Controller<double> controller(experiment_.loop, record.sample_time);
+        load(r, points, unknowns, group);
+        for (std::size_t first = 0; first < record.size(); first += chunk_samples) {
+            const std::size_t n = std::min(chunk_samples, record.size() - first);
+            advance_outputs(experiment_.kernels->in_double, experiment_.loop, controller, group, record.input.data() + first, n,
+                            rows.data());
+            for (std::size_t k = 0; k < n; ++k) y[k] = rows[k * W];
+            on_outputs(r, first, {y.data(), n});
+            experiment_.stop_if_asked();
+        }
+    }
+}
+
 void Sweep::errors(std::span<const double* const> points, const Unknowns& unknowns, std::span<const double> phi, double* sums) {
     const std::size_t history = phi.size();
     bank_.resize(std::max<std::size_t>(bank_.size(), 1));

@@ -50,6 +50,10 @@ public:
     using OnChunk = std::function<void(const Chunk&)>;
     void linearise(std::span<const double> x, const Unknowns& unknowns, std::size_t history, const OnChunk& on_chunk);
 
+    // The outputs at one point.
+    using OnOutputs = std::function<void(std::size_t record, std::size_t first, std::span<const double> y)>;
+    void outputs(std::span<const double> x, const Unknowns& unknowns, const OnOutputs& on_outputs);
+
     // sums[i] = sum of squares of e at points[i], or of e filtered by 1 - sum phi_i z^-i where phi is not empty. At most double_lanes points.
     void errors(std::span<const double* const> points, const Unknowns& unknowns, std::span<const double> phi, double* sums);
 
