@@ -101,13 +101,7 @@ void Sweep::linearise(std::span<const double> x, const Unknowns& unknowns, std::
                 double* const rows = columns_[g].data() + history * W;
                 advance_outputs(*experiment_.kernels, experiment_.loop, controller, bank_[g], record.input.data() + first,
                                 n, rows);
-                const double* const s = scale.data() + g * W;
-                for (std::size_t k = 0; k < n; ++k) {
-                    double* const row = rows + k * W;
-                    const double y = row[0];
-                    for (std::size_t lane = 0; lane < W; ++lane) row[lane] = s[lane] * (y - row[lane]);
-                    row[0] = output[k] - y;
-                }
+                experiment_.kernels->differences(scale.data() + g * W, output, n, rows);
             }
             on_chunk({r, first, n, own, columns_, history});
             experiment_.stop_if_asked();

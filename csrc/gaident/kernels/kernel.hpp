@@ -161,6 +161,7 @@ struct KernelSource {
                 {set<double, double_lanes>(), stepped_errors<double, double_lanes>, stepped_outputs<double, double_lanes>},
                 set<float, float_lanes>(),
                 Products::gram,
+                Products::differences,
                 Products::whiten,
                 Products::colour};
     }

@@ -16,20 +16,32 @@ struct ProductSource {
 
     // sums[i][j] += sum_k a[k][i] b[k][j]
     static void gram(const double* a, const double* b, std::size_t n, double* sums) {
-        // Four rows of sums at a time, in registers.
-        constexpr int T = 4;
+        // As many rows of sums at a time as the registers hold.
+        constexpr int T = L::registers == 1 ? 8 : L::registers == 2 ? 4 : 2;
         for (int i = 0; i < W; i += T) {
             L part[T];
             for (int t = 0; t < T; ++t) part[t] = L(0.0);
             for (std::size_t k = 0; k < n; ++k) {
                 const L row = L::load(b + k * W);
-#pragma GCC unroll 4
+#pragma GCC unroll 8
                 for (int t = 0; t < T; ++t) part[t] = part[t] + L::all(a[k * W + static_cast<std::size_t>(i + t)]) * row;
             }
             for (int t = 0; t < T; ++t) {
                 double* const sum = sums + static_cast<std::size_t>(i + t) * W;
                 (L::load(sum) + part[t]).store(sum);
             }
+        }
+    }
+
+    // Outputs y of a point (lane 0) and of its neighbours, in place, into the error and its derivatives: row[k][0] = output[k] - y, and
+    // row[k][l] = scale[l] (y - row[k][l]).
+    static void differences(const double* scale, const double* output, std::size_t n, double* rows) {
+        const L s = L::load(scale);
+        for (std::size_t k = 0; k < n; ++k) {
+            double* const row = rows + k * W;
+            const double y = row[0];
+            (s * (L::all(y) - L::load(row))).store(row);
+            row[0] = output[k] - y;
         }
     }
 

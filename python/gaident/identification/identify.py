@@ -36,7 +36,7 @@ ProgressCallback = Callable[[float, str], None]
 FINAL_ITERATIONS = 60
 FINAL_TOLERANCE = 1e-9
 WHOLE_ITERATIONS = 30  # of a fit found on a part of a long record
-REACH = 100.0  # units of BIC on the part, within which a structure may still win on all samples
+REACH = math.log(2.0)  # units of BIC per sample of the part: with twice the error of the best there, none wins on all samples
 
 
 def identify(
@@ -186,7 +186,7 @@ class _Work:
         noise = selection.noise_of(self.searched, min(candidates, key=lambda c: c.cost), self.search_lengths)
         scores = selection.scored(self.searched, candidates, noise, self.search_lengths, self.ranges, self.workers)
         best = min(c.bic for c in scores)
-        near = [c.bic <= best + REACH for c in scores]
+        near = [c.bic <= best + REACH * sum(self.search_lengths) for c in scores]
         return [c for c, n in zip(candidates, near, strict=True) if n], [
             c for c, n in zip(candidates, near, strict=True) if not n
         ]
