@@ -1,11 +1,13 @@
 #include "species.hpp"
 
+#include "island.hpp"
 #include "neighbours.hpp"
 #include "parallel.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <memory>
 #include <numeric>
 
 namespace gaident {
@@ -26,9 +28,11 @@ struct Effort {
     std::size_t promising;  // starts that get more
 };
 constexpr Effort quick{2, 2, 3}, thorough{5, 6, 10};
-constexpr int more_iterations = 4, full_iterations = 40;
+constexpr int more_iterations = 4, settling_iterations = 8, full_iterations = 40;
 // Where the root mean square error is so many times the noise of the measured velocity, there may be a better optimum.
 constexpr double down_to_noise = 1.2;
+// Samples from which a search is worth threads, and how many islands it then has.
+constexpr std::size_t long_enough = 4096, most_islands = 4;
 // A structure whose error sum is so many times another one's of no larger size is not fitted to the end.
 constexpr double out_of_reach = 2.0;
 
@@ -49,15 +53,19 @@ class SpeciesRun {
 public:
     SpeciesRun(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random, int workers,
                Progress& progress)
-        : experiment_(experiment), genome_(genome), settings_(with_room(settings, genome)), workers_(workers), progress_(progress),
-          all_(structures(genome.ranges())), refiner_(experiment, options(genome, experiment.samples())),
-          breeder_(experiment, genome_, settings_, random) {
-        const std::size_t n = static_cast<std::size_t>(settings_.population), share = n / all_.size(), extra = n % all_.size();
-        std::size_t first = 0;
-        for (std::size_t i = 0; i < all_.size(); ++i) {
-            const std::size_t count = share + (i < extra ? 1 : 0);
-            groups_.push_back({first, static_cast<std::uint32_t>(count), 1, true});
-            first += count;
+        : genome_(genome), settings_(settings), workers_(worth_threads(experiment) ? workers : 1), progress_(progress),
+          all_(structures(genome.ranges())), refiner_(experiment, options(genome, experiment.samples())) {
+        // The number of islands depends on the data alone, never on the workers: the same seed has to give the same result.
+        const std::size_t islands = worth_threads(experiment) ? std::min(most_islands, all_.size()) : 1;
+        settings_.population = std::max(settings_.population, static_cast<int>(3 * all_.size()));
+        for (std::size_t k = 0; k < islands; ++k) {
+            const std::size_t first = k * all_.size() / islands, last = (k + 1) * all_.size() / islands;
+            for (std::size_t i = first; i < last; ++i) places_.push_back({k, i - first});
+            Settings own = settings_;
+            own.population = static_cast<int>((k + 1) * static_cast<std::size_t>(settings_.population) / islands -
+                                              k * static_cast<std::size_t>(settings_.population) / islands);
+            islands_.push_back(std::make_unique<Island>(experiment, genome_, own, islands == 1 ? random : Random(random.word()),
+                                                        std::span(all_).subspan(first, last - first)));
         }
         trial_.species.resize(all_.size());
         for (const Record& r : experiment.records) {
@@ -78,16 +86,12 @@ public:
             else quiet = better || done == 0 ? 0 : quiet + 1;
             done += generations;
         }
-        trial_.evaluations = breeder_.evaluations();
+        for (const auto& island : islands_) trial_.evaluations += island->evaluations();
         return std::move(trial_);
     }
 
 private:
-    static Settings with_room(Settings s, const Genome& genome) {
-        const auto needed = 3 * structures(genome.ranges()).size();  // fewer than three cannot mate
-        s.population = std::max(s.population, static_cast<int>(needed));
-        return s;
-    }
+    static bool worth_threads(const Experiment& experiment) { return experiment.samples() >= long_enough; }
     static RefineOptions options(const Genome& genome, std::size_t samples) {
         RefineOptions o;
         o.ranges = genome.ranges();
@@ -98,20 +102,17 @@ private:
     // Every round starts from fresh random individuals: the optima already fitted are kept apart, and what a round is for
     // is to find another basin.
     void breed_round(int generations, int done) {
-        breeder_.randomise(0, static_cast<std::size_t>(settings_.population));
-        for (std::size_t i = 0; i < all_.size(); ++i) breeder_.set_structure(groups_[i].first, groups_[i].count, all_[i]);
-        breeder_.evaluate();
-        for (int g = 0;; ++g) {
-            const std::size_t best = breeder_.best_of(0, static_cast<std::size_t>(settings_.population));
-            trial_.history.push_back(std::min(breeder_.cost(best), trial_.best_fitness));
-            if (breeder_.cost(best) < trial_.best_fitness) {
-                trial_.best_fitness = breeder_.cost(best);
-                trial_.best_generation = done + g;
-                std::copy(breeder_[best], breeder_[best] + genome_.words(), trial_.best.begin());
+        parallel(islands_.size(), workers_, [&](std::size_t k) {
+            islands_[k]->breed(generations, [&](double least) { progress_.note(k == 0 ? 1 : 0, least); });
+        });
+        for (std::size_t g = 0; g < static_cast<std::size_t>(generations); ++g) {
+            for (const auto& island : islands_) {
+                if (!(island->history()[g] < trial_.best_fitness)) continue;
+                trial_.best_fitness = island->history()[g];
+                trial_.best_generation = done + static_cast<int>(g);
+                trial_.best = island->best();  // of its round; a later generation that is better still comes later in this loop
             }
-            progress_.note(1, trial_.best_fitness);
-            if (g + 1 == generations) break;
-            breeder_.generation(groups_);
+            trial_.history.push_back(trial_.best_fitness);
         }
     }
 
@@ -124,6 +125,7 @@ private:
             fit_level(first, last, effort);
             first = last;
         }
+        finish();
         fit_smaller();
         return std::any_of(better_.begin(), better_.end(), [](char c) { return c != 0; });
     }
@@ -168,9 +170,21 @@ private:
         }
         parallel(best.size(), workers_, [&](std::size_t k) {
             const double before = trial_.species[first + k].cost;
-            if (best[k].cost < 1.5 * before && best[k].cost < within_reach) best[k] = refiner_.go_on(best[k], full_iterations);
+            if (best[k].cost < 1.5 * before && best[k].cost < within_reach) best[k] = refiner_.go_on(best[k], settling_iterations);
         });
         for (std::size_t i = first; i < last; ++i) keep_better(i, best[i - first]);
+    }
+
+    // What is within reach goes on to its optimum.
+    void finish() {
+        const double within_reach = out_of_reach * lead();
+        std::vector<std::size_t> near;
+        for (std::size_t i = 0; i < all_.size(); ++i)
+            if (better_[i] != 0 && !trial_.species[i].converged && trial_.species[i].cost < within_reach) near.push_back(i);
+        parallel(near.size(), workers_, [&](std::size_t k) {
+            Refined& own = trial_.species[near[k]];
+            own = refiner_.go_on(own, full_iterations);
+        });
     }
 
     // What a larger structure has found, a smaller one may lack: the leader lends its optimum with one module taken away.
@@ -218,8 +232,8 @@ private:
 
     void first_fits(Source& s, const Effort& effort) const {
         if (s.from == s.species) {
-            const std::size_t best = breeder_.best_of(groups_[s.species].first, groups_[s.species].count);
-            s.starts.push_back(refiner_.fit(breeder_.candidate(best), {}, effort.first));
+            const Place at = places_[s.species];
+            s.starts.push_back(refiner_.fit(islands_[at.island]->candidate(at.species), {}, effort.first));
             return;
         }
         const std::vector<Factors<double>> grown =
@@ -243,15 +257,18 @@ private:
         return chosen;
     }
 
-    const Experiment& experiment_;
+    struct Place {
+        std::size_t island, species;
+    };
+
     Genome genome_;
     Settings settings_;
     int workers_;
     Progress& progress_;
     std::vector<Structure> all_;
     Refiner refiner_;
-    Breeder breeder_;
-    std::vector<Breeder::Group> groups_;
+    std::vector<std::unique_ptr<Island>> islands_;
+    std::vector<Place> places_;  // of each structure
     Trial trial_;
     std::vector<char> better_;  // per species: improved in the round under way
     double slowest_ = 1e300, fastest_ = 0.0;  // rad/s, where a module can still be seen

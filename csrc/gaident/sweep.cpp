@@ -119,7 +119,7 @@ void Sweep::outputs(std::span<const double> x, const Unknowns& unknowns, const O
         load(r, points, unknowns, group);
         for (std::size_t first = 0; first < record.size(); first += chunk_samples) {
             const std::size_t n = std::min(chunk_samples, record.size() - first);
-            advance_outputs(experiment_.kernels->in_double, experiment_.loop, controller, group, record.input.data() + first, n,
+            advance_outputs(*experiment_.kernels, experiment_.loop, controller, group, record.input.data() + first, n,
                             rows.data());
             for (std::size_t k = 0; k < n; ++k) y[k] = rows[k * W];
             on_outputs(r, first, {y.data(), n});

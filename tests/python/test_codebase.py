@@ -22,24 +22,9 @@ PACKAGE = ROOT / "python" / "gaident"
 # The core, lowest first: a file includes only what stands above it. Files of one folder share its place.
 CORE_ORDER = [
     *("rng", "arithmetic", "float_pair", "lanes", "denormals", "chromosome", "genome", "factors", "decode", "parameters"),
-    "neighbours",
-    *("delta", "bilinear", "held", "controller", "closed_loop", "loop", "record", "fitness", "kernels/"),
-    *(
-        "advance",
-        "batch",
-        "simulate",
-        "linear",
-        "sweep",
-        "refine",
-        "statistics",
-        "settings",
-        "operators",
-        "breeder",
-        "parallel",
-        "species",
-        "engine",
-        "reference/",
-    ),
+    *("neighbours", "delta", "bilinear", "held", "controller", "closed_loop", "loop", "record", "fitness", "kernels/"),
+    *("advance", "batch", "simulate", "linear", "sweep", "refine", "statistics", "settings", "operators", "breeder"),
+    *("island", "parallel", "species", "engine", "reference/"),
 ]
 
 # Python: what each room may import of gaident, beside itself, and what inside a function only. A room is a
