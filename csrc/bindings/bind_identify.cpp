@@ -53,7 +53,8 @@ void run_work(PyExperiment& e, std::size_t times, const std::function<void()>& w
     }
 }
 
-RefineOptions options_of(const std::optional<SearchRanges>& ranges, const std::vector<double>& whitening, double tolerance = 1e-9) {
+RefineOptions options_of(const std::optional<SearchRanges>& ranges, const std::vector<double>& whitening,
+                         double tolerance = 1e-9) {
     RefineOptions o;
     o.tolerance = tolerance;
     if (ranges) o.ranges = *ranges;
@@ -64,7 +65,8 @@ RefineOptions options_of(const std::optional<SearchRanges>& ranges, const std::v
 }
 
 std::vector<Trial> search_records(PyExperiment& e, const SearchRanges& ranges, const Settings& settings, int trials,
-                                  std::uint64_t seed, int workers, const std::optional<std::function<void(std::size_t, double)>>& report) {
+                                  std::uint64_t seed, int workers,
+                                  const std::optional<std::function<void(std::size_t, double)>>& report) {
     std::vector<Trial> result;
     Progress progress;
     e.stop = false;
@@ -87,7 +89,8 @@ std::vector<PyRefined> go_on(PyExperiment& e, const std::vector<PyRefined>& fits
 }
 
 // Refines several starting models at once: one list entry each, in the order given.
-std::vector<PyRefined> refine(PyExperiment& e, const std::vector<std::tuple<double, ComplexArray, ComplexArray, RealArray>>& models,
+std::vector<PyRefined> refine(PyExperiment& e,
+                              const std::vector<std::tuple<double, ComplexArray, ComplexArray, RealArray>>& models,
                               const std::optional<SearchRanges>& ranges, const std::vector<double>& whitening, int max_iterations,
                               int workers, double tolerance) {
     std::vector<PyRefined> fits;
@@ -95,7 +98,8 @@ std::vector<PyRefined> refine(PyExperiment& e, const std::vector<std::tuple<doub
         PyRefined f;
         f.r.factors = make_factors(gain, poles, zeros);
         f.r.starts.assign(start.data(), start.data() + start.size());
-        if (f.r.starts.empty()) f.r.starts = Unknowns(e.experiment, f.r.factors.structure).steady_starts(e.experiment, f.r.factors);
+        if (f.r.starts.empty())
+            f.r.starts = Unknowns(e.experiment, f.r.factors.structure).steady_starts(e.experiment, f.r.factors);
         fits.push_back(std::move(f));
     }
     return go_on(e, fits, ranges, whitening, max_iterations, tolerance, workers);
@@ -143,7 +147,8 @@ py::tuple sensitivities(PyExperiment& e, double gain, const ComplexArray& poles,
 std::tuple<double, ComplexArray, ComplexArray> decode_bits(const std::vector<Word>& words, const SearchRanges& ranges, bool gray,
                                                            bool logarithmic) {
     const Genome genome(ranges, gray ? Code::gray : Code::binary, logarithmic ? Scale::logarithmic : Scale::linear);
-    if (static_cast<int>(words.size()) != genome.words()) throw std::invalid_argument("words: wrong number of words for this genome");
+    if (static_cast<int>(words.size()) != genome.words())
+        throw std::invalid_argument("words: wrong number of words for this genome");
     const Factors<double> f = decode(words.data(), genome);
     return {f.gain, poles_of(f), zeros_of(f)};
 }
@@ -154,15 +159,23 @@ void bind_identify(py::module_& m) {
     py::class_<SearchRanges>(m, "SearchRanges")
         .def(py::init([](std::pair<double, double> gain, std::pair<double, double> real, std::pair<double, double> imaginary,
                          std::pair<int, int> p, std::pair<int, int> q, int bits, double gain_scale) {
-                 return SearchRanges{{gain.first, gain.second}, {real.first, real.second}, {imaginary.first, imaginary.second},
-                                     p.first, p.second, q.first, q.second, bits, gain_scale};
+                 return SearchRanges{{gain.first, gain.second},
+                                     {real.first, real.second},
+                                     {imaginary.first, imaginary.second},
+                                     p.first,
+                                     p.second,
+                                     q.first,
+                                     q.second,
+                                     bits,
+                                     gain_scale};
              }),
-             py::arg("gain"), py::arg("real"), py::arg("imaginary"), py::arg("p"), py::arg("q"), py::arg("bits"), py::arg("gain_scale") = 1.0);
+             py::arg("gain"), py::arg("real"), py::arg("imaginary"), py::arg("p"), py::arg("q"), py::arg("bits"),
+             py::arg("gain_scale") = 1.0);
 
     py::class_<Settings>(m, "EngineSettings")
-        .def(py::init([](int population, int tournament, double crossover, double mutation, int generations, int elites, bool gray,
-                         bool logarithmic, double error_weight, double order_weight, bool species, int round, int quiet_rounds,
-                         bool in_float) {
+        .def(py::init([](int population, int tournament, double crossover, double mutation, int generations, int elites,
+                         bool gray, bool logarithmic, double error_weight, double order_weight, bool species, int round,
+                         int quiet_rounds, bool in_float) {
                  Settings s;
                  s.population = population;
                  s.tournament = tournament;

@@ -15,8 +15,11 @@ Settings with_room(Settings s, std::size_t species) {
 
 Island::Island(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random,
                std::span<const Structure> species)
-    : genome_(genome), settings_(with_room(settings, species.size())), species_(species.begin(), species.end()),
-      breeder_(experiment, genome_, settings_, random), best_(static_cast<std::size_t>(genome.words())) {
+    : genome_(genome),
+      settings_(with_room(settings, species.size())),
+      species_(species.begin(), species.end()),
+      breeder_(experiment, genome_, settings_, random),
+      best_(static_cast<std::size_t>(genome.words())) {
     const std::size_t n = static_cast<std::size_t>(settings_.population), share = n / species.size(), extra = n % species.size();
     std::size_t first = 0;
     for (std::size_t i = 0; i < species.size(); ++i) {

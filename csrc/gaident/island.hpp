@@ -22,7 +22,9 @@ public:
     const std::vector<Word>& best() const { return best_; }
 
     // The best individual of the k-th species as the round left it.
-    Factors<double> candidate(std::size_t k) const { return breeder_.candidate(breeder_.best_of(groups_[k].first, groups_[k].count)); }
+    Factors<double> candidate(std::size_t k) const {
+        return breeder_.candidate(breeder_.best_of(groups_[k].first, groups_[k].count));
+    }
     std::size_t evaluations() const { return breeder_.evaluations(); }
 
 private:

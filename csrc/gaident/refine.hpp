@@ -13,10 +13,10 @@ namespace gaident {
 
 struct RefineOptions {
     SearchRanges ranges;
-    bool bounded = true;             // keep roots and gain inside the ranges
-    std::vector<double> whitening;   // phi; empty: the plain error
+    bool bounded = true;            // keep roots and gain inside the ranges
+    std::vector<double> whitening;  // phi; empty: the plain error
     int max_iterations = 30;
-    double tolerance = 1e-9;         // relative fall of J, twice in a row, at which it stops
+    double tolerance = 1e-9;  // relative fall of J, twice in a row, at which it stops
 };
 
 struct Refined {

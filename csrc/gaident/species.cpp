@@ -42,7 +42,8 @@ double noise_power(std::span<const double> w) {
     constexpr std::size_t enough = 4096;
     const std::size_t stride = std::max<std::size_t>(1, w.size() / enough);
     std::vector<double> sizes;
-    for (std::size_t n = 3; n < w.size(); n += stride) sizes.push_back(std::abs(w[n] - 3.0 * w[n - 1] + 3.0 * w[n - 2] - w[n - 3]));
+    for (std::size_t n = 3; n < w.size(); n += stride)
+        sizes.push_back(std::abs(w[n] - 3.0 * w[n - 1] + 3.0 * w[n - 2] - w[n - 3]));
     if (sizes.empty()) return 0.0;
     const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
     std::nth_element(sizes.begin(), middle, sizes.end());
@@ -53,8 +54,12 @@ class SpeciesRun {
 public:
     SpeciesRun(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random, int workers,
                Progress& progress)
-        : genome_(genome), settings_(settings), workers_(worth_threads(experiment) ? workers : 1), progress_(progress),
-          all_(structures(genome.ranges())), refiner_(experiment, options(genome, experiment.samples())) {
+        : genome_(genome),
+          settings_(settings),
+          workers_(worth_threads(experiment) ? workers : 1),
+          progress_(progress),
+          all_(structures(genome.ranges())),
+          refiner_(experiment, options(genome, experiment.samples())) {
         // The number of islands depends on the data alone, never on the workers: the same seed has to give the same result.
         const std::size_t islands = worth_threads(experiment) ? std::min(most_islands, all_.size()) : 1;
         settings_.population = std::max(settings_.population, static_cast<int>(3 * all_.size()));
@@ -165,12 +170,14 @@ private:
         within_reach *= out_of_reach;
         std::vector<Refined> best(last - first);
         for (const Refined& r : chosen) {
-            Refined& b = best[static_cast<std::size_t>(std::find(all_.begin(), all_.end(), r.factors.structure) - all_.begin()) - first];
+            Refined& b =
+                best[static_cast<std::size_t>(std::find(all_.begin(), all_.end(), r.factors.structure) - all_.begin()) - first];
             if (b.cost == worst_fitness || r.cost < b.cost) b = r;
         }
         parallel(best.size(), workers_, [&](std::size_t k) {
             const double before = trial_.species[first + k].cost;
-            if (best[k].cost < 1.5 * before && best[k].cost < within_reach) best[k] = refiner_.go_on(best[k], settling_iterations);
+            if (best[k].cost < 1.5 * before && best[k].cost < within_reach)
+                best[k] = refiner_.go_on(best[k], settling_iterations);
         });
         for (std::size_t i = first; i < last; ++i) keep_better(i, best[i - first]);
     }
@@ -191,8 +198,8 @@ private:
     void fit_smaller() {
         for (;;) {
             const auto lower = [](const Refined& x, const Refined& y) { return x.cost < y.cost; };
-            const auto leader = static_cast<std::size_t>(
-                std::min_element(trial_.species.begin(), trial_.species.end(), lower) - trial_.species.begin());
+            const auto leader = static_cast<std::size_t>(std::min_element(trial_.species.begin(), trial_.species.end(), lower) -
+                                                         trial_.species.begin());
             std::vector<std::size_t> smaller;
             for (std::size_t i = 0; i < leader; ++i)
                 if (may_grow(all_[i], all_[leader])) smaller.push_back(i);
@@ -239,7 +246,8 @@ private:
         const std::vector<Factors<double>> grown =
             grow(trial_.species[s.from].factors, all_[s.species], genome_.ranges(), slowest_, fastest_);
         const std::vector<double> costs = refiner_.costs(grown);
-        for (const std::size_t at : lowest_apart(grown, costs, effort.grown)) s.starts.push_back(refiner_.fit(grown[at], {}, effort.first));
+        for (const std::size_t at : lowest_apart(grown, costs, effort.grown))
+            s.starts.push_back(refiner_.fit(grown[at], {}, effort.first));
     }
 
     // The best grown candidates, no two of them from the same place on the grid (grow() lists one place after the other).
@@ -248,7 +256,8 @@ private:
         const std::size_t place = std::max<std::size_t>(1, grown.size() / grid_points);
         std::vector<std::size_t> order(grown.size()), chosen;
         std::iota(order.begin(), order.end(), std::size_t{0});
-        std::sort(order.begin(), order.end(), [&](std::size_t x, std::size_t y) { return costs[x] < costs[y] || (costs[x] == costs[y] && x < y); });
+        std::sort(order.begin(), order.end(),
+                  [&](std::size_t x, std::size_t y) { return costs[x] < costs[y] || (costs[x] == costs[y] && x < y); });
         for (const std::size_t at : order) {
             const bool apart = std::none_of(chosen.begin(), chosen.end(), [&](std::size_t c) { return c / place == at / place; });
             if (apart) chosen.push_back(at);
@@ -270,7 +279,7 @@ private:
     std::vector<std::unique_ptr<Island>> islands_;
     std::vector<Place> places_;  // of each structure
     Trial trial_;
-    std::vector<char> better_;  // per species: improved in the round under way
+    std::vector<char> better_;                // per species: improved in the round under way
     double slowest_ = 1e300, fastest_ = 0.0;  // rad/s, where a module can still be seen
     double noise_ = 0.0;                      // error sum that the noise of the measured velocity alone makes
 };

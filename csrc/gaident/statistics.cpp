@@ -24,7 +24,8 @@ struct Rows {
     void clear() { std::fill(all.begin(), all.end(), 0.0); }
     // The last rows of a chunk of n become the past of the next.
     void next(std::size_t n) {
-        std::copy(all.begin() + static_cast<std::ptrdiff_t>(n * W), all.begin() + static_cast<std::ptrdiff_t>((n + history) * W), all.begin());
+        std::copy(all.begin() + static_cast<std::ptrdiff_t>(n * W), all.begin() + static_cast<std::ptrdiff_t>((n + history) * W),
+                  all.begin());
     }
 };
 
@@ -99,7 +100,8 @@ ResidualSums residual_sums(const Experiment& experiment, const Factors<double>& 
             for (std::size_t k = 0; k <= lags; ++k) part[k] += now[n] * past[k];
         }
         for (std::size_t k = 0; k <= lags; ++k) result.products[k] += part[lags - k];
-        std::copy(e.begin() + static_cast<std::ptrdiff_t>(y.size()), e.begin() + static_cast<std::ptrdiff_t>(y.size() + lags), e.begin());
+        std::copy(e.begin() + static_cast<std::ptrdiff_t>(y.size()), e.begin() + static_cast<std::ptrdiff_t>(y.size() + lags),
+                  e.begin());
     });
     return result;
 }

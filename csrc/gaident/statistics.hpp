@@ -17,9 +17,10 @@ ResidualSums residual_sums(const Experiment& experiment, const Factors<double>& 
 // Sums of products of the derivatives J = de/dx and of regressors that a linear model's residual must not depend on.
 struct FitSums {
     std::size_t unknowns = 0, regressors = 0;
-    std::vector<double> plain;     // J'J
-    std::vector<double> coloured;  // J'S J for the covariance S = F^-1 F'^-1 of noise with the autoregression phi and unit innovations
-    std::vector<double> white;     // X'X of X = F [e | J | regressors], samples without their past left out
+    std::vector<double> plain;  // J'J
+    std::vector<double>
+        coloured;  // J'S J for the covariance S = F^-1 F'^-1 of noise with the autoregression phi and unit innovations
+    std::vector<double> white;  // X'X of X = F [e | J | regressors], samples without their past left out
 };
 
 // F = 1 - sum phi_i z^-i. S is that of stationary noise: since J'S J is the same forwards and backwards in time, it is the sum of squares of

@@ -23,8 +23,10 @@ void keep_history(std::vector<double>& rows, std::size_t history, std::size_t fi
 }  // namespace
 
 Unknowns::Unknowns(const Experiment& experiment, Structure s)
-    : structure(s), model(static_cast<std::size_t>(s.parameters())),
-      states(static_cast<std::size_t>(start_states(s, experiment.loop))), count(model) {
+    : structure(s),
+      model(static_cast<std::size_t>(s.parameters())),
+      states(static_cast<std::size_t>(start_states(s, experiment.loop))),
+      count(model) {
     for (const Record& r : experiment.records) {
         starts.push_back(r.start == Start::free ? count : none);
         if (r.start == Start::free) count += states;
@@ -99,8 +101,8 @@ void Sweep::linearise(std::span<const double> x, const Unknowns& unknowns, std::
             for (std::size_t g = 0; g < groups; ++g) {
                 keep_history(columns_[g], history, first);
                 double* const rows = columns_[g].data() + history * W;
-                advance_outputs(*experiment_.kernels, experiment_.loop, controller, bank_[g], record.input.data() + first,
-                                n, rows);
+                advance_outputs(*experiment_.kernels, experiment_.loop, controller, bank_[g], record.input.data() + first, n,
+                                rows);
                 experiment_.kernels->differences(scale.data() + g * W, output, n, rows);
             }
             on_chunk({r, first, n, own, columns_, history});
@@ -162,8 +164,8 @@ void Sweep::errors(std::span<const double* const> points, const Unknowns& unknow
     for (std::size_t i = 0; i < points.size(); ++i) sums[i] = sane(total[i]);
 }
 
-void Sweep::whiten(const Experiment& experiment, std::span<const double> phi, std::size_t first, std::size_t n, const double* rows,
-                   double* out) {
+void Sweep::whiten(const Experiment& experiment, std::span<const double> phi, std::size_t first, std::size_t n,
+                   const double* rows, double* out) {
     experiment.kernels->whiten(phi.data(), phi.size(), rows, n, out);
     if (first < phi.size()) std::fill(out, out + std::min(n, phi.size() - first) * W, 0.0);
 }

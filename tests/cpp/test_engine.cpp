@@ -142,8 +142,7 @@ TEST_CASE("engine: every kernel set gives the identical trial, in double and in 
                 for (const Kernels* k : available()) {
                     bench.experiment.kernels = k;
                     Progress progress;
-                    const auto result =
-                        search(bench.experiment, with_species ? few() : SearchRanges{}, s, 1, 21, 1, progress);
+                    const auto result = search(bench.experiment, with_species ? few() : SearchRanges{}, s, 1, 21, 1, progress);
                     if (first.empty()) first = result;
                     CHECK(same(result[0], first[0]));
                 }
@@ -193,8 +192,8 @@ TEST_CASE("engine: the stop flag ends a long run quickly") {
     Settings refining = species(1000000);
     refining.round = 20;
     refining.quiet_rounds = 1000000;
-    for (const Long& run : {Long{paper(1000000), 250, 1}, Long{paper(1000000), 250, 2}, Long{large, 50000, 1},
-                            Long{refining, 20000, 2}}) {
+    for (const Long& run :
+         {Long{paper(1000000), 250, 1}, Long{paper(1000000), 250, 2}, Long{large, 50000, 1}, Long{refining, 20000, 2}}) {
         Bench bench(two_mass(LoopKind::continuous, run.samples));
         std::atomic<bool> stop{false};
         bench.experiment.stop = &stop;

@@ -18,15 +18,13 @@ double low(const Factors<double>& f) {
 
 }  // namespace
 
-TEST_CASE(
-    "neighbours: a grown structure is the smaller one and a module that changes one end of the frequencies at most") {
+TEST_CASE("neighbours: a grown structure is the smaller one and a module that changes one end of the frequencies at most") {
     Random random(141);
     const SearchRanges ranges;
     for (int p = 0; p <= 3; ++p)
         for (int q = 0; q <= 3; ++q) {
-            reference::Plant g =
-                reference::random_plant(random, static_cast<std::size_t>(p), static_cast<std::size_t>(q),
-                                        reference::Family::ordinary, 2e-3, 250);
+            reference::Plant g = reference::random_plant(random, static_cast<std::size_t>(p), static_cast<std::size_t>(q),
+                                                         reference::Family::ordinary, 2e-3, 250);
             g.K = 5000.0;
             const Factors<double> from = reference::factors_of(g);
             for (int dp = -1; dp <= 3; ++dp)

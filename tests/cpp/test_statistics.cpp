@@ -81,7 +81,8 @@ TEST_CASE("statistics: products of derivatives and regressors equal those of who
         };
         put(e);
         for (std::size_t p = 0; p < P; ++p) {
-            plain.emplace_back(J.begin() + static_cast<std::ptrdiff_t>(p * N), J.begin() + static_cast<std::ptrdiff_t>((p + 1) * N));
+            plain.emplace_back(J.begin() + static_cast<std::ptrdiff_t>(p * N),
+                               J.begin() + static_cast<std::ptrdiff_t>((p + 1) * N));
             put(plain.back());
             // Coloured record by record, each with room to die away in.
             coloured.emplace_back();
@@ -89,7 +90,8 @@ TEST_CASE("statistics: products of derivatives and regressors equal those of who
                 const std::size_t base = coloured.back().size();
                 for (std::size_t n = first; n < last + 2000; ++n) {
                     double z = n < last ? plain.back()[n] : 0.0;
-                    for (std::size_t i = 0; i < phi.size() && n - first > i; ++i) z += phi[i] * coloured.back()[base + n - first - 1 - i];
+                    for (std::size_t i = 0; i < phi.size() && n - first > i; ++i)
+                        z += phi[i] * coloured.back()[base + n - first - 1 - i];
                     coloured.back().push_back(z);
                 }
             }

@@ -129,7 +129,8 @@ def independence_p(v: Vector, own: Vector, extra: Vector, samples: int) -> float
 def _independence(sums: Vector, own: int, samples: int) -> float:
     """The same from sums of products: of v first, then of `own` columns, then of the others.
 
-    What `own` explains is taken out of the sums (a Schur complement), and what is left of v is regressed on what is left of the others.
+    What `own` explains is taken out of the sums (a Schur complement); what is left of v is regressed on what is left of the
+    others.
     """
     diagonal = np.diag(sums)
     # A column without power, or without a number, explains nothing.
