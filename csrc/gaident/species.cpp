@@ -28,13 +28,15 @@ struct Effort {
     std::size_t promising;  // starts that get more
 };
 constexpr Effort quick{2, 2, 3}, thorough{5, 6, 10};
-constexpr int more_iterations = 4, settling_iterations = 8, full_iterations = 40;
+constexpr int more_iterations = 4, full_iterations = 40;
 // Where the root mean square error is so many times the noise of the measured velocity, there may be a better optimum.
 constexpr double down_to_noise = 1.2;
 // Samples from which a search is worth threads, and how many islands it then has.
 constexpr std::size_t long_enough = 4096, most_islands = 4;
 // A structure whose error sum is so many times another one's of no larger size is not fitted to the end.
 constexpr double out_of_reach = 2.0;
+// A structure whose error sum is within so many times the least describes the data about as well as any.
+constexpr double close_to_best = 1.2;
 
 // Power of white noise on a smooth signal, from its third differences (median, so robust), whose variance is 1 + 9 + 9 + 1 = 20 times
 // the noise's. Of a long record an evenly spaced part will do.
@@ -130,7 +132,6 @@ private:
             fit_level(first, last, effort);
             first = last;
         }
-        finish();
         fit_smaller();
         return std::any_of(better_.begin(), better_.end(), [](char c) { return c != 0; });
     }
@@ -176,58 +177,38 @@ private:
         }
         parallel(best.size(), workers_, [&](std::size_t k) {
             const double before = trial_.species[first + k].cost;
-            if (best[k].cost < 1.5 * before && best[k].cost < within_reach)
-                best[k] = refiner_.go_on(best[k], settling_iterations);
+            if (best[k].cost < 1.5 * before && best[k].cost < within_reach) best[k] = refiner_.go_on(best[k], full_iterations);
         });
         for (std::size_t i = first; i < last; ++i) keep_better(i, best[i - first]);
     }
 
-    // What is within reach goes on to its optimum.
-    void finish() {
-        const double within_reach = out_of_reach * lead();
-        std::vector<std::size_t> near;
-        for (std::size_t i = 0; i < all_.size(); ++i)
-            if (better_[i] != 0 && !trial_.species[i].converged && trial_.species[i].cost < within_reach) near.push_back(i);
-        parallel(near.size(), workers_, [&](std::size_t k) {
-            Refined& own = trial_.species[near[k]];
-            own = refiner_.go_on(own, full_iterations);
-        });
-    }
-
-    // What a larger structure has found, a smaller one may lack: the leader lends its optimum with one module taken away.
+    // What a larger structure has found, a smaller one may lack: each that is close to the best lends its optimum with one module taken
+    // away, the largest first, so that what it gave goes on to the next smaller one.
     void fit_smaller() {
-        for (;;) {
-            const auto lower = [](const Refined& x, const Refined& y) { return x.cost < y.cost; };
-            const auto leader = static_cast<std::size_t>(std::min_element(trial_.species.begin(), trial_.species.end(), lower) -
-                                                         trial_.species.begin());
+        for (std::size_t from = all_.size(); from-- > 0;) {
+            if (trial_.species[from].cost > close_to_best * lead()) continue;
             std::vector<std::size_t> smaller;
-            for (std::size_t i = 0; i < leader; ++i)
-                if (may_grow(all_[i], all_[leader])) smaller.push_back(i);
+            for (std::size_t i = 0; i < from; ++i)
+                if (may_grow(all_[i], all_[from])) smaller.push_back(i);
             std::vector<Refined> found(smaller.size());
             parallel(smaller.size(), workers_, [&](std::size_t k) {
-                const std::vector<Factors<double>> made = shrink(trial_.species[leader].factors, all_[smaller[k]]);
+                const std::vector<Factors<double>> made = shrink(trial_.species[from].factors, all_[smaller[k]]);
                 if (made.empty()) return;
                 const std::vector<double> costs = refiner_.costs(made);
-                const auto at = static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
-                found[k] = refiner_.fit(made[at], {}, quick.first + more_iterations);
-                if (found[k].cost < out_of_reach * trial_.species[leader].cost)
-                    found[k] = refiner_.go_on(found[k], full_iterations);
+                const auto at = std::min_element(costs.begin(), costs.end()) - costs.begin();
+                if (costs[static_cast<std::size_t>(at)] < trial_.species[smaller[k]].cost)
+                    found[k] = refiner_.fit(made[static_cast<std::size_t>(at)], {}, full_iterations);
             });
-            bool taken = false;
             for (std::size_t k = 0; k < smaller.size(); ++k)
-                if (found[k].cost < worst_fitness) taken = keep_better(smaller[k], found[k]) || taken;
-            // A smaller structure that has become the leader lends in its turn.
-            if (!taken || lead() >= trial_.species[leader].cost) return;
+                if (found[k].cost < trial_.species[smaller[k]].cost) keep_better(smaller[k], found[k]);
         }
     }
 
-    bool keep_better(std::size_t i, Refined& found) {
+    void keep_better(std::size_t i, Refined& found) {
         Refined& own = trial_.species[i];
-        if (!(found.cost < own.cost) && own.cost < worst_fitness) return false;
-        const bool clearly = found.cost < 0.999 * own.cost;
-        if (clearly) better_[i] = 1;
+        if (!(found.cost < own.cost) && own.cost < worst_fitness) return;
+        if (found.cost < 0.999 * own.cost) better_[i] = 1;
         own = std::move(found);
-        return clearly;
     }
 
     // The least error sum of all structures.

@@ -121,7 +121,7 @@ def assess(s: Sums) -> Adequacy:
 
 
 def independence_p(v: Vector, own: Vector, extra: Vector, samples: int) -> float:
-    """p-value of the F-test that the rows `extra` explain nothing of v beyond the rows `own`; samples: degrees of freedom before."""
+    """p-value of the F-test that the rows `extra` explain nothing of v beyond the rows `own`; samples: degrees of freedom."""
     rows = np.vstack([v, own, extra])
     return _independence(rows @ rows.T, len(own), samples)
 

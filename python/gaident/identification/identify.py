@@ -17,6 +17,7 @@ from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
+from gaident.identification.notes import warnings_of
 from gaident.identification.parts import search_parts
 from gaident.identification.result import Identification, Rival, Structure, TrialOutcome
 from gaident.identification.selection import MARGIN, Candidate
@@ -24,7 +25,7 @@ from gaident.identification.settings import Settings
 from gaident.identification.space import SearchSpace, derive_space
 from gaident.identification.starts import doubtful_start, noise_std, starts_moving
 from gaident.models.controller import PI
-from gaident.models.mechanics import OneMass, TwoMass, mechanics_from_model
+from gaident.models.mechanics import mechanics_from_model
 from gaident.models.model import Model
 from gaident.version import version
 
@@ -278,7 +279,7 @@ class _Work:
             structures=tuple(Structure(c.p, c.q, c.cost, c.bic - lowest) for c in scored),
             trials=tuple(self.outcome(t) for t in found),
             adequacy=judged,
-            warnings=_warnings(
+            warnings=warnings_of(
                 judged,
                 parameters,
                 mechanics,
@@ -310,54 +311,6 @@ class _Work:
         return TrialOutcome(
             p, q, trial.best_fitness, len(trial.history), trial.best_generation, trial.evaluations, tuple(trial.history.tolist())
         )
-
-
-def _warnings(
-    judged: adequacy.Adequacy,
-    parameters: dict[str, covariance.Estimate],
-    mechanics: OneMass | TwoMass | None,
-    rivals: Sequence[Rival],
-    model: Model,
-    larger_fits_better: bool,
-    started: Sequence[str],
-) -> tuple[str, ...]:
-    notes = list(started)
-    if judged.falsified or judged.undecided:
-        notes.append(judged.sentence)
-    if judged.falsified and larger_fits_better:
-        notes.append(
-            "Larger structures come closer, but only by absorbing what no linear structure holds; the smallest mechanism "
-            f"is reported, ({model.p},{model.q})."
-        )
-    bound = [n for n, e in parameters.items() if e.at_bound]
-    if bound:
-        notes.append(f"At a bound of the search range: {', '.join(bound)}. Widen the space, or doubt the structure.")
-    unknown = [n for n, e in parameters.items() if not e.at_bound and not e.identifiable]
-    if unknown:
-        notes.append(f"Not identifiable from this data (standard deviation as large as the value): {', '.join(unknown)}.")
-    if rivals:
-        names = ", ".join(f"({r.p},{r.q})" for r in rivals)
-        notes.append(f"Structures within {MARGIN:.0f} BIC units of ({model.p},{model.q}): {names}; the smallest is reported.")
-    if mechanics is not None:
-        notes.extend(_shaft_notes(mechanics))
-        notes.extend(mechanics.notes)
-    return tuple(notes)
-
-
-def _shaft_notes(mechanics: OneMass | TwoMass) -> list[str]:
-    """A sentence where the six numbers of a two-mass model contradict a shaft without damping by more than three deviations."""
-    std = mechanics.std.get("inconsistency", 0.0)
-    found = mechanics.inconsistency or 0.0
-    if not isinstance(mechanics, TwoMass) or not std > 0.0 or found < 3.0 * std:
-        return []
-    damped = mechanics.with_shaft_damping
-    remedy = "an effect that the model lacks bends them; trust neither"
-    if damped is not None and damped.physical:
-        remedy = (
-            f"use mechanics.with_shaft_damping (JM = {damped.JM:.4g}, JL = {damped.JL:.4g}, KG = {damped.KG:.4g}, "
-            f"DG = {damped.DG:.3g}), or look for an effect that the model lacks"
-        )
-    return [f"The mechanics without shaft damping contradict the model by {100 * found:.2g} +- {100 * std:.2g} %: {remedy}."]
 
 
 def _checked_records(rec: Record | Sequence[Record], controller: PI | None) -> list[Record]:
