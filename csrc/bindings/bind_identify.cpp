@@ -1,5 +1,6 @@
 #include "../gaident/decode.hpp"
 #include "../gaident/parallel.hpp"
+#include "../gaident/statistics.hpp"
 #include "bindings.hpp"
 
 using namespace gaident;
@@ -41,8 +42,21 @@ struct PyRefined {
     Refined r;
 };
 
-RefineOptions options_of(const std::optional<SearchRanges>& ranges, const std::vector<double>& whitening) {
+// Work on few samples is over before a thread for it would have started, and before anyone could press Ctrl-C.
+void run_work(PyExperiment& e, std::size_t times, const std::function<void()>& work) {
+    e.stop = false;
+    if (times * e.experiment.samples() < 100000) {
+        const py::gil_scoped_release release;
+        work();
+    } else {
+        run_interruptibly(e.stop, work, [] {});
+    }
+}
+
+RefineOptions options_of(const std::optional<SearchRanges>& ranges, const std::vector<double>& whitening,
+                         double tolerance = 1e-9) {
     RefineOptions o;
+    o.tolerance = tolerance;
     if (ranges) o.ranges = *ranges;
     o.bounded = ranges.has_value();
     o.whitening = whitening;
@@ -51,7 +65,8 @@ RefineOptions options_of(const std::optional<SearchRanges>& ranges, const std::v
 }
 
 std::vector<Trial> search_records(PyExperiment& e, const SearchRanges& ranges, const Settings& settings, int trials,
-                                  std::uint64_t seed, int workers, const std::optional<std::function<void(std::size_t, double)>>& report) {
+                                  std::uint64_t seed, int workers,
+                                  const std::optional<std::function<void(std::size_t, double)>>& report) {
     std::vector<Trial> result;
     Progress progress;
     e.stop = false;
@@ -63,26 +78,53 @@ std::vector<Trial> search_records(PyExperiment& e, const SearchRanges& ranges, c
     return result;
 }
 
-// Refines several starting models at once: one list entry each, in the order given.
-std::vector<PyRefined> refine(PyExperiment& e, const std::vector<std::tuple<double, ComplexArray, ComplexArray, RealArray>>& models,
-                              const std::optional<SearchRanges>& ranges, const std::vector<double>& whitening, int max_iterations,
-                              int workers) {
-    std::vector<Factors<double>> factors;
-    std::vector<std::vector<double>> starts;
-    for (const auto& [gain, poles, zeros, start] : models) {
-        factors.push_back(make_factors(gain, poles, zeros));
-        starts.emplace_back(start.data(), start.data() + start.size());
-    }
-    std::vector<PyRefined> result(models.size());
-    const Refiner refiner(e.experiment, options_of(ranges, whitening));
-    e.stop = false;
-    run_interruptibly(
-        e.stop,
-        [&] {
-            parallel(models.size(), workers, [&](std::size_t i) { result[i].r = refiner.fit(factors[i], starts[i], max_iterations); });
-        },
-        [] {});
+std::vector<PyRefined> go_on(PyExperiment& e, const std::vector<PyRefined>& fits, const std::optional<SearchRanges>& ranges,
+                             const std::vector<double>& whitening, int max_iterations, double tolerance, int workers) {
+    std::vector<PyRefined> result(fits.size());
+    const Refiner refiner(e.experiment, options_of(ranges, whitening, tolerance));
+    run_work(e, fits.size() * static_cast<std::size_t>(std::max(1, max_iterations)), [&] {
+        parallel(fits.size(), workers, [&](std::size_t i) { result[i].r = refiner.go_on(fits[i].r, max_iterations); });
+    });
     return result;
+}
+
+// Refines several starting models at once: one list entry each, in the order given.
+std::vector<PyRefined> refine(PyExperiment& e,
+                              const std::vector<std::tuple<double, ComplexArray, ComplexArray, RealArray>>& models,
+                              const std::optional<SearchRanges>& ranges, const std::vector<double>& whitening, int max_iterations,
+                              int workers, double tolerance) {
+    std::vector<PyRefined> fits;
+    for (const auto& [gain, poles, zeros, start] : models) {
+        PyRefined f;
+        f.r.factors = make_factors(gain, poles, zeros);
+        f.r.starts.assign(start.data(), start.data() + start.size());
+        if (f.r.starts.empty())
+            f.r.starts = Unknowns(e.experiment, f.r.factors.structure).steady_starts(e.experiment, f.r.factors);
+        fits.push_back(std::move(f));
+    }
+    return go_on(e, fits, ranges, whitening, max_iterations, tolerance, workers);
+}
+
+// (sums of e(n) e(n+k) for k = 0..lags, largest |wm|)
+std::pair<RealArray, double> residual_sums_of(PyExperiment& e, const PyRefined& fit, std::size_t lags) {
+    ResidualSums sums;
+    run_work(e, 1, [&] { sums = residual_sums(e.experiment, fit.r.factors, fit.r.starts, lags); });
+    return {to_array(sums.products), sums.largest_output};
+}
+
+// (J'J, J'SJ, X'X), see statistics.hpp
+std::tuple<RealArray, RealArray, RealArray> fit_sums_of(PyExperiment& e, const PyRefined& fit, const std::vector<double>& phi,
+                                                        const std::vector<int>& lags, double threshold) {
+    if (phi.size() >= chunk_samples) throw std::invalid_argument("phi: at most 511 coefficients");
+    FitSums sums;
+    run_work(e, 2, [&] { sums = fit_sums(e.experiment, fit.r.factors, fit.r.starts, phi, lags, threshold); });
+    const auto square = [](const std::vector<double>& v) {
+        const auto n = static_cast<py::ssize_t>(std::lround(std::sqrt(static_cast<double>(v.size()))));
+        RealArray a({n, n});
+        std::copy(v.begin(), v.end(), a.mutable_data());
+        return a;
+    };
+    return {square(sums.plain), square(sums.coloured), square(sums.white)};
 }
 
 py::tuple sensitivities(PyExperiment& e, double gain, const ComplexArray& poles, const ComplexArray& zeros,
@@ -90,9 +132,7 @@ py::tuple sensitivities(PyExperiment& e, double gain, const ComplexArray& poles,
     const Factors<double> g = make_factors(gain, poles, zeros);
     std::vector<double> error, columns;
     const Refiner refiner(e.experiment, options_of(std::nullopt, whitening));
-    e.stop = false;
-    run_interruptibly(
-        e.stop, [&] { refiner.sensitivities(g, starts, error, columns); }, [] {});
+    run_work(e, 2, [&] { refiner.sensitivities(g, starts, error, columns); });
     RealArray J({static_cast<py::ssize_t>(refiner.parameters(g.structure)), static_cast<py::ssize_t>(error.size())});
     std::copy(columns.begin(), columns.end(), J.mutable_data());
     std::vector<double> factors;
@@ -104,33 +144,11 @@ py::tuple sensitivities(PyExperiment& e, double gain, const ComplexArray& poles,
     return py::make_tuple(to_array(error), J, to_array(factors));
 }
 
-// The adjoint of colouring white noise by an autoregression: z(n) = x(n) + sum phi_i z(n+i), backwards, row by row.
-RealArray colour(const RealArray& rows, const std::vector<double>& phi) {
-    if (rows.ndim() != 2) throw std::invalid_argument("rows must be two-dimensional");
-    const auto n = static_cast<std::ptrdiff_t>(rows.shape(1));
-    RealArray out({rows.shape(0), rows.shape(1)});
-    const double* const first_x = rows.data();
-    double* const first_z = out.mutable_data();
-    const py::gil_scoped_release release;
-    for (py::ssize_t r = 0; r < rows.shape(0); ++r) {
-        const double* const x = first_x + r * n;
-        double* const z = first_z + r * n;
-        for (std::ptrdiff_t k = n; k-- > 0;) {
-            double sum = x[k];
-            for (std::size_t i = 0; i < phi.size(); ++i) {
-                const std::ptrdiff_t later = k + 1 + static_cast<std::ptrdiff_t>(i);
-                if (later < n) sum += phi[i] * z[later];
-            }
-            z[k] = sum;
-        }
-    }
-    return out;
-}
-
 std::tuple<double, ComplexArray, ComplexArray> decode_bits(const std::vector<Word>& words, const SearchRanges& ranges, bool gray,
                                                            bool logarithmic) {
     const Genome genome(ranges, gray ? Code::gray : Code::binary, logarithmic ? Scale::logarithmic : Scale::linear);
-    if (static_cast<int>(words.size()) != genome.words()) throw std::invalid_argument("words: wrong number of words for this genome");
+    if (static_cast<int>(words.size()) != genome.words())
+        throw std::invalid_argument("words: wrong number of words for this genome");
     const Factors<double> f = decode(words.data(), genome);
     return {f.gain, poles_of(f), zeros_of(f)};
 }
@@ -141,15 +159,23 @@ void bind_identify(py::module_& m) {
     py::class_<SearchRanges>(m, "SearchRanges")
         .def(py::init([](std::pair<double, double> gain, std::pair<double, double> real, std::pair<double, double> imaginary,
                          std::pair<int, int> p, std::pair<int, int> q, int bits, double gain_scale) {
-                 return SearchRanges{{gain.first, gain.second}, {real.first, real.second}, {imaginary.first, imaginary.second},
-                                     p.first, p.second, q.first, q.second, bits, gain_scale};
+                 return SearchRanges{{gain.first, gain.second},
+                                     {real.first, real.second},
+                                     {imaginary.first, imaginary.second},
+                                     p.first,
+                                     p.second,
+                                     q.first,
+                                     q.second,
+                                     bits,
+                                     gain_scale};
              }),
-             py::arg("gain"), py::arg("real"), py::arg("imaginary"), py::arg("p"), py::arg("q"), py::arg("bits"), py::arg("gain_scale") = 1.0);
+             py::arg("gain"), py::arg("real"), py::arg("imaginary"), py::arg("p"), py::arg("q"), py::arg("bits"),
+             py::arg("gain_scale") = 1.0);
 
     py::class_<Settings>(m, "EngineSettings")
-        .def(py::init([](int population, int tournament, double crossover, double mutation, int generations, int elites, bool gray,
-                         bool logarithmic, double error_weight, double order_weight, bool species, int round, int quiet_rounds,
-                         bool in_float) {
+        .def(py::init([](int population, int tournament, double crossover, double mutation, int generations, int elites,
+                         bool gray, bool logarithmic, double error_weight, double order_weight, bool species, int round,
+                         int quiet_rounds, bool in_float) {
                  Settings s;
                  s.population = population;
                  s.tournament = tournament;
@@ -203,10 +229,13 @@ void bind_identify(py::module_& m) {
         .def("search", &search_records, py::arg("ranges"), py::arg("settings"), py::arg("trials"), py::arg("seed"),
              py::arg("workers"), py::arg("progress") = py::none())
         .def("refine", &refine, py::arg("models"), py::arg("ranges"), py::arg("whitening"), py::arg("max_iterations"),
-             py::arg("workers"))
+             py::arg("workers"), py::arg("tolerance") = 1e-9)
+        .def("go_on", &go_on, py::arg("fits"), py::arg("ranges"), py::arg("whitening"), py::arg("max_iterations"),
+             py::arg("tolerance"), py::arg("workers"))
+        .def("residual_sums", &residual_sums_of, py::arg("fit"), py::arg("lags"))
+        .def("fit_sums", &fit_sums_of, py::arg("fit"), py::arg("phi"), py::arg("lags"), py::arg("threshold"))
         .def("sensitivities", &sensitivities, py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("starts"),
              py::arg("whitening"));
 
-    m.def("colour", &colour, py::arg("rows"), py::arg("phi"));
     m.def("decode", &decode_bits, py::arg("words"), py::arg("ranges"), py::arg("gray"), py::arg("logarithmic"));
 }

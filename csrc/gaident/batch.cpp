@@ -1,5 +1,7 @@
 #include "batch.hpp"
 
+#include "advance.hpp"
+
 #include <algorithm>
 #include <numeric>
 

@@ -1,25 +1,21 @@
 // The little linear algebra the local fit needs.
 #pragma once
 
-#include <array>
-#include <cmath>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 namespace gaident {
 
-// Sum of products with eight running sums, so that it vectorises and its rounding is the same everywhere.
-inline double dot(const double* x, const double* y, std::size_t n) {
-    std::array<double, 8> part{};
-    std::size_t i = 0;
-    for (; i + 8 <= n; i += 8)
-        for (std::size_t k = 0; k < 8; ++k) part[k] += x[i + k] * y[i + k];
-    double sum = 0.0;
-    for (; i < n; ++i) sum += x[i] * y[i];
-    return sum + (((part[0] + part[4]) + (part[2] + part[6])) + ((part[1] + part[5]) + (part[3] + part[7])));
-}
+inline constexpr std::size_t damping_lanes = 8;
 
-// Solves A x = b for symmetric positive definite A (row-major n x n, destroyed) by Cholesky; false where A is not.
-bool solve_spd(std::vector<double>& A, std::vector<double>& b, std::size_t n);
+// Levenberg-Marquardt steps for eight damping factors at once, one per lane:
+//
+//     (A + factor diag(A)) s = b,   A symmetric positive definite, n x n row-major
+//
+// by Cholesky, which runs the same operations in every lane. `s` is [i][lane]; a lane whose matrix is not positive definite gets
+// zeros. `work` is memory, kept between calls.
+void solve_damped(std::span<const double> A, std::span<const double> b, const double (&factors)[damping_lanes],
+                  std::vector<double>& work, std::span<double> s);
 
 }  // namespace gaident

@@ -21,7 +21,7 @@ void parallel(std::size_t n, int workers, const std::function<void(std::size_t)>
         const FlushDenormals flush;
         for (std::size_t i = next++; i < n; i = next++) {
             try {
-                work(i);
+                work(n - 1 - i);
             } catch (...) {
                 const std::lock_guard<std::mutex> guard(lock);
                 if (!error) error = std::current_exception();

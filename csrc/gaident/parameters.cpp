@@ -19,19 +19,25 @@ Pair<double> inside(Pair<double> f, Range real, Range imaginary) {
     return r1 == a1.real() && r2 == a2.real() ? f : real_pair(r1, r2);
 }
 
+void pack_roots(const Factors<double>& g, std::span<double> x) {
+    std::size_t k = 1;
+    for (int i = 0; i < g.structure.pole_pairs(); ++i, k += 2) x[k] = g.pole_pair[i].e1, x[k + 1] = g.pole_pair[i].e0;
+    if (g.structure.single_pole()) x[k++] = g.pole;
+    for (int i = 0; i < g.structure.zero_pairs(); ++i, k += 2) x[k] = g.zero_pair[i].e1, x[k + 1] = g.zero_pair[i].e0;
+    if (g.structure.single_zero()) x[k++] = g.zero;
+}
+
 }  // namespace
 
 std::vector<double> pack(const Factors<double>& g, const std::vector<double>& starts) {
-    std::vector<double> x{std::log(g.gain)};
-    for (int i = 0; i < g.structure.pole_pairs(); ++i) x.insert(x.end(), {g.pole_pair[i].e1, g.pole_pair[i].e0});
-    if (g.structure.single_pole()) x.push_back(g.pole);
-    for (int i = 0; i < g.structure.zero_pairs(); ++i) x.insert(x.end(), {g.zero_pair[i].e1, g.zero_pair[i].e0});
-    if (g.structure.single_zero()) x.push_back(g.zero);
+    std::vector<double> x(static_cast<std::size_t>(g.structure.parameters()));
+    x[0] = std::log(g.gain);
+    pack_roots(g, x);
     x.insert(x.end(), starts.begin(), starts.end());
     return x;
 }
 
-Factors<double> unpack(const std::vector<double>& x, Structure s) {
+Factors<double> unpack(std::span<const double> x, Structure s) {
     Factors<double> g;
     g.structure = s;
     std::size_t k = 0;
@@ -43,22 +49,18 @@ Factors<double> unpack(const std::vector<double>& x, Structure s) {
     return g;
 }
 
-void project(std::vector<double>& x, Structure s, const SearchRanges& r) {
+void project(std::span<double> x, Structure s, const SearchRanges& r) {
     Factors<double> g = unpack(x, s);
     const double gain = inside(g.gain, r.gain_limits(s.p));
     for (int i = 0; i < s.pole_pairs(); ++i) g.pole_pair[i] = inside(g.pole_pair[i], r.real, r.imaginary);
     if (s.single_pole()) g.pole = inside(g.pole, r.real);
     for (int i = 0; i < s.zero_pairs(); ++i) g.zero_pair[i] = inside(g.zero_pair[i], r.real, r.imaginary);
     if (s.single_zero()) g.zero = inside(g.zero, r.real);
-    const std::vector<double> starts(x.begin() + s.parameters(), x.end());
-    const double log_gain = x[0];
-    const bool keep = gain == g.gain;
-    g.gain = gain;
-    x = pack(g, starts);
-    if (keep) x[0] = log_gain;  // exp and log need not be exact inverses
+    if (gain != g.gain) x[0] = std::log(gain);  // exp and log need not be exact inverses
+    pack_roots(g, x);
 }
 
-std::vector<bool> at_bounds(const std::vector<double>& x, Structure s, const SearchRanges& ranges) {
+std::vector<bool> at_bounds(std::span<const double> x, Structure s, const SearchRanges& ranges) {
     std::vector<bool> at(static_cast<std::size_t>(s.parameters()), false);
     const auto near = [](double v, Range r) {
         const double tiny = 1e-9 * (r.hi - r.lo);
@@ -85,7 +87,7 @@ std::vector<bool> at_bounds(const std::vector<double>& x, Structure s, const Sea
     return at;
 }
 
-double step_size(const std::vector<double>& x, Structure s, double slowest, std::size_t i) {
+double step_size(std::span<const double> x, Structure s, double slowest, std::size_t i) {
     constexpr double relative = 1e-6;
     if (i == 0) return relative;
     std::size_t k = 1;

@@ -116,7 +116,28 @@ class Experiment:
         whitening: Sequence[float],
         max_iterations: int,
         workers: int,
+        tolerance: float = 1e-9,
     ) -> list[Refined]: ...
+    def go_on(
+        self,
+        fits: Sequence[Refined],
+        ranges: SearchRanges | None,
+        whitening: Sequence[float] | NDArray[np.float64],
+        max_iterations: int,
+        tolerance: float,
+        workers: int,
+    ) -> list[Refined]:
+        """Each fit some iterations further; with none, its cost and what stands at a bound."""
+    def residual_sums(self, fit: Refined, lags: int) -> tuple[NDArray[np.float64], float]:
+        """(sum over n and records of e(n) e(n+k) for k = 0..lags, largest absolute simulated velocity)."""
+    def fit_sums(
+        self, fit: Refined, phi: Sequence[float] | NDArray[np.float64], lags: Sequence[int], threshold: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """(J'J, J'SJ, X'X): J = de/dx with start states last; S the covariance of unit noise with the autoregression phi.
+
+        X = F [e | J | regressors]: the input at lags[0] and its changes from lag to lag, 1, the sign of the simulated velocity
+        where its size exceeds threshold, and its signed square; F = 1 - sum phi_i z^-i.
+        """
     def sensitivities(
         self,
         gain: float,
@@ -208,9 +229,6 @@ class EffectRecord:
         workers: int,
     ) -> NDArray[np.float64]:
         """Velocities of models given as rows of natural parameters and effects' parameters."""
-
-def colour(rows: NDArray[np.float64], phi: Sequence[float]) -> NDArray[np.float64]:
-    """F'^-1 of each row (parameters x samples): z(n) = rows(n) + sum phi_i z(n+i)."""
 
 def decode(
     words: Sequence[int], ranges: SearchRanges, gray: bool, logarithmic: bool

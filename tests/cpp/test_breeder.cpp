@@ -1,6 +1,6 @@
 #include "check.hpp"
+#include "drive_bench.hpp"
 #include "gaident/breeder.hpp"
-#include "gaident/reference/drives.hpp"
 
 #include <cstdlib>
 #include <new>
@@ -37,30 +37,6 @@ void operator delete(void* p, std::size_t, std::align_val_t) noexcept { release(
 void operator delete[](void* p, std::size_t, std::align_val_t) noexcept { release(p); }
 
 using namespace gaident;
-
-namespace {
-
-// The paper's two-mass record, or one like it.
-struct Bench {
-    reference::Drive drive;
-    reference::Measurement measured;
-    Experiment experiment;
-
-    explicit Bench(reference::Drive d, double noise = 0.3) : drive(std::move(d)), measured(drive, noise, 17) {
-        experiment.records.push_back(measured.record());
-        experiment.loop = drive.loop;
-    }
-    Bench(const Bench&) = delete;
-};
-
-reference::Drive two_mass(LoopKind kind = LoopKind::continuous, std::size_t samples = 250) {
-    reference::Drive d = reference::paper_drive(true);
-    d.loop.kind = kind;
-    d.input.assign(samples, kind == LoopKind::open ? 0.2 : 43.6);
-    return d;
-}
-
-}  // namespace
 
 TEST_CASE("breeder: generations equal the referee's bit for bit; odd groups, elites, fixed structures, no crossover") {
     const Bench bench(two_mass());

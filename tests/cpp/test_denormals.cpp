@@ -1,7 +1,9 @@
 #include "check.hpp"
+#include "drive_bench.hpp"
 #include "gaident/engine.hpp"
 #include "gaident/parallel.hpp"
 #include "gaident/simulate.hpp"
+#include "gaident/statistics.hpp"
 
 #include <stdexcept>
 
@@ -79,4 +81,44 @@ TEST_CASE("denormals: simulating leaves the control word alone, and a long decay
 #if defined(__SSE2__) || defined(__aarch64__)
     for (const double w : velocity) CHECK(std::fpclassify(w) != FP_SUBNORMAL);
 #endif
+}
+
+TEST_CASE("denormals: every entry point restores the caller's state, also where it is stopped") {
+    Bench bench(two_mass(LoopKind::sampled, 2000));
+    const Factors<double> g = bench.drive.factors();
+    std::atomic<bool> stop{false};
+    bench.experiment.stop = &stop;
+    Settings settings;
+    settings.species = true;
+    settings.generations = settings.round = 2;
+    SearchRanges ranges;
+    ranges.p_min = ranges.p_max = 1;
+    ranges.q_max = 1;
+    RefineOptions unbounded;
+    unbounded.bounded = false;
+    const Refiner refiner(bench.experiment, unbounded);
+    const std::function<void()> entries[] = {
+        [&] {
+            Progress progress;
+            search(bench.experiment, ranges, settings, 2, 1, 2, progress);
+        },
+        [&] { refiner.fit(g, {}, 2); },
+        [&] { refiner.costs({&g, 1}); },
+        [&] {
+            std::vector<double> error, columns;
+            refiner.sensitivities(g, {}, error, columns);
+        },
+        [&] { residual_sums(bench.experiment, g, {}, 5); },
+        [&] { fit_sums(bench.experiment, g, {}, {}, std::vector<int>{0, 1}, 1.0); },
+    };
+    for (const auto& entry : entries) {
+        const unsigned before = control_word();
+        stop = false;
+        entry();
+        CHECK(control_word() == before);
+        stop = true;
+        CHECK_THROWS(entry(), Stopped);
+        CHECK(control_word() == before);
+        CHECK(half_of_smallest() > 0.0);
+    }
 }

@@ -1,8 +1,8 @@
 #include "check.hpp"
+#include "drive_bench.hpp"
 #include "gaident/decode.hpp"
 #include "gaident/engine.hpp"
 #include "gaident/parameters.hpp"
-#include "gaident/reference/drives.hpp"
 
 #include <chrono>
 #include <thread>
@@ -10,26 +10,6 @@
 using namespace gaident;
 
 namespace {
-
-// The paper's two-mass record, or one like it.
-struct Bench {
-    reference::Drive drive;
-    reference::Measurement measured;
-    Experiment experiment;
-
-    explicit Bench(reference::Drive d, double noise = 0.3) : drive(std::move(d)), measured(drive, noise, 17) {
-        experiment.records.push_back(measured.record());
-        experiment.loop = drive.loop;
-    }
-    Bench(const Bench&) = delete;
-};
-
-reference::Drive two_mass(LoopKind kind = LoopKind::continuous, std::size_t samples = 250) {
-    reference::Drive d = reference::paper_drive(true);
-    d.loop.kind = kind;
-    d.input.assign(samples, kind == LoopKind::open ? 0.2 : 43.6);
-    return d;
-}
 
 Settings paper(int generations) {
     Settings s;
@@ -125,6 +105,30 @@ TEST_CASE("engine: same seed, same result, for any number of workers; another se
     }
 }
 
+TEST_CASE("engine: a long record is searched by several threads to the same result") {
+    Bench bench(two_mass(LoopKind::sampled, 5000));
+    Random random(5);
+    for (std::size_t i = 0; i < bench.measured.input.size(); i += 250)
+        std::fill_n(bench.measured.input.begin() + static_cast<std::ptrdiff_t>(i), 250, 40.0 * reference::normal(random));
+    bench.drive.input = bench.measured.input;
+    bench.measured = reference::Measurement(bench.drive, 0.3, 18);
+    bench.experiment.records[0] = bench.measured.record();
+    std::vector<Trial> results;
+    for (const int workers : {1, 2, 5}) {
+        Progress progress;
+        results.push_back(search(bench.experiment, few(), species(6), 1, 13, workers, progress)[0]);
+        CHECK(same(results.back(), results.front()));
+        CHECK(progress.done == results.back().history.size());
+        CHECK(progress.best == results.back().best_fitness);
+    }
+    // The best chromosome of all islands is the one that is reported.
+    const Genome genome(few(), Code::gray, Scale::linear);
+    const Factors<double> g = decode(results[0].best.data(), genome);
+    double sum;
+    Batch(bench.experiment, 1, false).errors({&g, 1}, {&sum, 1});
+    CHECK_NEAR(fitness(sum, g.structure, FitnessWeights{}), results[0].best_fitness, 1e-12 * results[0].best_fitness);
+}
+
 TEST_CASE("engine: every kernel set gives the identical trial, in double and in float") {
     Bench bench(two_mass());
     for (const bool limited : {false, true})
@@ -138,8 +142,7 @@ TEST_CASE("engine: every kernel set gives the identical trial, in double and in 
                 for (const Kernels* k : available()) {
                     bench.experiment.kernels = k;
                     Progress progress;
-                    const auto result =
-                        search(bench.experiment, with_species ? few() : SearchRanges{}, s, 1, 21, 1, progress);
+                    const auto result = search(bench.experiment, with_species ? few() : SearchRanges{}, s, 1, 21, 1, progress);
                     if (first.empty()) first = result;
                     CHECK(same(result[0], first[0]));
                 }
@@ -189,8 +192,8 @@ TEST_CASE("engine: the stop flag ends a long run quickly") {
     Settings refining = species(1000000);
     refining.round = 20;
     refining.quiet_rounds = 1000000;
-    for (const Long& run : {Long{paper(1000000), 250, 1}, Long{paper(1000000), 250, 2}, Long{large, 50000, 1},
-                            Long{refining, 20000, 2}}) {
+    for (const Long& run :
+         {Long{paper(1000000), 250, 1}, Long{paper(1000000), 250, 2}, Long{large, 50000, 1}, Long{refining, 20000, 2}}) {
         Bench bench(two_mass(LoopKind::continuous, run.samples));
         std::atomic<bool> stop{false};
         bench.experiment.stop = &stop;

@@ -26,16 +26,6 @@ Settings quick() {
     return s;
 }
 
-// G(0)-like limits of a plant relative to another one's: how the low and the high frequencies changed.
-double low(const Factors<double>& f) {
-    double x = f.gain;
-    for (int i = 0; i < f.structure.pole_pairs(); ++i) x /= f.pole_pair[i].e0;
-    if (f.structure.single_pole()) x /= f.pole;
-    for (int i = 0; i < f.structure.zero_pairs(); ++i) x *= f.zero_pair[i].e0;
-    if (f.structure.single_zero()) x *= f.zero;
-    return x;
-}
-
 }  // namespace
 
 TEST_CASE("species: structures by p + q, then by q, every allowed one once") {
@@ -53,37 +43,6 @@ TEST_CASE("species: structures by p + q, then by q, every allowed one once") {
     r.p_min = r.p_max = 1;
     r.q_min = r.q_max = 2;
     CHECK((structures(r) == std::vector<Structure>{{1, 2}}));
-}
-
-TEST_CASE(
-    "species: a grown structure is the smaller one and a module that changes one end of the frequencies at most") {
-    Random random(141);
-    const SearchRanges ranges;
-    for (int p = 0; p <= 3; ++p)
-        for (int q = 0; q <= 3; ++q) {
-            reference::Plant g =
-                reference::random_plant(random, static_cast<std::size_t>(p), static_cast<std::size_t>(q),
-                                        reference::Family::ordinary, 2e-3, 250);
-            g.K = 5000.0;
-            const Factors<double> from = reference::factors_of(g);
-            for (int dp = -1; dp <= 3; ++dp)
-                for (int dq = -1; dq <= 3; ++dq) {
-                    const Structure to{p + dp, q + dq};
-                    if (to.p < 0 || to.q < 0) continue;
-                    const auto made = grow(from, to, ranges, 4.0, 5000.0);
-                    const bool one_module = (dp == 0 && (dq == 1 || dq == 2)) || (dq == 0 && (dp == 1 || dp == 2));
-                    CHECK(made.empty() != one_module);
-                    for (const Factors<double>& f : made) {
-                        CHECK(f.structure == to);
-                        CHECK(f.gain > 0.0 && std::isfinite(f.gain));
-                        const bool low_kept = std::abs(low(f) / low(from) - 1.0) < 1e-9;
-                        const bool high_kept = dp == 0 && std::abs(f.gain / from.gain - 1.0) < 1e-9;
-                        CHECK(low_kept || high_kept);
-                    }
-                }
-        }
-    // Nothing to see between the slowest and the fastest: nothing is made.
-    CHECK(grow(reference::paper_drive(false).factors(), {1, 2}, ranges, 300.0, 200.0).empty());
 }
 
 TEST_CASE("species: finds the true structure's optimum, and no smaller structure reaches it") {

@@ -4,6 +4,7 @@
 #include "../lanes.hpp"
 #include "../loop.hpp"
 #include "kernels.hpp"
+#include "products.hpp"
 
 namespace gaident {
 
@@ -215,11 +216,16 @@ struct KernelSource {
         return {group_errors<T, W>, errors<T, W>, settling_errors<T, W>, outputs<T, W>};
     }
     static Kernels all(const char* name) {
+        using Products = ProductSource<Isa>;
         return {name,
                 coefficients,
                 words,
                 {set<double, double_lanes>(), stepped_errors<double, double_lanes>, stepped_outputs<double, double_lanes>},
-                set<float, float_lanes>()};
+                set<float, float_lanes>(),
+                Products::gram,
+                Products::differences,
+                Products::whiten,
+                Products::colour};
     }
 };
 

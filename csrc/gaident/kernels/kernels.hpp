@@ -64,6 +64,11 @@ struct Kernels {
     WordStream::Fill words;
     SteppedKernelSet in_double;
     KernelSet<FloatGroup, float> in_float;
+    // Rows of double_lanes numbers, see products.hpp.
+    void (*gram)(const double* a, const double* b, std::size_t n, double* sums);
+    void (*differences)(const double* scale, const double* output, std::size_t n, double* rows);
+    void (*whiten)(const double* phi, std::size_t order, const double* in, std::size_t n, double* out);
+    void (*colour)(const double* phi, std::size_t order, const double* in, std::size_t n, double* z);
 };
 
 const Kernels& baseline_kernels();

@@ -15,9 +15,8 @@ from gaident.diagnosis.candidates import CANDIDATES, TWINS, Scales
 from gaident.diagnosis.controller_place import controller_findings
 from gaident.diagnosis.driven import AT_CONTROLLER, Driven
 from gaident.diagnosis.excitation import excitation
-from gaident.diagnosis.gains import Gains, measured_gains
+from gaident.diagnosis.gains import measured_gains
 from gaident.diagnosis.hygiene import cleaned, outliers, quantisation
-from gaident.diagnosis.layout import Layout
 from gaident.diagnosis.leftover import leftover
 from gaident.diagnosis.problem import Fit, Problem
 from gaident.diagnosis.result import Diagnosis, Finding

@@ -220,16 +220,21 @@ def least_squares_filter(parts: list[Vector], order: int) -> Vector:
     return np.linalg.lstsq(gram, right, rcond=1e-13)[0]
 
 
-def project_out(J: Matrix, V: Matrix) -> Matrix:
-    """Rows of V without what the rows of J can explain."""
-    sizes = np.sqrt(np.einsum("ij,ij->i", J, J))
-    keep = (sizes > 0.0) & np.isfinite(sizes)
-    if not keep.any():
-        return V
-    rows = J[keep] / sizes[keep][:, None]
+def orthonormal_rows(rows: Matrix) -> Matrix:
+    """An orthonormal basis of the row space, as rows; rows without power or without a number do not count."""
+    sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    rows = rows[(sizes > 0.0) & np.isfinite(sizes)]
+    if len(rows) == 0:
+        return np.zeros((0, rows.shape[1]))
+    rows = rows / np.sqrt(np.einsum("ij,ij->i", rows, rows))[:, None]
     values, vectors = np.linalg.eigh(rows @ rows.T)
     known = values > 1e-10 * values[-1]
-    basis = (vectors[:, known] / np.sqrt(values[known])).T @ rows
+    return np.asarray((vectors[:, known] / np.sqrt(values[known])).T @ rows)
+
+
+def project_out(J: Matrix, V: Matrix) -> Matrix:
+    """Rows of V without what the rows of J can explain."""
+    basis = orthonormal_rows(J)
     return np.asarray(V - (V @ basis.T) @ basis)
 
 

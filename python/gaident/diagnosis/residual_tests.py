@@ -24,9 +24,9 @@ from gaident.data.record import Record
 from gaident.diagnosis.directed import torque_columns
 from gaident.diagnosis.excitation import position_of
 from gaident.diagnosis.pi_torque import pi_torque
+from gaident.diagnosis.problem import orthonormal_rows
 from gaident.diagnosis.state_space import discretised, disturbed
 from gaident.errors import RecordError
-from gaident.identification.adequacy import orthonormal_rows
 from gaident.identification.noise import Autoregression, chi2_tail, fit_autoregression, ljung_box, whiten
 from gaident.identification.starts import starts_moving
 from gaident.models.controller import PI

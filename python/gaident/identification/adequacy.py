@@ -9,16 +9,16 @@ out, it is regressed on the input at several lags, a constant, and sign(w), w|w|
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.identification.noise import Autoregression, chi2_tail, ljung_box, whiten
-from gaident.identification.starts import noise_std
+from gaident.identification.noise import Autoregression, chi2_tail, ljung_box_of
 
-__all__ = ["Adequacy", "assess", "independence_p", "orthonormal_rows"]
+__all__ = ["Adequacy", "Sums", "assess", "independence_p", "regressor_lags", "white_lags"]
 
 Vector = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ class Adequacy:
                 "Do not trust the mechanical parameters; an effect that is not in the model bends them."
             )
         if self.undecided:
-            if not np.isfinite(self.excess):
+            if not math.isfinite(self.excess):
                 return (
                     "Undecided: the residual is coloured, and the measured velocity shows no noise at all. Is it a measurement, "
                     "or a command or a simulation? Missing dynamics cannot be told from coloured noise here."
@@ -76,84 +76,96 @@ class Adequacy:
         return "The residual is white: nothing left that this linear model could be blamed for."
 
 
-def assess(
-    residuals: Sequence[Vector],
-    J: NDArray[np.float64],
-    inputs: Sequence[Vector],
-    outputs: Sequence[Vector],
-    noise: Autoregression,
-    open_loop: bool,
-) -> Adequacy:
-    """residuals, inputs and simulated outputs per record; J: sensitivities, parameters x all samples.
+@dataclass(frozen=True)
+class Sums:
+    """What the tests need of a fit, gathered by the core over all samples of all records.
+
+    products: sums of e(n) e(n+k), k = 0..; white: X'X of X = F [e | J | regressors], see `_core.Experiment.fit_sums`;
+    unknowns: columns of J; lengths: samples of each record; noise: the autoregression F.
+    quiet: noise of the measured velocity by its third differences [rad/s].
+    """
+
+    products: Vector
+    white: Vector
+    unknowns: int
+    lengths: Sequence[int]
+    noise: Autoregression
+    quiet: float
+
+
+def regressor_lags(lengths: Sequence[int], open_loop: bool) -> list[int]:
+    """Lags of the input that the residual is tested on.
 
     open_loop: the input is a torque. It acts from the next sample on, and if a controller made it, it carries the noise of its
-    own
-    sample: lag 0 would then be correlated with the residual by construction and is left out.
+    own sample: lag 0 would then be correlated with the residual by construction and is left out.
     """
-    lengths = [len(e) for e in residuals]
-    total = sum(lengths)
-    power = sum(float(e @ e) for e in residuals) / total
-    white_p = ljung_box(residuals, lags=min(20, total // 5))
-    predictable = 1.0 - noise.std**2 / power if power > 0.0 else 0.0
-    lags = [k for k in LAGS if k < min(lengths) // 4 and not (open_loop and k == 0)]
-    columns = [_joined([_lagged(u, k) for u in inputs], noise.phi) for k in lags]
-    columns.append(_joined([np.ones(n) for n in lengths], noise.phi))
-    threshold = 0.01 * max(float(np.abs(y).max()) for y in outputs)
-    columns.append(_joined([np.where(np.abs(y) > threshold, np.sign(y), 0.0) for y in outputs], noise.phi))
-    columns.append(_joined([y * np.abs(y) for y in outputs], noise.phi))
-    own = [_joined(_split(row, lengths), noise.phi) for row in J]
-    v = _joined(residuals, noise.phi)
-    p = independence_p(v, np.array(own), np.array(columns), total - noise.order * len(lengths))
-    measured = [y + e for y, e in zip(outputs, residuals, strict=True)]
-    quiet = float(np.sqrt(sum(len(w) * noise_std(w) ** 2 for w in measured) / total))
-    excess = float(np.sqrt(power)) / quiet if quiet > 0.0 else (0.0 if power == 0.0 else float("inf"))
+    return [k for k in LAGS if k < min(lengths) // 4 and not (open_loop and k == 0)]
+
+
+def white_lags(lengths: Sequence[int]) -> int:
+    """Lags of the whiteness test."""
+    return min(20, sum(lengths) // 5)
+
+
+def assess(s: Sums) -> Adequacy:
+    """The verdict on a fit."""
+    total = sum(s.lengths)
+    power = float(s.products[0]) / total
+    white_p = ljung_box_of(s.products[: white_lags(s.lengths) + 1], total)
+    predictable = 1.0 - s.noise.std**2 / power if power > 0.0 else 0.0
+    p = _independence(s.white, s.unknowns, total - s.noise.order * len(s.lengths))
+    excess = math.sqrt(power) / s.quiet if s.quiet > 0.0 else (0.0 if power == 0.0 else math.inf)
     falsified = p < LEVEL
     undecided = not falsified and white_p < LEVEL and excess > 2.0
-    return Adequacy(white_p, noise.order, noise.std, float(max(predictable, 0.0)), excess, p, falsified, undecided)
+    return Adequacy(white_p, s.noise.order, s.noise.std, max(predictable, 0.0), excess, p, falsified, undecided)
 
 
-def independence_p(v: Vector, own: NDArray[np.float64], extra: NDArray[np.float64], samples: int) -> float:
-    """p-value of the F-test that `extra` explains nothing of v beyond `own`."""
-    basis = orthonormal_rows(own)
-    rest = v - basis.T @ (basis @ v)
-    more = extra - (extra @ basis.T) @ basis
-    sizes = np.linalg.norm(extra, axis=1)
-    keep = np.linalg.norm(more, axis=1) > 1e-6 * np.where(sizes > 0.0, sizes, 1.0)
-    if not np.any(keep):
+def independence_p(v: Vector, own: Vector, extra: Vector, samples: int) -> float:
+    """p-value of the F-test that the rows `extra` explain nothing of v beyond the rows `own`; samples: degrees of freedom."""
+    rows = np.vstack([v, own, extra])
+    return _independence(rows @ rows.T, len(own), samples)
+
+
+def _independence(sums: Vector, own: int, samples: int) -> float:
+    """The same from sums of products: of v first, then of `own` columns, then of the others.
+
+    What `own` explains is taken out of the sums (a Schur complement); what is left of v is regressed on what is left of the
+    others.
+    """
+    diagonal = np.diag(sums)
+    # A column without power, or without a number, explains nothing.
+    sound = np.isfinite(diagonal) & (diagonal > 0.0)
+    scale = np.where(sound, np.sqrt(np.where(sound, diagonal, 1.0)), np.inf)
+    scale[0] = 1.0
+    G = np.nan_to_num(sums) / np.outer(scale, scale)
+    mine = np.flatnonzero(sound[1 : 1 + own]) + 1
+    others = np.flatnonzero(sound[1 + own :]) + 1 + own
+    basis = _orthonormal(G[np.ix_(mine, mine)])
+    of_v, of_others = basis @ G[mine, 0], basis @ G[np.ix_(mine, others)]
+    rest = float(G[0, 0] - of_v @ of_v)
+    cross = G[others, 0] - of_others.T @ of_v
+    more = G[np.ix_(others, others)] - of_others.T @ of_others
+    size = np.diag(more)
+    keep = np.flatnonzero(size > 1e-8)  # of the column's power; what is less is rounding
+    if len(keep) == 0:
         return 1.0
-    directions = orthonormal_rows(more[keep])
+    root = np.sqrt(size[keep])
+    directions = _orthonormal(more[np.ix_(keep, keep)] / np.outer(root, root))
     m = len(directions)
-    explained = float(np.sum((directions @ rest) ** 2))
-    left = float(rest @ rest) - explained
+    explained = float(np.sum((directions @ (cross[keep] / root)) ** 2))
+    left = rest - explained
     dof = samples - len(basis) - m
     if dof < 1 or not left > 0.0:
         return 1.0 if not explained > 0.0 else 0.0
     # F(m, dof) by its chi2 limit with the finite-sample correction dof ln(1 + m F / dof).
-    return chi2_tail((dof + 0.5 * m) * float(np.log1p(explained / left)), m)
+    return chi2_tail((dof + 0.5 * m) * math.log1p(explained / left), m)
 
 
-def orthonormal_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """An orthonormal basis of the row space, as rows."""
-    sizes = np.linalg.norm(rows, axis=1)
-    rows = rows[(sizes > 0.0) & np.isfinite(sizes)]
-    if len(rows) == 0:
-        return np.zeros((0, rows.shape[1]))
-    rows = rows / np.linalg.norm(rows, axis=1)[:, None]
-    values, vectors = np.linalg.eigh(rows @ rows.T)
+def _orthonormal(gram: Vector) -> Vector:
+    """Combinations (rows) of columns of unit power that make them orthonormal, from their sums of products."""
+    if len(gram) == 0:
+        return np.zeros((0, 0))
+    values, vectors = np.linalg.eigh(gram)
     known = values > 1e-10 * values[-1]
-    basis: NDArray[np.float64] = (vectors[:, known] / np.sqrt(values[known])).T @ rows
-    return basis
-
-
-def _lagged(x: Vector, k: int) -> Vector:
-    out = np.zeros_like(x)
-    out[k:] = x[: len(x) - k]
-    return out
-
-
-def _joined(parts: Sequence[Vector], phi: Vector) -> Vector:
-    return np.concatenate([whiten(x, phi) for x in parts])
-
-
-def _split(row: Vector, lengths: Sequence[int]) -> list[Vector]:
-    return np.split(row, np.cumsum(lengths)[:-1])
+    rows: Vector = (vectors[:, known] / np.sqrt(values[known])).T
+    return rows

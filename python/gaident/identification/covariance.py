@@ -4,8 +4,9 @@ The estimate minimises the plain simulation error e; its covariance to first ord
 
     cov = (J'J)^-1 J' S J (J'J)^-1,    S = s^2 (F'F)^-1
 
-with J = de/dx, F the whitening filter of the residual and s the standard deviation of F e. For white residuals this is s^2
-(J'J)^-1.
+with J = de/dx, F the whitening filter of the residual and s the standard deviation of F e; S is that of stationary noise, so
+that the first samples have their share of it too. For white residuals this is s^2 (J'J)^-1. J itself is never held: the core
+sums its products.
 """
 
 from __future__ import annotations
@@ -16,8 +17,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident import _core
-from gaident.identification.noise import Autoregression
 from gaident.models.factors import factor_parameters, gain_unit
 from gaident.models.model import Model
 
@@ -75,39 +74,32 @@ def core_layout(model: Model) -> tuple[Matrix, list[int]]:
     return T, of_core
 
 
-def covariance_of_factors(
-    model: Model, J: Matrix, noise: Autoregression, lengths: Sequence[int], at_bound: Sequence[bool]
-) -> Matrix:
+def covariance_of_factors(model: Model, plain: Matrix, coloured: Matrix, std: float, at_bound: Sequence[bool]) -> Matrix:
     """Covariance of factor_parameters(model).
 
-    J: sensitivities of the error in the core's order, parameters (start states last) x samples; lengths: samples of each record;
-    at_bound: per parameter of the model, core order. Rows and columns of parameters at a bound are nan; directions that the
-    record
-    does not determine have infinite variance.
+    plain, coloured: J'J and J'S J for s = 1, in the core's order of parameters, start states last; std: s. at_bound: per
+    parameter of the model, core order. Rows and columns of parameters at a bound are nan; directions that the record does not
+    determine have infinite variance.
     """
     count = len(at_bound)
-    free = [i for i in range(J.shape[0]) if i >= count or not at_bound[i]]
-    scale = np.sqrt(np.einsum("ij,ij->i", J, J))
-    seen = [i for i in free if scale[i] > 0.0 and np.isfinite(scale[i])]
+    bound = np.array([*at_bound, *[False] * (len(plain) - count)])
+    scale = np.sqrt(np.diag(plain))
+    seen = np.flatnonzero(~bound & (scale > 0.0) & np.isfinite(scale))
     cov = np.full((count, count), np.nan)
-    for i in free:
-        if i < count:
-            cov[i, i] = np.inf
-    if seen:
-        Js = J[seen] / scale[seen][:, None]
-        A = Js @ Js.T
-        coloured = _correlate(Js, noise.phi, lengths) if noise.order else Js
-        values, vectors = np.linalg.eigh(A)
+    free = np.flatnonzero(~bound[:count])
+    cov[free, free] = np.inf
+    if len(seen):
+        size = np.outer(scale[seen], scale[seen])
+        block = np.ix_(seen, seen)
+        values, vectors = np.linalg.eigh(plain[block] / size)
         known = values > 1e-13 * values[-1]
         inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
-        small = noise.std**2 * inverse @ (coloured @ coloured.T) @ inverse
+        small = std**2 * inverse @ (coloured[block] / size) @ inverse
         lost = np.sum(vectors[:, ~known] ** 2, axis=1) > 1e-6
         small[lost, :] = small[:, lost] = 0.0
         small[lost, lost] = np.inf
-        for a, i in enumerate(seen):
-            for b, k in enumerate(seen):
-                if i < count and k < count:
-                    cov[i, k] = small[a, b] / (scale[i] * scale[k])
+        own = seen < count
+        cov[np.ix_(seen[own], seen[own])] = (small / size)[np.ix_(own, own)]
     return _transform(core_layout(model)[0], 0.5 * (cov + cov.T))
 
 
@@ -121,12 +113,6 @@ def _transform(T: Matrix, cov: Matrix) -> Matrix:
         result[touched, :] = result[:, touched] = np.nan
         result[touched, touched] = cov[i, i]
     return result
-
-
-def _correlate(J: Matrix, phi: NDArray[np.float64], lengths: Sequence[int]) -> Matrix:
-    """F'^-1 J, record by record."""
-    parts = np.split(J, np.cumsum(lengths)[:-1], axis=1)
-    return np.concatenate([_core.colour(rows=part, phi=list(phi)) for part in parts], axis=1)
 
 
 def estimates(model: Model, cov: Matrix, at_bound_core: Sequence[bool]) -> dict[str, Estimate]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +16,16 @@ from gaident import _core
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
-from gaident.identification.noise import Autoregression, fit_autoregression
+from gaident.identification.noise import Autoregression, autoregression_of, highest_order
+from gaident.identification.notes import warnings_of
+from gaident.identification.parts import search_parts
 from gaident.identification.result import Identification, Rival, Structure, TrialOutcome
 from gaident.identification.selection import MARGIN, Candidate
 from gaident.identification.settings import Settings
 from gaident.identification.space import SearchSpace, derive_space
-from gaident.identification.starts import doubtful_start, starts_moving
+from gaident.identification.starts import doubtful_start, noise_std, starts_moving
 from gaident.models.controller import PI
-from gaident.models.mechanics import OneMass, TwoMass, mechanics_from_model
+from gaident.models.mechanics import mechanics_from_model
 from gaident.models.model import Model
 from gaident.version import version
 
@@ -32,6 +35,9 @@ Vector = NDArray[np.float64]
 ProgressCallback = Callable[[float, str], None]
 
 FINAL_ITERATIONS = 60
+FINAL_TOLERANCE = 1e-9
+WHOLE_ITERATIONS = 30  # of a fit found on a part of a long record
+REACH = math.log(2.0)  # units of BIC per sample of the part: with twice the error of the best there, none wins on all samples
 
 
 def identify(
@@ -68,17 +74,20 @@ def identify(
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
             raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
     threads = _processors() if workers is None else int(workers)
-    records = sorted(given, key=lambda r: (r.digest, r.name))  # sums must not depend on the order given
+    digests = _distinct(given)
+    # Sums must not depend on the order given.
+    order = sorted(range(len(given)), key=lambda i: (digests[i], given[i].name))
+    records, digests = [given[i] for i in order], [digests[i] for i in order]
     derived = space is None
     space = _checked_space(derive_space(records, controller) if space is None else space, controller)
 
     moving = [
         settings.initial_state == "free" or (settings.initial_state == "auto" and starts_moving(r, controller)) for r in records
     ]
-    work = _Work(records, controller, space, settings, moving)
-    found = work.search(int(trials), int(seed), threads, progress)
-    best, scored, noise = work.select(found, threads)
-    result = work.report(best, scored, noise, found, int(seed))
+    work = _Work(records, digests, controller, space, settings, moving, threads)
+    found = work.search(int(trials), int(seed), progress)
+    best, scored = work.select(found)
+    result = work.report(best, scored, found, int(seed))
     if derived and not settings.species:
         warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give space=SearchSpace(...)."
         object.__setattr__(result, "warnings", (*result.warnings, warning))
@@ -86,33 +95,53 @@ def identify(
     return result
 
 
+@dataclass(frozen=True)
+class _Judged:
+    """A fit with what its residual says about it."""
+
+    candidate: Candidate
+    error_sum: float
+    noise: Autoregression
+    plain: Vector  # J'J
+    coloured: Vector  # J'S J
+    adequacy: adequacy.Adequacy
+
+
 @dataclass
 class _Work:
     """One identification on its way."""
 
     records: list[Record]
+    digests: list[str]
     controller: PI | None
     space: SearchSpace
     settings: Settings
     moving: list[bool]
+    workers: int
 
     def __post_init__(self) -> None:
+        self.lengths = [len(r) for r in self.records]
+        self.samples = sum(self.lengths)
+        self.ranges = self.space.ranges(paper=not self.settings.species and self.settings.scale == "linear")
+        whole = list(zip(self.records, self.moving, strict=True))
+        self.experiment = self.experiment_of(whole)
+        # A long record is searched in part, and what is found fitted to all of it.
+        parts = search_parts(self.records, self.controller, self.moving) if self.settings.species else whole
+        self.in_parts = sum(len(r) for r, _ in parts) < self.samples
+        self.search_lengths = [len(r) for r, _ in parts]
+        self.searched = self.experiment_of(parts) if self.in_parts else self.experiment
+
+    def experiment_of(self, parts: Sequence[tuple[Record, bool]]) -> _core.Experiment:
+        """The core's view of (record, whether it starts in motion)."""
         c = self.controller
         loop, kp, ki = ("open", 0.0, 0.0) if c is None else (c.loop, c.kp, c.ki)
         limits = (np.inf, np.inf) if c is None else c.limits
-        self.inputs = [_input(r, c) for r in self.records]
         rows = [
-            (u, r.velocity, r.dt, "free" if m else "rest", float(r.velocity[:3].mean()))
-            for u, r, m in zip(self.inputs, self.records, self.moving, strict=True)
+            (_input(r, c), r.velocity, r.dt, "free" if moving else "rest", float(r.velocity[:3].mean())) for r, moving in parts
         ]
-        self.experiment = _core.Experiment(
-            records=rows, loop=loop, kp=kp, ki=ki, torque_limit=limits[0], integrator_limit=limits[1]
-        )
-        self.loop = (loop, kp, ki, *limits)
-        self.samples = sum(len(r) for r in self.records)
-        self.ranges = self.space.ranges(paper=not self.settings.species and self.settings.scale == "linear")
+        return _core.Experiment(records=rows, loop=loop, kp=kp, ki=ki, torque_limit=limits[0], integrator_limit=limits[1])
 
-    def search(self, trials: int, seed: int, workers: int, progress: ProgressCallback | None) -> list[_core.Trial]:
+    def search(self, trials: int, seed: int, progress: ProgressCallback | None) -> list[_core.Trial]:
         """The genetic runs."""
         total = trials * self.settings.generations
         usual = 4.0 * trials * self.settings.round  # species stop by themselves: the bar approaches its end
@@ -122,61 +151,79 @@ class _Work:
             fraction = done / (done + usual) if self.settings.species else done / total
             progress(min(1.0, fraction), f"generation {done}, best fitness {best:.4g}")
 
-        return self.experiment.search(
+        return self.searched.search(
             ranges=self.ranges,
             settings=self.settings.engine_settings(),
             trials=trials,
             seed=seed,
-            workers=workers,
+            workers=self.workers,
             progress=None if progress is None else report,
         )
 
-    def select(self, found: list[_core.Trial], workers: int) -> tuple[Candidate, list[Candidate], Autoregression]:
-        """The winner, all structures with their BIC (the plain engine compares none), and the noise model of the winner."""
-        if self.settings.species:
-            merged = [min((t.species[i] for t in found), key=lambda s: s.cost) for i in range(len(found[0].species))]
-            candidates = [selection.from_core(s) for s in merged if s.cost < 1e300]
-            if not candidates:
-                raise SpaceError("space: every candidate diverged in it; widen the ranges, or leave space=None")
-            scored, winner, _ = selection.choose(
-                self.experiment, candidates, self.residuals, [len(r) for r in self.records], self.ranges, workers
-            )
-            best = self.polished(scored[winner])
-            if self.judged(best).falsified:
-                chain = selection.smallest_mechanism(scored, self.samples)
-                best = best if chain is None or chain == winner else self.polished(scored[chain])
-        else:
-            trial = min(found, key=lambda t: t.best_fitness)
-            gain, poles, zeros = _core.decode(
-                words=trial.best,
-                ranges=self.ranges,
-                gray=self.settings.code == "gray",
-                logarithmic=self.settings.scale == "logarithmic",
-            )
-            model = Model(gain, poles, zeros)
-            # No local fit: only the start states the search assumed (steady motion) and what stands at a bound.
-            best = self.refined(Candidate(model, np.zeros(0), np.inf, ()), 0)
-            scored = []
-        return best, scored, fit_autoregression(self.residuals(best))
+    def select(self, found: list[_core.Trial]) -> tuple[_Judged, list[Candidate]]:
+        """The winner, and all structures compared with their BIC (the plain engine compares none)."""
+        if not self.settings.species:
+            return self.judged(self.plain_best(found)), []
+        merged = [min((t.species[i] for t in found), key=lambda s: s.cost) for i in range(len(found[0].species))]
+        candidates = [Candidate(s) for s in merged if s.cost < 1e300]
+        if not candidates:
+            raise SpaceError("space: every candidate diverged in it; widen the ranges, or leave space=None")
+        others: list[Candidate] = []
+        if self.in_parts:
+            candidates, others = self.within_reach(candidates)
+            candidates = self.on_all_samples(candidates)
+        noise = selection.noise_of(self.experiment, min(candidates, key=lambda c: c.cost), self.lengths)
+        scores = self.scored(candidates, noise)
+        winner = selection.smallest_close(scores)
+        best = self.judged(self.polished(scores[winner]))
+        if best.adequacy.falsified:
+            scores += self.scored(self.on_all_samples([c for c in others if selection.is_chain(c)]), noise)
+            chain = selection.smallest_mechanism(scores, self.samples)
+            best = best if chain is None or chain == winner else self.judged(self.polished(scores[chain]))
+        return best, scores
+
+    def within_reach(self, candidates: list[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
+        """(what may win on all samples, the rest) by the comparison on the parts that were searched."""
+        noise = selection.noise_of(self.searched, min(candidates, key=lambda c: c.cost), self.search_lengths)
+        scores = selection.scored(self.searched, candidates, noise, self.search_lengths, self.ranges, self.workers)
+        best = min(c.bic for c in scores)
+        near = [c.bic <= best + REACH * sum(self.search_lengths) for c in scores]
+        return [c for c, n in zip(candidates, near, strict=True) if n], [
+            c for c, n in zip(candidates, near, strict=True) if not n
+        ]
+
+    def on_all_samples(self, candidates: list[Candidate]) -> list[Candidate]:
+        """Fits of the parts, fitted to all samples; the start states of the whole records are other ones."""
+        starts = [(*c.as_start()[:3], np.zeros(0)) for c in candidates]
+        tolerance = selection.tolerance(self.samples)
+        fits = self.experiment.refine(starts, self.ranges, [], WHOLE_ITERATIONS, self.workers, tolerance)
+        return [Candidate(f) for f in fits if f.cost < 1e300]
+
+    def scored(self, candidates: list[Candidate], noise: Autoregression) -> list[Candidate]:
+        """The candidates with their BIC on all samples."""
+        return selection.scored(self.experiment, candidates, noise, self.lengths, self.ranges, self.workers)
+
+    def plain_best(self, found: list[_core.Trial]) -> Candidate:
+        """The best candidate ever seen by the plain engine, without a local fit."""
+        trial = min(found, key=lambda t: t.best_fitness)
+        model = Model(*self.decoded(trial))
+        # Only the start states that the search assumed (steady motion) and what stands at a bound.
+        fits = self.experiment.refine(
+            [(model.gain, np.array(model.poles, complex), np.array(model.zeros, complex), np.zeros(0))], self.ranges, [], 0, 1
+        )
+        return Candidate(fits[0])
+
+    def decoded(self, trial: _core.Trial) -> tuple[float, NDArray[np.complex128], NDArray[np.complex128]]:
+        """(gain, poles, zeros) of a trial's best chromosome."""
+        s = self.settings
+        return _core.decode(words=trial.best, ranges=self.ranges, gray=s.code == "gray", logarithmic=s.scale == "logarithmic")
 
     def polished(self, c: Candidate) -> Candidate:
         """The local fit taken to the end."""
-        done = self.refined(c, FINAL_ITERATIONS)
-        # Once more without a step: the core reports bounds in the order of the factors it was given, and Model may have put
-        # the roots into another.
-        return self.refined(done if done.cost <= c.cost else c, 0)
-
-    def refined(self, c: Candidate, iterations: int) -> Candidate:
-        """The local fit from c; with no iterations, c with its start states, cost and what stands at a bound."""
-        fit = self.experiment.refine(
-            models=[(c.model.gain, np.array(c.model.poles, complex), np.array(c.model.zeros, complex), c.starts)],
-            ranges=self.ranges,
-            whitening=[],
-            max_iterations=iterations,
-            workers=1,
-        )[0]
-        done = selection.from_core(fit)
-        return replace(done, model=done.model if iterations else c.model, bic=c.bic)
+        done = self.experiment.go_on([c.fit], self.ranges, [], FINAL_ITERATIONS, FINAL_TOLERANCE, 1)[0]
+        best = Candidate(done if done.cost <= c.cost else c.fit, c.bic)
+        # Once more without a step, from the roots in the order of Model: the core reports bounds in the order of its factors.
+        return Candidate(self.experiment.refine([best.as_start()], self.ranges, [], 0, 1)[0], c.bic)
 
     def states(self, c: Candidate) -> list[Vector]:
         """Start state of each record; empty: at rest."""
@@ -188,66 +235,38 @@ class _Work:
             at += n
         return states
 
-    def outputs(self, c: Candidate) -> list[Vector]:
-        """Simulated velocity of each record."""
-        loop, kp, ki, torque_limit, integrator_limit = self.loop
-        poles, zeros = np.array(c.model.poles, complex), np.array(c.model.zeros, complex)
-        return [
-            _core.simulate(c.model.gain, poles, zeros, r.dt, u, loop, kp, ki, torque_limit, integrator_limit, s)[0]
-            for r, u, s in zip(self.records, self.inputs, self.states(c), strict=True)
-        ]
+    def judged(self, c: Candidate) -> _Judged:
+        """Whether the data contradict this candidate, and the sums its uncertainty is made of."""
+        order = highest_order(self.lengths)
+        products, largest = self.experiment.residual_sums(c.fit, max(order, adequacy.white_lags(self.lengths)))
+        noise = autoregression_of(products[: order + 1], self.samples)
+        lags = adequacy.regressor_lags(self.lengths, self.controller is None)
+        plain, coloured, white = self.experiment.fit_sums(c.fit, noise.phi, lags, 0.01 * largest)
+        sums = adequacy.Sums(products, white, len(plain), self.lengths, noise, self.quiet)
+        return _Judged(c, float(products[0]), noise, plain, coloured, adequacy.assess(sums))
 
-    def residuals(self, c: Candidate) -> list[Vector]:
-        """Measured minus simulated velocity of each record."""
-        return [r.velocity - y for r, y in zip(self.records, self.outputs(c), strict=True)]
+    @cached_property
+    def quiet(self) -> float:
+        """Noise of the measured velocity as its third differences show it [rad/s]."""
+        return math.sqrt(sum(len(r) * noise_std(r.velocity) ** 2 for r in self.records) / self.samples)
 
-    def sensitivities(self, c: Candidate) -> Any:
-        """de/dx of the plain error, parameters (start states last) x samples."""
-        return self.experiment.sensitivities(
-            gain=c.model.gain,
-            poles=np.array(c.model.poles, complex),
-            zeros=np.array(c.model.zeros, complex),
-            starts=list(c.starts),
-            whitening=[],
-        )[1]
-
-    def judged(self, c: Candidate) -> adequacy.Adequacy:
-        """Whether the data contradict this candidate."""
-        outputs = self.outputs(c)
-        residuals = [r.velocity - y for r, y in zip(self.records, outputs, strict=True)]
-        return adequacy.assess(
-            residuals, self.sensitivities(c), self.inputs, outputs, fit_autoregression(residuals), self.controller is None
-        )
-
-    def report(
-        self, best: Candidate, scored: list[Candidate], noise: Autoregression, found: list[_core.Trial], seed: int
-    ) -> Identification:
-        """Uncertainty, tests, mechanics, and everything the user sees."""
-        model = best.model
-        outputs = self.outputs(best)
-        residuals = [r.velocity - y for r, y in zip(self.records, outputs, strict=True)]
-        J = self.sensitivities(best)
-        lengths = [len(r) for r in self.records]
-        cov = covariance.covariance_of_factors(model, J, noise, lengths, best.at_bound)
-        parameters = covariance.estimates(model, cov, best.at_bound)
-        judged = adequacy.assess(residuals, J, self.inputs, outputs, noise, self.controller is None)
+    def report(self, best: _Judged, scored: list[Candidate], found: list[_core.Trial], seed: int) -> Identification:
+        """Uncertainty, mechanics, and everything the user sees."""
+        model, judged, error_sum, bic = best.candidate.model, best.adequacy, best.error_sum, best.candidate.bic
+        at_bound = best.candidate.at_bound
+        cov = covariance.covariance_of_factors(model, best.plain, best.coloured, best.noise.std, at_bound)
+        parameters = covariance.estimates(model, cov, at_bound)
         mechanics = mechanics_from_model(model, covariance.usable_covariance(model, cov))
-        error_sum = sum(float(e @ e) for e in residuals)
-        mean = sum(float(r.velocity.sum()) for r in self.records) / self.samples
-        spread = sum(float(np.sum((r.velocity - mean) ** 2)) for r in self.records)
+        spread = _spread(self.records)
         s = self.settings
         lowest = min((c.bic for c in scored), default=0.0)
         # Where every structure is contradicted a criterion that supposes one of them true ranks nothing.
         close = [] if judged.falsified else scored
         rivals = sorted(
-            (
-                Rival(c.model.p, c.model.q, c.bic - best.bic, c.model)
-                for c in close
-                if c.bic <= best.bic + MARGIN and (c.model.p, c.model.q) != (model.p, model.q)
-            ),
+            (Rival(c.p, c.q, c.bic - bic, c.model) for c in close if c.bic <= bic + MARGIN and (c.p, c.q) != (model.p, model.q)),
             key=lambda r: r.delta_bic,
         )
-        states = {r.digest: tuple(float(v) for v in x) for r, x in zip(self.records, self.states(best), strict=True) if len(x)}
+        states = {d: tuple(x.tolist()) for d, x in zip(self.digests, self.states(best.candidate), strict=True) if len(x)}
         return Identification(
             model=model,
             controller=self.controller,
@@ -257,16 +276,16 @@ class _Work:
             rmse=float(np.sqrt(error_sum / self.samples)),
             fit_percent=float(100.0 * (1.0 - np.sqrt(error_sum / spread))) if spread > 0.0 else float("nan"),
             rivals=tuple(rivals),
-            structures=tuple(Structure(c.model.p, c.model.q, c.cost, c.bic - lowest) for c in scored),
+            structures=tuple(Structure(c.p, c.q, c.cost, c.bic - lowest) for c in scored),
             trials=tuple(self.outcome(t) for t in found),
             adequacy=judged,
-            warnings=_warnings(
+            warnings=warnings_of(
                 judged,
                 parameters,
                 mechanics,
                 rivals,
                 model,
-                lowest < best.bic - MARGIN,
+                lowest < bic - MARGIN,
                 [n for r in self.records if (n := doubtful_start(r, self.controller))] if s.initial_state == "auto" else [],
             ),
             space=self.space,
@@ -274,7 +293,7 @@ class _Work:
             seed=seed,
             seconds=0.0,
             samples=self.samples,
-            digests=tuple(r.digest for r in self.records),
+            digests=tuple(self.digests),
             initial_states=states,
             version=version(),
             records=tuple(self.records),
@@ -287,61 +306,11 @@ class _Work:
             top = min(trial.species, key=lambda f: s.error_weight**2 * f.cost + s.order_weight * (f.p + f.q))
             p, q = top.p, top.q
         else:
-            model = _core.decode(
-                words=trial.best, ranges=self.ranges, gray=s.code == "gray", logarithmic=s.scale == "logarithmic"
-            )
-            p, q = len(model[1]) - len(model[2]), len(model[2])
+            _, poles, zeros = self.decoded(trial)
+            p, q = len(poles) - len(zeros), len(zeros)
         return TrialOutcome(
             p, q, trial.best_fitness, len(trial.history), trial.best_generation, trial.evaluations, tuple(trial.history.tolist())
         )
-
-
-def _warnings(
-    judged: adequacy.Adequacy,
-    parameters: dict[str, covariance.Estimate],
-    mechanics: OneMass | TwoMass | None,
-    rivals: Sequence[Rival],
-    model: Model,
-    larger_fits_better: bool,
-    started: Sequence[str],
-) -> tuple[str, ...]:
-    notes = list(started)
-    if judged.falsified or judged.undecided:
-        notes.append(judged.sentence)
-    if judged.falsified and larger_fits_better:
-        notes.append(
-            "Larger structures come closer, but only by absorbing what no linear structure holds; the smallest mechanism "
-            f"is reported, ({model.p},{model.q})."
-        )
-    bound = [n for n, e in parameters.items() if e.at_bound]
-    if bound:
-        notes.append(f"At a bound of the search range: {', '.join(bound)}. Widen the space, or doubt the structure.")
-    unknown = [n for n, e in parameters.items() if not e.at_bound and not e.identifiable]
-    if unknown:
-        notes.append(f"Not identifiable from this data (standard deviation as large as the value): {', '.join(unknown)}.")
-    if rivals:
-        names = ", ".join(f"({r.p},{r.q})" for r in rivals)
-        notes.append(f"Structures within {MARGIN:.0f} BIC units of ({model.p},{model.q}): {names}; the smallest is reported.")
-    if mechanics is not None:
-        notes.extend(_shaft_notes(mechanics))
-        notes.extend(mechanics.notes)
-    return tuple(notes)
-
-
-def _shaft_notes(mechanics: OneMass | TwoMass) -> list[str]:
-    """A sentence where the six numbers of a two-mass model contradict a shaft without damping by more than three deviations."""
-    std = mechanics.std.get("inconsistency", 0.0)
-    found = mechanics.inconsistency or 0.0
-    if not isinstance(mechanics, TwoMass) or not std > 0.0 or found < 3.0 * std:
-        return []
-    damped = mechanics.with_shaft_damping
-    remedy = "an effect that the model lacks bends them; trust neither"
-    if damped is not None and damped.physical:
-        remedy = (
-            f"use mechanics.with_shaft_damping (JM = {damped.JM:.4g}, JL = {damped.JL:.4g}, KG = {damped.KG:.4g}, "
-            f"DG = {damped.DG:.3g}), or look for an effect that the model lacks"
-        )
-    return [f"The mechanics without shaft damping contradict the model by {100 * found:.2g} +- {100 * std:.2g} %: {remedy}."]
 
 
 def _checked_records(rec: Record | Sequence[Record], controller: PI | None) -> list[Record]:
@@ -362,15 +331,27 @@ def _checked_records(rec: Record | Sequence[Record], controller: PI | None) -> l
                 f"{where} has no torque, which drives the model in open loop: give Record(torque=...), or "
                 "controller=PI(...) to identify in closed loop"
             )
-    seen: dict[str, str] = {}
-    for i, r in enumerate(records):
-        where = f"record {i} ({r.name})" if r.name else f"record {i}"
-        if r.digest in seen:
-            raise RecordError(
-                f"{where} holds the same data as {seen[r.digest]}: counted twice it would halve every variance; leave one out"
-            )
-        seen[r.digest] = where
     return records
+
+
+def _distinct(records: Sequence[Record]) -> list[str]:
+    """The records' digests; a RecordError where two are the same."""
+    digests = [r.digest for r in records]
+    for i, digest in enumerate(digests):
+        first = digests.index(digest)
+        if first < i:
+            names = [f"record {k} ({records[k].name})" if records[k].name else f"record {k}" for k in (i, first)]
+            raise RecordError(
+                f"{names[0]} holds the same data as {names[1]}: counted twice it would halve every variance; leave one out"
+            )
+    return digests
+
+
+def _spread(records: Sequence[Record], block: int = 1 << 18) -> float:
+    """Sum of squares of the velocity about its mean, a block at a time."""
+    mean = sum(float(r.velocity.sum()) for r in records) / sum(len(r) for r in records)
+    parts = (r.velocity[i : i + block] - mean for r in records for i in range(0, len(r), block))
+    return sum(float(w @ w) for w in parts)
 
 
 def _checked_space(space: SearchSpace, controller: PI | None) -> SearchSpace:

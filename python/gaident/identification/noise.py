@@ -5,16 +5,18 @@ v(n) = e(n) - sum_i phi_i e(n-i)
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from math import erfc
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Autoregression", "fit_autoregression", "ljung_box", "whiten"]
+__all__ = ["Autoregression", "autoregression_of", "fit_autoregression", "highest_order", "ljung_box", "ljung_box_of", "whiten"]
 
 Vector = NDArray[np.float64]
+
+MAX_ORDER = 30
 
 
 class Autoregression(NamedTuple):
@@ -29,27 +31,38 @@ class Autoregression(NamedTuple):
         return len(self.phi)
 
 
-def fit_autoregression(residuals: Sequence[Vector], max_order: int = 30) -> Autoregression:
+def fit_autoregression(residuals: Sequence[Vector], max_order: int = MAX_ORDER) -> Autoregression:
     """Order by BIC, coefficients by Levinson-Durbin on the autocovariance pooled over records.
 
     residuals: one array per record, not centred (a mean is an error too). The order is at most a twentieth of the samples.
     """
-    total = sum(len(e) for e in residuals)
-    top = max(0, min(max_order, total // 20, min(len(e) for e in residuals) - 1))
-    cov = sum((_autocorrelation(e, top) for e in residuals), start=np.zeros(top + 1)) / total
+    lengths = [len(e) for e in residuals]
+    top = highest_order(lengths, max_order)
+    products: Vector = np.sum([autocorrelation(e, top) for e in residuals], axis=0)
+    return autoregression_of(products, sum(lengths))
+
+
+def highest_order(lengths: Sequence[int], max_order: int = MAX_ORDER) -> int:
+    """The largest order that so many samples are asked for."""
+    return max(0, min(max_order, sum(lengths) // 20, min(lengths) - 1))
+
+
+def autoregression_of(products: Vector, total: int) -> Autoregression:
+    """The same from sums of products e(n) e(n+k), k = 0..top, over `total` samples."""
+    cov = products / total
     if not cov[0] > 0.0:
         return Autoregression(np.zeros(0), 0.0)
     phi, variance = np.zeros(0), float(cov[0])
-    best, best_score = Autoregression(phi, float(np.sqrt(variance))), total * np.log(variance)
-    for m in range(1, top + 1):
-        reflection = (cov[m] - phi @ cov[m - 1 : 0 : -1]) / variance if m > 1 else cov[1] / cov[0]
-        phi = np.concatenate([phi - reflection * phi[::-1], [reflection]])
+    best, best_score = Autoregression(phi, math.sqrt(variance)), total * math.log(variance)
+    for m in range(1, len(cov)):
+        reflection = float(cov[m] - phi @ cov[m - 1 : 0 : -1]) / variance
+        phi = np.append(phi - reflection * phi[::-1], reflection)
         variance *= 1.0 - reflection**2
         if not variance > 1e-14 * cov[0]:
             break
-        score = total * np.log(variance) + m * np.log(total)
+        score = total * math.log(variance) + m * math.log(total)
         if score < best_score:
-            best, best_score = Autoregression(phi.copy(), float(np.sqrt(variance))), score
+            best, best_score = Autoregression(phi, math.sqrt(variance)), score
     return best
 
 
@@ -64,15 +77,20 @@ def whiten(x: Vector, phi: Vector) -> Vector:
 
 def ljung_box(residuals: Sequence[Vector], lags: int) -> float:
     """p-value of the Ljung-Box test that residuals are white up to `lags`, pooled over records."""
-    total = sum(len(e) for e in residuals)
-    r = sum((_autocorrelation(e, lags) for e in residuals), start=np.zeros(lags + 1))
-    if not r[0] > 0.0:
+    products: Vector = np.sum([autocorrelation(e, lags) for e in residuals], axis=0)
+    return ljung_box_of(products, sum(len(e) for e in residuals))
+
+
+def ljung_box_of(products: Vector, total: int) -> float:
+    """The same from sums of products e(n) e(n+k), k = 0..lags, over `total` samples."""
+    lags = len(products) - 1
+    if not products[0] > 0.0 or lags < 1:
         return 1.0
-    statistic = float(np.sum((r[1:] / r[0]) ** 2 / (total - np.arange(1, lags + 1))))
+    statistic = float(np.sum((products[1:] / products[0]) ** 2 / (total - np.arange(1, lags + 1))))
     return chi2_tail(total * (total + 2) * statistic, lags)
 
 
-def _autocorrelation(e: Vector, lags: int) -> Vector:
+def autocorrelation(e: Vector, lags: int) -> Vector:
     """sum_n e(n) e(n+k), k = 0..lags, by FFT (padded, so not circular)."""
     size = 1 << (len(e) + lags).bit_length()
     spectrum = np.fft.rfft(e, size)
@@ -84,5 +102,5 @@ def chi2_tail(x: float, dof: int) -> float:
     """P(chi2 > x), Wilson-Hilferty: good to a few per cent of the tail probability."""
     if x <= 0.0:
         return 1.0
-    z = ((x / dof) ** (1.0 / 3.0) - (1.0 - 2.0 / (9.0 * dof))) / np.sqrt(2.0 / (9.0 * dof))
-    return 0.5 * erfc(float(z) / np.sqrt(2.0))
+    z = ((x / dof) ** (1.0 / 3.0) - (1.0 - 2.0 / (9.0 * dof))) / math.sqrt(2.0 / (9.0 * dof))
+    return 0.5 * math.erfc(float(z) / math.sqrt(2.0))

@@ -10,48 +10,77 @@ best wins
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.identification.noise import Autoregression, fit_autoregression
+from gaident import _core
+from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.models.model import Model
 
-__all__ = ["MARGIN", "Candidate", "choose", "smallest_mechanism"]
+__all__ = ["MARGIN", "Candidate", "is_chain", "noise_of", "scored", "smallest_close", "smallest_mechanism", "tolerance"]
 
 MARGIN = 10.0
 CANCELLATION = 0.02
+WHITE_ITERATIONS = 8
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One structure's fit: `cost` is the plain error sum, `bic` the whitened criterion."""
+    """One structure's fit: `bic` is the whitened criterion."""
 
-    model: Model
-    starts: NDArray[np.float64]
-    cost: float
-    at_bound: tuple[bool, ...]
+    fit: _core.Refined
     bic: float = float("nan")
+
+    @property
+    def p(self) -> int:
+        """Poles in excess of zeros."""
+        return self.fit.p
+
+    @property
+    def q(self) -> int:
+        """Zeros."""
+        return self.fit.q
+
+    @property
+    def cost(self) -> float:
+        """Plain error sum."""
+        return self.fit.cost
+
+    @property
+    def starts(self) -> NDArray[np.float64]:
+        """Start states of the records that do not begin at rest, one after the other."""
+        return self.fit.starts
+
+    @property
+    def at_bound(self) -> tuple[bool, ...]:
+        """Per parameter of the model, in the core's order."""
+        return tuple(self.fit.at_bound)
 
     @property
     def size(self) -> int:
         """1 + p + 2 q."""
-        return 1 + self.model.p + 2 * self.model.q
+        return 1 + self.p + 2 * self.q
+
+    @cached_property
+    def model(self) -> Model:
+        """The model, its roots in the order of Model."""
+        return Model(self.fit.gain, self.fit.poles, self.fit.zeros)
+
+    def as_start(self) -> tuple[float, NDArray[np.complex128], NDArray[np.complex128], NDArray[np.float64]]:
+        """What `_core.Experiment.refine` takes."""
+        return self.model.gain, np.array(self.model.poles, complex), np.array(self.model.zeros, complex), self.starts
 
 
-def from_core(fit: Any) -> Candidate:
-    """A Candidate of the core's Refined."""
-    return Candidate(Model(fit.gain, fit.poles, fit.zeros), fit.starts, fit.cost, tuple(fit.at_bound))
-
-
-def cancellations(model: Model) -> int:
+def cancellations(poles: Sequence[complex], zeros: Sequence[complex]) -> int:
     """Zeros with a pole closer than 2 % of their magnitude (each pole counts once)."""
-    free = list(model.poles)
+    free = list(poles)
     count = 0
-    for zero in model.zeros:
+    for zero in zeros:
         near = [pole for pole in free if abs(pole - zero) < CANCELLATION * max(abs(zero), 1e-12)]
         if near:
             free.remove(min(near, key=lambda pole: abs(pole - zero)))
@@ -59,46 +88,65 @@ def cancellations(model: Model) -> int:
     return count
 
 
-def choose(
-    experiment: Any, candidates: Sequence[Candidate], residuals_of: Any, lengths: Sequence[int], ranges: Any, workers: int
-) -> tuple[list[Candidate], int, Autoregression]:
-    """(candidates with their BIC, index of the winner, the common noise model).
+def noise_of(experiment: _core.Experiment, c: Candidate, lengths: Sequence[int]) -> Autoregression:
+    """The noise model of a candidate's residual."""
+    products, _ = experiment.residual_sums(c.fit, highest_order(lengths))
+    return autoregression_of(products, sum(lengths))
 
-    residuals_of(candidate) -> one residual array per record.
-    """
-    fitted = min(candidates, key=lambda c: c.cost)
-    noise = fit_autoregression(residuals_of(fitted))
+
+def scored(
+    experiment: _core.Experiment,
+    candidates: Sequence[Candidate],
+    noise: Autoregression,
+    lengths: Sequence[int],
+    ranges: _core.SearchRanges,
+    workers: int,
+) -> list[Candidate]:
+    """The candidates with their BIC under a common noise model."""
     costs = [c.cost for c in candidates]
     count = sum(lengths)
     if noise.order > 0:
-        models = [
-            (c.model.gain, np.array(c.model.poles, complex), np.array(c.model.zeros, complex), c.starts) for c in candidates
-        ]
-        whitened = experiment.refine(models=models, ranges=ranges, whitening=list(noise.phi), max_iterations=8, workers=workers)
+        fits = [c.fit for c in candidates]
+        whitened = experiment.go_on(fits, ranges, noise.phi, WHITE_ITERATIONS, tolerance(count), workers)
         costs = [w.cost for w in whitened]
         count -= noise.order * len(lengths)  # the first samples of each record, whose past is missing
-    scored = []
+    logarithm = math.log(count)
+    found = []
     for c, cost in zip(candidates, costs, strict=True):
-        bic = count * np.log(max(cost, 1e-300) / count) + (c.size + len(c.starts)) * np.log(count)
-        scored.append(replace(c, bic=float(bic + MARGIN * cancellations(c.model))))
-    best = min(c.bic for c in scored)
-    close = [i for i, c in enumerate(scored) if c.bic <= best + MARGIN]
-    winner = min(close, key=lambda i: (scored[i].size, scored[i].bic))
-    return scored, winner, noise
+        bic = count * math.log(max(cost, 1e-300) / count) + (c.size + len(c.starts)) * logarithm
+        found.append(replace(c, bic=bic + MARGIN * cancellations(c.fit.poles.tolist(), c.fit.zeros.tolist())))
+    return found
 
 
-def smallest_mechanism(scored: Sequence[Candidate], samples: int) -> int | None:
+def tolerance(samples: int) -> float:
+    """Relative fall of an error sum that is worth 0.01 units of BIC: less is no progress where structures are compared."""
+    return 0.01 / samples
+
+
+def smallest_close(scores: Sequence[Candidate]) -> int:
+    """Index of the winner: the smallest structure within 10 units of the best."""
+    best = min(c.bic for c in scores)
+    close = [i for i, c in enumerate(scores) if c.bic <= best + MARGIN]
+    return min(close, key=lambda i: (scores[i].size, scores[i].bic))
+
+
+def is_chain(c: Candidate) -> bool:
+    """Whether the structure is a chain of masses: p = 1, q = 0, 2, 4, ..."""
+    return c.p == 1 and c.q % 2 == 0
+
+
+def smallest_mechanism(scores: Sequence[Candidate], samples: int) -> int | None:
     """What to report where the data contradict every linear structure: index of the smallest mechanism, None where there is none.
 
     An information criterion supposes that one of the models is true. Where none is, every module more absorbs a little of what
     is missing, and the largest structure wins without meaning anything. Then only chains of masses (p = 1, q = 0, 2, 4, ...) are
     considered, and a mass more has to halve the whitened error sum, which noise-like misfit does not let it do.
     """
-    chains = {c.model.q: i for i, c in enumerate(scored) if c.model.p == 1 and c.model.q % 2 == 0}
+    chains = {c.q: i for i, c in enumerate(scores) if is_chain(c)}
     if not chains:
         return None
     chosen = chains[min(chains)]
     for q in sorted(chains):
-        if scored[chains[q]].bic < scored[chosen].bic - samples * np.log(2.0):
+        if scores[chains[q]].bic < scores[chosen].bic - samples * math.log(2.0):
             chosen = chains[q]
     return chosen

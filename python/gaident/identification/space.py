@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from numbers import Real
 from typing import TYPE_CHECKING, Any
@@ -166,13 +166,27 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
     gram, right = np.zeros((2, 2)), np.zeros(2)
     steps = energy = 0.0
     for rec in records:
-        u, w = torque_of(rec, controller), rec.velocity
-        columns = np.vstack([_integral(u, rec.dt), -_integral(w, rec.dt)])
-        columns = columns - columns.mean(axis=1, keepdims=True)
-        gram += columns @ columns.T
-        right += columns @ (w - w.mean())
-        steps += float(np.diff(w) @ u[:-1]) * rec.dt
-        energy += float(u @ u) * rec.dt**2
+        # Sums of products of x = (int u dt, -int w dt, w) about their means, a block at a time.
+        products, sums = np.zeros((3, 3)), np.zeros(3)
+        integrals, before = np.zeros(2), np.zeros(2)
+        for first, u, w in _torque_blocks(rec, controller):
+            x = np.empty((3, len(u)))
+            for i, (signal, sign) in enumerate(((u, 1.0), (w, -1.0))):
+                trapezia = 0.5 * rec.dt * sign * (signal + np.concatenate([before[i : i + 1], signal[:-1]]))
+                if first == 0:
+                    trapezia[0] = 0.0
+                x[i] = integrals[i] + np.cumsum(trapezia)
+            x[2] = w
+            if first > 0:
+                steps += float(w[0] - before[1]) * float(before[0]) * rec.dt
+            steps += float(np.diff(w) @ u[:-1]) * rec.dt
+            energy += float(u @ u) * rec.dt**2
+            products += x @ x.T
+            sums += x.sum(axis=1)
+            integrals, before = x[:2, -1].copy(), np.array([u[-1], w[-1]])
+        centred = products - np.outer(sums, sums) / len(rec)
+        gram += centred[:2, :2]
+        right += centred[:2, 2]
     for what, still in (("torque", not energy > 0.0), ("velocity", all(np.ptp(r.velocity) == 0.0 for r in records))):
         if still:
             raise SpaceError(
@@ -231,20 +245,30 @@ def torque_of(rec: Record, controller: PI | None) -> NDArray[np.float64]:
     """The record's torque or, where none was recorded, the controller's answer to command and velocity (limits included)."""
     if rec.torque is not None:
         return rec.torque
-    assert controller is not None and rec.command is not None  # checked on entry to identify()
-    e = rec.command - rec.velocity
-    half = 0.5 * controller.ki * rec.dt
-    increments = half * (e + np.concatenate([[0.0], e[:-1]]))
-    integral = np.cumsum(increments)
-    torque_limit, integrator_limit = controller.limits
-    if np.abs(integral).max() > integrator_limit:
-        total = 0.0
-        for n, step in enumerate(increments):
-            total = min(max(total + step, -integrator_limit), integrator_limit)
-            integral[n] = total
-    torque: NDArray[np.float64] = np.clip(controller.kp * e + integral, -torque_limit, torque_limit)
-    return torque
+    return np.concatenate([u for _, u, _ in _torque_blocks(rec, controller)])
 
 
-def _integral(x: NDArray[np.float64], dt: float) -> NDArray[np.float64]:
-    return np.concatenate([[0.0], np.cumsum(0.5 * dt * (x[1:] + x[:-1]))])
+def _torque_blocks(
+    rec: Record, controller: PI | None, length: int = 1 << 18
+) -> Iterator[tuple[int, NDArray[np.float64], NDArray[np.float64]]]:
+    """(first sample, torque, velocity) a block at a time: of a long record no copy is made."""
+    integral = last = 0.0
+    for first in range(0, len(rec), length):
+        w = rec.velocity[first : first + length]
+        if rec.torque is not None:
+            yield first, rec.torque[first : first + length], w
+            continue
+        assert controller is not None and rec.command is not None  # checked on entry to identify()
+        e = rec.command[first : first + length] - w
+        increments = 0.5 * controller.ki * rec.dt * (e + np.concatenate([[last], e[:-1]]))
+        increments[0] += integral
+        integrals = np.cumsum(increments)
+        torque_limit, integrator_limit = controller.limits
+        if np.abs(integrals).max() > integrator_limit:
+            total = 0.0
+            for n, step in enumerate(increments.tolist()):
+                total = min(max(total + step, -integrator_limit), integrator_limit)
+                integrals[n] = total
+        integral, last = float(integrals[-1]), float(e[-1])
+        torque: NDArray[np.float64] = np.clip(controller.kp * e + integrals, -torque_limit, torque_limit)
+        yield first, torque, w

@@ -8,15 +8,24 @@ from numpy.typing import NDArray
 from gaident.data.record import Record
 from gaident.models.controller import PI
 
-__all__ = ["doubtful_start", "noise_std", "starts_moving"]
+__all__ = ["doubtful_start", "noise_std", "starts_moving", "stretches"]
 
 
 def noise_std(velocity: NDArray[np.float64]) -> float:
     """Standard deviation of white noise on a smooth signal, from its third differences (median, so robust) [rad/s].
 
-    A third difference of white noise has the variance 1 + 9 + 9 + 1 = 20 times the noise's.
+    A third difference of white noise has the variance 1 + 9 + 9 + 1 = 20 times the noise's. Of a long signal evenly spaced
+    stretches, a million samples in all, will do.
     """
-    return float(1.4826 * np.median(np.abs(np.diff(velocity, 3))) / np.sqrt(20.0))
+    thirds = np.concatenate([np.diff(w, 3) for w in stretches(velocity)])
+    return float(1.4826 * np.median(np.abs(thirds)) / np.sqrt(20.0))
+
+
+def stretches(x: NDArray[np.float64], count: int = 64, length: int = 16384) -> list[NDArray[np.float64]]:
+    """Evenly spaced views of a long signal; of a shorter one the whole."""
+    if len(x) <= count * length:
+        return [x]
+    return [x[i : i + length] for i in np.linspace(0, len(x) - length, count).astype(int).tolist()]
 
 
 def starts_moving(rec: Record, controller: PI | None) -> bool:
@@ -51,10 +60,11 @@ def _constant_input(rec: Record, controller: PI | None) -> bool:
 
 def _first_is_motion(rec: Record, controller: PI | None) -> bool:
     w = rec.velocity
-    steps = np.abs(np.diff(w))
-    smallest = float(steps[steps > 0.0].min()) if np.any(steps > 0.0) else 0.0
-    quantum = smallest if np.mean(steps == 0.0) > 0.1 else 0.0  # repeats betray a quantised signal
-    tolerance = max(6.0 * noise_std(w), 1.5 * quantum, 1e-3 * float(np.abs(w).max()))
+    steps = np.concatenate([np.abs(np.diff(part)) for part in stretches(w)])
+    moves = steps[steps > 0.0]
+    # Repeats betray a quantised signal.
+    quantum = float(moves.min()) if len(moves) and len(moves) < 0.9 * len(steps) else 0.0
+    tolerance = max(6.0 * noise_std(w), 1.5 * quantum, 1e-3 * max(float(w.max()), -float(w.min())))
     first = float(w[0])
     if controller is not None and controller.loop == "continuous" and rec.command is not None and rec.command[0] != 0.0:
         passed = first / float(rec.command[0])

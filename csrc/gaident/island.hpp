@@ -1,0 +1,41 @@
+// Some species of a search, bred together. Species never mate with one another, so islands can run side by side.
+#pragma once
+
+#include "breeder.hpp"
+
+#include <functional>
+
+namespace gaident {
+
+class Island {
+public:
+    // `settings.population` individuals, shared evenly, at least three per species: fewer cannot mate.
+    Island(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random,
+           std::span<const Structure> species);
+    Island(const Island&) = delete;
+
+    // One round from fresh random individuals; `on_generation` hears the least fitness of each generation.
+    void breed(int generations, const std::function<void(double)>& on_generation);
+
+    // Of the round: least fitness per generation, and the chromosome of the least of all.
+    const std::vector<double>& history() const { return history_; }
+    const std::vector<Word>& best() const { return best_; }
+
+    // The best individual of the k-th species as the round left it.
+    Factors<double> candidate(std::size_t k) const {
+        return breeder_.candidate(breeder_.best_of(groups_[k].first, groups_[k].count));
+    }
+    std::size_t evaluations() const { return breeder_.evaluations(); }
+
+private:
+    Genome genome_;
+    Settings settings_;
+    std::vector<Structure> species_;
+    std::vector<Breeder::Group> groups_;
+    Breeder breeder_;
+    std::vector<double> history_;
+    std::size_t best_generation_ = 0;
+    std::vector<Word> best_;
+};
+
+}  // namespace gaident

@@ -1,0 +1,63 @@
+"""What to keep in mind about a result, in plain sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from gaident.identification.adequacy import Adequacy
+from gaident.identification.covariance import Estimate
+from gaident.identification.result import Rival
+from gaident.identification.selection import MARGIN
+from gaident.models.mechanics import OneMass, TwoMass
+from gaident.models.model import Model
+
+__all__ = ["warnings_of"]
+
+
+def warnings_of(
+    judged: Adequacy,
+    parameters: dict[str, Estimate],
+    mechanics: OneMass | TwoMass | None,
+    rivals: Sequence[Rival],
+    model: Model,
+    larger_fits_better: bool,
+    started: Sequence[str],
+) -> tuple[str, ...]:
+    """The sentences, those about the records (`started`) first."""
+    notes = list(started)
+    if judged.falsified or judged.undecided:
+        notes.append(judged.sentence)
+    if judged.falsified and larger_fits_better:
+        notes.append(
+            "Larger structures come closer, but only by absorbing what no linear structure holds; the smallest mechanism "
+            f"is reported, ({model.p},{model.q})."
+        )
+    bound = [n for n, e in parameters.items() if e.at_bound]
+    if bound:
+        notes.append(f"At a bound of the search range: {', '.join(bound)}. Widen the space, or doubt the structure.")
+    unknown = [n for n, e in parameters.items() if not e.at_bound and not e.identifiable]
+    if unknown:
+        notes.append(f"Not identifiable from this data (standard deviation as large as the value): {', '.join(unknown)}.")
+    if rivals:
+        names = ", ".join(f"({r.p},{r.q})" for r in rivals)
+        notes.append(f"Structures within {MARGIN:.0f} BIC units of ({model.p},{model.q}): {names}; the smallest is reported.")
+    if mechanics is not None:
+        notes.extend(_shaft_notes(mechanics))
+        notes.extend(mechanics.notes)
+    return tuple(notes)
+
+
+def _shaft_notes(mechanics: OneMass | TwoMass) -> list[str]:
+    """A sentence where the six numbers of a two-mass model contradict a shaft without damping by more than three deviations."""
+    std = mechanics.std.get("inconsistency", 0.0)
+    found = mechanics.inconsistency or 0.0
+    if not isinstance(mechanics, TwoMass) or not std > 0.0 or found < 3.0 * std:
+        return []
+    damped = mechanics.with_shaft_damping
+    remedy = "an effect that the model lacks bends them; trust neither"
+    if damped is not None and damped.physical:
+        remedy = (
+            f"use mechanics.with_shaft_damping (JM = {damped.JM:.4g}, JL = {damped.JL:.4g}, KG = {damped.KG:.4g}, "
+            f"DG = {damped.DG:.3g}), or look for an effect that the model lacks"
+        )
+    return [f"The mechanics without shaft damping contradict the model by {100 * found:.2g} +- {100 * std:.2g} %: {remedy}."]
