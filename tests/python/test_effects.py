@@ -64,9 +64,7 @@ def pulses(n: int = SAMPLES) -> Array:
     return np.where(k > 0.93 * n, 0.0, slow + 0.6 * (k % 90 < 6))
 
 
-def record(
-    dt: float, loop: str, position: Array | None = None, velocity: Array | None = None, n: int = SAMPLES
-) -> ga.Record:
+def record(dt: float, loop: str, position: Array | None = None, velocity: Array | None = None, n: int = SAMPLES) -> ga.Record:
     measured = np.zeros(n) if velocity is None else velocity
     if loop == "open":
         return ga.Record(dt, torque=pulses(n), velocity=measured, position=position)
