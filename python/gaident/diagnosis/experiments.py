@@ -82,7 +82,7 @@ class Proposal:
 
     command    velocity command [rad/s], shape (n,), one value every dt [s]
     separates  names of effects that it tells apart, or makes visible where there is no record yet
-    margin     chi2 that the wrong one of two rivals would leave (25 tells them apart); nan where nothing was compared
+    margin     BIC units by which the wrong one of two rivals would be worse (10 tell them apart); nan where nothing was compared
     reason     one plain sentence
     """
 

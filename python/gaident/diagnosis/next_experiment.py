@@ -139,7 +139,8 @@ def propose(
         listed = " from ".join(n.replace("_", " ") for n in names)
         return None, [*notes, f"No experiment of the menu within the limits of these records separates {listed}."]
     n = len(best.command)
-    return best.proposal(names, float(n * np.log1p(most / n))), notes
+    proposal = best.proposal(names, float(n * np.log1p(most / n)))
+    return replace(proposal, reason=f"{best.name.capitalize()}: {best.reason[0].lower()}{best.reason[1:]}"), notes
 
 
 def at_rest(fit: Fit) -> tuple[Layout, Vector]:

@@ -75,8 +75,9 @@ class Problem:
     def whitened(self, E: Matrix, phi: Vector) -> Matrix:
         """Rows of whitened errors; samples whose past is missing, or not in use, are 0."""
         V = E.copy()
-        for i, f in enumerate(phi, start=1):
-            V[:, i:] -= f * E[:, :-i]
+        with np.errstate(invalid="ignore", over="ignore"):  # rows of models that diverge
+            for i, f in enumerate(phi, start=1):
+                V[:, i:] -= f * E[:, :-i]
         return np.where(self.usable(len(phi)) > 0.0, V, 0.0)
 
     def usable(self, order: int) -> Vector:
