@@ -52,15 +52,15 @@ def overview(dia: Diagnosis, records: Sequence[Record], axis: str = "rotary") ->
         dia.after.noise_floor,
         std=float(np.median(missing.std)),
         extended=extended,
-        curve=velocity_curve(dia, float(np.abs(rec.velocity).max())),
+        curve=velocity_curve(dia, float(rec.velocity.min()), float(rec.velocity.max())),
         title=_title(dia, rec, len(records)),
         axis=axis,
     )
 
 
-def velocity_curve(dia: Diagnosis, top: float) -> Curve | None:
-    """(velocity, torque, label) of the effects that are functions of the velocity, over +-top [rad/s]; None without one."""
-    w = np.linspace(-top, top, 401)
+def velocity_curve(dia: Diagnosis, low: float, high: float) -> Curve | None:
+    """(velocity, torque, label) of the effects that are functions of the velocity, from low to high [rad/s]; None without one."""
+    w = np.linspace(low, high, 401)
     size, sign = np.abs(w), np.sign(w)
     torque, names = np.zeros_like(w), []
     for effect in dia.model.effects:
