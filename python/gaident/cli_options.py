@@ -138,15 +138,25 @@ def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], None]]) -> a
     g.add_argument("--plot", metavar="FILE", help=f"draw measured against simulated ({', '.join(PICTURES)})")
     g.add_argument("--json", action="store_true", help="print what --out saves instead of the summary")
 
-    sub = command("diagnose", "LOG... ", "log -> what the model gets wrong, its cause, the gain", DIAGNOSE_HELP, DIAGNOSE_EXAMPLES)
+    sub = command(
+        "diagnose", "LOG... ", "log -> what the model gets wrong, its cause, the gain", DIAGNOSE_HELP, DIAGNOSE_EXAMPLES
+    )
     sub.add_argument("logs", nargs="+", metavar="LOG", help="log file; several are judged together")
-    sub.add_argument("--validation", nargs="+", metavar="LOG", help="logs that no parameter is fitted to (default: the last 30 %% of each log)")
+    sub.add_argument(
+        "--validation", nargs="+", metavar="LOG", help="logs that no parameter is fitted to (default: the last 30 %% of each log)"
+    )
     sub.add_argument("--model", metavar="FILE", help="the identification to diagnose, as identify --out saved it")
     _add_log_options(sub)
     _add_controller_options(sub)
     g = sub.add_argument_group("the diagnosis")
     g.add_argument("--noise", type=float, metavar="X", help="standard deviation of the velocity noise, where it is known [rad/s]")
-    g.add_argument("--bootstrap", type=int, default=0, metavar="N", help="simulated records for the p-value of the first finding (default 0: none)")
+    g.add_argument(
+        "--bootstrap",
+        type=int,
+        default=0,
+        metavar="N",
+        help="simulated records for the p-value of the first finding (default 0: none)",
+    )
     g.add_argument("--seed", type=int, default=0, metavar="N", help="same seed, same result (default 0)")
     g = sub.add_argument_group("results")
     g.add_argument("--out", metavar="FILE", help="save the diagnosis (JSON)")

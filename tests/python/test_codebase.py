@@ -37,13 +37,14 @@ ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "data": ({"errors"}, set()),
     "models": ({"errors", "data", "_core"}, set()),
     "identification": ({"errors", "version", "data", "models", "_core"}, {"show"}),
-    "diagnosis": ({"errors", "data", "models", "identification"}, {"show"}),
+    "diagnosis": ({"errors", "version", "data", "models", "identification"}, {"show"}),
+    "store": ({"errors", "identification", "diagnosis"}, set()),
     "show": ({"errors"}, set()),
     "drive_file": (DESK, set()),
-    "demo": (DESK, {"show"}),
-    "cli": (DESK | {"drive_file", "demo"}, {"show", "_core"}),
+    "demo": (DESK | {"diagnosis"}, {"show"}),
+    "cli": (DESK | {"diagnosis", "store", "drive_file", "demo"}, {"show", "_core"}),
     "__main__": ({"cli"}, set()),
-    "__init__": (DESK, {"show", "version"}),
+    "__init__": (DESK | {"diagnosis", "store"}, {"show", "version"}),
 }
 
 

@@ -1,7 +1,7 @@
 """The linear mechanism that effects are added to: one mass or two.
 
-Lags, delays and filters are linear too, and an identification absorbs them in poles and zeros of no mechanical meaning. A diagnosis starts
-from the mechanism, so that they can be told by name.
+Lags, delays and filters are linear too, and an identification absorbs them in poles and zeros of no mechanical meaning. A
+diagnosis starts from the mechanism, so that they can be told by name.
 """
 
 from __future__ import annotations
@@ -27,9 +27,8 @@ Vector = NDArray[np.float64]
 def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]:
     """One mass, two masses, or both where only the effects can decide.
 
-    Two alone where nothing on one mass comes near it, else one mass first: a delay or a lag looks like a resonance as long as nothing
-    else is tried, and a load or a saturation hides one.
-    The identified model is a start where it is such a mechanism.
+    Two alone where nothing on one mass comes near it, else one mass first: a delay or a lag looks like a resonance as long as
+    nothing else is tried, and a load or a saturation hides one. The identified model is a start where it is such a mechanism.
     """
     problem, driven = search.problem, search.driven
     one = _fit(problem, driven, scales, one_mass(driven, identified))

@@ -29,7 +29,13 @@ Vector = NDArray[np.float64]
 
 
 def largest_gains(
-    problem: Problem, driven: Driven, allowed: tuple[str, ...], base: Fit, final: Fit, draws: int, seed: int,
+    problem: Problem,
+    driven: Driven,
+    allowed: tuple[str, ...],
+    base: Fit,
+    final: Fit,
+    draws: int,
+    seed: int,
     note: Callable[[str], None],
 ) -> Vector:
     """The best first gain on each of `draws` records without an effect (BIC units; -inf where nothing was worth a fit)."""

@@ -1,8 +1,8 @@
 """The candidates of a diagnosis: every effect as coordinates that a fit can move, with bounds, starts, kin and twins.
 
-The bounds are part of each definition: a Stribeck friction of any speed and any ratio imitates half of the library. Coordinates are chosen
-so that a fit moves smoothly: logarithms of positive numbers whose size is unknown, the two components a cos(phase), a sin(phase) of a
-harmonic, ratios instead of differences.
+The bounds are part of each definition: a Stribeck friction of any speed and any ratio imitates half of the library. Coordinates
+are chosen so that a fit moves smoothly: logarithms of positive numbers whose size is unknown, the two components a cos(phase),
+a sin(phase) of a harmonic, ratios instead of differences.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def _single(
 
 
 def _linear(effect: str, name: str, low: Callable[[Scales], float], high: Callable[[Scales], float],
-            starts: Callable[[Scales], tuple[float, ...]], step: Callable[[Scales], float]) -> Candidate:
+            starts: Callable[[Scales], tuple[float, ...]], step: Callable[[Scales], float]) -> Candidate:  # fmt: skip
     """A shaft torque in proportion to one number, moved as it is."""
     return Candidate(
         effect,
@@ -156,7 +156,8 @@ def _harmonic(effect: str, place: str, first: int, with_order: bool, kind: str) 
 
     def limits(s: Scales) -> Rows:
         a = amplitude(s)
-        return [(-a, a), (-a, a), (float(first), 1000.0)][: 3 if with_order else 2]
+        rows: Rows = [(-a, a), (-a, a), (float(first), 1000.0)]
+        return rows[: 3 if with_order else 2]
 
     def steps(s: Scales) -> tuple[float, ...]:
         a = 0.05 * amplitude(s)
@@ -197,7 +198,7 @@ CANDIDATES: dict[str, Candidate] = {
             "plant",
             _positive(0, 2),
             lambda p: np.array([np.log(p["frequency"]), p["damping"], np.log(p["zero_frequency"]), p["zero_damping"]]),
-            lambda s: [_ln(2.0 / s.duration, 0.95 * np.pi / s.dt), (1e-4, 2.0), _ln(2.0 / s.duration, 0.95 * np.pi / s.dt), (1e-4, 2.0)],  # type: ignore[list-item]
+            lambda s: 2 * [_ln(2.0 / s.duration, 0.95 * np.pi / s.dt), (1e-4, 2.0)],
             _resonance_starts,
             lambda s: (0.1, 0.05, 0.1, 0.05),
         ),
@@ -208,7 +209,7 @@ CANDIDATES: dict[str, Candidate] = {
             "shaft",
             _stribeck,
             lambda p: np.array([p["torque"], p["static_torque"] / p["torque"] - 1.0, np.log(p["stribeck_velocity"])]),
-            lambda s: [(1e-6 * s.torque, s.torque), (0.0, 2.0), _ln(1e-4 * s.speed, 0.1 * s.speed)],  # type: ignore[list-item]
+            lambda s: [(1e-6 * s.torque, s.torque), (0.0, 2.0), _ln(1e-4 * s.speed, 0.1 * s.speed)],
             lambda s: _grid((s.friction,), (0.3, 1.0), _ln(0.005 * s.speed, 0.02 * s.speed, 0.06 * s.speed)),
             lambda s: (_friction_steps(s), 0.3, 0.3),
             parents=("coulomb_friction",),
@@ -229,8 +230,10 @@ CANDIDATES: dict[str, Candidate] = {
             "shaft",
             _positive(1),
             lambda p: np.array([p["torque"], np.log(p["stiffness"])]),
-            lambda s: [(1e-6 * s.torque, s.torque), _ln(s.friction / max(0.3 * s.travel, 1e-9), 1e6 * s.friction / max(s.travel, 1e-9))],  # type: ignore[list-item]
-            lambda s: [(s.friction, float(np.log(s.friction / x))) for x in np.geomspace(2e-4, 0.1, 6) * min(max(s.travel, 1e-9), 1.0)],
+            lambda s: [(1e-6 * s.torque, s.torque),
+                       _ln(s.friction / max(0.3 * s.travel, 1e-9), 1e6 * s.friction / max(s.travel, 1e-9))],
+            lambda s: [(s.friction, float(np.log(s.friction / x)))
+                       for x in np.geomspace(2e-4, 0.1, 6) * min(max(s.travel, 1e-9), 1.0)],
             lambda s: (_friction_steps(s), 0.5),
             parents=("coulomb_friction",),
         ),
@@ -254,7 +257,8 @@ CANDIDATES: dict[str, Candidate] = {
         _single("backlash", "coupling", "gap", lambda s: 1e-4 * s.torque / s.stiffness, lambda s: 100.0 * s.torque / s.stiffness,
                 lambda s: tuple(s.torque / s.stiffness * np.geomspace(1e-3, 2.0, 16)), rough=True),
         _single("hardening_stiffness", "coupling", "cubic_stiffness", lambda s: 1e-3 * s.stiffness**3 / s.torque**2,
-                lambda s: 1e5 * s.stiffness**3 / s.torque**2, lambda s: tuple(s.stiffness**3 / s.torque**2 * np.geomspace(0.05, 500.0, 6)), rough=True),
+                lambda s: 1e5 * s.stiffness**3 / s.torque**2,
+                lambda s: tuple(s.stiffness**3 / s.torque**2 * np.geomspace(0.05, 500.0, 6)), rough=True),
         _single("torque_saturation", "actuator", "limit", lambda s: 0.01 * s.torque, lambda s: 1.0 * s.torque,
                 lambda s: tuple(s.torque * np.array([0.97, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2]))),
         _single("torque_dead_band", "actuator", "width", lambda s: 1e-4 * s.torque, lambda s: 0.7 * s.torque,
@@ -270,5 +274,5 @@ CANDIDATES: dict[str, Candidate] = {
         _single("command_rate_limit", "controller", "rate", lambda s: 1e-3 * s.acceleration, lambda s: s.acceleration,
                 lambda s: tuple(s.acceleration * np.geomspace(2e-3, 0.7, 8))),
     )
-}
+}  # fmt: skip
 """Every effect that a diagnosis can name, in the order of a report's tables."""

@@ -34,7 +34,7 @@ def controller_findings(driven: Driven, scales: Scales) -> tuple[list[Finding], 
     replays = [replay(r, driven.controller) for r in driven.records]
     if all(r.follows for r in replays):
         return [], AtController(AT_CONTROLLER), []
-    notes = []
+    notes: list[str] = []
     error = driven.replayed_error({})
     plain = float(error @ error)
     best: tuple[float, str, float] | None = None

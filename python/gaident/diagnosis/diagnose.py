@@ -63,15 +63,15 @@ def diagnose(
     """Shows what the model of an axis gets wrong, names the physical cause where the data allow it, and measures the gain.
 
     rec: a Record or a list. controller: the velocity loop's PI; None: open loop, the record's torque drives the model.
-    identification: what identify() found; without it, it is run first. validation: Record or list that no fit sees; without it the
-        last 30 % of each record are held out where they are long enough (see `held_out`).
+    identification: what identify() found; without it, it is run first. validation: Record or list that no fit sees; without it
+        the last 30 % of each record are held out where they are long enough (see `held_out`).
     noise: standard deviation of the velocity noise [rad/s], or a Record at standstill; None: from the record itself.
     bootstrap: simulated records without any effect to calibrate the p-value of the first finding; 0: none.
     progress: called now and then with (fraction done, message).
 
-    The method: stepwise extension by the effects of `gaident.effects.table()`, base and effects refitted together on whitened errors of a
-    torque-driven simulation, decided by BIC with a calibrated threshold; rivals within 10 units and structural twins make a finding
-    ambiguous; what no effect explains is reported by its driver and not named. See docs/diagnosis.md.
+    The method: stepwise extension by the effects of `gaident.effects.table()`, base and effects refitted together on whitened
+    errors of a torque-driven simulation, decided by BIC with a calibrated threshold; rivals within 10 units and structural
+    twins make a finding ambiguous; what no effect explains is reported by its driver and not named. See docs/diagnosis.md.
 
     Raises GaidentError (a ValueError) that names the argument, its value and the remedy.
     """
@@ -191,7 +191,14 @@ class _Work:
         causes = [e for e in self.final.effects if not self._only_describes(e, driver)]
         estimates = estimates_of(self.problem, self.final)
         gains = measured_gains(
-            self.clean, self.held, self.controller, self.idn.model, self.final, self.problem, self.noise, self.at_controller.effects
+            self.clean,
+            self.held,
+            self.controller,
+            self.idn.model,
+            self.final,
+            self.problem,
+            self.noise,
+            self.at_controller.effects,
         )
         findings = [*self._noise_findings(), *(replace(f, gain=gains.of(f.effect)) for f in self.controller_steps)]
         for effect in causes:
@@ -228,7 +235,9 @@ class _Work:
             self.note(0.95, "proposing the next experiment")
             from gaident.diagnosis.next_experiment import propose
 
-            proposal = propose(ambiguous, self.rivals, self.final, self.driven, self.problem, self.noise_floor())
+            elsewhere = self.at_controller.effects
+            proposal, notes = propose(ambiguous, self.rivals, self.final, self.driven, self.problem.count, elsewhere)
+            self.notes += notes
         return Diagnosis(
             verdict=verdict,
             findings=tuple(findings),
@@ -254,10 +263,6 @@ class _Work:
             records=self.records,
         )
 
-    def noise_floor(self) -> float:
-        """Standard deviation of the velocity noise [rad/s]."""
-        return self.noise if self.noise is not None else float(np.sqrt(self.final.cost / self.problem.count))
-
     def _only_describes(self, effect: str, driver: str | None) -> bool:
         """Whether a finding stands in the domain of what is left: something there is not in the library."""
         if driver is None:
@@ -280,11 +285,18 @@ class _Work:
             fraction = self.spoiled / total
             text = f"{self.spoiled} of {total} samples leave the signal and come back; they are left out of every fit."
             found.append(
-                Finding("outliers", {"fraction": Estimate(fraction, float(np.sqrt(self.spoiled) / total), "1")}, evidence=text, is_noise=True)
+                Finding(
+                    "outliers",
+                    {"fraction": Estimate(fraction, float(np.sqrt(self.spoiled) / total), "1")},
+                    evidence=text,
+                    is_noise=True,
+                )
             )
         if self.step > 0.0:
             text = f"All velocities lie on a lattice of {self.step:.4g} rad/s: the resolution of the encoder or of the log."
-            found.append(Finding("velocity_quantisation", {"step": Estimate(self.step, 0.0, "rad/s")}, evidence=text, is_noise=True))
+            found.append(
+                Finding("velocity_quantisation", {"step": Estimate(self.step, 0.0, "rad/s")}, evidence=text, is_noise=True)
+            )
         return found
 
     def _structural(self, estimates: dict[str, dict[str, Estimate]]) -> list[Finding]:
@@ -332,7 +344,12 @@ def _records(rec: Record | Sequence[Record], name: str) -> tuple[Record, ...]:
 
 
 def _check(
-    records: tuple[Record, ...], held: tuple[Record, ...], controller: PI | None, idn: Identification | None, bootstrap: int, seed: int
+    records: tuple[Record, ...],
+    held: tuple[Record, ...],
+    controller: PI | None,
+    idn: Identification | None,
+    bootstrap: int,
+    seed: int,
 ) -> None:
     if controller is not None and not isinstance(controller, PI):
         raise SettingsError(f"controller is {controller!r}: give a gaident.PI, or None for a record in open loop")
@@ -356,5 +373,5 @@ def _noise_std(noise: float | Record | None) -> float | None:
     if isinstance(noise, Record):
         return float(np.std(noise.velocity))
     if isinstance(noise, bool) or not isinstance(noise, (int, float)) or not 0.0 < float(noise) < float("inf"):
-        raise SettingsError(f"noise is {noise!r}: give the standard deviation of the velocity noise in rad/s, above 0, or a Record at standstill")
+        raise SettingsError(f"noise is {noise!r}: give its standard deviation in rad/s, above 0, or a Record at standstill")
     return float(noise)

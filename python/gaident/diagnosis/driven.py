@@ -1,8 +1,8 @@
 """The records as the fit sees them: what drove the motor, where it stood, how it began.
 
-A model is driven by the torque that the controller issued: as logged or, without a log, as the controller makes it from the command and the
-*measured* velocity. Noise inside the loop then acts in the model as it did on the drive, and what is left at the truth is the noise
-of the sensor and torques that nobody commanded.
+A model is driven by the torque that the controller issued: as logged or, without a log, as the controller makes it from the
+command and the *measured* velocity. Noise inside the loop then acts in the model as it did on the drive, and what is left at
+the truth is the noise of the sensor and torques that nobody commanded.
 """
 
 from __future__ import annotations

@@ -8,8 +8,9 @@ asks for more than the torque limit on purpose, as nothing else shows saturation
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +82,7 @@ class Proposal:
 
     command    velocity command [rad/s], shape (n,), one value every dt [s]
     separates  names of effects that it tells apart, or makes visible where there is no record yet
-    margin     chi2 that the wrong one of two rivals would leave (25 tells them apart); nan where nothing was compared
+    margin     BIC units by which the wrong one of two rivals would be worse (10 tell them apart); nan where nothing was compared
     reason     one plain sentence
     """
 
@@ -95,6 +96,29 @@ class Proposal:
     def duration(self) -> float:
         """[s]."""
         return len(self.command) * self.dt
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "command": self.command.tolist(),
+            "dt": self.dt,
+            "separates": list(self.separates),
+            "margin": self.margin,
+            "reason": self.reason,
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Proposal:
+        """The inverse of to_dict."""
+        command = np.asarray(data["command"], dtype=np.float64)
+        return cls(command, float(data["dt"]), tuple(data["separates"]), float(data["margin"]), str(data["reason"]))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Proposal):
+            return NotImplemented
+        return repr(self.to_dict()) == repr(other.to_dict())
+
+    __hash__ = None  # type: ignore[assignment]
 
     @property
     def reach(self) -> tuple[float, float]:

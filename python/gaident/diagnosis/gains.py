@@ -1,7 +1,8 @@
 """Before and after: the free-run simulation, linear and extended, on data that no parameter was fitted to.
 
-With validation records these are used whole. Without, parameters are fitted again to the first 70 % of each record and judged on the
-rest of one continuous run, never started anew; where a record is too short for that, the figures are in-sample and say so.
+With validation records these are used whole. Without, parameters are fitted again to the first 70 % of each record and judged
+on the rest of one continuous run, never started anew; where a record is too short for that, the figures are in-sample and say
+so.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from gaident.models.controller import PI
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
 
-__all__ = ["Gains", "measured_gains"]
+__all__ = ["Gains", "free_run_errors", "measured_gains"]
 
 Vector = NDArray[np.float64]
 
@@ -68,9 +69,9 @@ def measured_gains(
     if at_controller:
         chain.append(_with(stages[0].layout.model(stages[0].x), at_controller))
     chain += [_with(f.layout.model(f.x), at_controller) for f in stages[1:]]
-    errors = [_errors(m, judged, controller) for m in chain]
+    errors = [free_run_errors(m, judged, controller) for m in chain]
     levels = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in errors]
-    base = _errors(stages[0].layout.model(stages[0].x), judged, controller)
+    base = free_run_errors(stages[0].layout.model(stages[0].x), judged, controller)
     level0 = float(np.sqrt(np.mean(np.concatenate(base) ** 2)))
     # The linear mechanism, refitted, may be better than the identified model already.
     previous = min(levels[0], level0) if np.isfinite(level0) else levels[0]
@@ -115,7 +116,8 @@ def _stages(final: Fit, problem: Problem, part: float | None) -> list[Fit]:
     return fits[::-1]
 
 
-def _errors(model: Model, judged: Sequence[tuple[Record, int]], controller: PI | None) -> list[Vector]:
+def free_run_errors(model: Model, judged: Sequence[tuple[Record, int]], controller: PI | None) -> list[Vector]:
+    """Measured minus simulated velocity of each record from a sample on [rad/s]; 1e150 where a simulation diverges."""
     errors = []
     for r, first in judged:
         state = None
@@ -149,5 +151,3 @@ def _memory(e: Vector) -> int:
     r = np.fft.irfft(spectrum, size)[: len(e)]
     below = np.flatnonzero(r < 0.2 * r[0])
     return int(below[0]) if len(below) else len(e)
-
-

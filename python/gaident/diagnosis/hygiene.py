@@ -48,7 +48,7 @@ def cleaned(rec: Record, hit: NDArray[np.intp]) -> Record:
 
 
 def quantisation(records: tuple[Record, ...]) -> float:
-    """Step of the lattice that all velocities lie on [rad/s], 0 where there is none or where it is below the noise of a text log."""
+    """Step of the lattice that all velocities lie on [rad/s], 0 where there is none or only a text log's."""
     w = np.concatenate([r.velocity for r in records])
     step = lattice_step(w)
     return step if step > 1e-4 * float(np.ptp(w)) else 0.0

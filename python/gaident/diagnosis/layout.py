@@ -1,10 +1,10 @@
 """The parameters of an extended model as one vector, and back.
 
-    one mass     x = [ln |K|, a | effects | start states]                            G(s) = K / (s + a)
-    two masses   x = [ln |K|, a, e1, e0, f1, f0 | effects | start states]            G(s) = K (s^2 + f1 s + f0) / ((s + a) (s^2 + e1 s + e0))
+    one mass   x = [ln |K|, a | effects | start states]                  G(s) = K / (s + a)
+    two masses x = [ln |K|, a, e1, e0, f1, f0 | effects | start states]  G(s) = K (s^2 + f1 s + f0) / ((s + a) (s^2 + e1 s + e0))
 
-a, e1, e0, f1, f0 in units of their own size, so that a step of 1 is large and one of 1e-4 small for every entry. Pairs pass smoothly
-from complex to real roots.
+a, e1, e0, f1, f0 in units of their own size, so that a step of 1 is large and one of 1e-4 small for every entry. Pairs pass
+smoothly from complex to real roots.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def described(scales: Scales, model: Model) -> Scales:
     values = mechanism(model)
     if len(values) == 2:
         return replace(scales, two_masses=False)
-    K, a, e1, e0, f1, f0 = values
+    K, a, e1, e0, _, f0 = values
     JM = 1.0 / abs(K)
     # sum of pairwise A = K_G (1/J_M + 1/J_L) and prod B = K_G/J_L, dampings left out
     load = max(e0 + a * e1 - f0, 1e-3 * abs(e0))
@@ -62,9 +62,9 @@ def described(scales: Scales, model: Model) -> Scales:
 class Layout:
     """What the entries of x mean.
 
-    masses: 1 or 2. sign: of K. units: size of a, e1, ...; starts: start states of each record (0: it starts at rest). looped: the command
-    drives the model through the controller, instead of the torque: what happens in a gap is so sensitive to its start that without the
-    loop's grip a simulation loses its way, at the truth too.
+    masses: 1 or 2. sign: of K. units: size of a, e1, ...; starts: start states of each record (0: it starts at rest). looped: the
+    command drives the model through the controller, instead of the torque: what happens in a gap is so sensitive to its start
+    that without the loop's grip a simulation loses its way, at the truth too.
     """
 
     masses: int

@@ -1,9 +1,9 @@
 """What the error still depends on, named by its driver and never by a cause.
 
-Each driver is a handful of torques that some function of it could make, without saying which: hats over velocity, torque and position,
-harmonics of the angle, elasto-plastic elements (what depends on the past path), drifts and single frequencies in time. The linear part of
-the model answers to each; what the answers explain of the whitened error, beyond what the model's own parameters could, is the
-driver's gain in BIC units. All share one noise filter, estimated on what all together leave.
+Each driver is a handful of torques that some function of it could make, without saying which: hats over velocity, torque and
+position, harmonics of the angle, elasto-plastic elements (what depends on the past path), drifts and single frequencies in
+time. The linear part of the model answers to each; what the answers explain of the whitened error, beyond what the model's own
+parameters could, is the driver's gain in BIC units. All share one noise filter, estimated on what all together leave.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def _hats_by_sign(w: Vector) -> Matrix:
     knots = top * np.array([0.0, 0.01, 0.04, 0.12, 0.3, 0.6, 1.0])
     hats = np.array([np.interp(np.abs(w), knots, np.eye(len(knots))[i]) for i in range(len(knots))])
     rows = np.vstack([hats * (w > 0.0), hats * (w < 0.0)])
-    return rows[np.abs(rows).sum(axis=1) > 0.0]
+    return np.asarray(rows[np.abs(rows).sum(axis=1) > 0.0])
 
 
 def _of_position(angle: Vector, w: Vector, lengths: tuple[int, ...]) -> Matrix:

@@ -1,7 +1,8 @@
 """The records as a fit sees them, and the fit: least squares of whitened errors over base, effects and start states at once.
 
-A model is driven by the torque that the controller issued, as logged or as the controller makes it from command and *measured* velocity:
-noise inside the loop then acts on the record as it did on the drive, and what is left at the truth is the noise of the sensor alone.
+A model is driven by the torque that the controller issued, as logged or as the controller makes it from command and *measured*
+velocity: noise inside the loop then acts on the record as it did on the drive, and what is left at the truth is the noise of the
+sensor alone.
 
     e(n) = w(n) - w_model(n; x),   v(n) = e(n) - sum_i phi_i e(n-i),   minimise V(x) = sum of v^2 over the samples in use
 
@@ -74,9 +75,10 @@ class Problem:
     def whitened(self, E: Matrix, phi: Vector) -> Matrix:
         """Rows of whitened errors; samples whose past is missing, or not in use, are 0."""
         V = E.copy()
-        for i, f in enumerate(phi, start=1):
-            V[:, i:] -= f * E[:, :-i]
-        return V * self.usable(len(phi))
+        with np.errstate(invalid="ignore", over="ignore"):  # rows of models that diverge
+            for i, f in enumerate(phi, start=1):
+                V[:, i:] -= f * E[:, :-i]
+        return np.where(self.usable(len(phi)) > 0.0, V, 0.0)
 
     def usable(self, order: int) -> Vector:
         """1 for samples that count under a filter of this order."""

@@ -29,10 +29,10 @@ SCHEMA_VERSION = 1
 class Finding:
     """One thing that was found.
 
-    effect: its name in the effects table; parameters: name -> Estimate. alternatives: effects that these data cannot tell from it,
-    by statistics or by nature; empty: the cause is named. gain: fall of the held-out error that it brought, a fraction of the error
-    before; delta_bic: what it is worth on whitened errors; p_value: of the bootstrap, else None; evidence: one sentence. is_noise: it
-    describes the record rather than the drive.
+    effect: its name in the effects table; parameters: name -> Estimate. alternatives: effects that these data cannot tell from
+    it, by statistics or by nature; empty: the cause is named. gain: fall of the held-out error that it brought, a fraction of
+    the error before; delta_bic: what it is worth on whitened errors; p_value: of the bootstrap, else None; evidence: one
+    sentence. is_noise: it describes the record rather than the drive.
     """
 
     effect: str
@@ -52,7 +52,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Fitness:
-    """Free-run simulation against the measured velocity: rmse [rad/s], fit [%], and the rms that the noise alone leaves [rad/s]."""
+    """Free-run simulation against the measured velocity: rmse [rad/s], fit [%], rms that the noise alone leaves [rad/s]."""
 
     rmse: float
     fit_percent: float
@@ -63,9 +63,9 @@ class Fitness:
 class Diagnosis:
     """What the simulation gets wrong, why, and what the extended model gains. Made by `diagnose`; see API for each attribute.
 
-    gain_interval: 95 % interval of the fall of the error from before to after, a fraction. held_out: how the figures of `before` and
-    `after` were held out ("in-sample" where they could not be). base_shift: parameter -> (before, after) of the linear part.
-    left: gain in BIC units of each driver of what is left. notes: what to keep in mind, in plain sentences.
+    gain_interval: 95 % interval of the fall of the error from before to after, a fraction. held_out: how the figures of
+    `before` and `after` were held out ("in-sample" where they could not be). base_shift: parameter -> (before, after) of the
+    linear part. left: gain in BIC units of each driver of what is left. notes: what to keep in mind, in plain sentences.
     """
 
     verdict: str
@@ -106,14 +106,17 @@ class Diagnosis:
 
         return diagnosis_summary(self, axis)
 
-    def plot(self, records: Record | Sequence[Record] | None = None) -> Figure:
-        """What is wrong and what is left, as a matplotlib Figure; `records` as used unless given."""
+    def plot(self, records: Record | Sequence[Record] | None = None, axis: str = "rotary") -> Figure:
+        """What is wrong and what is left, as a matplotlib Figure; `records` as used unless given; axis="linear" for m and N.
+
+        Raises GaidentError where a loaded diagnosis is given no records, SettingsError for another axis.
+        """
         from gaident.diagnosis.evidence import overview
 
         given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
         if not given:
             raise GaidentError("records: a loaded diagnosis holds no data; give plot(records)")
-        return overview(self, given)
+        return overview(self, given, axis)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, without the records."""
@@ -152,7 +155,8 @@ class Diagnosis:
         """The inverse of to_dict. Raises GaidentError where the data are something else or of a newer schema."""
         if data.get("schema") != SCHEMA or data.get("schema_version") != SCHEMA_VERSION:
             raise GaidentError(
-                f"schema is {data.get('schema')!r}, version {data.get('schema_version')!r}: this is no diagnosis that this gaident reads"
+                f"schema is {data.get('schema')!r}, version {data.get('schema_version')!r}: "
+                "this is no diagnosis that this gaident reads"
             )
         try:
             return cls(

@@ -1,6 +1,7 @@
 """Which candidates are worth a fit: each one's starts simulated once, with what the present model could absorb taken out.
 
-With v the whitened error of the present model, v_c that of a start row and P the projection beyond the present model's sensitivities,
+With v the whitened error of the present model, v_c that of a start row and P the projection beyond the present model's
+sensitivities,
 
     d = P (v_c - v),   V_c = |P v|^2 - max(0, -d'P v)^2 / |d|^2,
 
@@ -94,7 +95,8 @@ class Screening:
         """(orders, columns): what the plain error loses per unit of the two components, pairs of rows per order."""
         candidate = CANDIDATES[effect]
         angle = self.driven.angle
-        orders = np.array([1.0]) if effect == "unbalance" else np.arange(1.0 if candidate.harmonic == "velocity" else 2.0, HIGHEST_ORDER + 1.0)
+        first = 1.0 if candidate.harmonic == "velocity" else 2.0
+        orders = np.array([1.0]) if effect == "unbalance" else np.arange(first, HIGHEST_ORDER + 1.0)
         turned = np.ptp(angle)
         # Seen is what passes at least once, and slowly enough for the sampling at the speeds that matter.
         speed = float(np.median(np.abs(self.problem.measured)) + 1e-12)
@@ -122,8 +124,8 @@ class Screening:
                 finite = np.all(np.isfinite(t.errors), axis=1)
                 if finite.any():
                     rest = project_out(t.base.J, t.base.error[None, :])[0]
-                    best = np.argmin(_along(project_out(t.base.J, t.errors[finite]) - rest, rest))
-                    directions.append((t.errors[finite][best] - first.error)[None, :])
+                    nearest = np.argmin(_along(project_out(t.base.J, t.errors[finite]) - rest, rest))
+                    directions.append((t.errors[finite][nearest] - first.error)[None, :])
         D = np.vstack(directions)[: max(len(first.error) // 8, 1)]
         return self.problem.filter_of(project_out(D, first.error[None, :])[0])
 
@@ -176,6 +178,6 @@ def _pair_worth(V: Matrix, rest: Vector) -> Vector:
 
 
 def _harmonic_start(t: _Trial, V: Matrix, rest: Vector, i: int) -> Vector:
-    z = np.linalg.lstsq(V[2 * i : 2 * i + 2].T, rest, rcond=None)[0]
-    coordinates = z if t.effect == "unbalance" else np.concatenate([z, t.rows[i]])
+    z: Vector = np.asarray(np.linalg.lstsq(V[2 * i : 2 * i + 2].T, rest, rcond=None)[0], dtype=np.float64)
+    coordinates: Vector = z if t.effect == "unbalance" else np.concatenate([z, t.rows[i]])
     return t.base.layout.inserted(t.base.x, coordinates)

@@ -1,8 +1,8 @@
 """Stepwise extension: one effect after the other, everything refitted with each.
 
-A candidate is worth the fall of the BIC that it brings, each hypothesis with a noise filter of its own; the best is taken while it is
-worth more than THRESHOLD. The friction family is one seat: a generalisation takes the place of dry friction, and only where it is
-worth more than the simpler one by the threshold again. After each step every member has to show that it is still needed.
+A candidate is worth the fall of the BIC that it brings, each hypothesis with a noise filter of its own; the best is taken while
+it is worth more than THRESHOLD. The friction family is one seat: a generalisation takes the place of dry friction, and only where
+it is worth more than the simpler one by the threshold again. After each step every member has to show that it is still needed.
 """
 
 from __future__ import annotations
@@ -167,17 +167,18 @@ class Search:
             self.add_generalisations(screening, fits[0], "coulomb_friction")
         if self.only_noise(now):
             # Where nothing but noise is left the linearised gains are upper bounds, near enough.
-            fall = max((now.bic - self.promised(s, phi) for phi in (now.phi, beyond) for s in screening.ranked(phi)[:1]), default=0.0)
+            hopes = [now.bic - self.promised(s, phi) for phi in (now.phi, beyond) for s in screening.ranked(phi)[:1]]
+            fall = max(hopes, default=0.0)
             if fall < 0.5 * THRESHOLD:
                 return fits
         # Two views: plainly, and through a filter of what the library cannot explain; each misses what the other one sees.
         short: dict[str, Fit] = {}
         for phi in (NONE, beyond):
             for s in screening.ranked(phi)[:FITTED]:
-                for start in s.starts[:2]:
+                for x0 in s.starts[:2]:
                     if s.effect == "coulomb_friction" and fits:
                         continue
-                    fit = self.problem.judged(self.problem.fit(s.layout, start, phi, 3))
+                    fit = self.problem.judged(self.problem.fit(s.layout, x0, phi, 3))
                     if s.effect not in short or fit.bic < short[s.effect].bic:
                         short[s.effect] = fit
         best = sorted(short.values(), key=lambda f: f.bic)[:FINISHED]
@@ -187,7 +188,7 @@ class Search:
 
     def promised(self, s: Screened, phi: Vector) -> float:
         """The BIC that a screened candidate promises under a filter."""
-        return s.bic + len(phi) * np.log(self.problem.count)
+        return s.bic + len(phi) * float(np.log(self.problem.count))
 
     def finished(self, fit: Fit) -> Fit:
         """A short fit taken to the end, under the filter of what it leaves itself."""

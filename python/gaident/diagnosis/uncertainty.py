@@ -47,7 +47,8 @@ def estimates_of(problem: Problem, fit: Fit) -> dict[str, dict[str, Estimate]]:
         values = CANDIDATES[effect].natural(z[None, :])[0]
         h = 1e-6 * np.maximum(np.abs(z), np.array(CANDIDATES[effect].steps(fit.layout.scales)))
         h[h == 0.0] = 1.0
-        slopes = np.array([(CANDIDATES[effect].natural((z + h * unit)[None, :])[0] - values) / h[i] for i, unit in enumerate(np.eye(len(z)))])
+        moved = CANDIDATES[effect].natural(z + np.diag(h))
+        slopes = (moved - values) / h[:, None]
         finite = np.where(np.isfinite(part), part, 0.0)
         variances = np.einsum("ij,ik,kj->j", slopes, finite, slopes)
         lost = np.any((np.abs(slopes) > 0.0) & ~np.isfinite(np.diag(part))[:, None], axis=0)

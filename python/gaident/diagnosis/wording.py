@@ -11,7 +11,9 @@ from gaident.models.effects import table
 __all__ = ["evidence_of", "value_text"]
 
 
-def evidence_of(effect: str, parameters: Mapping[str, Estimate], gain: float, rivals: Sequence[Rival], alternatives: Sequence[str]) -> str:
+def evidence_of(
+    effect: str, parameters: Mapping[str, Estimate], gain: float, rivals: Sequence[Rival], alternatives: Sequence[str]
+) -> str:
     """What speaks for a finding, and how far behind the next explanation is."""
     meaning = next(row.meaning for row in table() if row.name == effect)
     numbers = ", ".join(f"{name.replace('_', ' ')} {value_text(e)}" for name, e in parameters.items())

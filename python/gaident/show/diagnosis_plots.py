@@ -180,7 +180,11 @@ def _orders(ax: Axes, position: Vector, dhat: Vector, velocity: Vector, highest:
     travel = f"{lines.turns:.1f} turns" if axis == "rotary" else f"{scale:.3g} m"
     ax.plot(orders, lines.amplitude, color=BLUE, linewidth=0.8, label=travel)
     ax.axhline(lines.level, color=ORANGE, linewidth=1.2, linestyle="--", label="1 % level of chance")
+    labelled: list[float] = []
     for order, amplitude in lines.peaks:
+        if any(abs(order - other) < 0.06 * highest for other in labelled):
+            continue
+        labelled.append(order)
         where, text = (order / scale, amplitude), f"{order / scale:.3g}"
         ax.annotate(text, where, xytext=(0, 3), textcoords="offset points", ha="center", fontsize="small")
     ax.set_xlim(0.0, highest / scale)
@@ -195,8 +199,9 @@ def _reversals(ax: Axes, velocity: Vector, dhat: Vector, drive_torque: Vector, d
     styles = {"small torque": (SKY, "-"), "large torque": (VERMILION, "--"), "all": (BLUE, "-")}
     for name, (mean, spread, w, count) in found.groups.items():
         color, dashes = styles[name]
+        text = name.replace("torque", _kind(axis))
         ax.fill_between(ms, mean - spread, mean + spread, color=color, alpha=0.2, linewidth=0)
-        ax.plot(ms, mean, color=color, linestyle=dashes, linewidth=1.6, label=f"{name}: {count} reversal{'s' * (count > 1)}")
+        ax.plot(ms, mean, color=color, linestyle=dashes, linewidth=1.6, label=f"{text}: {count} reversal{'s' * (count > 1)}")
         if low is not None:
             low.plot(ms, w, color=color, linestyle=dashes, linewidth=1.3)
     if low is not None:
@@ -204,7 +209,8 @@ def _reversals(ax: Axes, velocity: Vector, dhat: Vector, drive_torque: Vector, d
         low.axvline(0.0, color=BLACK, linewidth=0.5)
         low.set_ylabel(f"velocity [{velocity_unit(axis)}]")
     if not found.groups:
-        ax.text(0.5, 0.5, "the velocity never reverses", transform=ax.transAxes, ha="center", color=GREY)
+        ax.text(0.5, 0.5, "the velocity never reverses", transform=ax.transAxes, ha="center", va="center", color=GREY)
+        ax.set_yticks([])
     ax.margins(x=0.0)
     ax.set_xlabel("time from the reversal [ms], the new direction positive")
     ax.set_ylabel(_torque_label(axis))
@@ -232,7 +238,18 @@ def _residual_frequency(ax: Axes, time: Vector, residual: Vector, noise_std: flo
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_xlabel("frequency [Hz]")
-    ax.set_ylabel(f"residual [{velocity_unit(axis)}/$\\sqrt{{\\mathrm{{Hz}}}}$]")
+    ax.set_ylabel(f"residual [{velocity_unit(axis)} / Hz$^{{1/2}}$]")
+    _plain_decades(ax)
+
+
+def _plain_decades(ax: Axes) -> None:
+    """Logarithmic axes with plain numbers, at 1, 2, 5 where few decades are shown."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    for each, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
+        each.set_major_locator(LogLocator(subs=(1.0,) if high > 1e3 * low else (1.0, 2.0, 5.0)))
+        each.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        each.set_minor_formatter(NullFormatter())
 
 
 def _torque_label(axis: str) -> str:

@@ -32,7 +32,16 @@ def diagnosis_summary(dia: Any, axis: str = "rotary") -> str:
 
     dia: a Diagnosis, or anything with its attributes. axis: "rotary", or "linear" for units of m and N.
     """
-    sections = [_verdict(dia, axis), _causes(dia, axis), _gain(dia, axis), _base(dia, axis), _noise(dia), _untested(dia), _next(dia), _how(dia)]
+    sections = [
+        _verdict(dia, axis),
+        _causes(dia, axis),
+        _gain(dia, axis),
+        _base(dia, axis),
+        _noise(dia),
+        _untested(dia),
+        _next(dia),
+        _how(dia),
+    ]
     return "\n\n".join("\n".join(lines) for lines in sections if lines)
 
 
@@ -64,7 +73,10 @@ def _causes(dia: Any, axis: str) -> list[str]:
             continue
         status = "named" if not f.alternatives else "one of " + ", ".join(map(_words, (f.effect, *f.alternatives)))
         lines.append(f"{_words(f.effect)} ({status})")
-        rows = [(_words(n), with_std(e.value, e.std), unit(e.unit, axis) if e.unit != "1" else "", _flag(e)) for n, e in f.parameters.items()]
+        rows = [
+            (_words(n), with_std(e.value, e.std), unit(e.unit, axis) if e.unit != "1" else "", _flag(e))
+            for n, e in f.parameters.items()
+        ]
         lines += table(rows)
         lines += [f"  {line}" for line in textwrap.wrap(f.evidence, WIDTH - 2)]
         if f.p_value is not None:
@@ -128,11 +140,16 @@ def _next(dia: Any) -> list[str]:
         return []
     text = f"{p.reason} Separates {' from '.join(map(_words, p.separates))}; expected margin {p.margin:.0f} BIC units."
     lines = textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="  ")
-    return ["Next experiment", *lines, f"  command: {len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s"]
+    return [
+        "Next experiment",
+        *lines,
+        f"  command: {len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s",
+    ]
 
 
 def _how(dia: Any) -> list[str]:
     return [
-        f"Computed with seed {dia.seed}, gaident {dia.version or 'of unknown version'}, {dia.simulations} simulations, {dia.seconds:.2f} s; "
+        f"Computed with seed {dia.seed}, gaident {dia.version or 'of unknown version'}, "
+        f"{dia.simulations} simulations, {dia.seconds:.2f} s; "
         f"data {', '.join(d[:12] for d in dia.digests)}"
     ]
