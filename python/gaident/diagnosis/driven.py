@@ -32,8 +32,10 @@ AT_CONTROLLER = ("integrator_clamp", "command_rate_limit")
 
 @dataclass(frozen=True)
 class Driven:
-    """Records, each also as driven by its torque (`driven`), both with an angle: measured, or integrated from the measured velocity
-    (`turned`: the record itself with that angle; `free`: torque-driven, without an angle that was not measured)."""
+    """Records, each also as driven by its torque (`driven`), both with an angle, measured or integrated from the velocity.
+
+    turned: the record itself with that angle; free: torque-driven, without an angle that was not measured.
+    """
 
     records: tuple[Record, ...]
     controller: PI | None

@@ -68,7 +68,7 @@ class Search:
         return best if self.only_noise(best) else self.rescued(best, base)
 
     def rescued(self, best: Fit, base: Fit) -> Fit:
-        """Where more than noise is left at the end: a global search for each rough effect alone, which no slope may have led to."""
+        """Where more than noise is left at the end: a global search for each rough effect alone."""
         for effect in (e for e in self.candidates(base.layout) if CANDIDATES[e].rough and e not in best.effects):
             layout = replace(base.layout.extended(effect), looped=self.driven.loopable)
             rows = np.array(CANDIDATES[effect].starts(layout.scales))
@@ -80,7 +80,7 @@ class Search:
         return best
 
     def polished(self, fit: Fit) -> Fit:
-        """Where more than noise is left: every effect once more from all of its starts, and rough ones by a global search nearby."""
+        """Where more than noise is left: every effect from all of its starts again, rough ones by a global search nearby."""
         for effect in fit.effects[::-1]:
             if self.only_noise(fit):
                 break
@@ -90,7 +90,7 @@ class Search:
         return fit
 
     def restarted(self, fit: Fit, effect: str) -> Fit:
-        """The best fit from an effect's starts, with the rest as it stands: the first fit began far from the rest's final values."""
+        """The best fit from an effect's starts, with the rest as it stands: the first began far from the rest's final values."""
         rows = CANDIDATES[effect].starts(fit.layout.scales)
         if len(rows) == 0:
             return fit
