@@ -16,7 +16,7 @@ from gaident.diagnosis.driven import Driven
 from gaident.diagnosis.layout import Layout, described, two_masses
 from gaident.diagnosis.problem import NONE, WORST, Fit, Problem, project_out
 from gaident.diagnosis.screening import Screening
-from gaident.diagnosis.stepwise import THRESHOLD, Search, with_second_mass
+from gaident.diagnosis.stepwise import Search, with_second_mass
 from gaident.models.model import Model
 
 __all__ = ["linear_bases", "without_second_mass"]
@@ -104,4 +104,4 @@ def without_second_mass(search: Search, final: Fit) -> Fit:
         x = np.concatenate([x, final.x[final.layout.slot(e)]])
     x = np.concatenate([x, np.zeros(sum(layout.starts))])
     less = problem.settled(problem.fit(layout, x, final.phi, 20))
-    return with_second_mass(problem, less) if less.bic - final.bic < THRESHOLD else final
+    return with_second_mass(problem, less) if less.bic - final.bic < search.threshold else final

@@ -20,7 +20,7 @@ from gaident.diagnosis.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.leftover import leftover
 from gaident.diagnosis.problem import Fit, Problem
 from gaident.diagnosis.result import Diagnosis, Finding
-from gaident.diagnosis.stepwise import THRESHOLD, Rival, Search, with_second_mass
+from gaident.diagnosis.stepwise import Rival, Search, with_second_mass
 from gaident.diagnosis.uncertainty import estimates_of
 from gaident.diagnosis.wording import evidence_of
 from gaident.errors import RecordError, SettingsError
@@ -35,7 +35,7 @@ __all__ = ["diagnose"]
 Vector = NDArray[np.float64]
 ProgressCallback = Callable[[float, str], None]
 
-GATE = 1.2  # times the noise of the measured velocity: what an explained record may leave, whitened
+GATE = 1.5  # times the noise of the measured velocity: what an explained record may leave, whitened
 SWAP = 2.0  # BIC units by which a rival has to be better to take a finding's seat
 # What a driver of a remaining error is the domain of: a finding there only describes, it does not name.
 DOMAINS: dict[str, str] = {
@@ -180,7 +180,7 @@ class _Work:
             if not rivals:
                 continue
             contained = effect in CANDIDATES[rivals[0].effect].parents
-            if may_swap and rivals[0].behind < -(THRESHOLD if contained else SWAP):
+            if may_swap and rivals[0].behind < -(search.threshold if contained else SWAP):
                 return search.thinned(with_second_mass(self.problem, rivals[0].fit)), True
         return final, False
 

@@ -123,7 +123,7 @@ class Driven:
     @cached_property
     def noise(self) -> float:
         """Standard deviation of white noise on the velocity, as its third differences show it [rad/s]."""
-        rounding = quantisation(self.records) / np.sqrt(12.0)
+        rounding = float(quantisation(self.records) / np.sqrt(12.0))
         return max(float(np.mean([noise_std(r.velocity) for r in self.records])), rounding)
 
     @property

@@ -31,7 +31,8 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Predict = Callable[[Layout, Matrix], Matrix]
 
-WORST = 1e300
+LOST = 1e60  # rad/s: the error of a model that diverges, every sample; its squares stay numbers
+WORST = 1e100
 HIGHEST = 20  # order of a noise filter
 NONE = np.zeros(0)
 
@@ -70,7 +71,10 @@ class Problem:
     def errors(self, layout: Layout, X: Matrix) -> Matrix:
         """Rows of plain errors."""
         self.simulations += len(X)
-        return self.measured - self.predict(layout, X)
+        with np.errstate(invalid="ignore", over="ignore"):
+            E = self.measured - self.predict(layout, X)
+            E[~np.all(np.abs(E) < LOST, axis=1)] = LOST
+        return E
 
     def whitened(self, E: Matrix, phi: Vector) -> Matrix:
         """Rows of whitened errors; samples whose past is missing, or not in use, are 0."""
@@ -105,7 +109,7 @@ class Problem:
     def filter_of(self, error: Vector) -> Vector:
         """Noise filter phi of one row of plain errors, order by BIC."""
         clean = np.where(self.weight > 0.0, error, 0.0)
-        if not np.all(np.isfinite(clean)) or float(np.abs(clean).max()) > 1e100:
+        if float(np.abs(clean).max()) >= LOST:
             return NONE
         parts = np.split(clean, np.cumsum(self.lengths)[:-1])
         return least_squares_filter(parts, fit_autoregression(parts, self.head).order)
@@ -219,7 +223,7 @@ def least_squares_filter(parts: list[Vector], order: int) -> Vector:
         rows = np.lib.stride_tricks.sliding_window_view(e[:-1], order)[:, ::-1]
         gram += rows.T @ rows
         right += rows.T @ e[order:]
-    return np.linalg.lstsq(gram, right, rcond=1e-13)[0]
+    return np.asarray(np.linalg.lstsq(gram, right, rcond=1e-13)[0], dtype=np.float64)
 
 
 def orthonormal_rows(rows: Matrix) -> Matrix:

@@ -98,9 +98,10 @@ class Screening:
         first = 1.0 if candidate.harmonic == "velocity" else 2.0
         orders = np.array([1.0]) if effect == "unbalance" else np.arange(first, HIGHEST_ORDER + 1.0)
         turned = np.ptp(angle)
-        # Seen is what passes at least once, and slowly enough for the sampling at the speeds that matter.
+        # Seen is what passes a few times, and slowly enough for the sampling at the speeds that matter.
         speed = float(np.median(np.abs(self.problem.measured)) + 1e-12)
-        orders = orders[(orders * turned > np.pi) & (orders * speed * layout.scales.dt < 2.5)]
+        least = 2.0 * np.pi * (1.0 if effect == "unbalance" else 3.0)
+        orders = orders[(orders * turned > least) & (orders * speed * layout.scales.dt < 2.5)]
         if len(orders) == 0:
             return orders, np.zeros((0, len(error)))
         phase = orders[:, None] * angle[None, :]

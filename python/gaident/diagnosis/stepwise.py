@@ -24,10 +24,13 @@ __all__ = ["HINT", "MARGIN", "THRESHOLD", "Rival", "Search", "with_second_mass"]
 Vector = NDArray[np.float64]
 
 THRESHOLD = 12.0
-"""Gain in BIC units from which an extension counts; see the calibration table in the docs."""
+"""Gain in BIC units from which an extension counts in a long record; see the calibration table in the docs."""
 
 MARGIN = 10.0
-"""Rivals closer than this many BIC units cannot be told apart."""
+"""Rivals closer than this many BIC units cannot be told apart in a long record."""
+
+SHORT = 400.0
+"""Samples: a record of so few needs twice the gain and the margin, as its noise filter is uncertain itself."""
 
 HINT = 8.0
 """Fall of N ln V from which a generalisation is no longer ruled out by the simpler effect it contains."""
@@ -53,6 +56,8 @@ class Search:
 
     def __init__(self, problem: Problem, driven: Driven, allowed: Sequence[str], note: Callable[[str], None]) -> None:
         self.problem, self.driven, self.allowed, self.note = problem, driven, tuple(allowed), note
+        caution = 1.0 + SHORT / problem.count
+        self.threshold, self.margin = THRESHOLD * caution, MARGIN * caution
         self.known: dict[tuple[int, frozenset[str]], list[Fit]] = {}
 
     def run(self, base: Fit) -> Fit:
@@ -62,7 +67,7 @@ class Search:
             beyond = ", ".join(e.replace("_", " ") for e in best.effects)
             self.note(f"looking beyond {beyond or 'the linear model'}")
             found = self.best_extension(best)
-            if found is None or best.bic - found.bic < THRESHOLD:
+            if found is None or best.bic - found.bic < self.threshold:
                 break
             best = self.polished(self.thinned(with_second_mass(self.problem, found)))
         return best if self.only_noise(best) else self.rescued(best, base)
@@ -75,7 +80,7 @@ class Search:
             X = np.vstack([base.layout.inserted(base.x, z) for z in rows])
             x = X[int(np.argmin(self.problem.costs(layout, X, NONE)))]
             fit = self.searched(self.problem.judged(self.problem.fit(layout, x, NONE, 5)))
-            if best.bic - fit.bic > THRESHOLD:
+            if best.bic - fit.bic > self.threshold:
                 best = fit
         return best
 
@@ -169,7 +174,7 @@ class Search:
             # Where nothing but noise is left the linearised gains are upper bounds, near enough.
             hopes = [now.bic - self.promised(s, phi) for phi in (now.phi, beyond) for s in screening.ranked(phi)[:1]]
             fall = max(hopes, default=0.0)
-            if fall < 0.5 * THRESHOLD:
+            if fall < 0.5 * self.threshold:
                 return fits
         # Two views: plainly, and through a filter of what the library cannot explain; each misses what the other one sees.
         short: dict[str, Fit] = {}
@@ -227,10 +232,10 @@ class Search:
         return [e for e in self.allowed if e not in blocked and (layout.masses == 2 or CANDIDATES[e].place != "coupling")]
 
     def simplest(self, best: Fit, fits: Sequence[Fit]) -> Fit:
-        """A parent of the winner's newest effect, where the winner is not worth THRESHOLD more."""
+        """A parent of the winner's newest effect, where the winner is not worth self.threshold more."""
         for parent in CANDIDATES[best.effects[-1]].parents:
             for f in fits:
-                if f.effects[-1] == parent and f.bic - best.bic < THRESHOLD:
+                if f.effects[-1] == parent and f.bic - best.bic < self.threshold:
                     return f
         return best
 
@@ -238,7 +243,7 @@ class Search:
         """Without the members (of all, or of all but the newest) whose removal costs less than the threshold."""
         for effect in best.effects if every else best.effects[:-1]:
             less = self.without(best, effect)
-            if less.bic - best.bic < THRESHOLD:
+            if less.bic - best.bic < self.threshold:
                 best = less
         return best
 
@@ -261,7 +266,7 @@ class Search:
                 plain = behind - (CANDIDATES[name].size - CANDIDATES[effect].size) * np.log(self.problem.count)
                 if plain > -HINT:
                     continue
-            if behind < MARGIN:
+            if behind < self.margin:
                 found.append(Rival(name, behind, f))
         return less.bic - final.bic, found
 
