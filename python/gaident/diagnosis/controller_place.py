@@ -51,8 +51,9 @@ def controller_findings(driven: Driven, scales: Scales) -> tuple[list[Finding], 
         parameter = next(r for r in table() if r.name == effect).parameters[0]
         name, unit = parameter.name, parameter.unit
         text = (
-            f"The logged torque does not follow from command and velocity (rms {np.sqrt(plain / n):.3g} N m); with {effect} of "
-            f"{value:.4g} {unit} it does, to {np.sqrt(cost / n):.2g} N m rms. No model of the plant is involved."
+            f"The logged torque does not follow from command and velocity (rms {np.sqrt(plain / n):.3g} N m); with "
+            f"{name} {value:.4g} {unit} of the {effect.replace('_', ' ')} it does, to {np.sqrt(cost / n):.2g} N m rms. "
+            "No model of the plant is involved."
         )
         std = _std(driven, effect, value, cost)
         finding = Finding(effect, {name: Estimate(value, std, unit)}, (), 1.0 - float(np.sqrt(cost / plain)), gain, None, text)

@@ -79,7 +79,7 @@ def diagnose(
     note = _Note(progress)
     records = _records(rec, "rec")
     held = () if validation is None else _records(validation, "validation")
-    _check(records, held, controller, identification, bootstrap, seed)
+    _check(records, held, controller, identification, bootstrap, seed, progress)
     note(0.02, "identifying the linear model")
     given = identification is not None
     idn = identification if identification is not None else identify(list(records), controller, seed=seed)
@@ -211,7 +211,7 @@ class _Work:
                     alternatives=alternatives,
                     gain=gains.of(effect),
                     delta_bic=gain,
-                    evidence=evidence_of(effect, estimates[effect], gain, rivals, alternatives),
+                    evidence=evidence_of(effect, gain, alternatives),
                 )
             )
         findings += self._structural(estimates)
@@ -350,6 +350,7 @@ def _check(
     idn: Identification | None,
     bootstrap: int,
     seed: int,
+    progress: ProgressCallback | None,
 ) -> None:
     if controller is not None and not isinstance(controller, PI):
         raise SettingsError(f"controller is {controller!r}: give a gaident.PI, or None for a record in open loop")
@@ -362,6 +363,8 @@ def _check(
             raise RecordError(f"record {r.name or '(without a name)'} has no torque: give one, or the controller that makes it")
     if len({r.dt for r in (*records, *held)}) > 1:
         raise RecordError("records have different sample times: a diagnosis needs one; diagnose them apart")
+    if progress is not None and not callable(progress):
+        raise SettingsError(f"progress is {progress!r}: give a function of (fraction, message), or None")
     for name, value, low, high in (("bootstrap", bootstrap, 0, 100_000), ("seed", seed, 0, 2**63 - 1)):
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
             raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")

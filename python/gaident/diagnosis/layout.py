@@ -161,7 +161,15 @@ class Layout:
         if n == 0:
             return None
         first = self.size - sum(self.starts) + sum(self.starts[:record])
-        return X[:, first : first + n]
+        own = X[:, first : first + n]
+        if "extra_resonance" not in self.effects:
+            return own
+        # In the difference operator d the free motion is S(d)/A(d) = S(d) B(d)/(A(d) B(d)): the same motion, B unexcited.
+        rows = []
+        for s, (wp, zp, *_) in zip(own, self.effect_values(X, "extra_resonance"), strict=True):
+            roots = np.expm1(np.array(quadratic_roots(2.0 * zp * wp, wp * wp)) * self.scales.dt)
+            rows.append(np.convolve(s, np.poly(roots).real))
+        return np.array(rows)
 
     def model(self, x: Vector) -> Model:
         """The model of one x, with its effects."""

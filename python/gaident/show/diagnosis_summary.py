@@ -17,6 +17,7 @@ VERDICTS = {
     "partly explained": "Part of what the model gets wrong is explained; something significant is left.",
     "unexplained": "The model is wrong, and no effect of the library fits what is left.",
 }
+LINEAR = {"N m s^2/rad^2": "N s^2/m^2", "N m/rad^3": "N/m^3", "rad/s": "m/s", "rad": "m"}
 DRIVERS = {
     "velocity": "on the velocity",
     "position": "on the position",
@@ -36,10 +37,10 @@ def diagnosis_summary(dia: Any, axis: str = "rotary") -> str:
         _verdict(dia, axis),
         _causes(dia, axis),
         _gain(dia, axis),
-        _base(dia, axis),
-        _noise(dia),
-        _untested(dia),
         _next(dia),
+        _base(dia, axis),
+        _record(dia, axis),
+        _untested(dia, axis),
         _how(dia),
     ]
     return "\n\n".join("\n".join(lines) for lines in sections if lines)
@@ -47,6 +48,17 @@ def diagnosis_summary(dia: Any, axis: str = "rotary") -> str:
 
 def _words(effect: str) -> str:
     return effect.replace("_", " ")
+
+
+def _wrapped(text: str, indent: str = "", hanging: str = "") -> list[str]:
+    lines = textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent + hanging, break_on_hyphens=False)
+    return lines or [""]
+
+
+def _sentence(text: str, axis: str) -> str:
+    """A sentence with the units of the axis."""
+    text = unit(text, axis)
+    return text.replace("rad/s", "m/s") if axis == "linear" else text
 
 
 def _verdict(dia: Any, axis: str) -> list[str]:
@@ -60,9 +72,9 @@ def _verdict(dia: Any, axis: str) -> list[str]:
         head += f" Not told apart by these data: {'; '.join(open_)}."
     if dia.driver is not None:
         head += f" What is left depends {DRIVERS[dia.driver]}."
-    lines = [f"Verdict: {dia.verdict}", *textwrap.wrap(head, WIDTH)]
+    lines = [f"Verdict: {dia.verdict}", *_wrapped(head)]
     for note in dia.notes:
-        lines += textwrap.wrap(note, WIDTH)
+        lines += _wrapped(_sentence(note, axis))
     return lines
 
 
@@ -71,66 +83,96 @@ def _causes(dia: Any, axis: str) -> list[str]:
     for f in dia.findings:
         if f.is_noise:
             continue
-        status = "named" if not f.alternatives else "one of " + ", ".join(map(_words, (f.effect, *f.alternatives)))
-        lines.append(f"{_words(f.effect)} ({status})")
-        rows = [
-            (_words(n), with_std(e.value, e.std), unit(e.unit, axis) if e.unit != "1" else "", _flag(e))
-            for n, e in f.parameters.items()
-        ]
-        lines += table(rows)
-        lines += [f"  {line}" for line in textwrap.wrap(f.evidence, WIDTH - 2)]
+        lines.append(_words(f.effect) + "".join(f", or {_words(a)}" for a in f.alternatives))
+        lines += table([_parameter(n, e, axis) for n, e in f.parameters.items()], "    ")
+        lines += _wrapped(_sentence(f.evidence, axis), "    ")
         if f.p_value is not None:
-            lines.append(f"  false-alarm probability of the whole procedure (bootstrap): {f.p_value:.2g}")
-    return ["What was found", *(f"  {line}" for line in lines)] if lines else []
+            lines += _wrapped(f"Chance of such a finding where there is no effect at all (bootstrap): {f.p_value:.2g}.", "    ")
+    return ["What was found", *(line if line.startswith(" ") else f"  {line}" for line in lines)] if lines else []
 
 
-def _flag(e: Any) -> str:
-    return "at a bound" if e.at_bound else "" if e.identifiable else "not determined"
+def _parameter(name: str, e: Any, axis: str) -> tuple[str, str, str, str]:
+    """Name, value with its standard deviation, unit, remark."""
+    value, std, u = e.value, e.std, e.unit
+    if axis == "linear" and u == "1/turn":  # a turn is 2 pi m
+        value, std, u = value / math.tau, std / math.tau, "1/m"
+    elif axis == "linear" and name not in ("phase", "frequency", "zero_frequency"):
+        u = LINEAR.get(u) or unit(u, axis)
+    remark = "at a bound" if e.at_bound else "" if e.identifiable else "not determined"
+    return _words(name), with_std(value, std), "" if u == "1" else u, remark
 
 
 def _gain(dia: Any, axis: str) -> list[str]:
     v = velocity_unit(axis)
+    extended = bool(dia.model.effects)
     rows = [
         ("", f"rmse [{v}]", "fit [%]"),
-        ("linear model", number(dia.before.rmse), number(dia.before.fit_percent)),
-        ("extended model", number(dia.after.rmse), number(dia.after.fit_percent)),
+        ("linear model", number(dia.before.rmse), f"{dia.before.fit_percent:.2f}"),
+        ("extended model", number(dia.after.rmse), f"{dia.after.fit_percent:.2f}"),
         ("noise of the measured velocity", number(dia.after.noise_floor), ""),
     ]
-    where = {"in-sample": "IN-SAMPLE: the record is too short to hold anything out"}.get(dia.held_out, f"on {dia.held_out}")
-    lines = [f"Free-run simulation, {where}", *table(rows if dia.model.effects else [rows[0], rows[1], rows[3]])]
-    if dia.model.effects and dia.before.rmse > 0.0:
-        low, high = dia.gain_interval
-        fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)
-        interval = f" (95 % interval {100.0 * low:.0f} to {100.0 * high:.0f} %)" if math.isfinite(low) else ""
-        lines.append(f"  the error falls by {fall:.0f} %{interval}")
+    in_sample = dia.held_out == "in-sample"
+    where = "IN-SAMPLE: too little data to hold any out" if in_sample else f"on {dia.held_out}"
+    lines = [f"Free-run simulation, {where}", *table(rows if extended else [rows[0], rows[1], rows[3]])]
+    if extended and dia.before.rmse > 0.0:
+        lines += _wrapped(_fall(dia), "  ")
         steps = [f"{_words(f.effect)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
         if len(steps) > 1:
-            lines.append(f"  each step's share: {', '.join(steps)}")
+            lines += _wrapped(f"One after the other, each of what was left before it: {', '.join(steps)}.", "  ")
     return lines
+
+
+def _fall(dia: Any) -> str:
+    """By how much the error falls, in words."""
+    fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)
+    low, high = (100.0 * x for x in dia.gain_interval)
+    if fall < 1.0:
+        hidden = (
+            "" if dia.controller is None else ": the loop's integrator hides this effect in the velocity, the torque shows it"
+        )
+        return f"The error of the velocity hardly changes ({-fall:+.1f} %){hidden}."
+    interval = f" (95 % interval {low:.0f} to {high:.0f} %)" if math.isfinite(low) else ""
+    return f"The error falls by {fall:.0f} %{interval}."
 
 
 def _base(dia: Any, axis: str) -> list[str]:
     if not dia.base_shift or not dia.model.effects:
         return []
+    before, after = (_mechanical({n: v[i] for n, v in dia.base_shift.items()}, axis) for i in (0, 1))
     rows = [("", "linear fit", "with the effects", "moved")]
-    for name, (before, after) in dia.base_shift.items():
-        moved = f"{100.0 * (after / before - 1.0):+.1f} %" if before else ""
-        rows.append((_words(name), number(before, 5), number(after, 5), moved))
+    for name, old in before.items():
+        moved = f"{100.0 * (after[name] / old - 1.0):+.1f} %" if old else ""
+        rows.append((name, number(old, 5), number(after[name], 5), moved))
     return ["How far the effects had bent the linear model", *table(rows)]
 
 
-def _noise(dia: Any) -> list[str]:
+def _mechanical(base: dict[str, float], axis: str) -> dict[str, float]:
+    """Parameters of K / (s + a), or K (s^2 + f1 s + f0) / ((s + a) (s^2 + e1 s + e0)), as a mechanic calls them."""
+    K, a = base["gain"], base["pole"]
+    e0, f0 = base.get("pole_pair_e0", 1.0), base.get("zero_pair_e0", 1.0)
+    inertia = abs(e0 / (K * f0)) if K and f0 else math.nan
+    kind = "inertia" if axis == "rotary" else "mass"
+    found = {f"{kind} [{unit('kg m^2', axis)}]": inertia, f"viscous friction [{unit('N m s/rad', axis)}]": a * inertia}
+    if "pole_pair_e0" in base and e0 > 0.0 and f0 > 0.0:
+        found["resonance [Hz]"] = math.sqrt(e0) / math.tau
+        found["  its damping ratio"] = 0.5 * base["pole_pair_e1"] / math.sqrt(e0)
+        found["antiresonance [Hz]"] = math.sqrt(f0) / math.tau
+        found["  its damping ratio "] = 0.5 * base["zero_pair_e1"] / math.sqrt(f0)
+    return found
+
+
+def _record(dia: Any, axis: str) -> list[str]:
     lines = []
     for f in dia.findings:
         if f.is_noise:
-            lines += textwrap.wrap(f"{_words(f.effect)}: {f.evidence}", WIDTH, initial_indent="  ", subsequent_indent="  ")
+            lines += _wrapped(f"{_words(f.effect)}: {_sentence(f.evidence, axis)}", "  ", "  ")
     return ["About the record", *lines] if lines else []
 
 
-def _untested(dia: Any) -> list[str]:
+def _untested(dia: Any, axis: str) -> list[str]:
     lines = []
     for effect, reason in dia.not_testable.items():
-        lines += textwrap.wrap(f"{_words(effect)}: {reason}", WIDTH, initial_indent="  ", subsequent_indent="    ")
+        lines += _wrapped(f"{_words(effect)}: {_sentence(reason, axis)}", "  ", "  ")
     return ["Not testable with this record", *lines] if lines else []
 
 
@@ -138,18 +180,14 @@ def _next(dia: Any) -> list[str]:
     p = dia.next_experiment
     if p is None:
         return []
-    text = f"{p.reason} Separates {' from '.join(map(_words, p.separates))}; expected margin {p.margin:.0f} BIC units."
-    lines = textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="  ")
-    return [
-        "Next experiment",
-        *lines,
-        f"  command: {len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s",
-    ]
+    text = f"{p.reason} It separates {' from '.join(map(_words, p.separates))}"
+    text += f" by {p.margin:.0f} BIC units (10 are enough)." if math.isfinite(p.margin) else "."
+    size = f"The command: {len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s."
+    return ["Next experiment", *_wrapped(text, "  "), f"  {size}"]
 
 
 def _how(dia: Any) -> list[str]:
-    return [
-        f"Computed with seed {dia.seed}, gaident {dia.version or 'of unknown version'}, "
-        f"{dia.simulations} simulations, {dia.seconds:.2f} s; "
-        f"data {', '.join(d[:12] for d in dia.digests)}"
-    ]
+    data = ", ".join(digest[:12] for digest in dia.digests)
+    version = dia.version or "of unknown version"
+    work = f"{dia.samples} samples, {dia.simulations} simulations, {dia.seconds:.2f} s"
+    return _wrapped(f"{work}; seed {dia.seed}, gaident {version}, data {data}")

@@ -1,0 +1,274 @@
+"""What a diagnosis hands out: the summary word for word, the file, the picture; and what wrong use is told."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from gaident.diagnosis.evidence import velocity_curve
+from gaident.diagnosis.result import Finding, Fitness
+from gaident.errors import GaidentError, RecordError, SettingsError
+
+GOLDEN = Path(__file__).parent / "golden" / "diagnosis.txt"
+DT = 1e-3
+LEVELS = (20.0, -20.0, 5.0, -5.0, 40.0, -40.0, 10.0, -10.0)  # rad/s
+CONTROLLER = ga.PI(kp=0.05, ki=1.5)
+DRIVE = ga.Model(1.0 / 5e-4, [-4.0]).with_effect("coulomb_friction", torque=0.05)
+
+
+def command() -> np.ndarray:
+    dither = np.repeat(np.random.default_rng(1).choice([-1.0, 1.0], 400), 4)
+    return np.repeat(LEVELS, 200) + dither
+
+
+def drive_record(seed: int = 0) -> ga.Record:
+    """The drive of DRIVE in its loop, noise on the logged velocity only."""
+    still = ga.Record(DT, command=command(), velocity=np.zeros(len(command())))
+    done = ga.run(DRIVE, still, CONTROLLER)
+    noise = 0.05 * np.random.default_rng(seed).standard_normal(len(still))
+    return ga.Record(DT, command=still.command, velocity=done.velocity + noise, torque=done.torque, name="levels")
+
+
+@pytest.fixture(scope="module")
+def rec() -> ga.Record:
+    return drive_record()
+
+
+@pytest.fixture(scope="module")
+def dia(rec: ga.Record) -> ga.Diagnosis:
+    return ga.diagnose(rec, CONTROLLER, validation=drive_record(1))
+
+
+def fake() -> Any:
+    """What a summary looks at, with the figures of a drive that never was."""
+    torque = ga.Estimate(0.04123, 0.00035, "N m")
+    return SimpleNamespace(
+        verdict="partly explained",
+        findings=(
+            Finding(
+                "outliers", {"fraction": ga.Estimate(0.001, 1e-4, "1")}, evidence="4 of 4000 samples are left out.", is_noise=True
+            ),
+            Finding(
+                "coulomb_friction",
+                {"torque": torque},
+                (),
+                0.43,
+                812.4,
+                0.01,
+                "Dry friction of constant size: without it the model is 812 BIC units worse.",
+            ),
+            Finding(
+                "cogging",
+                {
+                    "amplitude": ga.Estimate(0.012, 2e-4, "N m"),
+                    "order": ga.Estimate(12.0, 0.0, "1/turn"),
+                    "phase": ga.Estimate(0.31, 0.02, "rad"),
+                },
+                ("velocity_ripple",),
+                0.2,
+                55.0,
+                None,
+                "Torque ripple n times per turn: without it the model is 55 BIC units worse, but these data cannot tell it from "
+                "velocity ripple.",
+            ),
+        ),
+        not_testable={"backlash": "the torque never changes its sign: the coupling stays on one flank"},
+        model=SimpleNamespace(effects=("coulomb_friction", "cogging")),
+        before=Fitness(0.5, 97.1, 0.1),
+        after=Fitness(0.2, 98.84, 0.1),
+        driver="time",
+        next_experiment=ga.Proposal(np.zeros(2000), DT, ("cogging", "velocity_ripple"), 412.3, "Slow speeds: several turns."),
+        gain_interval=(0.55, 0.64),
+        held_out="validation records",
+        base_shift={
+            "gain": (9000.0, 9790.0),
+            "pole": (20.0, 16.0),
+            "pole_pair_e1": (30.0, 28.8),
+            "pole_pair_e0": (29000.0, 29670.0),
+            "zero_pair_e1": (8.0, 7.5),
+            "zero_pair_e0": (4300.0, 4405.0),
+        },
+        notes=("The closest description leaves an error of 0.1 rad/s at 0.02 N m.",),
+        controller=CONTROLLER,
+        seed=3,
+        seconds=1.234,
+        simulations=4321,
+        samples=4000,
+        digests=("c0ffee" * 4, "beef" * 4),
+        version="0.1.0",
+    )
+
+
+def summary(result: Any, axis: str = "rotary") -> str:
+    from gaident.show.diagnosis_summary import diagnosis_summary
+
+    return diagnosis_summary(result, axis)
+
+
+def test_the_summary_reads_as_agreed() -> None:
+    """Word for word; after a change that is meant, write the new text into golden/diagnosis.txt."""
+    assert summary(fake()) + "\n" == GOLDEN.read_text()
+    assert max(map(len, summary(fake()).splitlines())) <= 100
+
+
+def test_a_linear_axis_is_spoken_of_in_metres_and_newtons() -> None:
+    text = summary(fake(), "linear")
+    assert "0.1 m/s at 0.02 N." in text and "mass [kg]" in text and "N s/m" in text
+    assert "rad/s" not in text and "N m" not in text and "turn " not in text.replace("per turn", "")
+    assert f"{12.0 / math.tau:.5g}" in text  # 12 per turn are 12/(2 pi) per metre
+
+
+def test_a_gain_that_is_none_is_not_called_one() -> None:
+    result = fake()
+    result.after = Fitness(0.501, 97.0, 0.1)
+    assert "hardly changes (+0.2 %)" in summary(result)
+    result.held_out = "in-sample"
+    assert "IN-SAMPLE" in summary(result)
+
+
+def test_the_file_holds_the_whole_result(dia: ga.Diagnosis, tmp_path: Path) -> None:
+    assert dia.verdict == "explained" and [f.effect for f in dia.causes] == ["coulomb_friction"]
+    dia.save(tmp_path / "dia.json")
+    back = ga.load(tmp_path / "dia.json")
+    assert isinstance(back, ga.Diagnosis)
+    assert back == dia and back.to_dict() == dia.to_dict() and back.summary() == dia.summary()
+    assert back.seed == dia.seed and back.digests == (drive_record().digest,) and back.model.effects == dia.model.effects
+    np.testing.assert_array_equal(
+        ga.simulate(back.model, drive_record(), CONTROLLER), ga.simulate(dia.model, drive_record(), CONTROLLER)
+    )
+    assert list(tmp_path.iterdir()) == [tmp_path / "dia.json"]
+
+
+def test_a_proposal_survives_the_file() -> None:
+    proposal = ga.first_experiment(DT, ga.Limits(100.0, 1.0, math.inf, 2.0))
+    assert ga.Proposal.from_dict(proposal.to_dict()) == proposal  # its margin is nan
+    assert proposal != ga.first_experiment(DT, ga.Limits(90.0, 1.0, math.inf, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda d: d.update(schema="something"), "neither a saved identification nor a saved diagnosis"),
+        (lambda d: d.update(schema_version=99), "version 99"),
+        (lambda d: d.pop("findings"), "damaged"),
+        (lambda d: d.update(before=3), "damaged"),
+    ],
+)
+def test_a_damaged_file_says_so(dia: ga.Diagnosis, tmp_path: Path, change: Any, words: str) -> None:
+    data = json.loads(dia.to_json())
+    change(data)
+    path = tmp_path / "bad.json"
+    path.write_text(json.dumps(data))
+    with pytest.raises(GaidentError, match=words) as caught:
+        ga.load(path)
+    assert str(path) in str(caught.value)
+
+
+def test_the_picture_renders_and_a_loaded_diagnosis_asks_for_its_records(dia: ga.Diagnosis, rec: ga.Record) -> None:
+    for axis in ("rotary", "linear"):
+        drawn = io.BytesIO()
+        dia.plot(axis=axis).savefig(drawn, format="png", dpi=40)
+        assert drawn.getvalue().startswith(b"\x89PNG")
+    loaded = ga.Diagnosis.from_dict(dia.to_dict())
+    with pytest.raises(GaidentError, match=r"plot\(records\)"):
+        loaded.plot()
+    assert len(loaded.plot([rec[:400], rec]).axes) == 6
+    assert "the longest of 2" in loaded.plot([rec[:400], rec]).get_suptitle()
+    with pytest.raises(SettingsError, match="axis is 'round'"):
+        dia.plot(axis="round")
+
+
+def test_the_curve_over_velocity_is_the_sum_of_its_effects(dia: ga.Diagnosis) -> None:
+    curve = velocity_curve(dia, -10.0, 10.0)
+    assert curve is not None and curve[2] == "coulomb friction"
+    level = dia.causes[0].parameters["torque"].value
+    np.testing.assert_allclose(curve[1], -level * np.sign(curve[0]))
+    more = SimpleNamespace(
+        model=DRIVE.with_effect("quadratic_drag", coefficient=1e-4).with_effect("cogging", amplitude=0.1, order=6, phase=0.0)
+    )
+    found = velocity_curve(more, 0.0, 10.0)  # type: ignore[arg-type]
+    assert found is not None and "cogging" not in found[2]
+    assert found[1][-1] == pytest.approx(-0.05 - 1e-4 * 100.0)
+    assert velocity_curve(SimpleNamespace(model=ga.Model(1.0, [-1.0])), 0.0, 1.0) is None  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "words"),
+    [
+        ({"rec": []}, RecordError, "rec is list"),
+        ({"rec": "run.csv"}, RecordError, "rec is str"),
+        ({"rec": [1]}, RecordError, "give a gaident.Record"),
+        ({"controller": 3.0}, SettingsError, "controller is 3.0"),
+        ({"identification": DRIVE}, SettingsError, "identification is Model"),
+        ({"validation": []}, RecordError, "validation is list"),
+        ({"validation": 4}, RecordError, "validation is int"),
+        ({"noise": -0.1}, SettingsError, "noise is -0.1"),
+        ({"noise": math.nan}, SettingsError, "noise is nan"),
+        ({"noise": True}, SettingsError, "noise is True"),
+        ({"bootstrap": -1}, SettingsError, "bootstrap is -1"),
+        ({"bootstrap": 1.5}, SettingsError, "bootstrap is 1.5"),
+        ({"seed": "a"}, SettingsError, "seed is 'a'"),
+        ({"progress": 3}, SettingsError, "progress is 3"),
+    ],
+)
+def test_wrong_use_names_argument_and_value(rec: ga.Record, arguments: dict[str, Any], error: type, words: str) -> None:
+    given = {"rec": rec, "controller": CONTROLLER, **arguments}
+    with pytest.raises(error, match=words):
+        ga.diagnose(**given)
+
+
+def test_records_that_do_not_fit_the_loop_are_refused(rec: ga.Record) -> None:
+    silent = ga.Record(DT, velocity=rec.velocity, torque=rec.torque, name="silent")
+    loose = ga.Record(DT, command=rec.command, velocity=rec.velocity, name="loose")
+    other = ga.Record(2 * DT, command=rec.command, velocity=rec.velocity)
+    with pytest.raises(RecordError, match="silent has no command"):
+        ga.diagnose(silent, CONTROLLER)
+    with pytest.raises(RecordError, match="loose has no torque"):
+        ga.diagnose(loose)
+    with pytest.raises(RecordError, match="different sample times"):
+        ga.diagnose([rec, other], CONTROLLER)
+    with pytest.raises(RecordError, match="silent has no command"):
+        ga.diagnose(rec, CONTROLLER, validation=silent)
+
+
+def test_the_same_seed_and_records_in_any_order_give_the_same_result(rec: ga.Record) -> None:
+    parts = [rec[:800], rec[800:]]
+    one, two = (ga.diagnose(p, CONTROLLER, bootstrap=1, seed=5) for p in (parts, parts[::-1]))
+    without = {"seconds": 0.0, "identification": None}  # an identification lists its records as given
+    assert one.to_dict() | without == two.to_dict() | without
+    assert one.causes[0].p_value == 0.5  # (1 + 0) / (1 + 1)
+
+
+def test_a_record_may_begin_in_motion(rec: ga.Record) -> None:
+    """In the middle of a level, where a resonance would have to have been moving too."""
+    found = ga.diagnose(rec[300:], CONTROLLER)
+    assert [f.effect for f in found.causes] == ["coulomb_friction"], found.summary()
+    assert found.causes[0].parameters["torque"].value == pytest.approx(0.05, rel=0.05)
+
+
+def test_standstill_tells_the_noise(rec: ga.Record) -> None:
+    rest = ga.Record(DT, command=np.zeros(500), velocity=0.07 * np.random.default_rng(2).standard_normal(500))
+    found = ga.diagnose(rec, CONTROLLER, noise=rest)
+    assert found.after.noise_floor == pytest.approx(np.std(rest.velocity))
+
+
+def test_progress_is_told_and_an_interrupt_gets_through(rec: ga.Record) -> None:
+    told: list[float] = []
+
+    def note(fraction: float, message: str) -> None:
+        assert message
+        told.append(fraction)
+        if len(told) == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        ga.diagnose(rec, CONTROLLER, progress=note)
+    assert told == sorted(told) and told[0] > 0.0 and told[-1] <= 1.0
