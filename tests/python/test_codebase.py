@@ -21,8 +21,8 @@ PACKAGE = ROOT / "python" / "gaident"
 
 # The core, lowest first: a file includes only what stands above it. Files of one folder share its place.
 CORE_ORDER = [
-    *("rng", "arithmetic", "float_pair", "lanes", "denormals", "chromosome", "genome", "factors", "decode", "decoder", "parameters"),
-    *("delta", "bilinear", "held", "controller", "closed_loop", "loop", "record", "fitness", "kernels/"),
+    *("rng", "arithmetic", "float_pair", "lanes", "denormals", "chromosome", "genome", "factors", "decode"),
+    *("decoder", "parameters", "delta", "bilinear", "held", "controller", "closed_loop", "loop", "record", "fitness", "kernels/"),
     *("batch", "simulate", "linear", "refine", "settings", "operators", "breeder", "parallel", "species", "engine", "reference/"),
 ]
 
