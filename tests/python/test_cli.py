@@ -390,7 +390,7 @@ def test_ctrl_c_ends_within_half_a_second(here: Path) -> None:
 def test_progress_bar_on_a_terminal_only(here: Path) -> None:
     import pty
 
-    args = ("identify", "step.csv", *NAMES, *LOOP, "--paper", "--trials", "40", "--workers", "1")
+    args = ("identify", "step.csv", *NAMES, *LOOP, "--paper", "--trials", "200", "--workers", "1")
     ours, theirs = pty.openpty()
     with subprocess.Popen(command(*args), stdout=subprocess.PIPE, stderr=theirs, text=True) as process:
         os.close(theirs)

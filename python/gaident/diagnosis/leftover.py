@@ -60,29 +60,36 @@ def leftover(problem: Problem, driven: Driven, fit: Fit) -> Leftover:
         torques["command"] = _hats(driven.command, 8)
     columns = {d: driven.response(layout, x, rows[:room]) for d, rows in torques.items()}
     lines = _lines(project_out(J, error[None, :])[0], driven, problem)
-    beyond = np.vstack([J, *columns.values(), *([lines] if len(lines) else [])])
-    phi = problem.filter_of(project_out(beyond[: len(w) // 4], error[None, :])[0])
-    n = problem.count
-    Jw = problem.whitened(J, phi)
-    rest = project_out(Jw, problem.whitened(error[None, :], phi))[0]
-    left = float(rest @ rest)
-    gains = {}
-    for driver, rows in columns.items():
-        gains[driver] = _gain(project_out(Jw, problem.whitened(rows, phi)), rest, left, n, 0)
+    judge = _Judge(problem, J, error, fit.phi)
+    none = judge.bic(np.zeros((0, len(w))))
+    gains = {driver: none - judge.bic(rows) for driver, rows in columns.items()}
     for i in range(0, len(lines), 2):
-        gain = _gain(project_out(Jw, problem.whitened(lines[i : i + 2], phi)), rest, left, n, 1)
-        gains["time"] = max(gains["time"], gain)
-    return Leftover(gains)
+        # A frequency that was searched for counts as a number more.
+        gains["time"] = max(gains["time"], none - judge.bic(lines[i : i + 2]) - np.log(problem.count))
+    return Leftover({driver: float(gain) for driver, gain in gains.items()})
 
 
-def _gain(rows: Matrix, rest: Vector, left: float, n: float, searched: int) -> float:
-    sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    rows = rows[sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)]
-    if len(rows) == 0 or left <= 0.0:
-        return -np.inf
-    after = project_out(rows, rest[None, :])[0]
-    rank = np.linalg.matrix_rank(rows @ rows.T / np.outer(*(2 * [np.linalg.norm(rows, axis=1)])), tol=1e-8)
-    return float(n * np.log(left / max(float(after @ after), 1e-300)) - (rank + searched) * np.log(n))
+class _Judge:
+    """BIC of the error with some columns taken out, each set under a noise filter of its own (two rounds of GLS)."""
+
+    def __init__(self, problem: Problem, J: Matrix, error: Vector, phi: Vector) -> None:
+        self.problem, self.J, self.error, self.phi = problem, J, error, phi
+
+    def bic(self, columns: Matrix) -> float:
+        sizes = np.sqrt(np.einsum("ij,ij->i", columns, columns))
+        columns = columns[sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)]
+        rows = np.vstack([self.J, columns])
+        n, phi = self.problem.count, self.phi
+        best = np.inf
+        for _ in range(3):
+            A, v = self.problem.whitened(rows, phi), self.problem.whitened(self.error[None, :], phi)[0]
+            scale = np.sqrt(np.einsum("ij,ij->i", A, A))
+            scale[scale == 0.0] = 1.0
+            coefficients, _, rank, _ = np.linalg.lstsq((A / scale[:, None]).T, v, rcond=1e-8)
+            left = v - (coefficients / scale) @ A
+            best = min(best, n * np.log(max(float(left @ left), 1e-300) / n) + (int(rank) + len(phi)) * np.log(n))
+            phi = self.problem.filter_of(self.error - (coefficients / scale) @ rows)
+        return float(best)
 
 
 def _hats(s: Vector, count: int) -> Matrix:

@@ -67,6 +67,8 @@ class Search:
             beyond = ", ".join(e.replace("_", " ") for e in best.effects)
             self.note(f"looking beyond {beyond or 'the linear model'}")
             found = self.best_extension(best)
+            if found is not None and found.layout.looped:
+                best = self.in_loop(best)
             if found is None or best.bic - found.bic < self.threshold:
                 break
             best = self.polished(self.thinned(with_second_mass(self.problem, found)))
@@ -188,8 +190,17 @@ class Search:
                         short[s.effect] = fit
         best = sorted(short.values(), key=lambda f: f.bic)[:FINISHED]
         fits += [self.finished(f) for f in best]
-        fits = [f for f in fits if f.cost < WORST]
-        return sorted(fits, key=lambda f: f.bic)
+        fits = sorted((f for f in fits if f.cost < WORST), key=lambda f: f.bic)
+        if fits and fits[0].layout.looped:
+            fits = sorted((self.in_loop(f) for f in fits[:FITTED]), key=lambda f: f.bic)
+        return fits
+
+    def in_loop(self, fit: Fit) -> Fit:
+        """The better of both views: where the best candidate was judged in the loop, all have to be."""
+        if fit.layout.looped or not self.driven.loopable:
+            return fit
+        looped = replace(fit.layout, looped=True)
+        return min((fit, self.problem.settled(self.problem.fit(looped, fit.x, NONE, 8))), key=lambda f: f.bic)
 
     def promised(self, s: Screened, phi: Vector) -> float:
         """The BIC that a screened candidate promises under a filter."""
@@ -255,6 +266,7 @@ class Search:
     def rivals(self, final: Fit, effect: str) -> tuple[float, list[Rival]]:
         """(gain of `effect` in the final model, other effects in its place that come within reach)."""
         less = self.without(final, effect)
+        gain = (self.in_loop(less) if final.layout.looped else less).bic - final.bic
         found = []
         for f in self.extensions(less):
             name = f.effects[-1]
@@ -268,7 +280,7 @@ class Search:
                     continue
             if behind < self.margin:
                 found.append(Rival(name, behind, f))
-        return less.bic - final.bic, found
+        return gain, found
 
 
 def with_second_mass(problem: Problem, fit: Fit) -> Fit:
