@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.cli import main
+from gaident.cli import COMMANDS, main
 from gaident.cli_options import drive_of, in_options, parser_of
 from gaident.data import differentiate
 from gaident.drive_file import read_drive_file
@@ -138,7 +138,7 @@ def test_drive_file_stands_for_options_and_options_win(here: Path) -> None:
         '[controller]\nkp = 0.02\nki = 1.367\nloop = "continuous"\n'
         "[space]\ninertia = [1e-4, 5e-3]\np = 1\nq = [0, 2]\n"
     )
-    arguments = parser_of({"identify": print, "simulate": print, "demo": print}).parse_args(
+    arguments = parser_of(dict.fromkeys(COMMANDS, print)).parse_args(
         [
             "identify",
             "step.csv",
@@ -164,7 +164,7 @@ def test_drive_file_stands_for_options_and_options_win(here: Path) -> None:
 
 def test_space_options(here: Path) -> None:
     def space(*options: str) -> ga.SearchSpace | None:
-        parser = parser_of({"identify": print, "simulate": print, "demo": print})
+        parser = parser_of(dict.fromkeys(COMMANDS, print))
         drive = drive_of(parser.parse_args(["identify", "step.csv", *NAMES, *LOOP, *options]))
         return drive.space([drive.read("step.csv")], drive.controller())
 
@@ -358,7 +358,7 @@ def test_a_reader_that_goes_away(here: Path) -> None:
 
 LONG = """
 import signal, sys
-from gaident.cli import main
+from gaident.cli import COMMANDS, main
 signal.signal(signal.SIGINT, signal.default_int_handler)  # some shells start jobs with it ignored
 print("ready", flush=True)
 sys.exit(main(sys.argv[1:]))
