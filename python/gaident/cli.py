@@ -10,7 +10,7 @@ import io
 import json
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -93,8 +93,7 @@ def _identify(args: argparse.Namespace) -> None:
     drive = drive_of(args)
     out = target_of(args.out, args.logs)
     plot = target_of(args.plot, args.logs, PICTURES)
-    if out is not None and plot is not None and out.resolve() == plot.resolve():
-        raise SettingsError(f"--out and --plot both name {out}: the second would overwrite the first; give two files")
+    _apart({"--out": out, "--plot": plot})
     controller = drive.controller()
     records = _read_all(drive, args.logs, controller)
     settings = Settings.paper() if args.paper else Settings()
@@ -124,6 +123,14 @@ def _identify(args: argparse.Namespace) -> None:
     print(_summary(idn, drive.axis))
     if written:
         print(f"\nwritten: {', '.join(map(str, written))}")
+
+
+def _apart(targets: Mapping[str, Path | None]) -> None:
+    """Raises where two options name the same file."""
+    seen: dict[Path, str] = {}
+    for option, target in targets.items():
+        if target is not None and (first := seen.setdefault(target.resolve(), option)) != option:
+            raise SettingsError(f"{first} and {option} both name {target}: the second would overwrite the first; give two files")
 
 
 def _simulate(args: argparse.Namespace) -> None:
@@ -285,9 +292,11 @@ def _print_json(data: dict[str, Any]) -> None:
 
 def _diagnose(args: argparse.Namespace) -> None:
     drive = drive_of(args)
-    out = target_of(args.out, args.logs)
-    plot = target_of(args.plot, args.logs, PICTURES)
-    following = target_of(args.next_command, args.logs)
+    sources = [*args.logs, *(args.validation or []), *([] if args.model is None else [args.model])]
+    out = target_of(args.out, sources)
+    plot = target_of(args.plot, sources, PICTURES)
+    following = target_of(args.next_command, sources)
+    _apart({"--out": out, "--plot": plot, "--next-command": following})
     controller = drive.controller()
     records = _read_all(drive, args.logs, controller)
     validation = _read_all(drive, args.validation, controller) if args.validation else None
@@ -322,7 +331,9 @@ def _diagnose(args: argparse.Namespace) -> None:
     if args.json:
         _print_json(dia.to_dict())
         return
-    print(dia.summary(drive.axis))
+    print(in_options(dia.summary(drive.axis)))
+    if following is not None and following not in written:
+        print(f"\nnot written: {following}, as there is no next experiment to propose")
     if written:
         print(f"\nwritten: {', '.join(map(str, written))}")
 

@@ -149,7 +149,7 @@ def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], None]]) -> a
     _add_log_options(sub)
     _add_controller_options(sub)
     g = sub.add_argument_group("the diagnosis")
-    g.add_argument("--noise", type=float, metavar="X", help="standard deviation of the velocity noise, where it is known [rad/s]")
+    g.add_argument("--noise", type=_number, metavar="X", help="standard deviation of the velocity noise, where known [rad/s]")
     g.add_argument(
         "--bootstrap",
         type=int,

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.cli import main
+from gaident.cli import COMMANDS, main
 from gaident.cli_options import drive_of, in_options, parser_of
 from gaident.data import differentiate
 from gaident.drive_file import read_drive_file
@@ -358,7 +358,7 @@ def test_a_reader_that_goes_away(here: Path) -> None:
 
 LONG = """
 import signal, sys
-from gaident.cli import main
+from gaident.cli import COMMANDS, main
 signal.signal(signal.SIGINT, signal.default_int_handler)  # some shells start jobs with it ignored
 print("ready", flush=True)
 sys.exit(main(sys.argv[1:]))
