@@ -138,7 +138,7 @@ def test_drive_file_stands_for_options_and_options_win(here: Path) -> None:
         '[controller]\nkp = 0.02\nki = 1.367\nloop = "continuous"\n'
         "[space]\ninertia = [1e-4, 5e-3]\np = 1\nq = [0, 2]\n"
     )
-    arguments = parser_of(dict.fromkeys(("identify", "diagnose", "simulate", "effects", "demo"), print)).parse_args(
+    arguments = parser_of(dict.fromkeys(COMMANDS, print)).parse_args(
         [
             "identify",
             "step.csv",
@@ -164,7 +164,7 @@ def test_drive_file_stands_for_options_and_options_win(here: Path) -> None:
 
 def test_space_options(here: Path) -> None:
     def space(*options: str) -> ga.SearchSpace | None:
-        parser = parser_of(dict.fromkeys(("identify", "diagnose", "simulate", "effects", "demo"), print))
+        parser = parser_of(dict.fromkeys(COMMANDS, print))
         drive = drive_of(parser.parse_args(["identify", "step.csv", *NAMES, *LOOP, *options]))
         return drive.space([drive.read("step.csv")], drive.controller())
 
