@@ -119,7 +119,8 @@ class Search:
         reach[0] = 0.15
         moved = np.flatnonzero(steps > 0.0)
         low, high = np.maximum(fit.x - reach, limits[0])[moved], np.minimum(fit.x + reach, limits[1])[moved]
-        if np.any(low >= high):
+        start = np.clip(fit.x[moved], low, high)
+        if np.any(low >= high) or not np.all(np.isfinite(start)):
             return fit
 
         def costs(columns: NDArray[np.float64]) -> Vector:
@@ -128,7 +129,7 @@ class Search:
             return np.log(self.problem.costs(layout, X, NONE))
 
         found = differential_evolution(
-            costs, list(zip(low, high, strict=True)), popsize=6, maxiter=50, x0=fit.x[moved], rng=0, vectorized=True,
+            costs, list(zip(low, high, strict=True)), popsize=6, maxiter=50, x0=start, rng=0, vectorized=True,
             updating="deferred", polish=False, tol=1e-4, mutation=(0.4, 0.9), recombination=0.9,
         )  # fmt: skip
         x = fit.x.copy()
