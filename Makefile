@@ -37,7 +37,7 @@ help: ## list the commands
 
 install: .venv/.installed ## set up .venv and install the package into it
 
-demo: .venv/.installed ## identify a two-mass drive; table on the screen, pictures in build/demo
+demo: .venv/.installed ## identify a two-mass drive, find a hidden friction; text on the screen, pictures in build/demo
 	@$(BIN)/gaident demo --out "$(DEMO_DIR)"
 
 test: lint test-cpp test-python ## every check: ruff, mypy, C++ tests (plain and sanitized), Python tests

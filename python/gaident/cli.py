@@ -191,6 +191,7 @@ def _demo(args: argparse.Namespace) -> None:
         "schema_version": 1,
         "two_masses": {"truth": truth.to_dict(), "identification": idn.to_dict()},
         "emps": None,
+        "friction": None,
     }
     path = demonstration.emps_path()
     if path is None:
@@ -204,6 +205,17 @@ def _demo(args: argparse.Namespace) -> None:
         _draw(idn, [rec], "linear", picture)
         say(f"\n{demonstration.EMPS_TRUTH}\nwritten: {picture}")
         report["emps"] = {"identification": idn.to_dict()}
+    say(f"\n{'-' * 100}\n{demonstration.FRICTION_STORY}")
+    with Progress(sys.stderr) as progress:
+        rec, dia = demonstration.diagnose_friction(args.seed, progress)
+    say(dia.summary())
+    log, picture = folder / "demo_friction.csv", folder / "demo_friction.png"
+    write(log, csv_text(rec, None, "rotary").encode())
+    _save_figure(dia.plot(), picture)
+    controller = demonstration.DIGITAL
+    say(f"\n{demonstration.FRICTION_TRUTH}\nwritten: {picture}, {log}; the same from the log:")
+    say(f"  gaident diagnose {log} --kp {controller.kp} --ki {controller.ki}")
+    report["friction"] = {"truth": {"coulomb_friction": {"torque": demonstration.FRICTION}}, "diagnosis": dia.to_dict()}
     if args.json:
         _print_json(report)
 

@@ -96,7 +96,8 @@ exit codes: 0 done (whatever the verdict), 1 the work failed, 2 wrong use, 130 i
 DEMO_HELP = """\
 The main job: identifies a two-mass drive (the paper's robot arm, Table III) from a noisy velocity step
 through its PI loop, and compares the result with the truth. Where the environment variable GAIDENT_DATA
-names a folder with emps/DATA_EMPS.mat, it then identifies that measured ball-screw axis too.
+names a folder with emps/DATA_EMPS.mat, it then identifies that measured ball-screw axis too. At the end it
+diagnoses the drive with a dry friction that the linear model does not know of: what is wrong, why, the gain.
 """
 
 

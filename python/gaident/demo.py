@@ -1,4 +1,4 @@
-"""gaident demo: the main job on a simulated two-mass drive, and on a measured axis where there is one."""
+"""gaident demo: the main jobs on simulated two-mass drives, and on a measured axis where there is one."""
 
 from __future__ import annotations
 
@@ -11,13 +11,26 @@ import numpy as np
 
 from gaident.data.readers import read
 from gaident.data.record import Record
+from gaident.diagnosis.diagnose import diagnose
+from gaident.diagnosis.result import Diagnosis
 from gaident.identification.identify import identify
 from gaident.identification.result import Identification
 from gaident.models.controller import PI
 from gaident.models.mechanics import TwoMass
-from gaident.models.simulate import simulate
+from gaident.models.simulate import run, simulate
 
-__all__ = ["CONTROLLER", "TRUTH", "emps_path", "identify_emps", "identify_two_masses"]
+__all__ = [
+    "CONTROLLER",
+    "DIGITAL",
+    "FRICTION",
+    "FRICTION_STORY",
+    "FRICTION_TRUTH",
+    "TRUTH",
+    "diagnose_friction",
+    "emps_path",
+    "identify_emps",
+    "identify_two_masses",
+]
 
 Progress = Callable[[float, str], None] | None
 
@@ -33,6 +46,20 @@ STORY = f"""\
 A two-mass drive, simulated: the robot arm of the paper's Table III, a step of {STEP} rad/s through its PI
 loop, {SAMPLES} samples of {1e3 * SAMPLE_TIME} ms, noise {NOISE} rad/s. What is found in this record:
 """
+
+DIGITAL = PI(CONTROLLER.kp, CONTROLLER.ki)
+FRICTION = 0.04  # N m, Coulomb
+LEVELS = (3.0, -3.0, 20.0, -20.0, 8.0, -8.0, 50.0, -50.0, 1.0, -1.0, 35.0, -35.0)  # rad/s
+DWELL, CHIP = 250, 9  # samples of a level, of one value of the dither
+DITHER = 2.0  # rad/s
+LOOP_NOISE = 0.1  # rad/s
+
+FRICTION_STORY = f"""\
+The same drive with a digital controller and a dry friction that nobody has told the model of: levels
+with reversals, noise of {LOOP_NOISE} rad/s inside the loop. What does a linear model get wrong, and why?
+"""
+FRICTION_TRUTH = f"""\
+The truth: a dry friction of {FRICTION} N m, an inertia of {TRUTH.J:.4g} kg m^2, a viscous friction of {TRUTH.D:.4g} N m s/rad."""
 
 EMPS_STORY = "A ball-screw axis, measured (EMPS, Janot, Gautier and Brunot 2019; m, m/s, N, kg)"
 EMPS_TRUTH = """\
@@ -54,6 +81,28 @@ def identify_two_masses(seed: int, progress: Progress, workers: int | None) -> t
     """The simulated record and what is found in it."""
     rec = two_mass_record(seed)
     return rec, identify(rec, controller=CONTROLLER, seed=seed, workers=workers, progress=progress)
+
+
+def friction_record(seed: int, order: int = 1) -> Record:
+    """Levels with reversals and dither, forwards (order 1) or backwards (-1), of the drive with hidden friction.
+
+    The controller acts on r - (w + noise) = (r - noise) - w: noise inside the loop is a command r - noise, and a logged
+    velocity w + noise.
+    """
+    rng = np.random.default_rng([seed, order % 3])
+    command = np.repeat(LEVELS[::order], DWELL)
+    dither = np.repeat(rng.choice([-DITHER, DITHER], len(command) // CHIP + 1), CHIP)[: len(command)]
+    command = command + dither * (np.arange(len(command)) // DWELL % 2)
+    noise = LOOP_NOISE * rng.standard_normal(len(command))
+    disturbed = Record(SAMPLE_TIME, command=command - noise, velocity=np.zeros(len(command)))
+    done = run(TRUTH.model().with_effect("coulomb_friction", torque=FRICTION), disturbed, DIGITAL)
+    return Record(SAMPLE_TIME, command=command, velocity=done.velocity + noise, torque=done.torque, name="levels")
+
+
+def diagnose_friction(seed: int, progress: Progress) -> tuple[Record, Diagnosis]:
+    """The record of the drive with hidden friction and its diagnosis, judged on a second record that no fit sees."""
+    rec = friction_record(seed)
+    return rec, diagnose(rec, DIGITAL, validation=friction_record(seed, -1), seed=seed, progress=progress)
 
 
 def emps_path() -> Path | None:

@@ -420,9 +420,14 @@ def test_demo_without_measured_data(here: Path, capsys: pytest.CaptureFixture[st
     assert err == ""
     assert "(p,q) = (1,2), two masses on a shaft; the linear model stands" in out
     assert "Compared with the truth" in out
-    assert out.splitlines()[-1].startswith("The measured EMPS axis is left out: GAIDENT_DATA")
-    assert sorted(p.name for p in here.iterdir()) == ["demo_two_mass.csv", "demo_two_mass.png", "step.csv"]
-    # The command that it proposes, with the drive file of the examples.
+    assert "\nThe measured EMPS axis is left out: GAIDENT_DATA" in out
+    assert "\nVerdict: explained\n" in out and "Cause: coulomb\nfriction." in out
+    assert "\nThe truth: a dry friction of 0.04 N m" in out
+    made = [f"demo_{name}.{suffix}" for name in ("friction", "two_mass") for suffix in ("csv", "png")]
+    assert sorted(p.name for p in here.iterdir()) == [*made, "step.csv"]
+    # The commands that it proposes, the first with the drive file of the examples.
+    assert main(out.splitlines()[-1].split()[1:]) == 0
+    assert "Cause: coulomb\nfriction." in capsys.readouterr().out
     drive = ROOT / "examples" / "drive.toml"
     assert main(["identify", "demo_two_mass.csv", "--drive", str(drive)]) == 0
     assert capsys.readouterr().out.startswith("(p,q) = (1,2)")
@@ -435,6 +440,10 @@ def test_demo_with_measured_data(here: Path, data_dir: Path, capsys: Any, monkey
     assert data["two_masses"]["truth"]["structure"] == "two masses"
     assert data["emps"]["identification"]["adequacy"]["falsified"] is True
     assert (here / "new" / "folder" / "demo_emps.png").is_file()
+    (found,) = data["friction"]["diagnosis"]["findings"]
+    truth = data["friction"]["truth"]["coulomb_friction"]["torque"]
+    assert found["effect"] == "coulomb_friction" and not found["alternatives"]
+    assert found["parameters"]["torque"]["value"] == pytest.approx(truth, rel=0.02)
 
 
 def test_emps_axis_falsifies_the_linear_model(here: Path, data_dir: Path, capsys: Any) -> None:

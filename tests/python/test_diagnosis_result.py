@@ -30,11 +30,11 @@ def command() -> np.ndarray:
 
 
 def drive_record(seed: int = 0) -> ga.Record:
-    """The drive of DRIVE in its loop, noise on the logged velocity only."""
-    still = ga.Record(DT, command=command(), velocity=np.zeros(len(command())))
-    done = ga.run(DRIVE, still, CONTROLLER)
-    noise = 0.05 * np.random.default_rng(seed).standard_normal(len(still))
-    return ga.Record(DT, command=still.command, velocity=done.velocity + noise, torque=done.torque, name="levels")
+    """The drive of DRIVE, noise inside its loop: the controller acts on r - (w + noise) = (r - noise) - w."""
+    asked = command()
+    noise = 0.05 * np.random.default_rng(seed).standard_normal(len(asked))
+    done = ga.run(DRIVE, ga.Record(DT, command=asked - noise, velocity=np.zeros(len(asked))), CONTROLLER)
+    return ga.Record(DT, command=asked, velocity=done.velocity + noise, torque=done.torque, name="levels")
 
 
 @pytest.fixture(scope="module")
