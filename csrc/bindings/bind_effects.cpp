@@ -128,7 +128,7 @@ py::tuple simulate_models(const PyRecord& record, const std::vector<EffectModel>
         if (initial_states.ndim() != 2 || static_cast<std::size_t>(initial_states.shape(0)) != count)
             throw std::invalid_argument("initial_states: one row per model is needed");
         for (std::size_t i = 0; i < count; ++i) {
-            const int states = start_states(reduced(models[i]).linear.structure, job.loop);
+            const int states = start_states(reduced(models[i], true).linear.structure, job.loop);
             if (initial_states.shape(1) != states)
                 throw std::invalid_argument("initial_states: " + std::to_string(initial_states.shape(1)) + " numbers given, " +
                                             std::to_string(states) + " needed");

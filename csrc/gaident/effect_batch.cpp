@@ -28,8 +28,8 @@ public:
         : job_(job), out_(out), samples_(job.record.input.size()), planned_(models.size()), order_(models.size()) {
         for (std::size_t i = 0; i < models.size(); ++i) {
             Planned& p = planned_[i];
-            p.model = reduced(models[i]);
             p.start = starts.empty() ? nullptr : starts[i];
+            p.model = reduced(models[i], p.start != nullptr);
             if (p.model.effects.bits != 0)
                 p.substeps = job.substeps > 0 ? job.substeps : substeps_for(p.model, job.record, job.loop);
         }

@@ -124,10 +124,11 @@ void two_masses(const EffectModel& model, double h, double sample_time, const De
 
 }  // namespace
 
-EffectModel reduced(const EffectModel& model) {
+EffectModel reduced(const EffectModel& model, bool moving) {
     EffectModel r = model;
     for (int i = 0; i < effect_count; ++i) {
         const auto e = static_cast<Effect>(i);
+        if (moving && e == Effect::extra_resonance) continue;
         if (r.effects.has(e) && effect_table[static_cast<std::size_t>(i)].neutral(r.of(e))) r.effects.remove(e);
     }
     if (r.effects.has(Effect::extra_resonance)) {

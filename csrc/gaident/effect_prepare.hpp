@@ -16,8 +16,9 @@ struct EffectRecord {
     double top_speed = 0.0;  // of the measured velocity [rad/s], for the choice of substeps
 };
 
-// The model without the effects whose parameters are neutral, and with the linear one (extra_resonance) multiplied into its factors.
-EffectModel reduced(const EffectModel& model);
+// The model without the effects whose parameters are neutral, and with the linear one (extra_resonance) multiplied into its factors: that
+// one also where it is neutral and the record begins in motion, as its states are among those given.
+EffectModel reduced(const EffectModel& model, bool moving);
 
 // Steps per sample that the reduced model needs: a power of two, so that neighbouring models have the same.
 int substeps_for(const EffectModel& model, const EffectRecord& record, const Loop& loop);

@@ -214,7 +214,6 @@ class _Work:
                     evidence=evidence_of(effect, gain, alternatives),
                 )
             )
-        findings += self._structural(estimates)
         model = self.final.layout.model(self.final.x)
         for name, values in self.at_controller.effects.items():
             model = model.with_effect(name, **values)
@@ -298,10 +297,6 @@ class _Work:
                 Finding("velocity_quantisation", {"step": Estimate(self.step, 0.0, "rad/s")}, evidence=text, is_noise=True)
             )
         return found
-
-    def _structural(self, estimates: dict[str, dict[str, Estimate]]) -> list[Finding]:
-        """A second mass that the given identification does not have is a finding; one found here is part of the linear model."""
-        return []
 
     def _base_shift(self) -> dict[str, tuple[float, float]]:
         """Base parameters before (the linear fit) and after (with the effects)."""

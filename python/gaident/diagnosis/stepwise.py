@@ -119,9 +119,9 @@ class Search:
         reach[0] = 0.15
         moved = np.flatnonzero(steps > 0.0)
         low, high = np.maximum(fit.x - reach, limits[0])[moved], np.minimum(fit.x + reach, limits[1])[moved]
-        start = np.clip(fit.x[moved], low, high)
-        if np.any(low >= high) or not np.all(np.isfinite(start)):
+        if np.any(low >= high) or not np.all(np.isfinite(fit.x)):
             return fit
+        start = low + (high - low) * np.clip((fit.x[moved] - low) / (high - low), 1e-6, 1.0 - 1e-6)
 
         def costs(columns: NDArray[np.float64]) -> Vector:
             X = np.repeat(fit.x[None, :], columns.shape[1], axis=0)
