@@ -184,7 +184,7 @@ def test_ctrl_c_returns_within_a_fifth_of_a_second() -> None:
     import _thread
 
     ctl = ga.PI(0.05, 2.0)
-    for samples, settings in ((300, ga.Settings(engine="plain", generations=5_000_000)), (300_000, ga.Settings())):
+    for samples, settings in ((300, ga.Settings(engine="plain", generations=5_000_000)), (6_000_000, ga.Settings())):
         rec = closed(TWO_MASS, ctl, stairs(samples), 0.05)
         sent: list[float] = []
 

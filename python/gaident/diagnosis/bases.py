@@ -55,7 +55,7 @@ def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]
 
 
 def _fit(problem: Problem, driven: Driven, scales: Scales, model: Model, iterations: int = 20) -> Fit:
-    layout = Layout.of(model, described(scales, model), driven.moving)
+    layout = Layout.of(model, described(scales, model), driven.moving, driven.loop_only)
     x = np.concatenate([layout.base_vector(model), np.zeros(sum(layout.starts))])
     return problem.fit(layout, x, NONE, iterations)
 
@@ -97,7 +97,9 @@ def without_second_mass(search: Search, final: Fit) -> Fit:
         return final
     K, a, _, e0, _, f0 = final.layout.base_values(final.x[None, :])[0]
     one = Model(float(K * f0 / e0) if e0 else float(K), [-float(a)])
-    layout = Layout.of(one, replace(final.layout.scales, two_masses=False), [n > 0 for n in final.layout.starts])
+    layout = Layout.of(
+        one, replace(final.layout.scales, two_masses=False), [n > 0 for n in final.layout.starts], final.layout.looped
+    )
     x = layout.base_vector(one)
     for e in final.effects:
         layout = layout.extended(e)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CANDIDATES", "FRICTION", "TWINS", "Candidate", "Scales"]
+__all__ = ["CANDIDATES", "FRICTION", "TWINS", "Candidate", "Scales", "conditional_twins"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -59,6 +59,7 @@ class Candidate:
     steps: Callable[[Scales], tuple[float, ...]]
     parents: tuple[str, ...] = ()
     harmonic: str = ""  # "torque" or "velocity": phase and size follow from two columns per order
+    neutral: Callable[[float, Scales], tuple[float, ...]] | None = None  # the parent of this level as this effect
     rough: bool = False  # a stop or an impact more or less leads a torque-driven simulation astray: fitted in the loop first
 
     @property
@@ -77,6 +78,19 @@ TWINS: tuple[frozenset[str], ...] = (
     frozenset({"load_torque", "asymmetric_friction"}),
 )
 """Effects that no record of command, velocity and torque tells apart (DIAGNOSIS classes E1, E3)."""
+
+
+def conditional_twins(reversals: int, step_sizes: int, torque_logged: bool) -> tuple[frozenset[str], ...]:
+    """Classes that records without reversals, or with a single size of step, cannot split (E7, E8, E10, E13)."""
+    classes = []
+    if reversals == 0:
+        classes.append(frozenset({*FRICTION, "load_torque", "torque_dead_band"}))
+        classes.append(frozenset({"quadratic_drag", "friction_drift"}))
+    if step_sizes <= 1:
+        classes.append(frozenset({"hardening_stiffness", "extra_resonance"}))
+        if not torque_logged:
+            classes.append(frozenset({"torque_saturation", "command_rate_limit", "integrator_clamp"}))
+    return tuple(classes)
 
 
 def _positive(*logs: int) -> Natural:
@@ -213,6 +227,7 @@ CANDIDATES: dict[str, Candidate] = {
             lambda s: _grid((s.friction,), (0.3, 1.0), _ln(0.005 * s.speed, 0.02 * s.speed, 0.06 * s.speed)),
             lambda s: (_friction_steps(s), 0.3, 0.3),
             parents=("coulomb_friction",),
+            neutral=lambda level, s: (level, 0.0, float(np.log(0.02 * s.speed))),
             rough=True,
         ),
         Candidate(
@@ -224,6 +239,7 @@ CANDIDATES: dict[str, Candidate] = {
             lambda s: [(s.friction, s.friction, b) for b in (0.0, 0.3 * s.friction / s.speed, -0.3 * s.friction / s.speed)],
             lambda s: (_friction_steps(s), _friction_steps(s), _friction_steps(s) / s.speed),
             parents=("coulomb_friction",),
+            neutral=lambda level, s: (level, level, 0.0),
         ),
         Candidate(
             "presliding_friction",
@@ -236,6 +252,7 @@ CANDIDATES: dict[str, Candidate] = {
                        for x in np.geomspace(2e-4, 0.1, 6) * min(max(s.travel, 1e-9), 1.0)],
             lambda s: (_friction_steps(s), 0.5),
             parents=("coulomb_friction",),
+            neutral=lambda level, s: (level, float(np.log(1e6 * s.friction / max(s.travel, 1e-9)))),
         ),
         Candidate(
             "friction_drift",
@@ -246,6 +263,7 @@ CANDIDATES: dict[str, Candidate] = {
             lambda s: [(s.friction, r / s.duration) for r in (-0.4, 0.4)],
             lambda s: (_friction_steps(s), 0.3 / s.duration),
             parents=("coulomb_friction",),
+            neutral=lambda level, s: (level, 0.0),
         ),
         _linear("quadratic_drag", "coefficient", lambda s: 0.0, lambda s: s.torque / s.speed**2,
                 lambda s: tuple(f * s.torque / s.speed**2 for f in (0.01, 0.05, 0.2)), lambda s: 0.05 * s.torque / s.speed**2),
@@ -270,9 +288,9 @@ CANDIDATES: dict[str, Candidate] = {
         _single("velocity_filter", "sensor", "time_constant", lambda s: 0.02 * s.dt, lambda s: 30.0 * s.dt,
                 lambda s: tuple(s.dt * np.geomspace(0.25, 16.0, 6))),
         _single("integrator_clamp", "controller", "limit", lambda s: 1e-3 * s.integral, lambda s: s.integral,
-                lambda s: tuple(s.integral * np.array([0.95, 0.8, 0.6, 0.4, 0.2, 0.08]))),
+                lambda s: tuple(s.integral * np.geomspace(5e-3, 0.95, 14)), rough=True),
         _single("command_rate_limit", "controller", "rate", lambda s: 1e-3 * s.acceleration, lambda s: s.acceleration,
-                lambda s: tuple(s.acceleration * np.geomspace(2e-3, 0.7, 8))),
+                lambda s: tuple(s.acceleration * np.geomspace(2e-3, 0.7, 8)), rough=True),
     )
 }  # fmt: skip
 """Every effect that a diagnosis can name, in the order of a report's tables."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.diagnosis.bases import linear_bases, without_second_mass
-from gaident.diagnosis.candidates import CANDIDATES, TWINS, Scales
+from gaident.diagnosis.candidates import CANDIDATES, TWINS, Scales, conditional_twins
 from gaident.diagnosis.controller_place import controller_findings
 from gaident.diagnosis.driven import AT_CONTROLLER, Driven
 from gaident.diagnosis.excitation import excitation
@@ -28,6 +28,7 @@ from gaident.identification.covariance import Estimate
 from gaident.identification.identify import identify
 from gaident.identification.result import Identification
 from gaident.models.controller import PI
+from gaident.models.simulate import simulate
 from gaident.version import version
 
 __all__ = ["diagnose"]
@@ -123,10 +124,10 @@ class _Work:
     def __post_init__(self) -> None:
         order = sorted(range(len(self.records)), key=lambda i: (self.records[i].digest, self.records[i].name))
         self.records = tuple(self.records[i] for i in order)  # sums must not depend on the order given
-        hit = [outliers(r.velocity) for r in self.records]
+        hit = [self._spikes(r) for r in self.records]
         clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
         self.clean = tuple(clean)
-        self.driven = Driven.of(clean, self.controller)
+        self.driven = Driven.of(clean, self.controller, any(len(h) for h in hit))
         weight = np.ones(sum(self.driven.lengths))
         at = 0
         for h, n in zip(hit, self.driven.lengths, strict=True):
@@ -137,6 +138,14 @@ class _Work:
         self.step = quantisation(self.records)
         self.spoiled = int(sum(len(h) for h in hit))
         self.excited = excitation(self.clean, self.controller)
+
+    def _spikes(self, rec: Record) -> NDArray[np.intp]:
+        """Samples that stand out of the velocity, or out of the linear model's error: a slope of the velocity may hide them."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            error = rec.velocity - simulate(self.idn.model, rec, self.controller)
+        if np.all(np.abs(error) < 1e6 * np.abs(rec.velocity).max()):
+            return outliers(rec.velocity, error)
+        return outliers(rec.velocity)
 
     def search(self) -> None:
         """Base, controller, stepwise extension, rivals, what is left."""
@@ -164,7 +173,7 @@ class _Work:
         final = search.thinned(final, every=True)
         for effect in final.effects:
             if effect not in self.rivals or again:
-                self.rivals[effect] = search.rivals(final, effect)
+                self.rivals[effect] = search.rivals(final, effect, self._twins_here(effect))
         self.final = final
         self.adequate = search.only_noise(final, GATE)
         self.note(0.85, "looking for what is left")
@@ -175,7 +184,7 @@ class _Work:
         self.rivals = {}
         for effect in final.effects:
             self.note(None, f"rivals of {effect.replace('_', ' ')}")
-            gain, rivals = search.rivals(final, effect)
+            gain, rivals = search.rivals(final, effect, self._twins_here(effect))
             self.rivals[effect] = (gain, rivals)
             if not rivals:
                 continue
@@ -272,10 +281,17 @@ class _Work:
     def _alternatives(self, effect: str, rivals: Sequence[Rival]) -> tuple[str, ...]:
         """Statistical rivals and structural twins."""
         names = [r.effect for r in rivals]
+        names += sorted(self._twins_here(effect))
         for twins in TWINS:
             if effect in twins:
                 names += [t for t in sorted(twins) if t != effect]
         return tuple(dict.fromkeys(names))
+
+    def _twins_here(self, effect: str) -> set[str]:
+        """What these records cannot tell from an effect, whatever their noise, for lack of reversals or of sizes of steps."""
+        e = self.excited
+        classes = conditional_twins(e.reversals, len(e.steps), self.driven.torque_logged)
+        return set().union(*(c for c in classes if effect in c)) - {effect} - set(self.not_testable)
 
     def _noise_findings(self) -> list[Finding]:
         found = []

@@ -27,6 +27,7 @@ __all__ = ["Driven"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
+FINEST = 0.125e-3  # s, of a substep: the accuracy that friction on a stiff shaft needs
 AT_CONTROLLER = ("integrator_clamp", "command_rate_limit")
 
 
@@ -43,19 +44,25 @@ class Driven:
     turned: tuple[Record, ...]
     free: tuple[Record, ...]
     moving: tuple[bool, ...]
+    spoiled: bool = False
 
     @classmethod
-    def of(cls, records: Sequence[Record], controller: PI | None) -> Driven:
-        """The records as driven by their torque."""
+    def of(cls, records: Sequence[Record], controller: PI | None, spoiled: bool = False) -> Driven:
+        """The records as driven by their torque; spoiled: some velocities are not what the controller read."""
         driven = tuple(_driven(r, torque_of(r, controller)) for r in records)
         turned = tuple(_with_angle(r, _angle(a)) for r, a in zip(records, driven, strict=True))
         free = tuple(a if r.position is not None else _with_angle(a, None) for r, a in zip(records, driven, strict=True))
-        return cls(tuple(records), controller, driven, turned, free, tuple(starts_moving(r, None) for r in driven))
+        return cls(tuple(records), controller, driven, turned, free, tuple(starts_moving(r, None) for r in driven), spoiled)
 
     @property
     def angle_logged(self) -> bool:
         """Whether every record holds the angle."""
         return all(r.position is not None for r in self.records)
+
+    @property
+    def loop_only(self) -> bool:
+        """Whether a torque is not to be had: a replay keeps what one wrong velocity adds to its integral for ever."""
+        return self.spoiled and not self.torque_logged and self.loopable
 
     @property
     def torque_logged(self) -> bool:
@@ -97,17 +104,28 @@ class Driven:
         """Simulated velocities of rows of x, (n, samples)."""
         if layout.looped:
             names, values = layout.values(X)
+            steps = self.substeps(names)
             source = self.records if layout.own_angle else self.turned
-            return np.concatenate([simulate_values(layout.structure, names, values, r, self.controller) for r in source], axis=1)
+            return np.concatenate(
+                [simulate_values(layout.structure, names, values, r, self.controller, substeps=steps) for r in source], axis=1
+            )
         at_controller = [e for e in layout.effects if e in AT_CONTROLLER]
         if at_controller:
             return np.vstack([self._predict_one(layout, x, at_controller) for x in X])
         names, values = layout.values(X)
         parts = [
-            simulate_values(layout.structure, names, values, r, initial_states=layout.start_values(X, i))
+            simulate_values(
+                layout.structure, names, values, r, initial_states=layout.start_values(X, i), substeps=self.substeps(names)
+            )
             for i, r in enumerate(self.free if layout.own_angle else self.driven)
         ]
         return np.concatenate(parts, axis=1)
+
+    def substeps(self, effects: Sequence[str]) -> int | None:
+        """As many for every model with effects, so that no candidate is ahead for being simulated more finely."""
+        if not set(effects) - {"extra_resonance"}:
+            return None
+        return int(2 ** np.clip(np.ceil(np.log2(self.records[0].dt / FINEST)), 0.0, 5.0))
 
     def _predict_one(self, layout: Layout, x: Vector, at_controller: Sequence[str]) -> Matrix:
         """With effects of the controller the torque itself depends on x."""

@@ -16,11 +16,11 @@ ROBUST = 1.4826  # median absolute deviation of normal noise -> standard deviati
 FAR = 9.0  # standard deviations
 
 
-def outliers(velocity: Vector) -> NDArray[np.intp]:
+def outliers(velocity: Vector, error: Vector | None = None) -> NDArray[np.intp]:
     """Samples that leave the signal and come back: both steps, to the sample and from it, are far beyond the usual.
 
     A corner of the signal has one large second difference, an outlier at n has d(n) large and d(n-1), d(n+1) half of it with the
-    other sign.
+    other sign. A slope of the signal hides one; where the error of a model is given, one that stands out of it does as well.
     """
     w = velocity
     if len(w) < 7:
@@ -31,7 +31,10 @@ def outliers(velocity: Vector) -> NDArray[np.intp]:
     steps = np.abs(np.diff(w))
     quantum = float(steps[steps > 0.0].min()) if np.any(steps > 0.0) else 0.0
     local = np.maximum(spread, quantum)
-    far = (np.abs(middle) > FAR * local) & (np.abs(middle) > 3.0 * around)
+    clear = np.abs(middle) > 3.0 * around
+    if error is not None:
+        clear[np.setdiff1d(outliers(error), [0, 1]) - 2] = True
+    far = (np.abs(middle) > FAR * local) & clear
     both = np.sign(w[2:-2] - w[1:-3]) == np.sign(w[2:-2] - w[3:-1])
     return np.flatnonzero(far & both) + 2
 

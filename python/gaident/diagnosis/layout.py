@@ -77,7 +77,7 @@ class Layout:
     own_angle: bool = False
 
     @classmethod
-    def of(cls, model: Model, scales: Scales, moving: Sequence[bool]) -> Layout:
+    def of(cls, model: Model, scales: Scales, moving: Sequence[bool], looped: bool = False) -> Layout:
         """The layout of a linear model of one or two masses (effects are added by `extended`)."""
         values = mechanism(model)
         floor = 2.0 / scales.duration
@@ -87,7 +87,7 @@ class Layout:
             units += [w, w * w]
         masses = 1 if len(values) == 2 else 2
         starts = tuple((1, 3)[masses - 1] if m else 0 for m in moving)
-        return cls(masses, float(np.sign(values[0])), tuple(float(u) for u in units), (), starts, scales)
+        return cls(masses, float(np.sign(values[0])), tuple(float(u) for u in units), (), starts, scales, looped)
 
     def extended(self, effect: str) -> Layout:
         """With one effect more, behind the others."""

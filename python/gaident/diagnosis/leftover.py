@@ -21,8 +21,8 @@ __all__ = ["LEFT", "Leftover", "leftover"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-LEFT = 12.0
-"""Gain in BIC units from which something counts as left."""
+LEFT = 40.0
+"""Gain in BIC units from which something counts as left: above what small errors of the angle and the simulation make."""
 
 
 @dataclass(frozen=True)

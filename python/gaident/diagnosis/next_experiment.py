@@ -123,9 +123,18 @@ def propose(
             f"Without a controller no command can be worked out that separates {listed}: give controller=PI(...).",
         ]
     bench = _Bench(driven.controller, final.phi, max(final.cost / count, 1e-300), driven.torque_logged, elsewhere)
-    trials = _trials(pairs, final)
     items = menu(driven, final)
-    rough = [min(_tried(bench, item, trial, False) for trial in trials) for item in items]
+    # A generalisation that was fitted as its neutral case is the same drive: such a pair no command separates.
+    table = [
+        (pair, trial, [_tried(bench, item, trial, False) for item in items]) for pair in pairs for trial in _trials([pair], final)
+    ]
+    hopeless = {id(pair) for pair, _, T in table if max(T, default=0.0) < 0.5 * CLEAR}
+    table = [row for row in table if id(row[0]) not in hopeless]
+    pairs = [pair for pair in pairs if id(pair) not in hopeless]
+    if pairs:
+        names = tuple(dict.fromkeys(name for effect, rival in pairs for name in (effect, rival.effect)))
+    trials = [trial for _, trial, _ in table]
+    rough = np.min([T for *_, T in table], axis=0) if table and items else np.zeros(0)
     best, most = None, -1.0
     for i in np.argsort(rough)[::-1][:REFITTED]:
         T = np.inf

@@ -7,7 +7,7 @@ it is worth more than the simpler one by the threshold again. After each step ev
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -211,7 +211,7 @@ class Search:
         """A short fit taken to the end, under the filter of what it leaves itself."""
         fit = self.problem.settled(fit if fit.converged else self.problem.fit(fit.layout, fit.x, fit.phi, 8))
         # Found in the loop's grip or with the measured angle, the parameters may be good enough for a view that sees more.
-        views = [replace(fit.layout, looped=False)] if fit.layout.looped else []
+        views = [replace(fit.layout, looped=False)] if fit.layout.looped and not self.driven.loop_only else []
         if not fit.layout.own_angle and not self.driven.angle_logged and set(fit.effects) & set(OF_ANGLE):
             views.append(replace(fit.layout, own_angle=True))
         tries = [self.problem.settled(self.problem.fit(view, fit.x, NONE, 8)) for view in views]
@@ -244,12 +244,34 @@ class Search:
         return [e for e in self.allowed if e not in blocked and (layout.masses == 2 or CANDIDATES[e].place != "coupling")]
 
     def simplest(self, best: Fit, fits: Sequence[Fit]) -> Fit:
-        """A parent of the winner's newest effect, where the winner is not worth self.threshold more."""
-        for parent in CANDIDATES[best.effects[-1]].parents:
+        """A parent of the winner's newest effect, where the winner is not worth the threshold more than it.
+
+        The parent is also taken as the winner's own neutral case, in the same view and with the same substeps: what only the
+        accuracy of the simulation brings does not count.
+        """
+        newest = best.effects[-1]
+        for parent in CANDIDATES[newest].parents:
             for f in fits:
-                if f.effects[-1] == parent and f.bic - best.bic < self.threshold:
+                if f.effects[-1] != parent:
+                    continue
+                if min(f.bic, self.as_neutral(f, best)) - best.bic < self.threshold:
                     return f
         return best
+
+    def as_neutral(self, parent: Fit, child: Fit) -> float:
+        """BIC of a parent's parameters simulated as the neutral case of its generalisation."""
+        neutral = CANDIDATES[child.effects[-1]].neutral
+        if neutral is None:
+            return np.inf
+        layout, scales = child.layout, child.layout.scales
+        z = np.array(neutral(float(parent.x[parent.layout.slot(parent.effects[-1])][0]), scales))
+        x = layout.without(child.effects[-1])
+        base = parent.layout.removed(parent.x, parent.effects[-1])
+        if base.shape != (x.size,):
+            return np.inf
+        as_child = Fit(layout, x.inserted(base, z), child.phi, 0.0, np.inf)
+        freedom = CANDIDATES[child.effects[-1]].size - CANDIDATES[parent.effects[-1]].size
+        return float(self.problem.judged(as_child).bic - freedom * np.log(self.problem.count))
 
     def thinned(self, best: Fit, every: bool = False) -> Fit:
         """Without the members (of all, or of all but the newest) whose removal costs less than the threshold."""
@@ -264,8 +286,8 @@ class Search:
         layout = fit.layout.without(effect)
         return self.problem.settled(self.problem.fit(layout, fit.layout.removed(fit.x, effect), fit.phi, 8))
 
-    def rivals(self, final: Fit, effect: str) -> tuple[float, list[Rival]]:
-        """(gain of `effect` in the final model, other effects in its place that come within reach)."""
+    def rivals(self, final: Fit, effect: str, twins: Collection[str] = ()) -> tuple[float, list[Rival]]:
+        """(gain of `effect` in the final model, other effects in its place that come within reach, or are its twins here)."""
         less = self.without(final, effect)
         gain = (self.in_loop(less) if final.layout.looped else less).bic - final.bic
         found = []
@@ -274,10 +296,13 @@ class Search:
             if name == effect or name in final.effects:
                 continue
             behind = f.bic - final.bic
+            if name in twins:
+                found.append(Rival(name, behind, f))
+                continue
             if effect in CANDIDATES[name].parents:
                 # A generalisation is never worse by more than its parameters: only a hint of what it adds counts.
-                plain = behind - (CANDIDATES[name].size - CANDIDATES[effect].size) * np.log(self.problem.count)
-                if plain > -HINT:
+                more = CANDIDATES[name].size - CANDIDATES[effect].size
+                if behind - more * np.log(self.problem.count) > -(HINT + 3.0 * (more - 1)):
                     continue
             if behind < self.margin:
                 found.append(Rival(name, behind, f))
@@ -290,7 +315,7 @@ def with_second_mass(problem: Problem, fit: Fit) -> Fit:
     if layout.masses == 2 or "extra_resonance" not in layout.effects:
         return fit
     model = two_masses(layout, x)
-    longer = Layout.of(model, described(layout.scales, model), [n > 0 for n in layout.starts])
+    longer = Layout.of(model, described(layout.scales, model), [n > 0 for n in layout.starts], layout.looped)
     y = longer.base_vector(model)
     for e in layout.effects:
         if e != "extra_resonance":
