@@ -182,7 +182,10 @@ def test_numpy_numbers_are_numbers() -> None:
 def test_ctrl_c_returns_within_a_fifth_of_a_second() -> None:
     """From the signal to KeyboardInterrupt, in a search that would take minutes and in a fit of a long record."""
     import _thread
+    import signal
 
+    # A shell starts background jobs with SIGINT ignored, and interrupt_main() respects that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     ctl = ga.PI(0.05, 2.0)
     for samples, settings in ((300, ga.Settings(engine="plain", generations=5_000_000)), (6_000_000, ga.Settings())):
         rec = closed(TWO_MASS, ctl, stairs(samples), 0.05)
