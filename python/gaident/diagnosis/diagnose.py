@@ -71,7 +71,7 @@ def diagnose(
     progress: called now and then with (fraction done, message).
 
     The method: stepwise extension by the effects of `gaident.effects.table()`, base and effects refitted together on whitened
-    errors of a torque-driven simulation, decided by BIC with a calibrated threshold; rivals within 10 units and structural
+    errors of a torque-driven simulation, decided by BIC; rivals within 10 units and structural
     twins make a finding ambiguous; what no effect explains is reported by its driver and not named. See docs/diagnosis.md.
 
     Raises GaidentError (a ValueError) that names the argument, its value and the remedy.
@@ -82,11 +82,10 @@ def diagnose(
     held = () if validation is None else _records(validation, "validation")
     _check(records, held, controller, identification, bootstrap, seed, progress)
     note(0.02, "identifying the linear model")
-    given = identification is not None
     idn = identification if identification is not None else identify(list(records), controller, seed=seed)
-    work = _Work(records, held, controller, idn, given, _noise_std(noise), note)
+    work = _Work(records, held, controller, idn, _noise_std(noise), note)
     work.search()
-    result = work.report(seed, time.perf_counter() - began)
+    result = work.report(seed)
     if bootstrap:
         from gaident.diagnosis.bootstrap import with_p_value
 
@@ -96,7 +95,7 @@ def diagnose(
 
 
 class _Note:
-    """Progress that goes on by itself: each message takes half of what is left."""
+    """Progress that goes on by itself: each message without a fraction takes a fifth of what is left."""
 
     def __init__(self, callback: ProgressCallback | None) -> None:
         self.callback, self.fraction = callback, 0.0
@@ -115,10 +114,8 @@ class _Work:
     held: tuple[Record, ...]
     controller: PI | None
     idn: Identification
-    given: bool
     noise: float | None
     note: _Note
-    findings: list[Finding] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -170,10 +167,9 @@ class _Work:
             final, again = self.with_rivals(search, final, swaps_left > 0)
             if not again:
                 break
-        final = search.thinned(final, every=True)
-        for effect in final.effects:
-            if effect not in self.rivals or again:
-                self.rivals[effect] = search.rivals(final, effect, self._twins_here(effect))
+        thinned = search.thinned(final, every=True)
+        if thinned is not final:  # gains and rivals are those of the model that is reported
+            final, _ = self.with_rivals(search, thinned, False)
         self.final = final
         self.adequate = search.only_noise(final, GATE)
         self.note(0.85, "looking for what is left")
@@ -193,7 +189,7 @@ class _Work:
                 return search.thinned(with_second_mass(self.problem, rivals[0].fit)), True
         return final, False
 
-    def report(self, seed: int, seconds: float) -> Diagnosis:
+    def report(self, seed: int) -> Diagnosis:
         """Everything the user sees."""
         self.note(0.9, "measuring the gain")
         driver = self.left.driver if self.adequate else self.left.strongest
@@ -263,7 +259,7 @@ class _Work:
             identification=self.idn,
             controller=self.controller,
             seed=seed,
-            seconds=seconds,
+            seconds=0.0,
             simulations=self.problem.simulations,
             samples=sum(self.driven.lengths),
             digests=tuple(r.digest for r in self.records),

@@ -131,11 +131,13 @@ class Driven:
         """With effects of the controller the torque itself depends on x."""
         limits = {e: float(layout.effect_values(x[None, :], e)[0, 0]) for e in at_controller}
         names, values = layout.values(x[None, :], at_controller)
+        steps = self.substeps(layout.effects)
         parts = []
         for i, r in enumerate(self.records):
             torque = replayed(r, self.controller, limits)
             states = layout.start_values(x[None, :], i)
-            parts.append(simulate_values(layout.structure, names, values, _driven(r, torque), initial_states=states))
+            driven = _driven(r, torque)
+            parts.append(simulate_values(layout.structure, names, values, driven, initial_states=states, substeps=steps))
         return np.concatenate(parts, axis=1)
 
     @cached_property

@@ -51,7 +51,7 @@ def leftover(problem: Problem, driven: Driven, fit: Fit) -> Leftover:
     room = max(len(w) // 16, 4)
     torques: dict[str, Matrix] = {
         "velocity": _hats_by_sign(w),
-        "position": _of_position(driven.angle, w, driven.lengths),
+        "position": _of_position(driven.angle, w),
         "torque": _hats(driven.torque, 8),
         "past": _of_path(driven.angle, driven.lengths),
         "time": _drifts(driven.time, w),
@@ -109,7 +109,7 @@ def _hats_by_sign(w: Vector) -> Matrix:
     return np.asarray(rows[np.abs(rows).sum(axis=1) > 0.0])
 
 
-def _of_position(angle: Vector, w: Vector, lengths: tuple[int, ...]) -> Matrix:
+def _of_position(angle: Vector, w: Vector) -> Matrix:
     """Slow functions of the angle, with and without the direction of motion; the first turns' harmonics."""
     turned = float(np.ptp(angle))
     direction = np.sign(w)

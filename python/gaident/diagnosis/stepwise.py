@@ -1,8 +1,9 @@
 """Stepwise extension: one effect after the other, everything refitted with each.
 
-A candidate is worth the fall of the BIC that it brings, each hypothesis with a noise filter of its own; the best is taken while
-it is worth more than THRESHOLD. The friction family is one seat: a generalisation takes the place of dry friction, and only where
-it is worth more than the simpler one by the threshold again. After each step every member has to show that it is still needed.
+A candidate is worth the fall of the BIC that it brings, each hypothesis with a noise filter of its own; the best is taken
+while it is worth more than a threshold. The friction family is one seat: a generalisation takes the place of dry friction,
+and only where it is worth more than the simpler one by the threshold again. After each step every member has to show that it
+is still needed.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ __all__ = ["HINT", "MARGIN", "THRESHOLD", "Rival", "Search", "with_second_mass"]
 Vector = NDArray[np.float64]
 
 THRESHOLD = 12.0
-"""Gain in BIC units from which an extension counts in a long record; see the calibration table in the docs."""
+"""Gain in BIC units from which an extension counts in a long record; not calibrated yet."""
 
 MARGIN = 10.0
 """Rivals closer than this many BIC units cannot be told apart in a long record."""
@@ -163,6 +164,8 @@ class Search:
         screening = Screening(self.problem, self.driven)
         layout, x = now.layout, now.x
         screening.add(layout, x, [e for e in self.candidates(layout) if e not in FRICTION[1:]])
+        if not screening.trials:
+            return []
         beyond = screening.filter_beyond()
         seat = next((e for e in layout.effects if e in FRICTION), None)
         fits: list[Fit] = []
