@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from gaident.diagnosis.candidates import CANDIDATES, FRICTION, Scales
 from gaident.diagnosis.driven import Driven
 from gaident.diagnosis.layout import Layout, described, two_masses
-from gaident.diagnosis.problem import NONE, WORST, Fit, Problem, project_out
+from gaident.diagnosis.noise_filter import WHITE
+from gaident.diagnosis.problem import WORST, Fit, Problem, project_out
 from gaident.diagnosis.screening import Screening
 from gaident.diagnosis.stepwise import Search, with_second_mass
 from gaident.models.model import Model
@@ -32,23 +33,21 @@ def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]
     """
     problem, driven = search.problem, search.driven
     one = _fit(problem, driven, scales, one_mass(driven, identified))
-    starts = [identified] if (identified.p, identified.q) == (1, 2) else []
-    starts += resonant(problem, one)
-    fits = [_fit(problem, driven, scales, m, 6) for m in starts]
-    fits = [f for f in fits if f.cost < WORST]
+    known = _fits(problem, driven, scales, reduced(identified))
+    fits = known + _fits(problem, driven, scales, resonant(problem, one))
     one = problem.settled(one)
     if not fits:
         return [one]
-    chosen = sorted(fits, key=lambda f: f.cost)[:1] + (fits[:1] if starts[0] is identified else [])
-    two = min((problem.settled(problem.fit(f.layout, f.x, NONE, 20)) for f in chosen), key=lambda f: f.bic)
+    chosen = sorted(fits, key=lambda f: f.cost)[:1] + sorted(known, key=lambda f: f.cost)[:1]
+    two = min((problem.settled(problem.fit(f.layout, f.x, WHITE, 20)) for f in chosen), key=lambda f: f.bic)
     if one.bic < two.bic:
         return [one, two]
     screening = Screening(problem, driven)
     screening.add(one.layout, one.x, [e for e in search.candidates(one.layout) if e not in (*FRICTION[1:], "extra_resonance")])
     tried: set[str] = set()
-    for phi in (NONE, two.phi):
-        for s in screening.ranked(phi)[:3]:
-            if s.effect not in tried and problem.judged(problem.fit(s.layout, s.starts[0], phi, 5)).bic < two.bic:
+    for noise in (WHITE, two.noise):
+        for s in screening.ranked(noise)[:3]:
+            if s.effect not in tried and problem.judged(problem.fit(s.layout, s.starts[0], noise, 5)).bic < two.bic:
                 return [one, two]
             tried.add(s.effect)
     return [two]
@@ -57,7 +56,31 @@ def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]
 def _fit(problem: Problem, driven: Driven, scales: Scales, model: Model, iterations: int = 20) -> Fit:
     layout = Layout.of(model, described(scales, model), driven.moving, driven.loop_only)
     x = np.concatenate([layout.base_vector(model), np.zeros(sum(layout.starts))])
-    return problem.fit(layout, x, NONE, iterations)
+    return problem.fit(layout, x, WHITE, iterations)
+
+
+def _fits(problem: Problem, driven: Driven, scales: Scales, starts: list[Model]) -> list[Fit]:
+    """Short fits of two masses."""
+    return [f for f in (_fit(problem, driven, scales, m, 6) for m in starts) if f.cost < WORST]
+
+
+def reduced(identified: Model) -> list[Model]:
+    """Two-mass starts: each resonance of the identified model with each of its antiresonances.
+
+    A lag or a delay adds roots of its own to those of the mechanism, which stand between them. With p, z one pair each and a the
+    slowest real pole, K |z|^2/(a |p|^2) is the identified model's gain at standstill.
+    """
+    real = [-r.real for r in identified.poles if r.imag == 0.0]
+    poles, zeros = ([r for r in roots if r.imag > 0.0] for roots in (identified.poles, identified.zeros))
+    if not real:
+        return []
+    a = min(real, key=abs)
+    others = [r for r in identified.poles if r != -a]
+    rigid = float(identified.gain * np.prod(np.abs(identified.zeros)) / np.prod(np.abs(others)))
+    return [
+        Model(rigid * abs(p) ** 2 / abs(z) ** 2, [-a, p, p.conjugate()], [z, z.conjugate()])
+        for p in poles for z in zeros
+    ]  # fmt: skip
 
 
 def one_mass(driven: Driven, identified: Model) -> Model:
@@ -82,7 +105,7 @@ def resonant(problem: Problem, one: Fit) -> list[Model]:
     layout = one.layout.extended("extra_resonance")
     rows = np.array(candidate.starts(one.layout.scales))
     X = np.vstack([one.layout.inserted(one.x, z) for z in rows])
-    _, J, _ = problem.linearised(one.layout, one.x, NONE)
+    _, J, _ = problem.linearised(one.layout, one.x, WHITE)
     E = problem.errors(layout, X)
     finite = np.all(np.isfinite(E), axis=1)
     rest = project_out(J, np.where(finite[:, None], E, 0.0))
@@ -105,5 +128,5 @@ def without_second_mass(search: Search, final: Fit) -> Fit:
         layout = layout.extended(e)
         x = np.concatenate([x, final.x[final.layout.slot(e)]])
     x = np.concatenate([x, np.zeros(sum(layout.starts))])
-    less = problem.settled(problem.fit(layout, x, final.phi, 20))
+    less = problem.settled(problem.fit(layout, x, final.noise, 20))
     return with_second_mass(problem, less) if less.bic - final.bic < search.threshold else final

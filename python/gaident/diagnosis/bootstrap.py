@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import Fit, Problem
 from gaident.diagnosis.result import Diagnosis
 from gaident.diagnosis.stepwise import Search
@@ -39,24 +40,18 @@ def largest_gains(
     note: Callable[[str], None],
 ) -> Vector:
     """The best first gain on each of `draws` records without an effect (BIC units; -inf where nothing was worth a fit)."""
-    from scipy.signal import lfilter
-
-    phi = final.phi
     rng = np.random.default_rng(seed)
     clean = problem.predict(base.layout, base.x[None, :])[0]
-    v = problem.whitened(problem.errors(final.layout, final.x[None, :]), phi)[0]
-    pool = v[problem.usable(len(phi)) > 0.0]
+    v = problem.whitened(problem.errors(final.layout, final.x[None, :]), final.noise)[0]
+    pool = v[problem.counted > 0.0]
     gains = np.empty(draws)
     for k in range(draws):
         note(f"bootstrap {k + 1} of {draws}")
-        noise = []
-        for n in problem.lengths:
-            # The filter's own start dies out in the samples in front.
-            drawn = rng.choice(pool, n + 20 * (len(phi) + 1))
-            noise.append(lfilter([1.0], np.concatenate([[1.0], -phi]), drawn)[-n:])
+        # The filter's own start dies out in the samples in front.
+        noise = [final.noise.coloured(rng.choice(pool, 2 * n))[-n:] for n in problem.lengths]
         drawn_problem = replace(problem, measured=clean + np.concatenate(noise), simulations=0)
         search = Search(drawn_problem, driven, allowed, lambda _: None)
-        start = drawn_problem.settled(drawn_problem.fit(base.layout, base.x, np.zeros(0)))
+        start = drawn_problem.settled(drawn_problem.fit(base.layout, base.x, WHITE))
         gains[k] = search.best_gain(start)
     return gains
 

@@ -60,6 +60,7 @@ class Candidate:
     parents: tuple[str, ...] = ()
     harmonic: str = ""  # "torque" or "velocity": phase and size follow from two columns per order
     neutral: Callable[[float, Scales], tuple[float, ...]] | None = None  # the parent of this level as this effect
+    proportional: bool = False  # its torque is proportional to its one coordinate
     rough: bool = False  # a stop or an impact more or less leads a torque-driven simulation astray: fitted in the loop first
 
     @property
@@ -147,6 +148,7 @@ def _linear(effect: str, name: str, low: Callable[[Scales], float], high: Callab
         lambda s: [(low(s), high(s))],
         lambda s: [(v,) for v in starts(s)],
         lambda s: (step(s),),
+        proportional=True,
     )
 
 

@@ -8,7 +8,7 @@ so.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,13 +106,13 @@ def _stages(final: Fit, problem: Problem, part: float | None) -> list[Fit]:
         for n in problem.lengths:
             weight[at + int(part * n) : at + n] = 0.0
             at += n
-        problem = Problem(problem.predict, problem.measured, problem.lengths, weight)
+        problem = replace(problem, weight=weight)
     fits = []
     layout, x = final.layout, final.x
     for e in reversed(final.layout.effects):
-        fits.append(problem.fit(layout, x, final.phi, 10) if part is not None or layout is not final.layout else final)
+        fits.append(problem.fit(layout, x, final.noise, 10) if part is not None or layout is not final.layout else final)
         x, layout = layout.removed(x, e), layout.without(e)
-    fits.append(problem.fit(layout, x, final.phi, 10))
+    fits.append(problem.fit(layout, x, final.noise, 10))
     return fits[::-1]
 
 

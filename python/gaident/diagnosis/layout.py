@@ -203,8 +203,13 @@ class Layout:
 
 
 def two_masses(layout: Layout, x: Vector) -> Model:
-    """One mass with an extra resonance is a drive of two masses: K (wp/wz)^2 (s^2 + ...)/((s + a)(s^2 + ...))."""
-    K, a = layout.base_values(x[None, :])[0]
+    """The drive of two masses whose resonance is the extra one of x: K (wp/wz)^2 (s^2 + ...)/((s + a)(s^2 + ...)).
+
+    On one mass the extra resonance is the second mass; on two it takes the place of theirs, K f0/e0 the gain of the whole.
+    """
+    K, a, *pairs = layout.base_values(x[None, :])[0]
+    if pairs:
+        K *= pairs[3] / pairs[1]
     wp, zp, wz, zz = layout.effect_values(x[None, :], "extra_resonance")[0]
     poles = [complex(-a), *quadratic_roots(2.0 * zp * wp, wp**2)]
     return Model(K * (wp / wz) ** 2, poles, quadratic_roots(2.0 * zz * wz, wz**2))

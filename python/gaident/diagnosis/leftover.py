@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.driven import Driven
+from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import Fit, Problem, project_out
 
 __all__ = ["LEFT", "Leftover", "leftover"]
@@ -46,7 +47,7 @@ class Leftover:
 def leftover(problem: Problem, driven: Driven, fit: Fit) -> Leftover:
     """Every driver's gain over the model."""
     layout, x = fit.layout, fit.x
-    _, J, error = problem.linearised(layout, x, np.zeros(0))
+    _, J, error = problem.linearised(layout, x, WHITE)
     w = problem.measured - error
     room = max(len(w) // 16, 4)
     torques: dict[str, Matrix] = {
@@ -60,7 +61,7 @@ def leftover(problem: Problem, driven: Driven, fit: Fit) -> Leftover:
         torques["command"] = _hats(driven.command, 8)
     columns = {d: driven.response(layout, x, rows[:room]) for d, rows in torques.items()}
     lines = _lines(project_out(J, error[None, :])[0], driven, problem)
-    judge = _Judge(problem, J, error, fit.phi)
+    judge = _Judge(problem, J, error, fit)
     none = judge.bic(np.zeros((0, len(w))))
     gains = {driver: none - judge.bic(rows) for driver, rows in columns.items()}
     for i in range(0, len(lines), 2):
@@ -72,23 +73,23 @@ def leftover(problem: Problem, driven: Driven, fit: Fit) -> Leftover:
 class _Judge:
     """BIC of the error with some columns taken out, each set under a noise filter of its own (two rounds of GLS)."""
 
-    def __init__(self, problem: Problem, J: Matrix, error: Vector, phi: Vector) -> None:
-        self.problem, self.J, self.error, self.phi = problem, J, error, phi
+    def __init__(self, problem: Problem, J: Matrix, error: Vector, fit: Fit) -> None:
+        self.problem, self.J, self.error, self.noise, self.looped = problem, J, error, fit.noise, fit.layout.looped
 
     def bic(self, columns: Matrix) -> float:
         sizes = np.sqrt(np.einsum("ij,ij->i", columns, columns))
         columns = columns[sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)]
         rows = np.vstack([self.J, columns])
-        n, phi = self.problem.count, self.phi
+        n, noise = self.problem.count, self.noise
         best = np.inf
         for _ in range(3):
-            A, v = self.problem.whitened(rows, phi), self.problem.whitened(self.error[None, :], phi)[0]
+            A, v = self.problem.whitened(rows, noise), self.problem.whitened(self.error[None, :], noise)[0]
             scale = np.sqrt(np.einsum("ij,ij->i", A, A))
             scale[scale == 0.0] = 1.0
             coefficients, _, rank, _ = np.linalg.lstsq((A / scale[:, None]).T, v, rcond=1e-8)
             left = v - (coefficients / scale) @ A
-            best = min(best, n * np.log(max(float(left @ left), 1e-300) / n) + (int(rank) + len(phi)) * np.log(n))
-            phi = self.problem.filter_of(self.error - (coefficients / scale) @ rows)
+            best = min(best, n * np.log(max(float(left @ left), 1e-300) / n) + (int(rank) + noise.size) * np.log(n))
+            noise = self.problem.filter_of(self.error - (coefficients / scale) @ rows, self.looped)
         return float(best)
 
 

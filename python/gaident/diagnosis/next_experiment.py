@@ -24,6 +24,7 @@ from gaident.diagnosis.candidates import CANDIDATES, TWINS
 from gaident.diagnosis.driven import Driven
 from gaident.diagnosis.experiments import Limits, MenuItem, Proposal, candidate_commands
 from gaident.diagnosis.layout import Layout
+from gaident.diagnosis.noise_filter import NoiseFilter
 from gaident.diagnosis.problem import WORST, Fit, Problem, project_out
 from gaident.diagnosis.result import Finding
 from gaident.diagnosis.stepwise import Rival
@@ -60,7 +61,7 @@ class _Bench:
     """What a proposed command is tried on."""
 
     controller: PI
-    phi: Vector
+    noise: NoiseFilter
     variance: float  # of the whitened noise
     torque_logged: bool
     elsewhere: Mapping[str, Mapping[str, float]]  # effects at the controller, known from the replay
@@ -83,9 +84,9 @@ class _Bench:
         problem = Problem(driven.predict, driven.measured, driven.lengths, np.ones(len(record)))
         layout, x = at_rest(rival)
         if refitted:
-            cost = problem.fit(layout, x, self.phi, ITERATIONS).cost
+            cost = problem.fit(layout, x, self.noise, ITERATIONS).cost
         else:
-            v, J, _ = problem.linearised(layout, x, self.phi)
+            v, J, _ = problem.linearised(layout, x, self.noise)
             rest = project_out(J, v[None, :])[0]
             cost = float(rest @ rest) if np.all(np.isfinite(rest)) else WORST
         return cost / self.variance
@@ -122,7 +123,7 @@ def propose(
             *notes,
             f"Without a controller no command can be worked out that separates {listed}: give controller=PI(...).",
         ]
-    bench = _Bench(driven.controller, final.phi, max(final.cost / count, 1e-300), driven.torque_logged, elsewhere)
+    bench = _Bench(driven.controller, final.noise, max(final.cost / count, 1e-300), driven.torque_logged, elsewhere)
     items = menu(driven, final)
     # A generalisation that was fitted as its neutral case is the same drive: such a pair no command separates.
     table = [

@@ -4,11 +4,11 @@ A model is driven by the torque that the controller issued, as logged or as the 
 velocity: noise inside the loop then acts on the record as it did on the drive, and what is left at the truth is the noise of the
 sensor alone.
 
-    e(n) = w(n) - w_model(n; x),   v(n) = e(n) - sum_i phi_i e(n-i),   minimise V(x) = sum of v^2 over the samples in use
+    e(n) = w(n) - w_model(n; x),   v = H^-1 e,   minimise V(x) = sum of v^2 over the samples in use
 
-Every hypothesis is judged with a noise filter phi of its own, which is part of it and charged for:
+Every hypothesis is judged with a noise filter H^-1 of its own, which is part of it and charged for:
 
-    BIC = N ln(V / N) + (k + order of phi) ln N
+    BIC = N ln(V / N) + (k + size of H) ln N
 
 so that no effect is whitened away by a filter that was estimated without it, and none is favoured by one estimated with it.
 """
@@ -17,13 +17,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.layout import Layout
+from gaident.diagnosis.noise_filter import HIGHEST, ON_TOP, WHITE, NoiseFilter, ShaftNoise, autoregression
 from gaident.errors import GaidentError
-from gaident.identification.noise import fit_autoregression
 
 __all__ = ["Fit", "Problem", "project_out"]
 
@@ -33,17 +34,15 @@ Predict = Callable[[Layout, Matrix], Matrix]
 
 LOST = 1e60  # rad/s: the error of a model that diverges, every sample; its squares stay numbers
 WORST = 1e100
-HIGHEST = 20  # order of a noise filter
-NONE = np.zeros(0)
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A layout with its best x under the noise filter phi: cost V there, and BIC."""
+    """A layout with its best x under a noise filter: cost V there, and BIC."""
 
     layout: Layout
     x: Vector
-    phi: Vector
+    noise: NoiseFilter
     cost: float
     bic: float
     converged: bool = False
@@ -59,13 +58,14 @@ class Problem:
     """Errors of many parameter vectors at once.
 
     predict(layout, X) -> simulated velocities (n, N), records one after the other; measured: (N,); lengths: samples of each
-    record; weight: (N,), 0 for samples that are left out.
+    record; weight: (N,), 0 for samples that are left out; shaft: the noise of torques at the shaft, None: not looked for.
     """
 
     predict: Predict
     measured: Vector
     lengths: tuple[int, ...]
     weight: Vector
+    shaft: ShaftNoise | None = None
     simulations: int = 0
 
     def errors(self, layout: Layout, X: Matrix) -> Matrix:
@@ -76,25 +76,32 @@ class Problem:
             E[~np.all(np.abs(E) < LOST, axis=1)] = LOST
         return E
 
-    def whitened(self, E: Matrix, phi: Vector) -> Matrix:
-        """Rows of whitened errors; samples whose past is missing, or not in use, are 0."""
-        V = E.copy()
-        with np.errstate(invalid="ignore", over="ignore"):  # rows of models that diverge
-            for i, f in enumerate(phi, start=1):
-                V[:, i:] -= f * E[:, :-i]
-        return np.where(self.usable(len(phi)) > 0.0, V, 0.0)
+    def whitened(self, E: Matrix, noise: NoiseFilter) -> Matrix:
+        """Rows of whitened errors; samples that do not count are 0."""
+        return np.where(self.counted > 0.0, noise.of(self._bridged(E), self.lengths), 0.0)
 
-    def usable(self, order: int) -> Vector:
-        """1 for samples that count under a filter of this order."""
+    @cached_property
+    def counted(self) -> Vector:
+        """1 for samples that count: all but the masked ones and the head of each record."""
         use = self.weight.copy()
         at = 0
         for n in self.lengths:
             use[at : at + self.head] = 0.0
             at += n
-        if order:
-            for i in np.flatnonzero(self.weight == 0.0):
-                use[i : i + order + 1] = 0.0
         return use
+
+    def _bridged(self, E: Matrix) -> Matrix:
+        """Errors with a straight line over the masked samples, so that a filter does not see them."""
+        gaps = np.flatnonzero(self.weight == 0.0)
+        if len(gaps) == 0:
+            return E
+        E = E.copy()
+        known = np.flatnonzero(self.weight > 0.0)
+        right = np.searchsorted(known, gaps)
+        before, after = known[np.maximum(right - 1, 0)], known[np.minimum(right, len(known) - 1)]
+        share = np.clip((gaps - before) / np.maximum(after - before, 1), 0.0, 1.0)
+        E[:, gaps] = E[:, before] + share * (E[:, after] - E[:, before])
+        return E
 
     @property
     def head(self) -> int:
@@ -103,23 +110,36 @@ class Problem:
 
     @property
     def count(self) -> float:
-        """Number of samples that count (those behind a masked one aside)."""
-        return float(self.weight.sum()) - self.head * len(self.lengths)
+        """Number of samples that count."""
+        return float(self.counted.sum())
 
-    def filter_of(self, error: Vector) -> Vector:
-        """Noise filter phi of one row of plain errors, order by BIC."""
-        clean = np.where(self.weight > 0.0, error, 0.0)
-        if float(np.abs(clean).max()) >= LOST:
-            return NONE
-        parts = np.split(clean, np.cumsum(self.lengths)[:-1])
-        return least_squares_filter(parts, fit_autoregression(parts, self.head).order)
+    def filter_of(self, error: Vector, looped: bool = False) -> NoiseFilter:
+        """The noise filter of one row of plain errors, of a model in its loop or not: an autoregression or noise at the shaft."""
+        if float(np.abs(error).max()) >= LOST:
+            return WHITE
+        error = self._bridged(error[None, :])
+        plain = WHITE.then(autoregression(self._parts(error[0])))
+        if self.shaft is None:
+            return plain
+        shaft = self.shaft.best(lambda f: float(_sums(self.whitened(error, f))[0]), looped)
+        if shaft is None:
+            return plain
+        shaft = shaft.then(autoregression(self._parts(shaft.of(error, self.lengths)[0]), ON_TOP))
+        n = self.count
+        return min(
+            (plain, shaft), key=lambda f: n * np.log(max(float(_sums(self.whitened(error, f))[0]), 1e-300)) + f.size * np.log(n)
+        )
 
-    def costs(self, layout: Layout, X: Matrix, phi: Vector) -> Vector:
+    def _parts(self, row: Vector) -> list[Vector]:
+        """The records without their heads, where filters begin."""
+        return [part[self.head // 2 :] for part in np.split(row, np.cumsum(self.lengths)[:-1])]
+
+    def costs(self, layout: Layout, X: Matrix, noise: NoiseFilter) -> Vector:
         """V of each row; WORST where a model diverges."""
-        V = self.whitened(self.errors(layout, X), phi)
+        V = self.whitened(self.errors(layout, X), noise)
         return _sums(V)
 
-    def linearised(self, layout: Layout, x: Vector, phi: Vector) -> tuple[Vector, Matrix, Vector]:
+    def linearised(self, layout: Layout, x: Vector, noise: NoiseFilter) -> tuple[Vector, Matrix, Vector]:
         """(v, J, plain errors) at x: J[j] = dv/dx_j, forward differences; rows of entries that are not moved are 0."""
         steps = layout.steps()
         limits = layout.limits()
@@ -129,20 +149,20 @@ class Problem:
         X = np.repeat(x[None, :], len(moved) + 1, axis=0)
         X[np.arange(1, len(moved) + 1), moved] += h[moved]
         E = self.errors(layout, X)
-        V = self.whitened(E, phi)
+        V = self.whitened(E, noise)
         J = np.zeros((layout.size, V.shape[1]))
         with np.errstate(invalid="ignore", over="ignore"):
             J[moved] = (V[1:] - V[0]) / h[moved][:, None]
         return V[0], J, E[0]
 
-    def fit(self, layout: Layout, x: Vector, phi: Vector, iterations: int = 12) -> Fit:
+    def fit(self, layout: Layout, x: Vector, noise: NoiseFilter, iterations: int = 12) -> Fit:
         """Levenberg-Marquardt from x, eight dampings side by side, bounds by projection."""
         limits, steps = layout.limits(), layout.steps()
         x = np.clip(x, *limits)
         damping, converged = 1e-2, False
-        v, J, _ = self.linearised(layout, x, phi)
+        v, J, _ = self.linearised(layout, x, noise)
         cost = float(_sums(v[None, :])[0])
-        noise = max(self.count, 1.0)
+        count = max(self.count, 1.0)
         for _ in range(iterations):
             if cost >= WORST:
                 break
@@ -164,7 +184,7 @@ class Problem:
                 except np.linalg.LinAlgError:
                     continue
             X = np.clip(X, *limits)
-            costs = self.costs(layout, X, phi)
+            costs = self.costs(layout, X, noise)
             best = int(np.argmin(costs))
             if not costs[best] < cost:
                 if damping > 1e5:
@@ -176,11 +196,11 @@ class Problem:
             x, cost = X[best], float(costs[best])
             damping = float(np.clip(damping * 10.0 ** (best - 3.0), 1e-9, 1e9))
             # In units of the noise a fall of 0.02 changes no decision.
-            if fall < 0.02 * cost / noise:
+            if fall < 0.02 * cost / count:
                 converged = True
                 break
-            v, J, _ = self.linearised(layout, x, phi)
-        return self._scored(layout, x, phi, cost, converged)
+            v, J, _ = self.linearised(layout, x, noise)
+        return self._scored(layout, x, noise, cost, converged)
 
     def settled(self, fit: Fit, iterations: int = 6) -> Fit:
         """The fit under the filter of what it leaves itself (two rounds of generalised least squares)."""
@@ -188,8 +208,8 @@ class Problem:
             return fit
         best = fit
         for n in (iterations, max(iterations // 2, 2)):
-            phi = self.filter_of(self.errors(fit.layout, fit.x[None, :])[0])
-            fit = self.fit(fit.layout, fit.x, phi, n)
+            noise = self.filter_of(self.errors(fit.layout, fit.x[None, :])[0], fit.layout.looped)
+            fit = self.fit(fit.layout, fit.x, noise, n)
             if fit.bic < best.bic:
                 best = fit
         return best
@@ -199,31 +219,19 @@ class Problem:
         if fit.cost >= WORST:
             return fit
         error = self.errors(fit.layout, fit.x[None, :])
-        phi = self.filter_of(error[0])
-        return self._scored(fit.layout, fit.x, phi, float(_sums(self.whitened(error, phi))[0]), fit.converged)
+        noise = self.filter_of(error[0], fit.layout.looped)
+        return self._scored(fit.layout, fit.x, noise, float(_sums(self.whitened(error, noise))[0]), fit.converged)
 
-    def _scored(self, layout: Layout, x: Vector, phi: Vector, cost: float, converged: bool) -> Fit:
+    def _scored(self, layout: Layout, x: Vector, noise: NoiseFilter, cost: float, converged: bool) -> Fit:
         n = self.count
-        bic = n * np.log(max(cost, 1e-300) / n) + (layout.size + len(phi)) * np.log(n)
-        return Fit(layout, x, phi, cost, float(bic) if cost < WORST else np.inf, converged)
+        bic = n * np.log(max(cost, 1e-300) / n) + (layout.size + noise.size) * np.log(n)
+        return Fit(layout, x, noise, cost, float(bic) if cost < WORST else np.inf, converged)
 
 
 def _sums(V: Matrix) -> Vector:
     with np.errstate(invalid="ignore", over="ignore"):
         sums = np.einsum("ij,ij->i", V, V)
     return np.where(np.isfinite(sums), np.minimum(sums, WORST), WORST)
-
-
-def least_squares_filter(parts: list[Vector], order: int) -> Vector:
-    """The autoregression of this order by least squares: of strong colour the biased autocovariance takes too little."""
-    if order == 0:
-        return NONE
-    gram, right = np.zeros((order, order)), np.zeros(order)
-    for e in parts:
-        rows = np.lib.stride_tricks.sliding_window_view(e[:-1], order)[:, ::-1]
-        gram += rows.T @ rows
-        right += rows.T @ e[order:]
-    return np.asarray(np.linalg.lstsq(gram, right, rcond=1e-13)[0], dtype=np.float64)
 
 
 def orthonormal_rows(rows: Matrix) -> Matrix:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from gaident.diagnosis.candidates import CANDIDATES
 from gaident.diagnosis.driven import Driven
 from gaident.diagnosis.layout import Layout
+from gaident.diagnosis.noise_filter import WHITE, NoiseFilter
 from gaident.diagnosis.problem import Problem, project_out
 
 __all__ = ["Screened", "Screening"]
@@ -32,11 +33,13 @@ HIGHEST_ORDER = 64
 
 @dataclass(frozen=True)
 class Screened:
-    """One candidate: layout, start vectors from the best on, and the BIC that the best of them promises."""
+    """One candidate: layout, start vectors from the best on, the fall of the BIC that the best of them promises, and the BIC."""
 
     effect: str
     layout: Layout
     starts: tuple[Vector, ...]
+    noise: NoiseFilter
+    fall: float
     bic: float
 
 
@@ -69,7 +72,7 @@ class Screening:
 
     def add(self, layout: Layout, x: Vector, effects: Sequence[str]) -> None:
         """Candidates as extensions of the model x."""
-        _, J, error = self.problem.linearised(layout, x, np.zeros(0))
+        _, J, error = self.problem.linearised(layout, x, WHITE)
         base = _Base(layout, x, error, J)
         rough = [e for e in effects if CANDIDATES[e].rough]
         if rough and self.driven.loopable and not layout.looped:
@@ -97,11 +100,12 @@ class Screening:
         angle = self.driven.angle
         first = 1.0 if candidate.harmonic == "velocity" else 2.0
         orders = np.array([1.0]) if effect == "unbalance" else np.arange(first, HIGHEST_ORDER + 1.0)
-        turned = np.ptp(angle)
-        # Seen is what passes a few times, and slowly enough for the sampling at the speeds that matter.
+        # Seen is what passes a few times, slowly enough for the sampling at the speeds that matter: there and back counts twice,
+        # but most of a turn has to be there.
+        turned, path = float(np.ptp(angle)), float(np.abs(np.diff(angle)).sum())
         speed = float(np.median(np.abs(self.problem.measured)) + 1e-12)
-        least = 2.0 * np.pi * (1.0 if effect == "unbalance" else 3.0)
-        orders = orders[(orders * turned > least) & (orders * speed * layout.scales.dt < 2.5)]
+        seen = (orders * turned > 0.75 * 2.0 * np.pi) & (orders * path > 3.0 * 2.0 * np.pi)
+        orders = orders[seen & (orders * speed * layout.scales.dt < 2.5)]
         if len(orders) == 0:
             return orders, np.zeros((0, len(error)))
         phase = orders[:, None] * angle[None, :]
@@ -112,51 +116,58 @@ class Screening:
         w = (self.problem.measured - error) * orders[:, None]
         return orders, np.stack([w * cosine, -w * sine], axis=1).reshape(-1, len(angle))
 
-    def filter_beyond(self) -> Vector:
+    def filter_beyond(self, base: _Base) -> NoiseFilter:
         """Noise filter of what nothing in the library explains, to first order: no effect is whitened away as noise."""
-        first = self.trials[0].base
-        directions = [first.J]
-        for t in self.trials:
+        directions = [base.J]
+        rest = project_out(base.J, base.error[None, :])[0]
+        for t in (t for t in self.trials if t.base is base):
             if t.columns:
-                rest = project_out(t.base.J, t.base.error[None, :])[0]
-                best = np.argsort(_pair_worth(project_out(t.base.J, t.errors), rest))[::-1][:2]
+                best = np.argsort(_pair_worth(project_out(base.J, t.errors), rest))[::-1][:2]
                 directions += [t.errors[2 * i : 2 * i + 2] for i in best]
             else:
                 finite = np.all(np.isfinite(t.errors), axis=1)
                 if finite.any():
-                    rest = project_out(t.base.J, t.base.error[None, :])[0]
-                    nearest = np.argmin(_along(project_out(t.base.J, t.errors[finite]) - rest, rest))
-                    directions.append((t.errors[finite][nearest] - first.error)[None, :])
-        D = np.vstack(directions)[: max(len(first.error) // 8, 1)]
-        return self.problem.filter_of(project_out(D, first.error[None, :])[0])
+                    nearest = np.argmin(_along(project_out(base.J, t.errors[finite]) - rest, rest))
+                    directions.append((t.errors[finite][nearest] - base.error)[None, :])
+        D = np.vstack(directions)[: max(len(base.error) // 8, 1)]
+        return self.problem.filter_of(project_out(D, base.error[None, :])[0], base.layout.looped)
 
-    def ranked(self, phi: Vector) -> list[Screened]:
-        """Candidates from the most to the least promising, by the cost that each promises."""
+    def ranked(self, noise: NoiseFilter | None) -> list[Screened]:
+        """Candidates from the most to the least promising, each in its better view.
+
+        What counts is the fall of a candidate's cost against the model that it extends, in the same view: a model in its loop
+        leaves another error than one that the torque drives. noise: the filter; None: each view's own of what nothing explains.
+        """
         n = self.problem.count
-        cache: dict[int, tuple[Matrix, Vector]] = {}
-        result = []
+        bases: dict[int, tuple[NoiseFilter, Matrix, Vector]] = {}
+        best: dict[str, Screened] = {}
         for t in self.trials:
             key = id(t.base)
-            if key not in cache:
-                J = self.problem.whitened(t.base.J, phi)
-                cache[key] = (J, project_out(J, self.problem.whitened(t.base.error[None, :], phi))[0])
-            J, rest = cache[key]
-            V = self.problem.whitened(t.errors, phi)
+            if key not in bases:
+                f = self.filter_beyond(t.base) if noise is None else noise
+                J = self.problem.whitened(t.base.J, f)
+                bases[key] = (f, J, project_out(J, self.problem.whitened(t.base.error[None, :], f))[0])
+            f, J, rest = bases[key]
+            V = self.problem.whitened(t.errors, f)
             finite = np.all(np.isfinite(V), axis=1)
             V = project_out(J, np.where(finite[:, None], V, 0.0))
-            size = CANDIDATES[t.effect].size
+            power = float(rest @ rest)
             if t.columns:
                 worth = _pair_worth(V, rest)
                 order = np.argsort(worth)[::-1][:2]
-                costs = np.maximum(float(rest @ rest) - worth[order], 1e-300)
+                costs = np.maximum(power - worth[order], 1e-300)
                 starts = tuple(_harmonic_start(t, V, rest, int(i)) for i in order)
             else:
                 costs = np.where(finite, _along(V - rest, rest), np.inf)
                 order = np.argsort(costs)
-                starts, costs = tuple(t.base.layout.inserted(t.base.x, t.rows[i]) for i in order[:3]), costs[order]
-            bic = n * np.log(max(float(costs[0]), 1e-300) / n) + (t.base.layout.size + size) * np.log(n)
-            result.append(Screened(t.effect, t.layout, starts, float(bic)))
-        return sorted(result, key=lambda s: s.bic)
+                starts = tuple(t.base.layout.inserted(t.base.x, row) for row in _start_rows(t, V, rest, order[:3]))
+                costs = costs[order]
+            cost, size = max(float(costs[0]), 1e-300), CANDIDATES[t.effect].size
+            fall = n * np.log(max(power, 1e-300) / cost) - size * np.log(n)
+            bic = n * np.log(cost / n) + (t.base.layout.size + size + f.size) * np.log(n)
+            if t.effect not in best or fall > best[t.effect].fall:
+                best[t.effect] = Screened(t.effect, t.layout, starts, f, float(fall), float(bic))
+        return sorted(best.values(), key=lambda s: -s.fall)
 
 
 def _along(D: Matrix, rest: Vector) -> Vector:
@@ -176,6 +187,15 @@ def _pair_worth(V: Matrix, rest: Vector) -> Vector:
     det = np.where(good, det, 1.0)
     worth = (bb * ra**2 - 2.0 * ab * ra * rb + aa * rb**2) / det
     return np.where(good, worth, 0.0)
+
+
+def _start_rows(t: _Trial, V: Matrix, rest: Vector, order: NDArray[np.intp]) -> Matrix:
+    """Start coordinates from the best on; where the torque is proportional to them, at the end of the best step."""
+    rows = t.rows[order]
+    if CANDIDATES[t.effect].proportional:
+        D = V[order] - rest
+        rows = rows * np.maximum(-(D @ rest) / np.maximum(np.einsum("ij,ij->i", D, D), 1e-300), 0.0)[:, None]
+    return np.asarray(rows)
 
 
 def _harmonic_start(t: _Trial, V: Matrix, rest: Vector, i: int) -> Vector:

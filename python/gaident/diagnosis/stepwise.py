@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from gaident.diagnosis.candidates import CANDIDATES, FRICTION
 from gaident.diagnosis.driven import Driven
 from gaident.diagnosis.layout import Layout, described, two_masses
-from gaident.diagnosis.problem import NONE, WORST, Fit, Problem
-from gaident.diagnosis.screening import Screened, Screening
+from gaident.diagnosis.noise_filter import WHITE
+from gaident.diagnosis.problem import WORST, Fit, Problem
+from gaident.diagnosis.screening import Screening
 
 __all__ = ["HINT", "MARGIN", "THRESHOLD", "Rival", "Search", "with_second_mass"]
 
@@ -68,6 +69,9 @@ class Search:
             beyond = ", ".join(e.replace("_", " ") for e in best.effects)
             self.note(f"looking beyond {beyond or 'the linear model'}")
             found = self.best_extension(best)
+            if found is not None and (other := self.resettled(found, best)) is not None:
+                best = other
+                continue
             if found is not None and found.layout.looped:
                 best = self.in_loop(best)
             if found is None or best.bic - found.bic < self.threshold:
@@ -75,14 +79,43 @@ class Search:
             best = self.polished(self.thinned(with_second_mass(self.problem, found)))
         return best if self.only_noise(best) else self.rescued(best, base)
 
+    def resettled(self, found: Fit, best: Fit) -> Fit | None:
+        """The two masses with the resonance that was found as their own, where that or a simple effect on it does as well.
+
+        What delays the torque or blocks the shaft pulls the resonance of two masses out of its place, where a fit finds no way
+        back, and the true one is then found as an extra.
+        """
+        layout, x = found.layout, found.x
+        if layout.masses == 1 or found.effects[-1] != "extra_resonance":
+            return None
+        shorter = replace(layout.without("extra_resonance"), looped=False)
+        y = layout.removed(x, "extra_resonance")
+        y[: shorter.base] = shorter.base_vector(two_masses(layout, x))
+        own = self.problem.settled(self.problem.fit(shorter, y, WHITE, 20))
+        tries = [own]
+        for effect in self.candidates(shorter):
+            candidate = CANDIDATES[effect]
+            if candidate.size > 1 or candidate.place == "shaft":
+                continue
+            longer = replace(shorter.extended(effect), looped=candidate.rough and self.driven.loopable)
+            X = np.array([shorter.inserted(y, np.array(row)) for row in candidate.starts(longer.scales)])
+            if len(X):
+                start = X[int(np.argmin(self.problem.costs(longer, X, WHITE)))]
+                tries.append(self.problem.settled(self.problem.fit(longer, start, WHITE, 20)))
+        fit = min(tries, key=lambda f: f.bic)
+        if fit.bic > min(found.bic + self.margin, best.bic - self.threshold):
+            return None
+        self.known.clear()
+        return self.thinned(fit, every=True)
+
     def rescued(self, best: Fit, base: Fit) -> Fit:
         """Where more than noise is left at the end: a global search for each rough effect alone."""
         for effect in (e for e in self.candidates(base.layout) if CANDIDATES[e].rough and e not in best.effects):
             layout = replace(base.layout.extended(effect), looped=self.driven.loopable)
             rows = np.array(CANDIDATES[effect].starts(layout.scales))
             X = np.vstack([base.layout.inserted(base.x, z) for z in rows])
-            x = X[int(np.argmin(self.problem.costs(layout, X, NONE)))]
-            fit = self.searched(self.problem.judged(self.problem.fit(layout, x, NONE, 5)))
+            x = X[int(np.argmin(self.problem.costs(layout, X, WHITE)))]
+            fit = self.searched(self.problem.judged(self.problem.fit(layout, x, WHITE, 5)))
             if best.bic - fit.bic > self.threshold:
                 best = fit
         return best
@@ -105,10 +138,10 @@ class Search:
         limits = np.array(CANDIDATES[effect].limits(fit.layout.scales)).T
         X = np.repeat(fit.x[None, :], len(rows), axis=0)
         X[:, fit.layout.slot(effect)] = np.clip(np.array(rows), *limits)
-        order = np.argsort(self.problem.costs(fit.layout, X, fit.phi))[:3]
-        tries = [self.problem.judged(self.problem.fit(fit.layout, X[i], NONE, 8)) for i in order]
+        order = np.argsort(self.problem.costs(fit.layout, X, fit.noise))[:3]
+        tries = [self.problem.judged(self.problem.fit(fit.layout, X[i], WHITE, 8)) for i in order]
         best = min(tries, key=lambda f: f.bic)
-        return self.problem.settled(self.problem.fit(best.layout, best.x, NONE, 12))
+        return self.problem.settled(self.problem.fit(best.layout, best.x, WHITE, 12))
 
     def searched(self, fit: Fit) -> Fit:
         """Differential evolution around a fit: a stop or an impact more or less makes valleys that no slope leads out of."""
@@ -127,7 +160,7 @@ class Search:
         def costs(columns: NDArray[np.float64]) -> Vector:
             X = np.repeat(fit.x[None, :], columns.shape[1], axis=0)
             X[:, moved] = columns.T
-            return np.log(self.problem.costs(layout, X, NONE))
+            return np.log(self.problem.costs(layout, X, WHITE))
 
         found = differential_evolution(
             costs, list(zip(low, high, strict=True)), popsize=6, maxiter=50, x0=start, rng=0, vectorized=True,
@@ -135,7 +168,7 @@ class Search:
         )  # fmt: skip
         x = fit.x.copy()
         x[moved] = found.x
-        return self.finished(self.problem.fit(layout, x, NONE, 15))
+        return self.finished(self.problem.fit(layout, x, WHITE, 15))
 
     def best_gain(self, now: Fit) -> float:
         """What the best extension is worth, in BIC units."""
@@ -166,30 +199,27 @@ class Search:
         screening.add(layout, x, [e for e in self.candidates(layout) if e not in FRICTION[1:]])
         if not screening.trials:
             return []
-        beyond = screening.filter_beyond()
         seat = next((e for e in layout.effects if e in FRICTION), None)
         fits: list[Fit] = []
         if seat is not None:
             self.add_generalisations(screening, now, seat)
         elif "coulomb_friction" in self.candidates(layout):
             # Dry friction first: its generalisations are tried at its level.
-            start = next(s for s in screening.ranked(NONE) if s.effect == "coulomb_friction")
-            fits.append(self.problem.settled(self.problem.fit(start.layout, start.starts[0], NONE, 8)))
+            start = next(s for s in screening.ranked(WHITE) if s.effect == "coulomb_friction")
+            fits.append(self.problem.settled(self.problem.fit(start.layout, start.starts[0], WHITE, 8)))
             self.add_generalisations(screening, fits[0], "coulomb_friction")
         if self.only_noise(now):
-            # Where nothing but noise is left the linearised gains are upper bounds, near enough.
-            hopes = [now.bic - self.promised(s, phi) for phi in (now.phi, beyond) for s in screening.ranked(phi)[:1]]
-            fall = max(hopes, default=0.0)
-            if fall < 0.5 * self.threshold:
+            # Where nothing but noise is left the linearised gains are near enough.
+            hopes = [s.fall for s in screening.ranked(now.noise)[:1]]
+            hopes += [now.bic - s.bic for s in screening.ranked(None) if s.layout.looped == layout.looped]
+            if max(hopes, default=0.0) < 0.5 * self.threshold:
                 return fits
         # Two views: plainly, and through a filter of what the library cannot explain; each misses what the other one sees.
         short: dict[str, Fit] = {}
-        for phi in (NONE, beyond):
-            for s in screening.ranked(phi)[:FITTED]:
+        for noise in (WHITE, None):
+            for s in [s for s in screening.ranked(noise) if s.effect != "coulomb_friction" or not fits][:FITTED]:
                 for x0 in s.starts[:2]:
-                    if s.effect == "coulomb_friction" and fits:
-                        continue
-                    fit = self.problem.judged(self.problem.fit(s.layout, x0, phi, 3))
+                    fit = self.problem.judged(self.problem.fit(s.layout, x0, s.noise, 3))
                     if s.effect not in short or fit.bic < short[s.effect].bic:
                         short[s.effect] = fit
         best = sorted(short.values(), key=lambda f: f.bic)[:FINISHED]
@@ -204,20 +234,16 @@ class Search:
         if fit.layout.looped or not self.driven.loopable:
             return fit
         looped = replace(fit.layout, looped=True)
-        return min((fit, self.problem.settled(self.problem.fit(looped, fit.x, NONE, 8))), key=lambda f: f.bic)
-
-    def promised(self, s: Screened, phi: Vector) -> float:
-        """The BIC that a screened candidate promises under a filter."""
-        return s.bic + len(phi) * float(np.log(self.problem.count))
+        return min((fit, self.problem.settled(self.problem.fit(looped, fit.x, WHITE, 8))), key=lambda f: f.bic)
 
     def finished(self, fit: Fit) -> Fit:
         """A short fit taken to the end, under the filter of what it leaves itself."""
-        fit = self.problem.settled(fit if fit.converged else self.problem.fit(fit.layout, fit.x, fit.phi, 8))
+        fit = self.problem.settled(fit if fit.converged else self.problem.fit(fit.layout, fit.x, fit.noise, 8))
         # Found in the loop's grip or with the measured angle, the parameters may be good enough for a view that sees more.
         views = [replace(fit.layout, looped=False)] if fit.layout.looped and not self.driven.loop_only else []
         if not fit.layout.own_angle and not self.driven.angle_logged and set(fit.effects) & set(OF_ANGLE):
             views.append(replace(fit.layout, own_angle=True))
-        tries = [self.problem.settled(self.problem.fit(view, fit.x, NONE, 8)) for view in views]
+        tries = [self.problem.settled(self.problem.fit(view, fit.x, WHITE, 8)) for view in views]
         return min((fit, *tries), key=lambda f: f.bic)
 
     def only_noise(self, fit: Fit, slack: float = 1.1) -> bool:
@@ -272,7 +298,7 @@ class Search:
         base = parent.layout.removed(parent.x, parent.effects[-1])
         if base.shape != (x.size,):
             return np.inf
-        as_child = Fit(layout, x.inserted(base, z), child.phi, 0.0, np.inf)
+        as_child = Fit(layout, x.inserted(base, z), child.noise, 0.0, np.inf)
         freedom = CANDIDATES[child.effects[-1]].size - CANDIDATES[parent.effects[-1]].size
         return float(self.problem.judged(as_child).bic - freedom * np.log(self.problem.count))
 
@@ -287,7 +313,7 @@ class Search:
     def without(self, fit: Fit, effect: str) -> Fit:
         """The model refitted without one of its effects."""
         layout = fit.layout.without(effect)
-        return self.problem.settled(self.problem.fit(layout, fit.layout.removed(fit.x, effect), fit.phi, 8))
+        return self.problem.settled(self.problem.fit(layout, fit.layout.removed(fit.x, effect), fit.noise, 8))
 
     def rivals(self, final: Fit, effect: str, twins: Collection[str] = ()) -> tuple[float, list[Rival]]:
         """(gain of `effect` in the final model, other effects in its place that come within reach, or are its twins here)."""
@@ -325,4 +351,4 @@ def with_second_mass(problem: Problem, fit: Fit) -> Fit:
             longer = longer.extended(e)
             y = np.concatenate([y, x[layout.slot(e)]])
     y = np.concatenate([y, np.zeros(sum(longer.starts))])
-    return problem.settled(problem.fit(longer, y, fit.phi, 8))
+    return problem.settled(problem.fit(longer, y, fit.noise, 8))

@@ -21,7 +21,7 @@ Matrix = NDArray[np.float64]
 
 def covariance_of(problem: Problem, fit: Fit) -> Matrix:
     """Covariance of x; infinite where the record says nothing, 0 for entries that were not moved."""
-    v, J, _ = problem.linearised(fit.layout, fit.x, fit.phi)
+    v, J, _ = problem.linearised(fit.layout, fit.x, fit.noise)
     moved = np.flatnonzero(fit.layout.steps() > 0.0)
     sizes = np.sqrt(np.einsum("ij,ij->i", J, J))
     cov = np.zeros((len(fit.x), len(fit.x)))
