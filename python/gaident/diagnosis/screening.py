@@ -3,7 +3,7 @@
 With v the whitened error of the present model, v_c that of a start row and P the projection beyond the present model's
 sensitivities,
 
-    d = P (v_c - v),   V_c = |P v|^2 - max(0, -d'P v)^2 / |d|^2,
+    d = P (v_c - v),   V_c = min over t of |P v + t d|^2,
 
 the cost after a linearised refit of everything else and of the size of the change. Harmonics of the angle need no grid: their two
 components are linear, order by order.
@@ -29,18 +29,23 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 HIGHEST_ORDER = 64
+FURTHEST = 2.0  # times the way to a start: the next one stands there
 
 
 @dataclass(frozen=True)
 class Screened:
-    """One candidate: layout, start vectors from the best on, the fall of the BIC that the best of them promises, and the BIC."""
+    """One candidate: layout, start vectors from the best on, the filter that it was judged with.
+
+    fall: what the best start promises against the model that it extends, under this filter; hope: the same against that model
+    under the filter of its own errors, in which the effect may pass for noise.
+    """
 
     effect: str
     layout: Layout
     starts: tuple[Vector, ...]
     noise: NoiseFilter
     fall: float
-    bic: float
+    hope: float
 
 
 @dataclass(frozen=True)
@@ -76,7 +81,9 @@ class Screening:
         base = _Base(layout, x, error, J)
         rough = [e for e in effects if CANDIDATES[e].rough]
         if rough and self.driven.loopable and not layout.looped:
-            self.add(replace(layout, looped=True), x, rough)
+            # A replayed torque that a limit inside the controller spoils has led the mechanism astray; the loop holds it.
+            inside = replace(layout, looped=True)
+            self.add(inside, x if self.driven.torque_logged else self.problem.fit(inside, x, WHITE, 8).x, rough)
             effects = [e for e in effects if CANDIDATES[e].place != "coupling"]
         for effect in effects:
             candidate = CANDIDATES[effect]
@@ -139,15 +146,16 @@ class Screening:
         leaves another error than one that the torque drives. noise: the filter; None: each view's own of what nothing explains.
         """
         n = self.problem.count
-        bases: dict[int, tuple[NoiseFilter, Matrix, Vector]] = {}
+        bases: dict[int, tuple[NoiseFilter, Matrix, Vector, float]] = {}
         best: dict[str, Screened] = {}
         for t in self.trials:
             key = id(t.base)
             if key not in bases:
                 f = self.filter_beyond(t.base) if noise is None else noise
                 J = self.problem.whitened(t.base.J, f)
-                bases[key] = (f, J, project_out(J, self.problem.whitened(t.base.error[None, :], f))[0])
-            f, J, rest = bases[key]
+                rest = project_out(J, self.problem.whitened(t.base.error[None, :], f))[0]
+                bases[key] = (f, J, rest, self._without(t.base, f if noise is not None else None))
+            f, J, rest, own = bases[key]
             V = self.problem.whitened(t.errors, f)
             finite = np.all(np.isfinite(V), axis=1)
             V = project_out(J, np.where(finite[:, None], V, 0.0))
@@ -158,7 +166,7 @@ class Screening:
                 costs = np.maximum(power - worth[order], 1e-300)
                 starts = tuple(_harmonic_start(t, V, rest, int(i)) for i in order)
             else:
-                costs = np.where(finite, _along(V - rest, rest), np.inf)
+                costs = np.where(finite, _along(V - rest, rest, CANDIDATES[t.effect].proportional), np.inf)
                 order = np.argsort(costs)
                 starts = tuple(t.base.layout.inserted(t.base.x, row) for row in _start_rows(t, V, rest, order[:3]))
                 costs = costs[order]
@@ -166,15 +174,23 @@ class Screening:
             fall = n * np.log(max(power, 1e-300) / cost) - size * np.log(n)
             bic = n * np.log(cost / n) + (t.base.layout.size + size + f.size) * np.log(n)
             if t.effect not in best or fall > best[t.effect].fall:
-                best[t.effect] = Screened(t.effect, t.layout, starts, f, float(fall), float(bic))
+                best[t.effect] = Screened(t.effect, t.layout, starts, f, float(fall), float(own - bic))
         return sorted(best.values(), key=lambda s: -s.fall)
 
+    def _without(self, base: _Base, noise: NoiseFilter | None) -> float:
+        """BIC of the model that is extended, under a filter or that of its own errors."""
+        n = self.problem.count
+        f = noise or self.problem.filter_of(base.error, base.layout.looped)
+        v = self.problem.whitened(base.error[None, :], f)[0]
+        return float(n * np.log(max(float(v @ v), 1e-300) / n) + (base.layout.size + f.size) * np.log(n))
 
-def _along(D: Matrix, rest: Vector) -> Vector:
-    """|rest|^2 after the best step forward along each row of D."""
-    sizes = np.einsum("ij,ij->i", D, D)
-    forward = np.maximum(-(D @ rest), 0.0)
-    return np.asarray(float(rest @ rest) - forward**2 / np.maximum(sizes, 1e-300))
+
+def _along(D: Matrix, rest: Vector, proportional: bool = False) -> Vector:
+    """|rest|^2 after the best step forward along each row of D: as far as the next start, further where all is proportional."""
+    sizes = np.maximum(np.einsum("ij,ij->i", D, D), 1e-300)
+    slopes = D @ rest
+    steps = np.clip(-slopes / sizes, 0.0, np.inf if proportional else FURTHEST)
+    return np.asarray(float(rest @ rest) + 2.0 * steps * slopes + steps**2 * sizes)
 
 
 def _pair_worth(V: Matrix, rest: Vector) -> Vector:

@@ -210,8 +210,7 @@ class Search:
             self.add_generalisations(screening, fits[0], "coulomb_friction")
         if self.only_noise(now):
             # Where nothing but noise is left the linearised gains are near enough.
-            hopes = [s.fall for s in screening.ranked(now.noise)[:1]]
-            hopes += [now.bic - s.bic for s in screening.ranked(None) if s.layout.looped == layout.looped]
+            hopes = [s.hope for noise in (now.noise, None) for s in screening.ranked(noise)]
             if max(hopes, default=0.0) < 0.5 * self.threshold:
                 return fits
         # Two views: plainly, and through a filter of what the library cannot explain; each misses what the other one sees.

@@ -197,6 +197,10 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
     found = [k for k in (rigid, steps / energy) if np.isfinite(k) and k > 0.0]
     if not found:
         _check_scales(records, controller, only_certain=False)
+        if controller is not None and not any(rec.torque is not None for rec in records):
+            # The torque is a replay, which a limit inside the controller spoils; its sign is the one at which the loop stands.
+            found = [abs(k) for k in (rigid, steps / energy) if np.isfinite(k) and k != 0.0]
+    if not found:
         raise SpaceError(
             "the velocity falls when the torque rises: reverse the sign of one of them (for example by a unit of -1), "
             "or give space=SearchSpace(gain=...)"
