@@ -22,8 +22,8 @@ __all__ = ["LEFT", "Leftover", "leftover"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-LEFT = 40.0
-"""Gain in BIC units from which something counts as left: above what small errors of the angle and the simulation make."""
+LEFT, LEFT_SHARE = 40.0, 0.03
+"""Gain from which something counts as left, BIC units and units per sample: above what small errors of the simulation make."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,7 @@ class Leftover:
     """Gains [BIC units] by driver, and the strongest where it counts."""
 
     gains: dict[str, float]
+    samples: float
 
     @property
     def strongest(self) -> str | None:
@@ -41,7 +42,7 @@ class Leftover:
     def driver(self) -> str | None:
         """The driver that explains most, None where nothing significant is left."""
         name = self.strongest
-        return name if name is not None and self.gains[name] > LEFT else None
+        return name if name is not None and self.gains[name] > max(LEFT, LEFT_SHARE * self.samples) else None
 
 
 def leftover(problem: Problem, driven: Driven, fit: Fit) -> Leftover:
@@ -60,6 +61,10 @@ def leftover(problem: Problem, driven: Driven, fit: Fit) -> Leftover:
     if driven.command is not None:
         torques["command"] = _hats(driven.command, 8)
     columns = {d: driven.response(layout, x, rows[:room]) for d, rows in torques.items()}
+    if layout.masses == 2:
+        columns["past"] = np.vstack(
+            [columns["past"], driven.coupling_response(layout, x, _of_path(driven.twist(layout, x), driven.lengths))]
+        )
     lines = _lines(project_out(J, error[None, :])[0], driven, problem)
     judge = _Judge(problem, J, error, fit)
     none = judge.bic(np.zeros((0, len(w))))
@@ -67,7 +72,7 @@ def leftover(problem: Problem, driven: Driven, fit: Fit) -> Leftover:
     for i in range(0, len(lines), 2):
         # A frequency that was searched for counts as a number more.
         gains["time"] = max(gains["time"], none - judge.bic(lines[i : i + 2]) - np.log(problem.count))
-    return Leftover({driver: float(gain) for driver, gain in gains.items()})
+    return Leftover({driver: float(gain) for driver, gain in gains.items()}, problem.count)
 
 
 class _Judge:

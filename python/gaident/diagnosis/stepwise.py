@@ -40,6 +40,9 @@ HINT = 8.0
 OF_ANGLE = ("unbalance", "cogging", "velocity_ripple")
 
 MOST = 4  # effects in one model
+SHARE, ROUGH_SHARE = 0.1, 0.35
+"""Part of what a model leaves beyond the noise that an extension has to explain; the second beyond stops and impacts."""
+
 FITTED = 6  # candidates that each of the two rankings sends into a short fit
 FINISHED = 5  # of these, how many are fitted to the end
 
@@ -74,10 +77,22 @@ class Search:
                 continue
             if found is not None and found.layout.looped:
                 best = self.in_loop(best)
-            if found is None or best.bic - found.bic < self.threshold:
+            if found is None or best.bic - found.bic < self.threshold or not self.material(best, found):
                 break
             best = self.polished(self.thinned(with_second_mass(self.problem, found)))
         return best if self.only_noise(best) else self.rescued(best, base)
+
+    def material(self, best: Fit, found: Fit) -> bool:
+        """Whether an extension explains a fair part of what the model leaves beyond the noise, or all of it.
+
+        Significant alone is not enough where a model is wrong: anything that moves a little helps a little. After an impact in a
+        gap more or less the simulation of the true drive leaves something, too.
+        """
+        if self.only_noise(found, 1.15):
+            return True
+        floor = self.problem.count * self.driven.noise**2
+        rough = any(CANDIDATES[e].rough for e in best.effects)
+        return best.cost - found.cost > (ROUGH_SHARE if rough else SHARE) * (best.cost - floor)
 
     def resettled(self, found: Fit, best: Fit) -> Fit | None:
         """The two masses with the resonance that was found as their own, where that or a simple effect on it does as well.
