@@ -179,13 +179,13 @@ class Driven:
     def twist(self, layout: Layout, x: Vector) -> Vector:
         """Twist of the shaft of two masses, to scale, as the linear part of the model x has it: u e0/(s^2 + e1 s + e0)."""
         _, _, e1, e0, *_ = layout.base_values(x[None, :])[0]
-        twist: Vector = self._second_order(self.torque[None, :], [0.0, 0.0, e0], e1, e0)[0]
+        twist: Vector = self._second_order(self.torque[None, :], [e0], e1, e0)[0]
         return twist
 
     def coupling_response(self, layout: Layout, x: Vector, torques: Matrix) -> Matrix:
         """Motor velocity under rows of a torque between the masses: -K s/(s^2 + e1 s + e0), open loop."""
         K, _, e1, e0, *_ = layout.base_values(x[None, :])[0]
-        return self._second_order(torques, [0.0, -K, 0.0], e1, e0)
+        return self._second_order(torques, [-K, 0.0], e1, e0)
 
     def _second_order(self, rows: Matrix, numerator: list[float], e1: float, e0: float) -> Matrix:
         from scipy.signal import cont2discrete, lfilter

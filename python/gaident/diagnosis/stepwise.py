@@ -88,6 +88,8 @@ class Search:
         Significant alone is not enough where a model is wrong: anything that moves a little helps a little. After an impact in a
         gap more or less the simulation of the true drive leaves something, too.
         """
+        if set(CANDIDATES[found.effects[-1]].parents) & set(best.effects) and not self.in_both_views(best, found):
+            return False
         if self.only_noise(found, 1.15):
             return True
         floor = self.problem.count * self.driven.noise**2
@@ -299,7 +301,27 @@ class Search:
                     continue
                 if min(f.bic, self.as_neutral(f, best)) - best.bic < self.threshold:
                     return f
+                # What led the generalisation to a better place may lead the simpler one there, too.
+                x = best.layout.removed(best.x, newest)
+                again = f.layout.inserted(x, f.x[f.layout.slot(parent)])
+                again_fit = self.problem.settled(self.problem.fit(f.layout, again, best.noise, 12))
+                if again_fit.bic - best.bic < self.threshold:
+                    return again_fit
+                if not self.in_both_views(min(f, again_fit, key=lambda g: g.bic), best):
+                    return again_fit
         return best
+
+    def in_both_views(self, parent: Fit, child: Fit) -> bool:
+        """Whether a generalisation is worth the threshold in its loop, too.
+
+        Driven by the torque, a model with dry friction comes to rest a little before or after the drive wherever a torque that
+        nobody commanded has turned the shaft, and two levels of friction may describe that better than one.
+        """
+        if child.layout.looped or not self.driven.loopable:
+            return True
+        fits = [self.problem.fit(replace(f.layout, looped=True), f.x, WHITE, 8) for f in (parent, child)]
+        inside = [self.problem.settled(f) for f in fits]
+        return inside[0].bic - inside[1].bic > self.threshold
 
     def as_neutral(self, parent: Fit, child: Fit) -> float:
         """BIC of a parent's parameters simulated as the neutral case of its generalisation."""
@@ -346,6 +368,8 @@ class Search:
                 # A generalisation is never worse by more than its parameters: only a hint of what it adds counts.
                 more = CANDIDATES[name].size - CANDIDATES[effect].size
                 if behind - more * np.log(self.problem.count) > -(HINT + 3.0 * (more - 1)):
+                    continue
+                if behind < -self.threshold and not self.in_both_views(final, f):
                     continue
             if behind < self.margin:
                 found.append(Rival(name, behind, f))
