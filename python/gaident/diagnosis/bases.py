@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gaident.diagnosis.candidates import CANDIDATES, FRICTION, Scales
 from gaident.diagnosis.driven import Driven
 from gaident.diagnosis.layout import Layout, described, two_masses
-from gaident.diagnosis.noise_filter import WHITE
+from gaident.diagnosis.noise_filter import WHITE, ShaftNoise
 from gaident.diagnosis.problem import WORST, Fit, Problem, project_out
 from gaident.diagnosis.screening import Screening
 from gaident.diagnosis.stepwise import Search, with_second_mass
@@ -23,6 +23,8 @@ from gaident.models.model import Model
 __all__ = ["linear_bases", "without_second_mass"]
 
 Vector = NDArray[np.float64]
+
+NEAR = 0.05  # BIC units per sample by which one mass with an effect may be behind two masses after a short fit
 
 
 def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]:
@@ -40,6 +42,9 @@ def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]
         return [one]
     chosen = sorted(fits, key=lambda f: f.cost)[:1] + sorted(known, key=lambda f: f.cost)[:1]
     two = min((problem.settled(problem.fit(f.layout, f.x, WHITE, 20)) for f in chosen), key=lambda f: f.bic)
+    best = min((one, two), key=lambda f: f.bic)
+    problem.shaft = ShaftNoise(best.layout.model(best.x), scales.dt, driven.controller)
+    one, two = problem.settled(one), problem.settled(two)
     if one.bic < two.bic:
         return [one, two]
     screening = Screening(problem, driven)
@@ -47,8 +52,10 @@ def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]
     tried: set[str] = set()
     for noise in (WHITE, two.noise):
         for s in screening.ranked(noise)[:3]:
-            if s.effect not in tried and problem.judged(problem.fit(s.layout, s.starts[0], noise, 5)).bic < two.bic:
-                return [one, two]
+            if s.effect not in tried:
+                near = problem.judged(problem.fit(s.layout, s.starts[0], noise, 5)).bic - two.bic < NEAR * problem.count
+                if near:
+                    return [one, two]
             tried.add(s.effect)
     return [two]
 

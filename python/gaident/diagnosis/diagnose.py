@@ -18,7 +18,6 @@ from gaident.diagnosis.excitation import excitation
 from gaident.diagnosis.gains import measured_gains
 from gaident.diagnosis.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.leftover import leftover
-from gaident.diagnosis.noise_filter import ShaftNoise
 from gaident.diagnosis.problem import Fit, Problem
 from gaident.diagnosis.result import Diagnosis, Finding
 from gaident.diagnosis.stepwise import Rival, Search, with_second_mass
@@ -157,9 +156,6 @@ class _Work:
         self.not_testable = not_testable
         self.seeker = search = Search(self.problem, self.driven, allowed, lambda message: self.note(None, message))
         bases = linear_bases(search, self.scales, self.idn.model)
-        best = min(bases, key=lambda f: f.bic)
-        self.problem.shaft = ShaftNoise(best.layout.model(best.x), self.scales.dt, self.controller)
-        bases = [self.problem.settled(f) for f in bases]
         ends: list[tuple[Fit, Fit]] = []
         for base in bases:
             ends.append((without_second_mass(search, search.run(base)), base))

@@ -40,7 +40,7 @@ HINT = 8.0
 OF_ANGLE = ("unbalance", "cogging", "velocity_ripple")
 
 MOST = 4  # effects in one model
-SHARE, ROUGH_SHARE = 0.1, 0.35
+SHARE, ROUGH_SHARE = 0.1, 0.5
 """Part of what a model leaves beyond the noise that an extension has to explain; the second beyond stops and impacts."""
 
 FITTED = 6  # candidates that each of the two rankings sends into a short fit
