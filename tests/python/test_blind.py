@@ -89,12 +89,7 @@ def test_on_a_single_step_no_wrong_name(members: tuple[str, ...]) -> None:
         assert not judged.wrong, judged
 
 
-UNSEEN = pytest.mark.xfail(
-    strict=True, reason="a hysteretic shaft of this size passes for coloured noise: the drivers lack one of the twist"
-)
-
-
-@pytest.mark.parametrize("effect", [pytest.param(e, marks=UNSEEN) if e == "hysteretic_spring" else e for e in OUTSIDE])
+@pytest.mark.parametrize("effect", OUTSIDE)
 def test_what_the_library_does_not_know_gets_no_name(effect: str) -> None:
     judged = diagnosed((effect,), factor=1.5)
     assert not judged.wrong, judged

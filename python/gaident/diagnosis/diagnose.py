@@ -20,7 +20,7 @@ from gaident.diagnosis.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.leftover import leftover
 from gaident.diagnosis.problem import Fit, Problem
 from gaident.diagnosis.result import Diagnosis, Finding
-from gaident.diagnosis.stepwise import Rival, Search, with_second_mass
+from gaident.diagnosis.stepwise import MARGIN, Rival, Search, with_second_mass
 from gaident.diagnosis.uncertainty import estimates_of
 from gaident.diagnosis.wording import evidence_of
 from gaident.errors import RecordError, SettingsError
@@ -37,6 +37,7 @@ Vector = NDArray[np.float64]
 ProgressCallback = Callable[[float, str], None]
 
 GATE = 1.5  # times the noise of the measured velocity: what an explained record may leave, whitened
+OF_ITS_SIZE = 0.25  # part of a finding's gain that a free function may still find beside it
 SWAP = 2.0  # BIC units by which a rival has to be better to take a finding's seat
 # What a driver of a remaining error is the domain of: a finding there only describes, it does not name.
 DOMAINS: dict[str, str] = {
@@ -174,6 +175,26 @@ class _Work:
         self.adequate = search.only_noise(final, GATE)
         self.note(0.85, "looking for what is left")
         self.left = leftover(self.problem, self.driven, final)
+        simpler = self._without_doubtful_detail(search, final)
+        if simpler is not final:
+            self.final, _ = self.with_rivals(search, simpler, False)
+            self.adequate = search.only_noise(self.final, GATE)
+            self.left = leftover(self.problem, self.driven, self.final)
+
+    def _without_doubtful_detail(self, search: Search, final: Fit) -> Fit:
+        """A generalisation back to the simpler effect, where as much is left as the detail explains: it describes the rest."""
+        driver = self.left.driver
+        if driver is None:
+            return final
+        for effect in final.effects:
+            for parent in CANDIDATES[effect].parents:
+                level = final.x[final.layout.slot(effect)][:1]
+                layout = final.layout.without(effect).extended(parent)
+                x = layout.without(parent).inserted(final.layout.removed(final.x, effect), level)
+                simpler = self.problem.settled(self.problem.fit(layout, x, final.noise, 12))
+                if self.left.gains[driver] > OF_ITS_SIZE * (simpler.bic - final.bic):
+                    return simpler
+        return final
 
     def with_rivals(self, search: Search, final: Fit, may_swap: bool) -> tuple[Fit, bool]:
         """Each finding's rivals in the final model; a better one takes the seat, and the round has to be run again."""
@@ -268,8 +289,16 @@ class _Work:
         )
 
     def _only_describes(self, effect: str, driver: str | None) -> bool:
-        """Whether a finding stands in the domain of what is left: something there is not in the library."""
-        if driver is None:
+        """Whether a finding describes something that is not in the library.
+
+        So it is where a free function of one signal in its place explains more, and where what is left, in the finding's own
+        domain, is of the finding's size.
+        """
+        gain = self.rivals[effect][0]
+        instead = leftover(self.problem, self.driven, self.seeker.without(self.final, effect)).gains
+        if max(instead.values()) > gain + MARGIN:
+            return True
+        if driver is None or self.left.gains[driver] < OF_ITS_SIZE * gain:
             return False
         domain = DOMAINS.get(effect)
         return domain == driver or (domain in FRICTION_DOMAIN and driver in FRICTION_DOMAIN)

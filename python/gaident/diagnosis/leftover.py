@@ -22,8 +22,8 @@ __all__ = ["LEFT", "Leftover", "leftover"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-LEFT, LEFT_SHARE = 40.0, 0.03
-"""Gain from which something counts as left, BIC units and units per sample: above what small errors of the simulation make."""
+LEFT = 40.0
+"""Gain in BIC units from which something counts as left: above what small errors of the angle and the simulation make."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,6 @@ class Leftover:
     """Gains [BIC units] by driver, and the strongest where it counts."""
 
     gains: dict[str, float]
-    samples: float
 
     @property
     def strongest(self) -> str | None:
@@ -42,7 +41,7 @@ class Leftover:
     def driver(self) -> str | None:
         """The driver that explains most, None where nothing significant is left."""
         name = self.strongest
-        return name if name is not None and self.gains[name] > max(LEFT, LEFT_SHARE * self.samples) else None
+        return name if name is not None and self.gains[name] > LEFT else None
 
 
 def leftover(problem: Problem, driven: Driven, fit: Fit) -> Leftover:
@@ -72,7 +71,7 @@ def leftover(problem: Problem, driven: Driven, fit: Fit) -> Leftover:
     for i in range(0, len(lines), 2):
         # A frequency that was searched for counts as a number more.
         gains["time"] = max(gains["time"], none - judge.bic(lines[i : i + 2]) - np.log(problem.count))
-    return Leftover({driver: float(gain) for driver, gain in gains.items()}, problem.count)
+    return Leftover({driver: float(gain) for driver, gain in gains.items()})
 
 
 class _Judge:
