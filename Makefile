@@ -14,7 +14,7 @@ endif
 endif
 
 BIN := .venv/bin
-PIP_INSTALL := $(BIN)/python -m pip install --quiet
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --no-compile
 # Built in folders that stay, so that a small change is a small build. The checks take warnings for errors and add tests
 # and benchmark to the same objects.
 PACKAGE := --no-build-isolation --config-settings=build-dir=build/python
@@ -28,8 +28,11 @@ export CMAKE_BUILD_PARALLEL_LEVEL := $(JOBS)
 SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 	$(shell find csrc python -name '__pycache__' -prune -o \( -type d -o -name '*.?pp' -o -name '*.py' -o -name '*.pyi' -o -name py.typed \) -print)
 
+# One thing after the other, but for what `test` may do at the same time.
+ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
-.PHONY: help install demo test bench tidy lint test-cpp test-python clean
+endif
+.PHONY: help install demo test bench tidy lint test-cpp test-python clean build-checked test-checked test-sanitized
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -40,23 +43,32 @@ install: .venv/.installed ## set up .venv and install the package into it
 demo: .venv/.installed ## identify a two-mass drive, find a hidden friction; text on the screen, pictures in build/demo
 	@$(BIN)/gaident demo --out "$(DEMO_DIR)"
 
-test: lint test-cpp test-python ## every check: ruff, mypy, C++ tests (plain and sanitized), Python tests
+# What needs one processor (pip, mypy) and what needs all of them (the builds) side by side; alone what measures speed.
+test: ## every check: ruff, mypy, C++ tests (plain and sanitized), Python tests
+	@$(MAKE) --no-print-directory --jobs=3 --output-sync=target SIDE_BY_SIDE=yes test-sanitized lint build-checked
+	@$(MAKE) --no-print-directory test-checked test-python
 
 lint: .venv/.tested
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-test-cpp: .venv/.tested
+test-cpp: test-checked test-sanitized
+
+build-checked: .venv/.tested
 	$(BIN)/cmake --build build/checked
+
+test-checked: build-checked
 	$(CTEST) build/checked
+
+test-sanitized: .venv/.tools
 	@mkdir -p build/sanitized
 	$(CMAKE) -B build/sanitized -DGAIDENT_SANITIZE=ON -DGAIDENT_BENCH=OFF > build/sanitized/configure.log || { cat build/sanitized/configure.log; exit 1; }
 	$(BIN)/cmake --build build/sanitized
 	$(CTEST) build/sanitized
 
 test-python: .venv/.tested
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 bench: .venv/.tools ## build (plainly, without Python) and run the C++ benchmark; BENCH_FLAGS=... goes to it
 	@mkdir -p build/plain

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import hypothesis
 import pytest
 
+try:
+    import fcntl
+except ImportError:  # not POSIX
+    fcntl = None  # type: ignore[assignment]
+
 ROOT = Path(__file__).resolve().parents[2]
+
+# Tests run side by side (pytest -n); threads below numpy would only stand in each other's way. Read when numpy is imported.
+for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(threads, "1")
 
 # The same examples in every run, and no clock: a slow machine is no failure.
 # HYPOTHESIS_PROFILE=search looks further.
@@ -27,3 +37,17 @@ def data_dir() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no recorded data: {folder} does not exist; set GAIDENT_DATA")
     return folder
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Let no test of another worker run beside one that is marked `alone`."""
+    if fcntl is None:
+        yield
+        return
+    # Two files that are there in any case. Who waits for an empty room holds the door, so that nobody else enters before.
+    with open(ROOT / "pyproject.toml") as door, open(__file__) as room:
+        fcntl.flock(door, fcntl.LOCK_EX)
+        fcntl.flock(room, fcntl.LOCK_EX if item.get_closest_marker("alone") else fcntl.LOCK_SH)
+        fcntl.flock(door, fcntl.LOCK_UN)
+        yield

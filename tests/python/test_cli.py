@@ -365,6 +365,7 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
+@pytest.mark.alone
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_ctrl_c_ends_within_half_a_second(here: Path) -> None:
     args = ["identify", "step.csv", *NAMES, *LOOP, "--trials", "100000", "--out", "idn.json"]

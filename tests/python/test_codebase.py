@@ -210,10 +210,10 @@ def test_python_imports_follow_the_rooms() -> None:
 
 
 def test_importing_gaident_is_light() -> None:
-    code = "import time, numpy, sys; t = time.perf_counter(); import gaident; print(time.perf_counter() - t); "
+    code = "import time, numpy, sys; t = time.process_time(); import gaident; print(time.process_time() - t); "
     code += "print([m for m in ('scipy', 'matplotlib', 'control', 'argparse') if m in sys.modules])"
     runs = []
-    for _ in range(3):
+    for _ in range(5):  # processor time of the fastest: the machine may have other things to do
         out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
         seconds, loaded = out.splitlines()
         assert loaded == "[]", f"import gaident also imports {loaded}"

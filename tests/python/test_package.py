@@ -84,6 +84,7 @@ def test_sdist_holds_the_sources(sdist: Path) -> None:
     assert not top & {".git", ".venv", "build", ".mypy_cache", ".ruff_cache", ".pytest_cache", ".hypothesis"}
 
 
+@pytest.mark.alone  # it builds in build/checked, as the same fixture of another worker would
 def test_wheel_holds_the_package_and_nothing_else(wheel: Path) -> None:
     python = ROOT / "python"
     sources = [f for f in (python / "gaident").rglob("*") if f.suffix == ".py"]
@@ -97,6 +98,7 @@ def test_wheel_holds_the_package_and_nothing_else(wheel: Path) -> None:
     assert names - extensions == expected
 
 
+@pytest.mark.alone  # it builds in build/checked, as the same fixture of another worker would
 def test_wheel_states_licence_and_command(wheel: Path) -> None:
     info = f"gaident-{pyproject_version()}.dist-info"
     with zipfile.ZipFile(wheel) as archive:
