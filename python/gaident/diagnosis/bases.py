@@ -30,8 +30,8 @@ NEAR = 0.05  # BIC units per sample by which one mass with an effect may be behi
 def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]:
     """One mass, two masses, or both where only the effects can decide.
 
-    Two alone where nothing on one mass comes near it, else one mass first: a delay or a lag looks like a resonance as long as
-    nothing else is tried, and a load or a saturation hides one. The identified model is a start where it is such a mechanism.
+    Two alone where they resonate as on a shaft and nothing on one mass comes near, else one mass first: a delay or a lag looks
+    like a resonance as long as nothing else is tried, and a load or a saturation hides one.
     """
     problem, driven = search.problem, search.driven
     one = _fit(problem, driven, scales, one_mass(driven, identified))
@@ -45,7 +45,7 @@ def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]
     best = min((one, two), key=lambda f: f.bic)
     problem.shaft = ShaftNoise(best.layout.model(best.x), scales.dt, driven.controller)
     one, two = problem.settled(one), problem.settled(two)
-    if one.bic < two.bic:
+    if one.bic < two.bic or not resonates(two):
         return [one, two]
     screening = Screening(problem, driven)
     screening.add(one.layout, one.x, [e for e in search.candidates(one.layout) if e not in (*FRICTION[1:], "extra_resonance")])
@@ -64,6 +64,12 @@ def _fit(problem: Problem, driven: Driven, scales: Scales, model: Model, iterati
     layout = Layout.of(model, described(scales, model), driven.moving, driven.loop_only)
     x = np.concatenate([layout.base_vector(model), np.zeros(sum(layout.starts))])
     return problem.fit(layout, x, WHITE, iterations)
+
+
+def resonates(fit: Fit) -> bool:
+    """Whether the pairs of two masses are damped as a shaft's are: e1 < 2 zeta sqrt(e0), f1 < 2 zeta sqrt(f0), zeta = 0.5."""
+    _, _, e1, e0, f1, f0 = fit.layout.base_values(fit.x[None, :])[0]
+    return bool(e0 > 0.0 and f0 > 0.0 and abs(e1) < np.sqrt(e0) and abs(f1) < np.sqrt(f0))
 
 
 def _fits(problem: Problem, driven: Driven, scales: Scales, starts: list[Model]) -> list[Fit]:
