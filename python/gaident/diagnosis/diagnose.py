@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
+from gaident.diagnosis.arguments import ProgressCallback, checked, noise_std_of, records_of
 from gaident.diagnosis.bases import linear_bases, without_second_mass
 from gaident.diagnosis.candidates import CANDIDATES, TWINS, Scales, conditional_twins
 from gaident.diagnosis.controller_place import controller_findings
@@ -23,7 +24,6 @@ from gaident.diagnosis.result import Diagnosis, Finding
 from gaident.diagnosis.stepwise import MARGIN, Rival, Search, with_second_mass
 from gaident.diagnosis.uncertainty import estimates_of
 from gaident.diagnosis.wording import evidence_of
-from gaident.errors import RecordError, SettingsError
 from gaident.identification.covariance import Estimate
 from gaident.identification.identify import identify
 from gaident.identification.result import Identification
@@ -34,8 +34,6 @@ from gaident.version import version
 __all__ = ["diagnose"]
 
 Vector = NDArray[np.float64]
-ProgressCallback = Callable[[float, str], None]
-
 GATE = 1.5  # times the noise of the measured velocity: what an explained record may leave, whitened
 OF_ITS_SIZE = 0.25  # part of a finding's gain that a free function may still find beside it
 SWAP = 2.0  # BIC units by which a rival has to be better to take a finding's seat
@@ -79,12 +77,12 @@ def diagnose(
     """
     began = time.perf_counter()
     note = _Note(progress)
-    records = _records(rec, "rec")
-    held = () if validation is None else _records(validation, "validation")
-    _check(records, held, controller, identification, bootstrap, seed, progress)
+    records = records_of(rec, "rec")
+    held = () if validation is None else records_of(validation, "validation")
+    checked(records, held, controller, identification, bootstrap, seed, progress)
     note(0.02, "identifying the linear model")
     idn = identification if identification is not None else identify(list(records), controller, seed=seed)
-    work = _Work(records, held, controller, idn, _noise_std(noise), note)
+    work = _Work(records, held, controller, idn, noise_std_of(noise), note)
     work.search()
     result = work.report(seed)
     if bootstrap:
@@ -370,47 +368,3 @@ def _scales(driven: Driven) -> Scales:
         two_masses=False,
         integral=integral,
     )
-
-
-def _records(rec: Record | Sequence[Record], name: str) -> tuple[Record, ...]:
-    given = (rec,) if isinstance(rec, Record) else tuple(rec) if isinstance(rec, Sequence) else ()
-    if not given or not all(isinstance(r, Record) for r in given):
-        raise RecordError(f"{name} is {type(rec).__name__}: give a gaident.Record or a list of them, at least one")
-    return given
-
-
-def _check(
-    records: tuple[Record, ...],
-    held: tuple[Record, ...],
-    controller: PI | None,
-    idn: Identification | None,
-    bootstrap: int,
-    seed: int,
-    progress: ProgressCallback | None,
-) -> None:
-    if controller is not None and not isinstance(controller, PI):
-        raise SettingsError(f"controller is {controller!r}: give a gaident.PI, or None for a record in open loop")
-    if idn is not None and not isinstance(idn, Identification):
-        raise SettingsError(f"identification is {type(idn).__name__}: give what identify() returned, or None")
-    for r in (*records, *held):
-        if controller is not None and r.command is None:
-            raise RecordError(f"record {r.name or '(without a name)'} has no command: give one, or controller=None for open loop")
-        if controller is None and r.torque is None:
-            raise RecordError(f"record {r.name or '(without a name)'} has no torque: give one, or the controller that makes it")
-    if len({r.dt for r in (*records, *held)}) > 1:
-        raise RecordError("records have different sample times: a diagnosis needs one; diagnose them apart")
-    if progress is not None and not callable(progress):
-        raise SettingsError(f"progress is {progress!r}: give a function of (fraction, message), or None")
-    for name, value, low, high in (("bootstrap", bootstrap, 0, 100_000), ("seed", seed, 0, 2**63 - 1)):
-        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
-            raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
-
-
-def _noise_std(noise: float | Record | None) -> float | None:
-    if noise is None:
-        return None
-    if isinstance(noise, Record):
-        return float(np.std(noise.velocity))
-    if isinstance(noise, bool) or not isinstance(noise, (int, float)) or not 0.0 < float(noise) < float("inf"):
-        raise SettingsError(f"noise is {noise!r}: give its standard deviation in rad/s, above 0, or a Record at standstill")
-    return float(noise)
