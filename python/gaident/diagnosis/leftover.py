@@ -131,11 +131,13 @@ def _of_path(angle: Vector, lengths: tuple[int, ...]) -> Matrix:
     rows = np.empty((len(widths), len(angle)))
     at = 0
     for n in lengths:
-        z = np.zeros(len(widths))
-        steps = np.diff(angle[at : at + n], prepend=angle[at])
-        for k, step in enumerate(steps.tolist()):
-            z = np.clip(z + step, -widths, widths)
-            rows[:, at + k] = z
+        steps = np.diff(angle[at : at + n], prepend=angle[at]).tolist()
+        for row, width in zip(rows, widths.tolist(), strict=True):
+            z, path = 0.0, []
+            for step in steps:
+                z = min(max(z + step, -width), width)
+                path.append(z)
+            row[at : at + n] = path
         at += n
     return rows / widths[:, None]
 

@@ -54,6 +54,8 @@ class NoiseFilter:
 
         ends = np.cumsum(lengths)[:-1]
         with np.errstate(invalid="ignore", over="ignore"):
+            if len(ends) == 0:
+                return np.asarray(lfilter(self.b, self.a, E, axis=1))
             return np.concatenate([lfilter(self.b, self.a, part, axis=1) for part in np.split(E, ends, axis=1)], axis=1)
 
     def then(self, phi: Vector) -> NoiseFilter:
@@ -89,6 +91,7 @@ class ShaftNoise:
     def __init__(self, model: Model, dt: float, controller: PI | None) -> None:
         self.plant: Discretised = discretised(model, dt)
         self.loop = None if controller is None else np.linalg.eigvals(disturbed(self.plant, controller, dt).A)
+        self.last: dict[bool, tuple[int, int]] = {}
         self.made: dict[tuple[int, int, bool], NoiseFilter | None] = {}
 
     def filter(self, i: int, j: int, looped: bool = False) -> NoiseFilter | None:
@@ -118,7 +121,7 @@ class ShaftNoise:
         return NoiseFilter(np.asarray(np.poly(roots).real), np.asarray(np.poly(filtered).real), 2)
 
     def best(self, cost: Callable[[NoiseFilter], float], looped: bool) -> NoiseFilter | None:
-        """The filter of least cost, downhill from the middle of the grid."""
+        """The filter of least cost, downhill from the one before, or the first time from the middle of the grid in large steps."""
         costs: dict[tuple[int, int], float] = {}
 
         def at(k: tuple[int, int]) -> float:
@@ -127,8 +130,8 @@ class ShaftNoise:
                 costs[k] = np.inf if f is None else cost(f)
             return costs[k]
 
-        here = (4, 7)
-        for stride in (3, 1):
+        here = self.last.get(looped, (4, 7))
+        for stride in (1,) if looped in self.last else (3, 1):
             while True:
                 i, j = here
                 around = [(i + stride * u, j + stride * v) for u in (-1, 0, 1) for v in (-1, 0, 1)]
@@ -136,4 +139,5 @@ class ShaftNoise:
                 if not at(best) < at(here):
                     break
                 here = best
+        self.last[looped] = here
         return self.filter(*here, looped) if np.isfinite(at(here)) else None

@@ -78,7 +78,10 @@ class Problem:
 
     def whitened(self, E: Matrix, noise: NoiseFilter) -> Matrix:
         """Rows of whitened errors; samples that do not count are 0."""
-        return np.where(self.counted > 0.0, noise.of(self._bridged(E), self.lengths), 0.0)
+        V = noise.of(self._bridged(E), self.lengths)
+        with np.errstate(invalid="ignore"):
+            V = V * self.counted
+        return V
 
     @cached_property
     def counted(self) -> Vector:
