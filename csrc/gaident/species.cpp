@@ -2,7 +2,6 @@
 
 #include "island.hpp"
 #include "neighbours.hpp"
-#include "parallel.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -31,8 +30,11 @@ constexpr Effort quick{2, 2, 3}, thorough{5, 6, 10};
 constexpr int more_iterations = 4, full_iterations = 40;
 // Where the root mean square error is so many times the noise of the measured velocity, there may be a better optimum.
 constexpr double down_to_noise = 1.2;
-// Samples from which a search is worth threads, and how many islands it then has.
-constexpr std::size_t long_enough = 4096, most_islands = 4;
+// How many islands the search of a long record has.
+constexpr std::size_t most_islands = 4;
+// Groups of individuals that mate, in all: where there are few species each has several, since every group is a start of its own, and a species
+// alone has no smaller ones that lend it theirs.
+constexpr std::size_t most_groups = 16;
 // A structure whose error sum is so many times another one's of no larger size is not fitted to the end.
 constexpr double out_of_reach = 2.0;
 // A structure whose error sum is within so many times the least describes the data about as well as any.
@@ -54,17 +56,17 @@ double noise_power(std::span<const double> w) {
 
 class SpeciesRun {
 public:
-    SpeciesRun(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random, int workers,
-               Progress& progress)
-        : genome_(genome),
+    SpeciesRun(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random, Progress& progress)
+        : experiment_(experiment),
+          genome_(genome),
           settings_(settings),
-          workers_(worth_threads(experiment) ? workers : 1),
           progress_(progress),
           all_(structures(genome.ranges())),
+          groups_(std::max<std::size_t>(1, most_groups / all_.size())),
           refiner_(experiment, options(genome, experiment.samples())) {
         // The number of islands depends on the data alone, never on the workers: the same seed has to give the same result.
-        const std::size_t islands = worth_threads(experiment) ? std::min(most_islands, all_.size()) : 1;
-        settings_.population = std::max(settings_.population, static_cast<int>(3 * all_.size()));
+        const std::size_t islands = experiment.is_long() ? std::min(most_islands, all_.size()) : 1;
+        settings_.population = std::max(settings_.population, static_cast<int>(3 * all_.size() * groups_));
         for (std::size_t k = 0; k < islands; ++k) {
             const std::size_t first = k * all_.size() / islands, last = (k + 1) * all_.size() / islands;
             for (std::size_t i = first; i < last; ++i) places_.push_back({k, i - first});
@@ -72,7 +74,7 @@ public:
             own.population = static_cast<int>((k + 1) * static_cast<std::size_t>(settings_.population) / islands -
                                               k * static_cast<std::size_t>(settings_.population) / islands);
             islands_.push_back(std::make_unique<Island>(experiment, genome_, own, islands == 1 ? random : Random(random.word()),
-                                                        std::span(all_).subspan(first, last - first)));
+                                                        std::span(all_).subspan(first, last - first), groups_));
         }
         trial_.species.resize(all_.size());
         for (const Record& r : experiment.records) {
@@ -98,7 +100,6 @@ public:
     }
 
 private:
-    static bool worth_threads(const Experiment& experiment) { return experiment.samples() >= long_enough; }
     static RefineOptions options(const Genome& genome, std::size_t samples) {
         RefineOptions o;
         o.ranges = genome.ranges();
@@ -109,7 +110,7 @@ private:
     // Every round starts from fresh random individuals: the optima already fitted are kept apart, and what a round is for
     // is to find another basin.
     void breed_round(int generations, int done) {
-        parallel(islands_.size(), workers_, [&](std::size_t k) {
+        experiment_.share(islands_.size(), [&](std::size_t k) {
             islands_[k]->breed(generations, [&](double least) { progress_.note(k == 0 ? 1 : 0, least); });
         });
         for (std::size_t g = 0; g < static_cast<std::size_t>(generations); ++g) {
@@ -126,60 +127,76 @@ private:
     // Local fits, from small structures to large; true where one got better.
     bool fit_round(const Effort& effort) {
         better_.assign(all_.size(), 0);
-        for (std::size_t first = 0; first < all_.size();) {
-            std::size_t last = first;  // one level: structures with the same p + q do not need one another
-            while (last < all_.size() && all_[last].poles() == all_[first].poles()) ++last;
-            fit_level(first, last, effort);
-            first = last;
-        }
+        Level level;
+        do level = fit_level(level, effort);
+        while (level.first < all_.size());
         fit_smaller();
         return std::any_of(better_.begin(), better_.end(), [](char c) { return c != 0; });
     }
 
-    // Where a species' local fits may start: its best individual (from == own index), or a smaller structure's optimum, grown.
+    // Where a species' local fits may start: the best individual of one of its groups (from == own index), or a smaller structure's optimum,
+    // grown.
     struct Source {
-        std::size_t species, from;
+        std::size_t species, from, group;
         std::vector<Refined> starts;
     };
 
-    // The species of one level. All starts get a few iterations, the most promising some more, and the best of each species goes on
-    // to its optimum: unless it stays so far behind what a smaller or equal structure has reached that it cannot win.
-    void fit_level(std::size_t first, std::size_t last, const Effort& effort) {
-        std::vector<Source> sources;
-        for (std::size_t i = first; i < last; ++i) {
-            sources.push_back({i, i, {}});
-            for (std::size_t j = 0; j < first; ++j) {
-                if (may_grow(all_[j], all_[i])) sources.push_back({i, j, {}});
-            }
+    // Structures [first, last) of the same p + q, which do not need one another, and the most promising fit of each.
+    struct Level {
+        std::size_t first = 0, last = 0;
+        std::vector<Refined> best;
+        double within_reach = 0.0;
+    };
+
+    // The level after `before`, and the end of the fits of that one. All starts get a few iterations, the most promising some more, and the
+    // best of each species goes on to its optimum: unless it stays so far behind what a smaller or equal structure has reached that it
+    // cannot win.
+    Level fit_level(Level& before, const Effort& effort) {
+        Level level{before.last, before.last, {}, 0.0};
+        while (level.last < all_.size() && all_[level.last].poles() == all_[level.first].poles()) ++level.last;
+        std::vector<Source> early, late;  // late: from the optima of the level before
+        for (std::size_t i = level.first; i < level.last; ++i) {
+            for (std::size_t g = 0; g < groups_; ++g) early.push_back({i, i, g, {}});
+            for (std::size_t j = 0; j < level.first; ++j)
+                if (may_grow(all_[j], all_[i])) (j < before.first ? early : late).push_back({i, j, 0, {}});
         }
-        parallel(sources.size(), workers_, [&](std::size_t k) { first_fits(sources[k], effort); });
+        // The few fits that go on to the end would leave threads idle: what does not need them is done beside them.
+        experiment_.share(early.size() + before.best.size(), [&](std::size_t k) {
+            if (k < early.size()) first_fits(early[k], effort);
+            else to_the_end(before, k - early.size());
+        });
+        for (std::size_t k = 0; k < before.best.size(); ++k) keep_better(before.first + k, before.best[k]);
+        experiment_.share(late.size(), [&](std::size_t k) { first_fits(late[k], effort); });
 
         const auto lower = [](const Refined& x, const Refined& y) { return x.cost < y.cost; };
         std::vector<Refined> chosen;
-        for (std::size_t i = first; i < last; ++i) {
+        for (std::size_t i = level.first; i < level.last; ++i) {
             std::vector<Refined> starts;
-            for (Source& s : sources)
-                if (s.species == i) std::move(s.starts.begin(), s.starts.end(), std::back_inserter(starts));
+            for (std::vector<Source>* sources : {&early, &late})
+                for (Source& s : *sources)
+                    if (s.species == i) std::move(s.starts.begin(), s.starts.end(), std::back_inserter(starts));
             std::stable_sort(starts.begin(), starts.end(), lower);
             starts.resize(std::min(starts.size(), effort.promising));
             std::move(starts.begin(), starts.end(), std::back_inserter(chosen));
         }
-        parallel(chosen.size(), workers_, [&](std::size_t k) { chosen[k] = refiner_.go_on(chosen[k], more_iterations); });
+        experiment_.share(chosen.size(), [&](std::size_t k) { chosen[k] = refiner_.go_on(chosen[k], more_iterations); });
 
-        double within_reach = lead();
-        for (const Refined& r : chosen) within_reach = std::min(within_reach, r.cost);
-        within_reach *= out_of_reach;
-        std::vector<Refined> best(last - first);
+        level.within_reach = lead();
+        for (const Refined& r : chosen) level.within_reach = std::min(level.within_reach, r.cost);
+        level.within_reach *= out_of_reach;
+        level.best.resize(level.last - level.first);
         for (const Refined& r : chosen) {
-            Refined& b =
-                best[static_cast<std::size_t>(std::find(all_.begin(), all_.end(), r.factors.structure) - all_.begin()) - first];
+            const auto i = std::find(all_.begin(), all_.end(), r.factors.structure) - all_.begin();
+            Refined& b = level.best[static_cast<std::size_t>(i) - level.first];
             if (b.cost == worst_fitness || r.cost < b.cost) b = r;
         }
-        parallel(best.size(), workers_, [&](std::size_t k) {
-            const double before = trial_.species[first + k].cost;
-            if (best[k].cost < 1.5 * before && best[k].cost < within_reach) best[k] = refiner_.go_on(best[k], full_iterations);
-        });
-        for (std::size_t i = first; i < last; ++i) keep_better(i, best[i - first]);
+        return level;
+    }
+
+    void to_the_end(Level& level, std::size_t k) const {
+        Refined& fit = level.best[k];
+        if (fit.cost < 1.5 * trial_.species[level.first + k].cost && fit.cost < level.within_reach)
+            fit = refiner_.go_on(fit, full_iterations);
     }
 
     // What a larger structure has found, a smaller one may lack: each that is close to the best lends its optimum with one module taken
@@ -191,7 +208,7 @@ private:
             for (std::size_t i = 0; i < from; ++i)
                 if (may_grow(all_[i], all_[from])) smaller.push_back(i);
             std::vector<Refined> found(smaller.size());
-            parallel(smaller.size(), workers_, [&](std::size_t k) {
+            experiment_.share(smaller.size(), [&](std::size_t k) {
                 const std::vector<Factors<double>> made = shrink(trial_.species[from].factors, all_[smaller[k]]);
                 if (made.empty()) return;
                 const std::vector<double> costs = refiner_.costs(made);
@@ -221,14 +238,14 @@ private:
     void first_fits(Source& s, const Effort& effort) const {
         if (s.from == s.species) {
             const Place at = places_[s.species];
-            s.starts.push_back(refiner_.fit(islands_[at.island]->candidate(at.species), {}, effort.first));
+            s.starts.push_back(refiner_.fit(islands_[at.island]->candidate(at.species, s.group), {}, effort.first));
             return;
         }
         const std::vector<Factors<double>> grown =
             grow(trial_.species[s.from].factors, all_[s.species], genome_.ranges(), slowest_, fastest_);
-        const std::vector<double> costs = refiner_.costs(grown);
-        for (const std::size_t at : lowest_apart(grown, costs, effort.grown))
-            s.starts.push_back(refiner_.fit(grown[at], {}, effort.first));
+        const std::vector<std::size_t> lowest = lowest_apart(grown, refiner_.costs(grown), effort.grown);
+        s.starts.resize(lowest.size());
+        experiment_.share(lowest.size(), [&](std::size_t k) { s.starts[k] = refiner_.fit(grown[lowest[k]], {}, effort.first); });
     }
 
     // The best grown candidates, no two of them from the same place on the grid (grow() lists one place after the other).
@@ -251,11 +268,12 @@ private:
         std::size_t island, species;
     };
 
+    const Experiment& experiment_;
     Genome genome_;
     Settings settings_;
-    int workers_;
     Progress& progress_;
     std::vector<Structure> all_;
+    std::size_t groups_;  // of each species
     Refiner refiner_;
     std::vector<std::unique_ptr<Island>> islands_;
     std::vector<Place> places_;  // of each structure
@@ -267,9 +285,9 @@ private:
 
 }  // namespace
 
-Trial run_species(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random, int workers,
+Trial run_species(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random,
                   Progress& progress) {
-    return SpeciesRun(experiment, genome, settings, random, workers, progress).run();
+    return SpeciesRun(experiment, genome, settings, random, progress).run();
 }
 
 }  // namespace gaident

@@ -10,7 +10,7 @@
 
 namespace gaident {
 
-Trial run_species(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random, int workers,
+Trial run_species(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random,
                   Progress& progress);
 
 // Structures allowed by the ranges, by p + q, then by q.
