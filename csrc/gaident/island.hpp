@@ -1,4 +1,4 @@
-// Some species of a search, bred together. Groups never mate with one another, so islands can run side by side.
+// Some species of a search, bred together. Species never mate with one another, so islands can run side by side.
 #pragma once
 
 #include "breeder.hpp"
@@ -9,9 +9,9 @@ namespace gaident {
 
 class Island {
 public:
-    // `settings.population` individuals, shared evenly among so many groups of each species, at least three in each: fewer cannot mate.
+    // `settings.population` individuals, shared evenly, at least three per species: fewer cannot mate.
     Island(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random,
-           std::span<const Structure> species, std::size_t groups = 1);
+           std::span<const Structure> species);
     Island(const Island&) = delete;
 
     // One round from fresh random individuals; `on_generation` hears the least fitness of each generation.
@@ -21,10 +21,9 @@ public:
     const std::vector<double>& history() const { return history_; }
     const std::vector<Word>& best() const { return best_; }
 
-    // The best individual of a group of the k-th species as the round left it.
-    Factors<double> candidate(std::size_t k, std::size_t group = 0) const {
-        const Breeder::Group& g = groups_[k * per_species_ + group];
-        return breeder_.candidate(breeder_.best_of(g.first, g.count));
+    // The best individual of the k-th species as the round left it.
+    Factors<double> candidate(std::size_t k) const {
+        return breeder_.candidate(breeder_.best_of(groups_[k].first, groups_[k].count));
     }
     std::size_t evaluations() const { return breeder_.evaluations(); }
 
@@ -32,7 +31,6 @@ private:
     Genome genome_;
     Settings settings_;
     std::vector<Structure> species_;
-    std::size_t per_species_;
     std::vector<Breeder::Group> groups_;
     Breeder breeder_;
     std::vector<double> history_;

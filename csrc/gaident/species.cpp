@@ -32,9 +32,8 @@ constexpr int more_iterations = 4, full_iterations = 40;
 constexpr double down_to_noise = 1.2;
 // How many islands the search of a long record has.
 constexpr std::size_t most_islands = 4;
-// Groups of individuals that mate, in all: where there are few species each has several, since every group is a start of its own, and a species
-// alone has no smaller ones that lend it theirs.
-constexpr std::size_t most_groups = 16;
+// Individuals that a species has at least: fewer cannot mate.
+constexpr std::size_t least_in_species = 3;
 // A structure whose error sum is so many times another one's of no larger size is not fitted to the end.
 constexpr double out_of_reach = 2.0;
 // A structure whose error sum is within so many times the least describes the data about as well as any.
@@ -54,6 +53,14 @@ double noise_power(std::span<const double> w) {
     return 1.4826 * 1.4826 * *middle * *middle / 20.0;
 }
 
+// The structures asked for and all smaller ones that lead to them. Those are fitted as well: from random starts alone the optimum of a
+// structure with two resonances is rarely found, from the optimum of one resonance nearly always.
+SearchRanges with_smaller(SearchRanges r) {
+    r.p_min = std::min(r.p_min, 1);
+    r.q_min = 0;
+    return r;
+}
+
 class SpeciesRun {
 public:
     SpeciesRun(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random, Progress& progress)
@@ -61,21 +68,23 @@ public:
           genome_(genome),
           settings_(settings),
           progress_(progress),
-          all_(structures(genome.ranges())),
-          groups_(std::max<std::size_t>(1, most_groups / all_.size())),
+          all_(structures(with_smaller(genome.ranges()))),
           refiner_(experiment, options(genome, experiment.samples())) {
+        places_.resize(all_.size());
+        std::vector<std::size_t> asked, smaller;
+        for (std::size_t i = 0; i < all_.size(); ++i) (is_asked(i) ? asked : smaller).push_back(i);
         // The number of islands depends on the data alone, never on the workers: the same seed has to give the same result.
-        const std::size_t islands = experiment.is_long() ? std::min(most_islands, all_.size()) : 1;
-        settings_.population = std::max(settings_.population, static_cast<int>(3 * all_.size() * groups_));
+        const std::size_t islands = experiment.is_long() ? std::min(most_islands, asked.size()) : 1;
+        const std::size_t population = std::max(static_cast<std::size_t>(settings_.population), least_in_species * asked.size());
         for (std::size_t k = 0; k < islands; ++k) {
-            const std::size_t first = k * all_.size() / islands, last = (k + 1) * all_.size() / islands;
-            for (std::size_t i = first; i < last; ++i) places_.push_back({k, i - first});
-            Settings own = settings_;
-            own.population = static_cast<int>((k + 1) * static_cast<std::size_t>(settings_.population) / islands -
-                                              k * static_cast<std::size_t>(settings_.population) / islands);
-            islands_.push_back(std::make_unique<Island>(experiment, genome_, own, islands == 1 ? random : Random(random.word()),
-                                                        std::span(all_).subspan(first, last - first), groups_));
+            const std::size_t first = k * asked.size() / islands, last = (k + 1) * asked.size() / islands;
+            settle(genome_, std::span(asked).subspan(first, last - first),
+                   (k + 1) * population / islands - k * population / islands, islands == 1 ? random : Random(random.word()));
         }
+        asked_islands_ = islands_.size();
+        if (!smaller.empty())
+            settle(Genome(with_smaller(genome_.ranges()), settings_.code, settings_.roots), smaller,
+                   least_in_species * smaller.size(), Random(random.word()));
         trial_.species.resize(all_.size());
         for (const Record& r : experiment.records) {
             slowest_ = std::min(slowest_, 0.5 / (static_cast<double>(r.size()) * r.sample_time));
@@ -96,10 +105,28 @@ public:
             done += generations;
         }
         for (const auto& island : islands_) trial_.evaluations += island->evaluations();
+        std::size_t kept = 0;
+        for (std::size_t i = 0; i < all_.size(); ++i)
+            if (is_asked(i)) std::swap(trial_.species[kept++], trial_.species[i]);
+        trial_.species.resize(kept);
         return std::move(trial_);
     }
 
 private:
+    // An island for these structures.
+    void settle(const Genome& genome, std::span<const std::size_t> which, std::size_t population, Random random) {
+        std::vector<Structure> species;
+        for (const std::size_t i : which) {
+            places_[i] = {islands_.size(), species.size()};
+            species.push_back(all_[i]);
+        }
+        Settings own = settings_;
+        own.population = static_cast<int>(population);
+        islands_.push_back(std::make_unique<Island>(experiment_, genome, own, random, species));
+    }
+
+    bool is_asked(std::size_t i) const { return all_[i].p >= genome_.ranges().p_min && all_[i].q >= genome_.ranges().q_min; }
+
     static RefineOptions options(const Genome& genome, std::size_t samples) {
         RefineOptions o;
         o.ranges = genome.ranges();
@@ -111,14 +138,16 @@ private:
     // is to find another basin.
     void breed_round(int generations, int done) {
         experiment_.share(islands_.size(), [&](std::size_t k) {
-            islands_[k]->breed(generations, [&](double least) { progress_.note(k == 0 ? 1 : 0, least); });
+            islands_[k]->breed(generations,
+                               [&](double least) { progress_.note(k == 0 ? 1 : 0, k < asked_islands_ ? least : worst_fitness); });
         });
         for (std::size_t g = 0; g < static_cast<std::size_t>(generations); ++g) {
-            for (const auto& island : islands_) {
-                if (!(island->history()[g] < trial_.best_fitness)) continue;
-                trial_.best_fitness = island->history()[g];
+            for (std::size_t k = 0; k < asked_islands_; ++k) {
+                const Island& island = *islands_[k];
+                if (!(island.history()[g] < trial_.best_fitness)) continue;
+                trial_.best_fitness = island.history()[g];
                 trial_.best_generation = done + static_cast<int>(g);
-                trial_.best = island->best();  // of its round; a later generation that is better still comes later in this loop
+                trial_.best = island.best();  // of its round; a later generation that is better still comes later in this loop
             }
             trial_.history.push_back(trial_.best_fitness);
         }
@@ -134,10 +163,9 @@ private:
         return std::any_of(better_.begin(), better_.end(), [](char c) { return c != 0; });
     }
 
-    // Where a species' local fits may start: the best individual of one of its groups (from == own index), or a smaller structure's optimum,
-    // grown.
+    // Where a species' local fits may start: its best individual (from == own index), or a smaller structure's optimum, grown.
     struct Source {
-        std::size_t species, from, group;
+        std::size_t species, from;
         std::vector<Refined> starts;
     };
 
@@ -156,9 +184,9 @@ private:
         while (level.last < all_.size() && all_[level.last].poles() == all_[level.first].poles()) ++level.last;
         std::vector<Source> early, late;  // late: from the optima of the level before
         for (std::size_t i = level.first; i < level.last; ++i) {
-            for (std::size_t g = 0; g < groups_; ++g) early.push_back({i, i, g, {}});
+            early.push_back({i, i, {}});
             for (std::size_t j = 0; j < level.first; ++j)
-                if (may_grow(all_[j], all_[i])) (j < before.first ? early : late).push_back({i, j, 0, {}});
+                if (may_grow(all_[j], all_[i])) (j < before.first ? early : late).push_back({i, j, {}});
         }
         // The few fits that go on to the end would leave threads idle: what does not need them is done beside them.
         experiment_.share(early.size() + before.best.size(), [&](std::size_t k) {
@@ -228,17 +256,18 @@ private:
         own = std::move(found);
     }
 
-    // The least error sum of all structures.
+    // The least error sum of all structures asked for.
     double lead() const {
         double least = worst_fitness;
-        for (const Refined& r : trial_.species) least = std::min(least, r.cost);
+        for (std::size_t i = 0; i < all_.size(); ++i)
+            if (is_asked(i)) least = std::min(least, trial_.species[i].cost);
         return least;
     }
 
     void first_fits(Source& s, const Effort& effort) const {
         if (s.from == s.species) {
             const Place at = places_[s.species];
-            s.starts.push_back(refiner_.fit(islands_[at.island]->candidate(at.species, s.group), {}, effort.first));
+            s.starts.push_back(refiner_.fit(islands_[at.island]->candidate(at.species), {}, effort.first));
             return;
         }
         const std::vector<Factors<double>> grown =
@@ -273,10 +302,10 @@ private:
     Settings settings_;
     Progress& progress_;
     std::vector<Structure> all_;
-    std::size_t groups_;  // of each species
     Refiner refiner_;
     std::vector<std::unique_ptr<Island>> islands_;
-    std::vector<Place> places_;  // of each structure
+    std::size_t asked_islands_ = 0;  // the first so many; the last may hold smaller structures
+    std::vector<Place> places_;      // of each structure
     Trial trial_;
     std::vector<char> better_;                // per species: improved in the round under way
     double slowest_ = 1e300, fastest_ = 0.0;  // rad/s, where a module can still be seen
