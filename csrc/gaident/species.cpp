@@ -183,12 +183,12 @@ private:
         Level level{before.last, before.last, {}, 0.0};
         while (level.last < all_.size() && all_[level.last].poles() == all_[level.first].poles()) ++level.last;
         std::vector<Source> early, late;  // late: from the optima of the level before
-        for (std::size_t i = level.first; i < level.last; ++i) {
-            early.push_back({i, i, {}});
+        for (std::size_t i = level.first; i < level.last; ++i)
             for (std::size_t j = 0; j < level.first; ++j)
                 if (may_grow(all_[j], all_[i])) (j < before.first ? early : late).push_back({i, j, {}});
-        }
-        // The few fits that go on to the end would leave threads idle: what does not need them is done beside them.
+        for (std::size_t i = level.first; i < level.last; ++i) early.push_back({i, i, {}});
+        // The few fits that go on to the end would leave threads idle: what does not need them is done beside them. Begun last, of what is
+        // listed first, is work that shares its own parts.
         experiment_.share(early.size() + before.best.size(), [&](std::size_t k) {
             if (k < early.size()) first_fits(early[k], effort);
             else to_the_end(before, k - early.size());
