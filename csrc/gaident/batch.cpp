@@ -23,9 +23,8 @@ std::size_t Experiment::samples() const {
     return n;
 }
 
-void Experiment::share(std::size_t n, const std::function<void(std::size_t)>& work) const {
-    if (workers != nullptr && is_long()) return workers->share(n, work);
-    while (n > 0) work(--n);
+void Experiment::share_among_workers(std::size_t n, const std::function<void(std::size_t)>& work) const {
+    workers->share(n, work);
 }
 
 void steady_start(const Delta<double>& plant, const Record& record, const Loop& loop, double* start) {

@@ -30,7 +30,12 @@ struct Experiment {
     // Long enough for one candidate's run over the records to be worth handing to another thread.
     bool is_long() const { return samples() >= 4096; }
     // Calls work(0) ... work(n-1), which run over the records each; the last is begun first.
-    void share(std::size_t n, const std::function<void(std::size_t)>& work) const;
+    template <class Work>
+    void share(std::size_t n, const Work& work) const {
+        if (workers != nullptr && is_long()) return share_among_workers(n, work);
+        while (n > 0) work(--n);
+    }
+    void share_among_workers(std::size_t n, const std::function<void(std::size_t)>& work) const;
     void stop_if_asked() const {
         if (stop != nullptr && stop->load(std::memory_order_relaxed)) throw Stopped{};
     }

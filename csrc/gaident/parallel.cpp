@@ -43,7 +43,7 @@ void Workers::share(std::size_t n, const Work& work) {
     }
     // What others still have under way may have been shared in turn. Work that is older than this may take far longer than this does.
     while (job.running > 0)
-        if (!newest_piece(&job, lock)) await_news(lock);
+        if (!piece_after(&job, lock)) await_news(lock);
     jobs_.erase(std::find(jobs_.begin(), jobs_.end(), &job));
     if (job.error) std::rethrow_exception(job.error);
 }
@@ -87,7 +87,7 @@ void Workers::help() {
     const FlushDenormals flush;
     std::unique_lock<std::mutex> lock(mutex_);
     while (!closed_)
-        if (!newest_piece(nullptr, lock)) await_news(lock);
+        if (!piece_after(nullptr, lock)) await_news(lock);
 }
 
 // Does a piece of the job; false where all have begun.
@@ -111,11 +111,11 @@ bool Workers::piece(Job& job, std::unique_lock<std::mutex>& lock) {
     return true;
 }
 
-// Does a piece of the newest job that has one, if it is newer than `older`.
-bool Workers::newest_piece(const Job* older, std::unique_lock<std::mutex>& lock) {
-    for (std::size_t k = jobs_.size(); k-- > 0 && jobs_[k] != older;)
-        if (piece(*jobs_[k], lock)) return true;
-    return false;
+// Does a piece of the oldest job that has one, its pieces being the largest, of those begun after `job`.
+bool Workers::piece_after(const Job* job, std::unique_lock<std::mutex>& lock) {
+    const auto first = job == nullptr ? jobs_.begin() : std::find(jobs_.begin(), jobs_.end(), job) + 1;
+    const auto found = std::find_if(first, jobs_.end(), [](const Job* j) { return j->to_begin > 0; });
+    return found != jobs_.end() && piece(**found, lock);
 }
 
 void Workers::announce() {

@@ -39,7 +39,7 @@ private:
     void start();
     void help();
     bool piece(Job& job, std::unique_lock<std::mutex>& lock);
-    bool newest_piece(const Job* older, std::unique_lock<std::mutex>& lock);
+    bool piece_after(const Job* job, std::unique_lock<std::mutex>& lock);
     void announce();
     void await_news(std::unique_lock<std::mutex>& lock);
 
