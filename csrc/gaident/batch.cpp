@@ -253,21 +253,21 @@ std::vector<int> sets_of(const G* groups, int count) {
 
 }  // namespace
 
-// Advances groups over a record; adds each lane's squared errors. Where that is long work, sets of groups are shared, a stretch of the
-// record at a time: which thread takes which stretch changes nothing in what is computed.
+// Advances groups over a record; adds each lane's squared errors. Where that is long work, sets of groups are shared, a chunk of the record
+// at a time: which thread takes which chunk changes nothing in what is computed.
 template <class T, class G>
 void Batch::advance(const View<T>& view, const Record& record, G* groups, int lanes, double* sums) const {
-    constexpr std::size_t stretch = 2 * chunk_samples, long_work = 1 << 18;  // samples of a candidate: near 0.1 ms
+    constexpr std::size_t long_work = 1 << 18;  // samples of a candidate: near 0.1 ms
     const std::size_t samples = view.output.size();
     if (experiment_.workers == nullptr || static_cast<std::size_t>(lanes) * samples < long_work)
         return advance_part(view, record, groups, lanes, 0, samples, sums);
     const std::vector<int> first = sets_of(groups, (lanes + G::width - 1) / G::width);
-    experiment_.workers->share_strands(
-        first.size() - 1, (samples + stretch - 1) / stretch, [&](std::size_t set, std::size_t step) {
-            const int lane = first[set] * G::width, own = std::min(lanes, first[set + 1] * G::width) - lane;
-            const std::size_t from = step * stretch;
-            advance_part(view, record, groups + first[set], own, from, std::min(from + stretch, samples), sums + lane);
-        });
+    const std::size_t chunks = (samples + chunk_samples - 1) / chunk_samples;
+    experiment_.workers->share_strands(first.size() - 1, chunks, [&](std::size_t set, std::size_t chunk) {
+        const int lane = first[set] * G::width, own = std::min(lanes, first[set + 1] * G::width) - lane;
+        const std::size_t from = chunk * chunk_samples;
+        advance_part(view, record, groups + first[set], own, from, std::min(from + chunk_samples, samples), sums + lane);
+    });
 }
 
 // Over samples [from, to), chunk by chunk.
