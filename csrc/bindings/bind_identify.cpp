@@ -81,10 +81,12 @@ std::vector<Trial> search_records(PyExperiment& e, const SearchRanges& ranges, c
 std::vector<PyRefined> go_on(PyExperiment& e, const std::vector<PyRefined>& fits, const std::optional<SearchRanges>& ranges,
                              const std::vector<double>& whitening, int max_iterations, double tolerance, int workers) {
     std::vector<PyRefined> result(fits.size());
-    const Refiner refiner(e.experiment, options_of(ranges, whitening, tolerance));
-    run_work(e, fits.size() * static_cast<std::size_t>(std::max(1, max_iterations)), [&] {
-        parallel(fits.size(), workers, [&](std::size_t i) { result[i].r = refiner.go_on(fits[i].r, max_iterations); });
-    });
+    Workers all(workers);
+    Experiment shared = e.experiment;
+    shared.workers = &all;
+    const Refiner refiner(shared, options_of(ranges, whitening, tolerance));
+    run_work(e, fits.size() * static_cast<std::size_t>(std::max(1, max_iterations)),
+             [&] { all.share(fits.size(), [&](std::size_t i) { result[i].r = refiner.go_on(fits[i].r, max_iterations); }); });
     return result;
 }
 

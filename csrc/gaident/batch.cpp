@@ -1,6 +1,7 @@
 #include "batch.hpp"
 
 #include "advance.hpp"
+#include "parallel.hpp"
 
 #include <algorithm>
 #include <numeric>
@@ -20,6 +21,10 @@ std::size_t Experiment::samples() const {
     std::size_t n = 0;
     for (const Record& r : records) n += r.size();
     return n;
+}
+
+void Experiment::share_among_workers(std::size_t n, const std::function<void(std::size_t)>& work) const {
+    workers->share(n, work);
 }
 
 void steady_start(const Delta<double>& plant, const Record& record, const Loop& loop, double* start) {
@@ -233,15 +238,46 @@ void narrow(const DoubleGroup& from, int offset, FloatGroup& to) {
     for (int lane = 0; lane < DoubleGroup::width; ++lane) to.s[offset + lane] = static_cast<float>(from.s[lane]);
 }
 
+// Groups that a thread takes together: neighbours of one order, since the kernels run two or three registers side by side faster than one
+// after the other, and no more than three.
+template <class G>
+std::vector<int> sets_of(const G* groups, int count) {
+    std::vector<int> first{0};
+    for (int g = 0; g < count; g = first.back()) {
+        int same = 1;
+        while (g + same < count && groups[g + same].order == groups[g].order) ++same;
+        first.push_back(g + (same <= 3 ? same : 2));
+    }
+    return first;
+}
+
 }  // namespace
 
-// Advances groups over a record, chunk by chunk; adds each lane's squared errors.
+// Advances groups over a record; adds each lane's squared errors. Where that is long work, sets of groups are shared, a chunk of the record
+// at a time: which thread takes which chunk changes nothing in what is computed.
 template <class T, class G>
 void Batch::advance(const View<T>& view, const Record& record, G* groups, int lanes, double* sums) const {
+    constexpr std::size_t long_work = 1 << 18;  // samples of a candidate: near 0.1 ms
+    const std::size_t samples = view.output.size();
+    if (experiment_.workers == nullptr || static_cast<std::size_t>(lanes) * samples < long_work)
+        return advance_part(view, record, groups, lanes, 0, samples, sums);
+    const std::vector<int> first = sets_of(groups, (lanes + G::width - 1) / G::width);
+    const std::size_t chunks = (samples + chunk_samples - 1) / chunk_samples;
+    experiment_.workers->share_strands(first.size() - 1, chunks, [&](std::size_t set, std::size_t chunk) {
+        const int lane = first[set] * G::width, own = std::min(lanes, first[set + 1] * G::width) - lane;
+        const std::size_t from = chunk * chunk_samples;
+        advance_part(view, record, groups + first[set], own, from, std::min(from + chunk_samples, samples), sums + lane);
+    });
+}
+
+// Over samples [from, to), chunk by chunk.
+template <class T, class G>
+void Batch::advance_part(const View<T>& view, const Record& record, G* groups, int lanes, std::size_t from, std::size_t to,
+                         double* sums) const {
     const bool settling = settling_[static_cast<std::size_t>(&record - experiment_.records.data())] != 0;
     const Controller<double> controller(experiment_.loop, record.sample_time);
-    for (std::size_t i = 0; i < view.output.size(); i += chunk_samples) {
-        const std::size_t n = std::min(chunk_samples, view.output.size() - i);
+    for (std::size_t i = from; i < to; i += chunk_samples) {
+        const std::size_t n = std::min(chunk_samples, to - i);
         const T *const in = view.input.data() + i, *const out = view.output.data() + i;
         T part[static_cast<std::size_t>(bank_groups) * DoubleGroup::width];
         const auto run = [&](const auto& kernels) {

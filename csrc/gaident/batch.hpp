@@ -8,6 +8,7 @@
 #include "record.hpp"
 
 #include <atomic>
+#include <functional>
 #include <vector>
 
 namespace gaident {
@@ -15,14 +16,26 @@ namespace gaident {
 // Thrown inside the core when the stop flag is seen; the caller asked for it.
 struct Stopped {};
 
+class Workers;
+
 struct Experiment {
     std::vector<Record> records;
     Loop loop;
     const Kernels* kernels = &best_kernels();
     const std::atomic<bool>* stop = nullptr;
+    Workers* workers = nullptr;  // among whom the work on long records is shared; null: nobody
 
     void check() const;  // throws std::invalid_argument, naming what is wrong
     std::size_t samples() const;
+    // Long enough for one candidate's run over the records to be worth handing to another thread.
+    bool is_long() const { return samples() >= 4096; }
+    // Calls work(0) ... work(n-1), which run over the records each; the last is begun first.
+    template <class Work>
+    void share(std::size_t n, const Work& work) const {
+        if (workers != nullptr && is_long()) return share_among_workers(n, work);
+        while (n > 0) work(--n);
+    }
+    void share_among_workers(std::size_t n, const std::function<void(std::size_t)>& work) const;
     void stop_if_asked() const {
         if (stop != nullptr && stop->load(std::memory_order_relaxed)) throw Stopped{};
     }
@@ -83,6 +96,9 @@ private:
     std::size_t group_end(std::size_t first, std::size_t count) const;
     template <class T, class G>
     void advance(const View<T>& view, const Record& record, G* groups, int lanes, double* sums) const;
+    template <class T, class G>
+    void advance_part(const View<T>& view, const Record& record, G* groups, int lanes, std::size_t from, std::size_t to,
+                      double* sums) const;
 
     const Experiment& experiment_;
     bool in_float_;

@@ -44,15 +44,18 @@ std::vector<Trial> search(const Experiment& experiment, const SearchRanges& rang
     if (trials < 1) throw std::invalid_argument("trials must be at least 1");
     const bool held = experiment.loop.kind != LoopKind::continuous;
     if (held && ranges.p_min < 1)
-        throw std::invalid_argument("p must be at least 1 in the sampled loop and in open loop: a plant that passes its torque "
-                                    "straight through does not exist behind a hold");
+        throw std::invalid_argument(
+            "p must be at least 1 in the sampled loop and in open loop: a plant that passes its torque "
+            "straight through does not exist behind a hold");
     const Genome genome(ranges, settings.code, settings.roots);
     std::vector<Trial> result(static_cast<std::size_t>(trials));
-    const int inner = trials >= workers ? 1 : workers / trials;
-    parallel(result.size(), workers, [&](std::size_t i) {
+    Workers all(workers);
+    Experiment shared = experiment;
+    shared.workers = &all;
+    all.share(result.size(), [&](std::size_t i) {
         const Random random = Random::stream(seed, i);
-        result[i] = settings.species ? run_species(experiment, genome, settings, random, inner, progress)
-                                     : run_plain(experiment, genome, settings, random, progress);
+        result[i] = settings.species ? run_species(shared, genome, settings, random, progress)
+                                     : run_plain(shared, genome, settings, random, progress);
     });
     return result;
 }

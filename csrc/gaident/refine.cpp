@@ -188,21 +188,24 @@ Refined Refiner::go_on(const Refined& from, int max_iterations) const {
 
 std::vector<double> Refiner::costs(std::span<const Factors<double>> candidates) const {
     const FlushDenormals flush;
-    std::vector<double> result(candidates.size());
-    Sweep sweep(experiment_);
     // Candidates of one structure run together.
-    for (std::size_t i = 0; i < candidates.size();) {
-        const Unknowns unknowns(experiment_, candidates[i].structure);
+    std::vector<std::size_t> first{0};
+    while (first.back() < candidates.size()) {
+        std::size_t i = first.back() + 1;
+        while (i < candidates.size() && i < first.back() + W && candidates[i].structure == candidates[first.back()].structure)
+            ++i;
+        first.push_back(i);
+    }
+    std::vector<double> result(candidates.size());
+    experiment_.share(first.size() - 1, [&](std::size_t k) {
+        const std::span<const Factors<double>> group = candidates.subspan(first[k], first[k + 1] - first[k]);
+        const Unknowns unknowns(experiment_, group[0].structure);
         std::vector<Vector> x;
         const double* points[W];
-        for (; i + x.size() < candidates.size() && x.size() < W && candidates[i + x.size()].structure == unknowns.structure;) {
-            const Factors<double>& g = candidates[i + x.size()];
-            x.push_back(pack(g, unknowns.steady_starts(experiment_, g)));
-            points[x.size() - 1] = x.back().data();
-        }
-        sweep.errors({points, x.size()}, unknowns, options_.whitening, result.data() + i);
-        i += x.size();
-    }
+        for (const Factors<double>& g : group) x.push_back(pack(g, unknowns.steady_starts(experiment_, g)));
+        for (std::size_t i = 0; i < x.size(); ++i) points[i] = x[i].data();
+        Sweep(experiment_).errors({points, x.size()}, unknowns, options_.whitening, result.data() + first[k]);
+    });
     return result;
 }
 

@@ -2,7 +2,6 @@
 
 #include "island.hpp"
 #include "neighbours.hpp"
-#include "parallel.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -31,8 +30,10 @@ constexpr Effort quick{2, 2, 3}, thorough{5, 6, 10};
 constexpr int more_iterations = 4, full_iterations = 40;
 // Where the root mean square error is so many times the noise of the measured velocity, there may be a better optimum.
 constexpr double down_to_noise = 1.2;
-// Samples from which a search is worth threads, and how many islands it then has.
-constexpr std::size_t long_enough = 4096, most_islands = 4;
+// How many islands the search of a long record has.
+constexpr std::size_t most_islands = 4;
+// Individuals that a species has at least: fewer cannot mate.
+constexpr std::size_t least_in_species = 3;
 // A structure whose error sum is so many times another one's of no larger size is not fitted to the end.
 constexpr double out_of_reach = 2.0;
 // A structure whose error sum is within so many times the least describes the data about as well as any.
@@ -52,28 +53,38 @@ double noise_power(std::span<const double> w) {
     return 1.4826 * 1.4826 * *middle * *middle / 20.0;
 }
 
+// The structures asked for and all smaller ones that lead to them. Those are fitted as well: from random starts alone the optimum of a
+// structure with two resonances is rarely found, from the optimum of one resonance nearly always.
+SearchRanges with_smaller(SearchRanges r) {
+    r.p_min = std::min(r.p_min, 1);
+    r.q_min = 0;
+    return r;
+}
+
 class SpeciesRun {
 public:
-    SpeciesRun(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random, int workers,
-               Progress& progress)
-        : genome_(genome),
+    SpeciesRun(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random, Progress& progress)
+        : experiment_(experiment),
+          genome_(genome),
           settings_(settings),
-          workers_(worth_threads(experiment) ? workers : 1),
           progress_(progress),
-          all_(structures(genome.ranges())),
+          all_(structures(with_smaller(genome.ranges()))),
           refiner_(experiment, options(genome, experiment.samples())) {
+        places_.resize(all_.size());
+        std::vector<std::size_t> asked, smaller;
+        for (std::size_t i = 0; i < all_.size(); ++i) (is_asked(i) ? asked : smaller).push_back(i);
         // The number of islands depends on the data alone, never on the workers: the same seed has to give the same result.
-        const std::size_t islands = worth_threads(experiment) ? std::min(most_islands, all_.size()) : 1;
-        settings_.population = std::max(settings_.population, static_cast<int>(3 * all_.size()));
+        const std::size_t islands = experiment.is_long() ? std::min(most_islands, asked.size()) : 1;
+        const std::size_t population = std::max(static_cast<std::size_t>(settings_.population), least_in_species * asked.size());
         for (std::size_t k = 0; k < islands; ++k) {
-            const std::size_t first = k * all_.size() / islands, last = (k + 1) * all_.size() / islands;
-            for (std::size_t i = first; i < last; ++i) places_.push_back({k, i - first});
-            Settings own = settings_;
-            own.population = static_cast<int>((k + 1) * static_cast<std::size_t>(settings_.population) / islands -
-                                              k * static_cast<std::size_t>(settings_.population) / islands);
-            islands_.push_back(std::make_unique<Island>(experiment, genome_, own, islands == 1 ? random : Random(random.word()),
-                                                        std::span(all_).subspan(first, last - first)));
+            const std::size_t first = k * asked.size() / islands, last = (k + 1) * asked.size() / islands;
+            settle(genome_, std::span(asked).subspan(first, last - first),
+                   (k + 1) * population / islands - k * population / islands, islands == 1 ? random : Random(random.word()));
         }
+        asked_islands_ = islands_.size();
+        if (!smaller.empty())
+            settle(Genome(with_smaller(genome_.ranges()), settings_.code, settings_.roots), smaller,
+                   least_in_species * smaller.size(), Random(random.word()));
         trial_.species.resize(all_.size());
         for (const Record& r : experiment.records) {
             slowest_ = std::min(slowest_, 0.5 / (static_cast<double>(r.size()) * r.sample_time));
@@ -94,11 +105,28 @@ public:
             done += generations;
         }
         for (const auto& island : islands_) trial_.evaluations += island->evaluations();
+        std::size_t kept = 0;
+        for (std::size_t i = 0; i < all_.size(); ++i)
+            if (is_asked(i)) std::swap(trial_.species[kept++], trial_.species[i]);
+        trial_.species.resize(kept);
         return std::move(trial_);
     }
 
 private:
-    static bool worth_threads(const Experiment& experiment) { return experiment.samples() >= long_enough; }
+    // An island for these structures.
+    void settle(const Genome& genome, std::span<const std::size_t> which, std::size_t population, Random random) {
+        std::vector<Structure> species;
+        for (const std::size_t i : which) {
+            places_[i] = {islands_.size(), species.size()};
+            species.push_back(all_[i]);
+        }
+        Settings own = settings_;
+        own.population = static_cast<int>(population);
+        islands_.push_back(std::make_unique<Island>(experiment_, genome, own, random, species));
+    }
+
+    bool is_asked(std::size_t i) const { return all_[i].p >= genome_.ranges().p_min && all_[i].q >= genome_.ranges().q_min; }
+
     static RefineOptions options(const Genome& genome, std::size_t samples) {
         RefineOptions o;
         o.ranges = genome.ranges();
@@ -109,15 +137,17 @@ private:
     // Every round starts from fresh random individuals: the optima already fitted are kept apart, and what a round is for
     // is to find another basin.
     void breed_round(int generations, int done) {
-        parallel(islands_.size(), workers_, [&](std::size_t k) {
-            islands_[k]->breed(generations, [&](double least) { progress_.note(k == 0 ? 1 : 0, least); });
+        experiment_.share(islands_.size(), [&](std::size_t k) {
+            islands_[k]->breed(generations,
+                               [&](double least) { progress_.note(k == 0 ? 1 : 0, k < asked_islands_ ? least : worst_fitness); });
         });
         for (std::size_t g = 0; g < static_cast<std::size_t>(generations); ++g) {
-            for (const auto& island : islands_) {
-                if (!(island->history()[g] < trial_.best_fitness)) continue;
-                trial_.best_fitness = island->history()[g];
+            for (std::size_t k = 0; k < asked_islands_; ++k) {
+                const Island& island = *islands_[k];
+                if (!(island.history()[g] < trial_.best_fitness)) continue;
+                trial_.best_fitness = island.history()[g];
                 trial_.best_generation = done + static_cast<int>(g);
-                trial_.best = island->best();  // of its round; a later generation that is better still comes later in this loop
+                trial_.best = island.best();  // of its round; a later generation that is better still comes later in this loop
             }
             trial_.history.push_back(trial_.best_fitness);
         }
@@ -126,12 +156,9 @@ private:
     // Local fits, from small structures to large; true where one got better.
     bool fit_round(const Effort& effort) {
         better_.assign(all_.size(), 0);
-        for (std::size_t first = 0; first < all_.size();) {
-            std::size_t last = first;  // one level: structures with the same p + q do not need one another
-            while (last < all_.size() && all_[last].poles() == all_[first].poles()) ++last;
-            fit_level(first, last, effort);
-            first = last;
-        }
+        Level level;
+        do level = fit_level(level, effort);
+        while (level.first < all_.size());
         fit_smaller();
         return std::any_of(better_.begin(), better_.end(), [](char c) { return c != 0; });
     }
@@ -142,44 +169,62 @@ private:
         std::vector<Refined> starts;
     };
 
-    // The species of one level. All starts get a few iterations, the most promising some more, and the best of each species goes on
-    // to its optimum: unless it stays so far behind what a smaller or equal structure has reached that it cannot win.
-    void fit_level(std::size_t first, std::size_t last, const Effort& effort) {
-        std::vector<Source> sources;
-        for (std::size_t i = first; i < last; ++i) {
-            sources.push_back({i, i, {}});
-            for (std::size_t j = 0; j < first; ++j) {
-                if (may_grow(all_[j], all_[i])) sources.push_back({i, j, {}});
-            }
-        }
-        parallel(sources.size(), workers_, [&](std::size_t k) { first_fits(sources[k], effort); });
+    // Structures [first, last) of the same p + q, which do not need one another, and the most promising fit of each.
+    struct Level {
+        std::size_t first = 0, last = 0;
+        std::vector<Refined> best;
+        double within_reach = 0.0;
+    };
+
+    // The level after `before`, and the end of the fits of that one. All starts get a few iterations, the most promising some more, and the
+    // best of each species goes on to its optimum: unless it stays so far behind what a smaller or equal structure has reached that it
+    // cannot win.
+    Level fit_level(Level& before, const Effort& effort) {
+        Level level{before.last, before.last, {}, 0.0};
+        while (level.last < all_.size() && all_[level.last].poles() == all_[level.first].poles()) ++level.last;
+        std::vector<Source> early, late;  // late: from the optima of the level before
+        for (std::size_t i = level.first; i < level.last; ++i)
+            for (std::size_t j = 0; j < level.first; ++j)
+                if (may_grow(all_[j], all_[i])) (j < before.first ? early : late).push_back({i, j, {}});
+        for (std::size_t i = level.first; i < level.last; ++i) early.push_back({i, i, {}});
+        // The few fits that go on to the end would leave threads idle: what does not need them is done beside them. Begun last, of what is
+        // listed first, is work that shares its own parts.
+        experiment_.share(early.size() + before.best.size(), [&](std::size_t k) {
+            if (k < early.size()) first_fits(early[k], effort);
+            else to_the_end(before, k - early.size());
+        });
+        for (std::size_t k = 0; k < before.best.size(); ++k) keep_better(before.first + k, before.best[k]);
+        experiment_.share(late.size(), [&](std::size_t k) { first_fits(late[k], effort); });
 
         const auto lower = [](const Refined& x, const Refined& y) { return x.cost < y.cost; };
         std::vector<Refined> chosen;
-        for (std::size_t i = first; i < last; ++i) {
+        for (std::size_t i = level.first; i < level.last; ++i) {
             std::vector<Refined> starts;
-            for (Source& s : sources)
-                if (s.species == i) std::move(s.starts.begin(), s.starts.end(), std::back_inserter(starts));
+            for (std::vector<Source>* sources : {&early, &late})
+                for (Source& s : *sources)
+                    if (s.species == i) std::move(s.starts.begin(), s.starts.end(), std::back_inserter(starts));
             std::stable_sort(starts.begin(), starts.end(), lower);
             starts.resize(std::min(starts.size(), effort.promising));
             std::move(starts.begin(), starts.end(), std::back_inserter(chosen));
         }
-        parallel(chosen.size(), workers_, [&](std::size_t k) { chosen[k] = refiner_.go_on(chosen[k], more_iterations); });
+        experiment_.share(chosen.size(), [&](std::size_t k) { chosen[k] = refiner_.go_on(chosen[k], more_iterations); });
 
-        double within_reach = lead();
-        for (const Refined& r : chosen) within_reach = std::min(within_reach, r.cost);
-        within_reach *= out_of_reach;
-        std::vector<Refined> best(last - first);
+        level.within_reach = lead();
+        for (const Refined& r : chosen) level.within_reach = std::min(level.within_reach, r.cost);
+        level.within_reach *= out_of_reach;
+        level.best.resize(level.last - level.first);
         for (const Refined& r : chosen) {
-            Refined& b =
-                best[static_cast<std::size_t>(std::find(all_.begin(), all_.end(), r.factors.structure) - all_.begin()) - first];
+            const auto i = std::find(all_.begin(), all_.end(), r.factors.structure) - all_.begin();
+            Refined& b = level.best[static_cast<std::size_t>(i) - level.first];
             if (b.cost == worst_fitness || r.cost < b.cost) b = r;
         }
-        parallel(best.size(), workers_, [&](std::size_t k) {
-            const double before = trial_.species[first + k].cost;
-            if (best[k].cost < 1.5 * before && best[k].cost < within_reach) best[k] = refiner_.go_on(best[k], full_iterations);
-        });
-        for (std::size_t i = first; i < last; ++i) keep_better(i, best[i - first]);
+        return level;
+    }
+
+    void to_the_end(Level& level, std::size_t k) const {
+        Refined& fit = level.best[k];
+        if (fit.cost < 1.5 * trial_.species[level.first + k].cost && fit.cost < level.within_reach)
+            fit = refiner_.go_on(fit, full_iterations);
     }
 
     // What a larger structure has found, a smaller one may lack: each that is close to the best lends its optimum with one module taken
@@ -191,7 +236,7 @@ private:
             for (std::size_t i = 0; i < from; ++i)
                 if (may_grow(all_[i], all_[from])) smaller.push_back(i);
             std::vector<Refined> found(smaller.size());
-            parallel(smaller.size(), workers_, [&](std::size_t k) {
+            experiment_.share(smaller.size(), [&](std::size_t k) {
                 const std::vector<Factors<double>> made = shrink(trial_.species[from].factors, all_[smaller[k]]);
                 if (made.empty()) return;
                 const std::vector<double> costs = refiner_.costs(made);
@@ -211,10 +256,11 @@ private:
         own = std::move(found);
     }
 
-    // The least error sum of all structures.
+    // The least error sum of all structures asked for.
     double lead() const {
         double least = worst_fitness;
-        for (const Refined& r : trial_.species) least = std::min(least, r.cost);
+        for (std::size_t i = 0; i < all_.size(); ++i)
+            if (is_asked(i)) least = std::min(least, trial_.species[i].cost);
         return least;
     }
 
@@ -226,9 +272,9 @@ private:
         }
         const std::vector<Factors<double>> grown =
             grow(trial_.species[s.from].factors, all_[s.species], genome_.ranges(), slowest_, fastest_);
-        const std::vector<double> costs = refiner_.costs(grown);
-        for (const std::size_t at : lowest_apart(grown, costs, effort.grown))
-            s.starts.push_back(refiner_.fit(grown[at], {}, effort.first));
+        const std::vector<std::size_t> lowest = lowest_apart(grown, refiner_.costs(grown), effort.grown);
+        s.starts.resize(lowest.size());
+        experiment_.share(lowest.size(), [&](std::size_t k) { s.starts[k] = refiner_.fit(grown[lowest[k]], {}, effort.first); });
     }
 
     // The best grown candidates, no two of them from the same place on the grid (grow() lists one place after the other).
@@ -251,14 +297,15 @@ private:
         std::size_t island, species;
     };
 
+    const Experiment& experiment_;
     Genome genome_;
     Settings settings_;
-    int workers_;
     Progress& progress_;
     std::vector<Structure> all_;
     Refiner refiner_;
     std::vector<std::unique_ptr<Island>> islands_;
-    std::vector<Place> places_;  // of each structure
+    std::size_t asked_islands_ = 0;  // the first so many; the last may hold smaller structures
+    std::vector<Place> places_;      // of each structure
     Trial trial_;
     std::vector<char> better_;                // per species: improved in the round under way
     double slowest_ = 1e300, fastest_ = 0.0;  // rad/s, where a module can still be seen
@@ -267,9 +314,9 @@ private:
 
 }  // namespace
 
-Trial run_species(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random, int workers,
+Trial run_species(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random,
                   Progress& progress) {
-    return SpeciesRun(experiment, genome, settings, random, workers, progress).run();
+    return SpeciesRun(experiment, genome, settings, random, progress).run();
 }
 
 }  // namespace gaident

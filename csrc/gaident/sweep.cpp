@@ -15,9 +15,8 @@ constexpr std::size_t W = Chunk::width;
 // Makes room in front of a chunk: the last rows of the one before, or zeros before the record.
 void keep_history(std::vector<double>& rows, std::size_t history, std::size_t first) {
     rows.resize((history + chunk_samples) * W);
-    const auto moved = rows.begin() + static_cast<std::ptrdiff_t>(chunk_samples * W);
-    if (first > 0) std::copy(moved, moved + static_cast<std::ptrdiff_t>(history * W), rows.begin());
-    else std::fill(rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(history * W), 0.0);
+    if (first == 0) std::fill_n(rows.begin(), history * W, 0.0);
+    else std::copy_n(rows.begin() + static_cast<std::ptrdiff_t>(chunk_samples * W), history * W, rows.begin());
 }
 
 }  // namespace
@@ -95,19 +94,16 @@ void Sweep::linearise(std::span<const double> x, const Unknowns& unknowns, std::
             }
             load(r, {points, used}, unknowns, bank_[g]);
         }
-        for (std::size_t first = 0; first < record.size(); first += chunk_samples) {
-            const std::size_t n = std::min(chunk_samples, record.size() - first);
-            const double* const output = record.output.data() + first;
+        each_chunk(record, [&](std::size_t first, std::size_t n) {
             for (std::size_t g = 0; g < groups; ++g) {
                 keep_history(columns_[g], history, first);
                 double* const rows = columns_[g].data() + history * W;
                 advance_outputs(*experiment_.kernels, experiment_.loop, controller, bank_[g], record.input.data() + first, n,
                                 rows);
-                experiment_.kernels->differences(scale.data() + g * W, output, n, rows);
+                experiment_.kernels->differences(scale.data() + g * W, record.output.data() + first, n, rows);
             }
             on_chunk({r, first, n, own, columns_, history});
-            experiment_.stop_if_asked();
-        }
+        });
     }
 }
 
@@ -119,36 +115,31 @@ void Sweep::outputs(std::span<const double> x, const Unknowns& unknowns, const O
         const Record& record = experiment_.records[r];
         const Controller<double> controller(experiment_.loop, record.sample_time);
         load(r, points, unknowns, group);
-        for (std::size_t first = 0; first < record.size(); first += chunk_samples) {
-            const std::size_t n = std::min(chunk_samples, record.size() - first);
+        each_chunk(record, [&](std::size_t first, std::size_t n) {
             advance_outputs(*experiment_.kernels, experiment_.loop, controller, group, record.input.data() + first, n,
                             rows.data());
             for (std::size_t k = 0; k < n; ++k) y[k] = rows[k * W];
             on_outputs(r, first, {y.data(), n});
-            experiment_.stop_if_asked();
-        }
+        });
     }
 }
 
 void Sweep::errors(std::span<const double* const> points, const Unknowns& unknowns, std::span<const double> phi, double* sums) {
     const std::size_t history = phi.size();
-    bank_.resize(std::max<std::size_t>(bank_.size(), 1));
-    columns_.resize(std::max<std::size_t>(columns_.size(), 1));
-    DoubleGroup& group = bank_[0];
+    DoubleGroup group;
     double total[W] = {};
     for (std::size_t r = 0; r < experiment_.records.size(); ++r) {
         const Record& record = experiment_.records[r];
         const Controller<double> controller(experiment_.loop, record.sample_time);
         load(r, points, unknowns, group);
-        for (std::size_t first = 0; first < record.size(); first += chunk_samples) {
-            const std::size_t n = std::min(chunk_samples, record.size() - first);
+        each_chunk(record, [&](std::size_t first, std::size_t n) {
             const double *const in = record.input.data() + first, *const out = record.output.data() + first;
             double part[W] = {};
             if (phi.empty()) {
                 advance_errors(*experiment_.kernels, experiment_.loop, controller, group, in, out, n, part);
             } else {
-                keep_history(columns_[0], history, first);
-                double* const rows = columns_[0].data() + history * W;
+                keep_history(coloured_, history, first);
+                double* const rows = coloured_.data() + history * W;
                 advance_outputs(*experiment_.kernels, experiment_.loop, controller, group, in, n, rows);
                 for (std::size_t k = 0; k < n; ++k)
                     for (std::size_t lane = 0; lane < W; ++lane) rows[k * W + lane] = out[k] - rows[k * W + lane];
@@ -158,8 +149,7 @@ void Sweep::errors(std::span<const double* const> points, const Unknowns& unknow
                     for (std::size_t lane = 0; lane < W; ++lane) part[lane] += white_[k * W + lane] * white_[k * W + lane];
             }
             for (std::size_t lane = 0; lane < W; ++lane) total[lane] += part[lane];
-            experiment_.stop_if_asked();
-        }
+        });
     }
     for (std::size_t i = 0; i < points.size(); ++i) sums[i] = sane(total[i]);
 }

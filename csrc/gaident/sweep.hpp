@@ -62,13 +62,21 @@ public:
                        const double* rows, double* out);
 
 private:
+    // Calls use(first, n) for each chunk of the record.
+    template <class Use>
+    void each_chunk(const Record& record, const Use& use) const {
+        for (std::size_t first = 0; first < record.size(); first += chunk_samples) {
+            use(first, std::min(chunk_samples, record.size() - first));
+            experiment_.stop_if_asked();
+        }
+    }
     void load(std::size_t record, std::span<const double* const> points, const Unknowns& unknowns, DoubleGroup& group) const;
 
     const Experiment& experiment_;
     double slowest_;  // 1 / duration of the longest record: the scale below which a root is as good as zero
     std::vector<DoubleGroup> bank_;
     std::vector<std::vector<double>> columns_;
-    std::vector<double> white_, moved_;
+    std::vector<double> coloured_, white_, moved_;
 };
 
 }  // namespace gaident

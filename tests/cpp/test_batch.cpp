@@ -1,4 +1,5 @@
 #include "check.hpp"
+#include "gaident/parallel.hpp"
 #include "gaident/simulate.hpp"
 #include "gaident/reference/drives.hpp"
 
@@ -233,6 +234,38 @@ TEST_CASE("batch: every kernel set gives the same sums, and neighbours do not ma
                 for (std::size_t i = 0; i < 50; ++i) CHECK(reversed[49 - i] == first[i]);
                 CHECK(alone[0] == first[0]);
             }
+        }
+}
+
+TEST_CASE("batch: a long record is shared among workers to the same bits; a small generation is not") {
+    Random random(101);
+    for (const bool limited : {false, true})
+        for (const bool constant : {false, true}) {
+            Loop loop = paper_loop(LoopKind::continuous);
+            if (limited) loop.torque_limit = 2.0;
+            Setup setup(random, loop, {9000, 250}, 0.444e-3);
+            if (constant) std::fill(setup.inputs[0].begin(), setup.inputs[0].end(), 20.0);
+            std::vector<Factors<double>> factors;
+            for (const auto& g : candidates(random, 50, 0)) factors.push_back(reference::factors_of(g));
+            for (const bool in_float : {false, true})
+                for (const Kernels* k : available()) {
+                    setup.experiment.kernels = k;
+                    setup.experiment.workers = nullptr;
+                    std::vector<double> alone(50);
+                    Batch(setup.experiment, 50, in_float).errors(factors, alone);
+                    for (const int count : {1, 2, 3}) {
+                        Workers workers(count);
+                        setup.experiment.workers = &workers;
+                        std::vector<double> sums(50), few(10);
+                        Batch batch(setup.experiment, 50, in_float);
+                        batch.errors(std::span(factors).first(10), few);
+                        CHECK(workers.helpers() == 0);
+                        CHECK(std::equal(few.begin(), few.end(), alone.begin()));
+                        batch.errors(factors, sums);
+                        CHECK(workers.helpers() + 1 == static_cast<std::size_t>(count));
+                        CHECK(sums == alone);
+                    }
+                }
         }
 }
 

@@ -114,7 +114,7 @@ TEST_CASE("engine: a long record is searched by several threads to the same resu
     bench.measured = reference::Measurement(bench.drive, 0.3, 18);
     bench.experiment.records[0] = bench.measured.record();
     std::vector<Trial> results;
-    for (const int workers : {1, 2, 5}) {
+    for (const int workers : {1, 2, 3, 5}) {
         Progress progress;
         results.push_back(search(bench.experiment, few(), species(6), 1, 13, workers, progress)[0]);
         CHECK(same(results.back(), results.front()));
@@ -127,6 +127,16 @@ TEST_CASE("engine: a long record is searched by several threads to the same resu
     double sum;
     Batch(bench.experiment, 1, false).errors({&g, 1}, {&sum, 1});
     CHECK_NEAR(fitness(sum, g.structure, FitnessWeights{}), results[0].best_fitness, 1e-12 * results[0].best_fitness);
+}
+
+TEST_CASE("engine: the plain engine shares the candidates of a long record, to the same result") {
+    const Bench bench(two_mass(LoopKind::continuous, 12000));
+    std::vector<std::vector<Trial>> results;
+    for (const int workers : {1, 2, 3}) {
+        Progress progress;
+        results.push_back(search(bench.experiment, SearchRanges{}, paper(4), 2, 13, workers, progress));
+        for (std::size_t i = 0; i < 2; ++i) CHECK(same(results.back()[i], results.front()[i]));
+    }
 }
 
 TEST_CASE("engine: every kernel set gives the identical trial, in double and in float") {

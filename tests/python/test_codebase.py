@@ -24,8 +24,8 @@ CORE_ORDER = [
     *("rng", "arithmetic", "float_pair", "lanes", "denormals", "chromosome", "genome", "factors", "decode"),
     *("decoder", "parameters", "neighbours", "delta", "bilinear", "held", "controller", "closed_loop", "loop", "record"),
     *("fitness", "kernels/", "elementary", "effects/", "friction", "two_mass", "effect_constants", "effect_plant"),
-    *("effect_loop", "effect_kernels/", "advance", "batch", "simulate", "linear", "sweep", "refine", "statistics", "settings"),
-    *("operators", "breeder", "island", "parallel", "species", "engine", "reference/", "effect_prepare", "effect_batch"),
+    *("effect_loop", "effect_kernels/", "advance", "parallel", "batch", "simulate", "linear", "sweep", "refine", "statistics"),
+    *("settings", "operators", "breeder", "island", "species", "engine", "reference/", "effect_prepare", "effect_batch"),
 ]
 
 # Python: what each room may import of gaident, beside itself, and what inside a function only. A room is a

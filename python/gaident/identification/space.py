@@ -179,9 +179,9 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
             x[2] = w
             if first > 0:
                 steps += float(w[0] - before[1]) * float(before[0]) * rec.dt
-            steps += float(np.diff(w) @ u[:-1]) * rec.dt
-            energy += float(u @ u) * rec.dt**2
-            products += x @ x.T
+            steps += _dot(np.diff(w), u[:-1]) * rec.dt
+            energy += _dot(u, u) * rec.dt**2
+            products += [[_dot(a, b) for b in x] for a in x]
             sums += x.sum(axis=1)
             integrals, before = x[:2, -1].copy(), np.array([u[-1], w[-1]])
         centred = products - np.outer(sums, sums) / len(rec)
@@ -226,8 +226,8 @@ def _check_scales(records: Sequence[Record], controller: PI | None, only_certain
     if controller is None:
         return
     pairs = [(rec.command, rec.velocity) for rec in records if rec.command is not None]
-    together = sum(float(r @ w) for r, w in pairs)
-    commands, velocities = sum(float(r @ r) for r, _ in pairs), sum(float(w @ w) for _, w in pairs)
+    together = sum(_dot(r, w) for r, w in pairs)
+    commands, velocities = sum(_dot(r, r) for r, _ in pairs), sum(_dot(w, w) for _, w in pairs)
     size = math.sqrt(commands * velocities)
     if together < -0.9 * size < 0.0:
         raise SpaceError(
@@ -243,6 +243,11 @@ def _check_scales(records: Sequence[Record], controller: PI | None, only_certain
     if rpm:
         hint = f"the {rpm} seems to be in rpm, the other in rad/s: give units={{'{rpm}': 'rpm'}}"
     raise SpaceError(f"the command is {factor:.3g} times the velocity all along: {hint}")
+
+
+def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """Sum of products, in one thread: a BLAS starts others for a long one, and their number shows in the last digits."""
+    return float(np.einsum("i,i", a, b))
 
 
 def torque_of(rec: Record, controller: PI | None) -> NDArray[np.float64]:
