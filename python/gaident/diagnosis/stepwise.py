@@ -80,6 +80,9 @@ class Search:
             if found is None or best.bic - found.bic < self.threshold or not self.material(best, found):
                 break
             best = self.polished(self.thinned(with_second_mass(self.problem, found)))
+            if set(best.effects) & set(FRICTION) and not self.only_noise(best):
+                # Driven by the torque, what nobody commanded adds up between the stops; the loop does not let it.
+                best = self.in_loop(best)
         return best if self.only_noise(best) else self.rescued(best, base)
 
     def material(self, best: Fit, found: Fit) -> bool:
