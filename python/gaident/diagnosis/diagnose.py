@@ -13,7 +13,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.arguments import ProgressCallback, checked, noise_std_of, records_of
 from gaident.diagnosis.bases import linear_bases, without_second_mass
 from gaident.diagnosis.candidates import CANDIDATES, TWINS, Scales, conditional_twins
-from gaident.diagnosis.controller_place import controller_findings
+from gaident.diagnosis.controller_place import as_logged, as_read, controller_findings
 from gaident.diagnosis.driven import AT_CONTROLLER, Driven
 from gaident.diagnosis.excitation import excitation
 from gaident.diagnosis.gains import measured_gains
@@ -80,9 +80,10 @@ def diagnose(
     records = records_of(rec, "rec")
     held = () if validation is None else records_of(validation, "validation")
     checked(records, held, controller, identification, bootstrap, seed, progress)
+    controller, notes = as_logged(records, controller)
     note(0.02, "identifying the linear model")
     idn = identification if identification is not None else identify(list(records), controller, seed=seed)
-    work = _Work(records, held, controller, idn, noise_std_of(noise), note)
+    work = _Work(records, held, controller, idn, noise_std_of(noise), note, notes)
     work.search()
     result = work.report(seed)
     if bootstrap:
@@ -123,14 +124,18 @@ class _Work:
         hit = [self._spikes(r) for r in self.records]
         clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
         self.clean = tuple(clean)
-        self.driven = Driven.of(clean, self.controller, any(len(h) for h in hit))
+        driven = Driven.of(clean, self.controller, any(len(h) for h in hit), as_read(self.records, clean, self.controller))
+        self.scales = _scales(driven)
+        self.controller_steps, self.at_controller, notes = controller_findings(driven, self.scales)
+        self.notes += notes
+        # Limits that the log shows act in every loop that is closed for a fit.
+        self.driven = replace(driven, controller=self.at_controller.controller or self.controller)
         weight = np.ones(sum(self.driven.lengths))
         at = 0
         for h, n in zip(hit, self.driven.lengths, strict=True):
             weight[at + h] = 0.0
             at += n
         self.problem = Problem(self.driven.predict, self.driven.measured, self.driven.lengths, weight)
-        self.scales = _scales(self.driven)
         self.step = quantisation(self.records)
         self.spoiled = int(sum(len(h) for h in hit))
         self.excited = excitation(self.clean, self.controller)
@@ -144,10 +149,7 @@ class _Work:
         return outliers(rec.velocity)
 
     def search(self) -> None:
-        """Base, controller, stepwise extension, rivals, what is left."""
-        found, self.at_controller, notes = controller_findings(self.driven, self.scales)
-        self.controller_steps = found
-        self.notes += notes
+        """Base, stepwise extension, rivals, what is left."""
         not_testable = dict(self.excited.not_testable)
         allowed = [e for e in CANDIDATES if e not in not_testable and e not in self.at_controller.decided]
         if self.controller is None:

@@ -15,16 +15,16 @@ Vector = NDArray[np.float64]
 ROBUST = 1.4826  # median absolute deviation of normal noise -> standard deviation
 FAR = 9.0  # standard deviations
 MISSED = 0.4  # of what an outlier stands out by: the least that the lines from either side, and a model, miss it by
+NEAR = 8  # samples on either side that an outlier stands out of
 PASSES = 4
 
 
 def outliers(velocity: Vector, error: Vector | None = None) -> NDArray[np.intp]:
     """Samples of the sensor that leave the signal and come back at once.
 
-    Both steps, to the sample and from it, are far beyond the usual, and the lines through the samples on either side miss it by
+    Such a sample exceeds its neighbours by far more than is usual, and the lines through the samples on either side miss it by
     as much, in the same direction. A corner, an impact or the end of a delay lies on the line from one side; from a round top
-    both lines lead beyond it. A slope of the signal hides an outlier; where the error of a model is given, one that stands out
-    of it is found there as well. What the model follows is none.
+    both lines lead beyond it. What a model follows, its `error` not leaving as well, is none.
     """
     w, e = velocity.copy(), None if error is None else error.copy()
     hit = np.zeros(0, dtype=np.intp)
@@ -43,19 +43,19 @@ def _leaving(w: Vector, error: Vector | None) -> NDArray[np.intp]:
     if len(w) < 7:
         return np.zeros(0, dtype=np.intp)
     middle = _middle(w)
-    around = 0.5 * (np.abs(w[3:-1] - w[1:-3]) + np.abs(w[4:] - w[:-4]))
     spread = ROBUST * float(np.median(np.abs(middle - np.median(middle))))
     steps = np.abs(np.diff(w))
     quantum = float(steps[steps > 0.0].min()) if np.any(steps > 0.0) else 0.0
-    clear = np.abs(middle) > 3.0 * around
+    size, least = np.abs(middle), FAR * max(spread, quantum)
+    left = (size > least) & _missed(w, middle, least) & _missed(w[::-1], middle[::-1], least)[::-1]
     if error is not None:
-        clear[np.setdiff1d(outliers(error), [0, 1]) - 2] = True
-    far = (np.abs(middle) > FAR * max(spread, quantum)) & clear
-    both = np.sign(w[2:-2] - w[1:-3]) == np.sign(w[2:-2] - w[3:-1])
-    sides = _missed(w, middle) & _missed(w[::-1], middle[::-1])[::-1]
-    if error is not None:
-        sides &= np.sign(middle) * _middle(error) > MISSED * np.abs(middle)
-    return np.flatnonzero(far & both & sides) + 2
+        left &= np.sign(middle) * _middle(error) > MISSED * size
+    found = np.flatnonzero(left)
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(size, NEAR), 2 * NEAR + 1)[found]
+    beside = np.abs(np.arange(-NEAR, NEAR + 1)) <= 2  # where the outlier itself shows
+    largest = size[found] >= around[:, beside].max(axis=1)
+    alone = np.sum(around[:, ~beside] > 0.5 * size[found, None], axis=1) < 2  # where much is as rough it rings
+    return found[largest & alone] + 2
 
 
 def _middle(w: Vector) -> Vector:
@@ -64,14 +64,16 @@ def _middle(w: Vector) -> Vector:
     return exceeds
 
 
-def _missed(w: Vector, middle: Vector) -> NDArray[np.bool_]:
-    """Whether the line through two samples before each misses it by a good part of `middle`; one of them may be spoiled too."""
+def _missed(w: Vector, middle: Vector, least: float) -> NDArray[np.bool_]:
+    """Whether the line through the two samples before each misses it by a good part of `middle` and by `least`.
+
+    The sample just before may be spoiled too: then the two before that decide, with more noise.
+    """
     before = np.concatenate([[w[0]], w])  # w(-1) = w(0)
     now, one, two, three = before[3:-2], before[2:-3], before[1:-4], before[:-5]
     sign = np.sign(middle)
-    missed: NDArray[np.bool_] = np.maximum(sign * (now - 2.0 * one + two), sign * (now - 3.0 * two + 2.0 * three)) > (
-        MISSED * np.abs(middle)
-    )
+    first, second = sign * (now - 2.0 * one + two), sign * (now - 3.0 * two + 2.0 * three)
+    missed: NDArray[np.bool_] = np.maximum(first, second / 1.5) > np.maximum(MISSED * np.abs(middle), least)
     return missed
 
 
