@@ -1,4 +1,4 @@
-"""What a diagnosis learns from the logged torque before any plant: the gains, limits, anti-windup; and which samples are outliers."""
+"""What the logged torque tells a diagnosis before any plant: gains, limits, anti-windup; and which samples are outliers."""
 
 from __future__ import annotations
 

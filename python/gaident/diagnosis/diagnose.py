@@ -22,7 +22,7 @@ from gaident.diagnosis.leftover import leftover
 from gaident.diagnosis.problem import Fit, Problem
 from gaident.diagnosis.result import Diagnosis, Finding
 from gaident.diagnosis.stepwise import MARGIN, Rival, Search, with_second_mass
-from gaident.diagnosis.uncertainty import estimates_of
+from gaident.diagnosis.uncertainty import estimates_of, mechanics_of
 from gaident.diagnosis.wording import evidence_of
 from gaident.identification.covariance import Estimate
 from gaident.identification.identify import identify
@@ -80,12 +80,13 @@ def diagnose(
     records = records_of(rec, "rec")
     held = () if validation is None else records_of(validation, "validation")
     checked(records, held, controller, identification, bootstrap, seed, progress)
+    noise_std = noise_std_of(noise)
     controller, notes = as_logged(records, controller)
     note(0.02, "identifying the linear model")
     idn = identification if identification is not None else identify(list(records), controller, seed=seed)
-    work = _Work(records, held, controller, idn, noise_std_of(noise), note, notes)
+    work = _Work(records, held, controller, idn, noise_std, note, notes)
     work.search()
-    result = work.report(seed)
+    result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap)
     if bootstrap:
         from gaident.diagnosis.bootstrap import with_p_value
 
@@ -276,6 +277,8 @@ class _Work:
             held_out=gains.held_out,
             base_shift=self._base_shift(),
             left=self.left.gains,
+            line=self.left.line if driver == "time" else None,
+            mechanics=mechanics_of(self.problem, self.final),
             notes=tuple(self.notes),
             identification=self.idn,
             controller=self.controller,
@@ -284,6 +287,8 @@ class _Work:
             simulations=self.problem.simulations,
             samples=sum(self.driven.lengths),
             digests=tuple(r.digest for r in self.records),
+            validation_digests=tuple(r.digest for r in self.held),
+            torque_logged=self.driven.torque_logged,
             version=version(),
             records=self.records,
         )

@@ -55,7 +55,8 @@ def _leaving(w: Vector, error: Vector | None) -> NDArray[np.intp]:
     beside = np.abs(np.arange(-NEAR, NEAR + 1)) <= 2  # where the outlier itself shows
     largest = size[found] >= around[:, beside].max(axis=1)
     alone = np.sum(around[:, ~beside] > 0.5 * size[found, None], axis=1) < 2  # where much is as rough it rings
-    return found[largest & alone] + 2
+    kept: NDArray[np.intp] = found[largest & alone] + 2
+    return kept
 
 
 def _middle(w: Vector) -> Vector:
