@@ -35,12 +35,14 @@ CLOSE = 1e-3  # of the replay's squared error: what an effect may leave that exp
 class AtController:
     """Which effects of the controller need no plant any more, and those that are there, with parameters.
 
-    controller: the given one with the limits that were found; None: none were.
+    controller: the given one with the limits that were found; None: none were. follows: whether the logged torque follows from
+    all that, or there is none.
     """
 
     decided: tuple[str, ...] = ()
     effects: dict[str, dict[str, float]] = field(default_factory=dict)
     controller: PI | None = None
+    follows: bool = True
 
 
 def as_logged(records: Sequence[Record], controller: PI | None) -> tuple[PI | None, list[str]]:
@@ -105,7 +107,7 @@ def controller_findings(driven: Driven, scales: Scales) -> tuple[list[Finding], 
         if effect == "integrator_clamp":
             at.controller = replace(controller, integrator_limit=value)
         return [finding], at, []
-    return [], AtController(AT_CONTROLLER), notes
+    return [], AtController(AT_CONTROLLER, follows=False), notes
 
 
 def _limits_shown(off: Sequence[Replay], controller: PI) -> PI | None:
@@ -129,7 +131,7 @@ def _limit_findings(
     assert given is not None
     n, before = len(plain), float(plain @ plain)
     held = any(r.cause == "anti_windup" for r in off)
-    at = AtController((*AT_CONTROLLER, "torque_saturation"), controller=shown)
+    at = AtController((*AT_CONTROLLER, "torque_saturation"), controller=shown, follows=not held)
     if not held and shown.limits[1] == given.limits[1]:
         notes = []  # the finding says it all
     findings = []

@@ -289,6 +289,7 @@ class _Work:
             digests=tuple(r.digest for r in self.records),
             validation_digests=tuple(r.digest for r in self.held),
             torque_logged=self.driven.torque_logged,
+            loop_follows=self.at_controller.follows,
             version=version(),
             records=self.records,
         )

@@ -68,7 +68,8 @@ class Diagnosis:
     linear part. left: gain in BIC units of each driver of what is left; line: where that is time and one frequency, (frequency
     [Hz], amplitude of the torque [N m]). mechanics: name -> Estimate of the linear part, fitted together with the effects.
     noise [rad/s] and bootstrap as they were asked for; controller as it was used: with the gains that the logged torque shows.
-    torque_logged: whether all records hold the torque. notes: what to keep in mind, in plain sentences.
+    torque_logged: whether all records hold the torque; loop_follows: False where it does not follow from command and velocity
+    through the simulated controller, whose free runs are then not the drive's. notes: what to keep in mind, in plain sentences.
     """
 
     verdict: str
@@ -96,6 +97,7 @@ class Diagnosis:
     noise: float | None = None
     bootstrap: int = 0
     torque_logged: bool = False
+    loop_follows: bool = True
     line: tuple[float, float] | None = None
     mechanics: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
@@ -161,6 +163,7 @@ class Diagnosis:
             "noise": self.noise,
             "bootstrap": self.bootstrap,
             "torque_logged": self.torque_logged,
+            "loop_follows": self.loop_follows,
             "line": None if self.line is None else list(self.line),
             "mechanics": {n: asdict(e) for n, e in self.mechanics.items()},
         }
@@ -210,6 +213,7 @@ class Diagnosis:
                 noise=data.get("noise"),
                 bootstrap=data.get("bootstrap", 0),
                 torque_logged=data.get("torque_logged", False),
+                loop_follows=data.get("loop_follows", True),
                 line=None if data.get("line") is None else (data["line"][0], data["line"][1]),
                 mechanics={n: Estimate(**e) for n, e in data.get("mechanics", {}).items()},
             )
