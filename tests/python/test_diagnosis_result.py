@@ -93,11 +93,10 @@ def fake() -> Any:
         held_out="validation records",
         base_shift={
             "gain": (9000.0, 9790.0),
-            "pole": (20.0, 16.0),
-            "pole_pair_e1": (30.0, 28.8),
-            "pole_pair_e0": (29000.0, 29670.0),
-            "zero_pair_e1": (8.0, 7.5),
-            "zero_pair_e0": (4300.0, 4405.0),
+            "inertia": (7.4935e-4, 6.88e-4),
+            "viscous_friction": (0.014987, 0.011),
+            "resonance": (27.103, 27.414),
+            "resonance_damping": (0.088083, 0.0836),
         },
         notes=("The closest description leaves an error of 0.1 rad/s at 0.02 N m.",),
         controller=CONTROLLER,
@@ -139,7 +138,7 @@ def test_the_summary_reads_as_agreed() -> None:
 
 def test_a_linear_axis_is_spoken_of_in_metres_and_newtons() -> None:
     text = summary(fake(), "linear")
-    assert "0.1 m/s at 0.02 N." in text and "mass [kg]" in text and "N s/m" in text
+    assert "0.1 m/s at 0.02 N." in text and "motor mass" in text and " kg\n" in text and "N s/m" in text
     assert "rad/s" not in text and "N m" not in text and "turn " not in text.replace("per turn", "")
     assert f"{12.0 / math.tau:.5g}" in text  # 12 per turn are 12/(2 pi) per metre
 
@@ -210,10 +209,9 @@ def test_figures_of_chance_are_given_as_what_they_are() -> None:
 
 def test_a_pair_that_does_not_swing_is_no_resonance() -> None:
     result = fake()
-    result.base_shift["pole_pair_e1"] = (30.0, 2.0 * math.sqrt(29670.0) * 1.7)
     result.mechanics = {name: result.mechanics[name] for name in ("inertia", "viscous_friction")}
     text = summary(result)
-    assert "resonance [Hz]" not in text and "damping ratio" not in text
+    assert "resonance  " not in text and "damping ratio" not in text
     assert "a second pair of poles that does not swing" in text
 
 

@@ -19,10 +19,11 @@ from gaident.diagnosis.excitation import excitation
 from gaident.diagnosis.gains import measured_gains
 from gaident.diagnosis.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.leftover import leftover
+from gaident.diagnosis.mechanics import mechanics_of, moved
 from gaident.diagnosis.problem import Fit, Problem
 from gaident.diagnosis.result import Diagnosis, Finding
 from gaident.diagnosis.stepwise import MARGIN, Rival, Search, with_second_mass
-from gaident.diagnosis.uncertainty import estimates_of, mechanics_of
+from gaident.diagnosis.uncertainty import estimates_of
 from gaident.diagnosis.wording import evidence_of
 from gaident.identification.covariance import Estimate
 from gaident.identification.identify import identify
@@ -352,7 +353,8 @@ class _Work:
         names = ("gain", "pole", "pole_pair_e1", "pole_pair_e0", "zero_pair_e1", "zero_pair_e0")
         before = self.base.layout.base_values(self.base.x[None, :])[0]
         after = self.final.layout.base_values(self.final.x[None, :])[0]
-        return {n: (float(b), float(a)) for n, b, a in zip(names, before, after, strict=False)}
+        coefficients = {n: (float(b), float(a)) for n, b, a in zip(names, before, after, strict=False)}
+        return coefficients | moved(self.base, self.final)
 
 
 def _scales(driven: Driven) -> Scales:

@@ -13,7 +13,7 @@ from gaident.diagnosis.problem import Fit, Problem
 from gaident.identification.covariance import Estimate
 from gaident.models.effects import table
 
-__all__ = ["covariance_of", "estimates_of", "mechanics_of"]
+__all__ = ["covariance_of", "estimates_of"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -63,64 +63,3 @@ def estimates_of(problem: Problem, fit: Fit) -> dict[str, dict[str, Estimate]]:
             known = std < abs(value) if value != 0.0 else np.isfinite(std)
             result[effect][name] = Estimate(value, std, unit, bool(bound[i]), bool(known))
     return result
-
-
-def mechanics_of(problem: Problem, fit: Fit) -> dict[str, Estimate]:
-    """What the linear part of a model is mechanically, fitted together with its effects: name -> Estimate.
-
-    One mass: inertia J = 1/|K|, viscous friction a J. Two: J = e0/(|K| f0), J_M = 1/|K|, J_L = J - J_M, stiffness f0 J_L (exact
-    without damping in the shaft), and frequency and damping ratio of both pairs. Of a pair that does not swing (damping ratio
-    1 or more), or where a mass or the stiffness would be negative, only inertia and friction are given.
-    """
-    layout = fit.layout
-    cov = covariance_of(problem, fit)[: layout.base, : layout.base]
-    x = fit.x[: layout.base]
-    h = 1e-6 * np.maximum(np.abs(x), 1.0)
-    values = layout.base_values(fit.x[None, :])[0]
-    names, found = _mechanical(values)
-    moved = np.repeat(fit.x[None, :], len(x), axis=0)
-    moved[np.arange(len(x)), np.arange(len(x))] += h
-    slopes = np.array(
-        [(_mechanical(row, len(names) > 2)[1] - found) / step for row, step in zip(layout.base_values(moved), h, strict=True)]
-    )
-    known = np.isfinite(np.diag(cov))
-    variances = np.einsum("ij,ik,kj->j", slopes, np.where(known[:, None] & known[None, :], cov, 0.0), slopes)
-    lost = np.any((np.abs(slopes) > 0.0) & ~known[:, None], axis=0)
-    std = np.where(lost, np.inf, np.sqrt(np.maximum(variances, 0.0)))
-    return {
-        name: Estimate(float(value), float(s), MECHANICS[name], False, bool(s < abs(value)))
-        for name, value, s in zip(names, found, std, strict=True)
-    }
-
-
-MECHANICS = {
-    "inertia": "kg m^2",
-    "viscous_friction": "N m s/rad",
-    "motor_inertia": "kg m^2",
-    "load_inertia": "kg m^2",
-    "stiffness": "N m/rad",
-    "resonance": "Hz",
-    "resonance_damping": "1",
-    "antiresonance": "Hz",
-    "antiresonance_damping": "1",
-}
-"""Names and units of `mechanics_of`."""
-
-
-def _mechanical(values: Vector, swings: bool | None = None) -> tuple[tuple[str, ...], Vector]:
-    """Names and numbers of `mechanics_of` from [K, a] or [K, a, e1, e0, f1, f0]; swings: with the pairs, None: where they are."""
-    K, a = abs(values[0]), values[1]
-    names = tuple(MECHANICS)
-    if len(values) == 2:
-        return names[:2], np.array([1.0 / K, a / K])
-    e1, e0, f1, f0 = values[2:]
-    if e0 <= 0.0 or f0 <= 0.0:
-        return names[:2], np.array([1.0 / K, a / K])
-    J, JM = e0 / (K * f0), 1.0 / K
-    wp, wz = np.sqrt(e0), np.sqrt(f0)
-    if swings is None:
-        swings = abs(e1) < 2.0 * wp and abs(f1) < 2.0 * wz and J > JM
-    if not swings:
-        return names[:2], np.array([J, a * J])
-    turn = 2.0 * np.pi
-    return names, np.array([J, a * J, JM, J - JM, f0 * (J - JM), wp / turn, 0.5 * e1 / wp, wz / turn, 0.5 * f1 / wz])

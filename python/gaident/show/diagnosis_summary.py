@@ -174,45 +174,27 @@ def _mechanics(dia: Any, axis: str) -> list[str]:
     head += ", fitted together with the effects" if dia.model.effects else ""
     rows = []
     for name, e in dia.mechanics.items():
-        words = _words(name) if not name.endswith("_damping") else "  its damping ratio"
         u = "" if e.unit == "1" else unit(e.unit, axis)
-        rows.append((sentence(words, axis), with_std(e.value, e.std), u, "" if e.identifiable else "not determined"))
+        rows.append((_mechanical(name, axis), with_std(e.value, e.std), u, "" if e.identifiable else "not determined"))
     lines = [head, *table(rows)]
     if "resonance" not in dia.mechanics and len(dia.model.poles) > 1:
         lines.append("  a second pair of poles that does not swing: no resonance of a shaft")
     return lines
 
 
+def _mechanical(name: str, axis: str) -> str:
+    return "  its damping ratio" if name.endswith("_damping") else sentence(_words(name), axis)
+
+
 def _base(dia: Any, axis: str) -> list[str]:
-    if not dia.base_shift or not dia.model.effects:
-        return []
-    before, after = (_mechanical({n: v[i] for n, v in dia.base_shift.items()}, axis) for i in (0, 1))
-    rows = [("", "linear fit", "with the effects", "moved")]
-    for name, old in before.items():
-        if name not in after:
-            continue
-        moved = f"{100.0 * (after[name] / old - 1.0):+.1f} %" if old else ""
-        rows.append((name, number(old, 5), number(after[name], 5), moved))
-    return ["How far the effects had bent the linear model", *table(rows)]
-
-
-def _mechanical(base: dict[str, float], axis: str) -> dict[str, float]:
-    """Parameters of K / (s + a), or K (s^2 + f1 s + f0) / ((s + a) (s^2 + e1 s + e0)), as a mechanic calls them."""
-    K, a = base["gain"], base["pole"]
-    e0, f0 = base.get("pole_pair_e0", 1.0), base.get("zero_pair_e0", 1.0)
-    inertia = abs(e0 / (K * f0)) if K and f0 else math.nan
-    kind = "inertia" if axis == "rotary" else "mass"
-    found = {f"{kind} [{unit('kg m^2', axis)}]": inertia, f"viscous friction [{unit('N m s/rad', axis)}]": a * inertia}
-    # With a damping ratio of 1 or more a pair is two real roots, and no resonance.
-    swings = (
-        e0 > 0.0 and f0 > 0.0 and base.get("pole_pair_e1", 0.0) ** 2 < 4.0 * e0 and base.get("zero_pair_e1", 0.0) ** 2 < 4.0 * f0
-    )
-    if "pole_pair_e0" in base and swings:
-        found["resonance [Hz]"] = math.sqrt(e0) / math.tau
-        found["  its damping ratio"] = 0.5 * base["pole_pair_e1"] / math.sqrt(e0)
-        found["antiresonance [Hz]"] = math.sqrt(f0) / math.tau
-        found["  its damping ratio "] = 0.5 * base["zero_pair_e1"] / math.sqrt(f0)
-    return found
+    rows = [("", "linear fit", "with the effects", "moved", "")]
+    for name, e in dia.mechanics.items():
+        if name in dia.base_shift:
+            old, new = dia.base_shift[name]
+            change = f"{100.0 * (new / old - 1.0):+.1f} %" if old else ""
+            u = "" if e.unit == "1" else unit(e.unit, axis)
+            rows.append((_mechanical(name, axis), number(old, 5), number(new, 5), change, u))
+    return ["How far the effects had bent the linear model", *table(rows)] if len(rows) > 1 and dia.model.effects else []
 
 
 def _record(dia: Any, axis: str) -> list[str]:
