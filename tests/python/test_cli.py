@@ -299,6 +299,12 @@ def test_drive_file_names_key_value_and_remedy(text: str, what: str, remedy: str
     assert what in str(caught.value) and remedy in str(caught.value)
 
 
+def test_the_drive_file_of_the_readme_is_one(tmp_path: Path) -> None:
+    (tmp_path / "drive.toml").write_text((ROOT / "README.md").read_text().split("```toml\n")[1].split("```")[0])
+    sections = read_drive_file(str(tmp_path / "drive.toml"))
+    assert sections["controller"] == {"kp": 0.0232, "ki": 1.367} and sections["columns"]["torque"] == "M"
+
+
 def test_a_drive_file_is_spoken_of_in_its_own_keys(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Not in the command line's options, and no word is suggested that looks nothing like the one that was written."""
     Path("drive.toml").write_text("zz = 0.1\n")

@@ -190,7 +190,8 @@ def _orders(ax: Axes, position: Vector, dhat: Vector, velocity: Vector, highest:
         where, text = (order / scale, amplitude), f"{order / scale:.3g}"
         ax.annotate(text, where, xytext=(0, 3), textcoords="offset points", ha="center", fontsize="small")
     ax.set_xlim(0.0, highest / scale)
-    ax.set_ylim(0.0, 1.18 * max(float(lines.amplitude.max()), float(lines.level.max())) or 1.0)
+    top = int(np.argmax(lines.amplitude))
+    ax.set_ylim(0.0, 1.18 * max(float(lines.amplitude[top]), float(lines.level[top])) or 1.0)
     _plain_numbers(ax)
 
 
