@@ -271,7 +271,7 @@ _IN_OPTIONS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
         r"=(?=[^=]|$)",
         r"--\1 ",
     ),
-    (r"\bvelocity_cutoff_hz=?", "--velocity-cutoff "),
+    (r"\bvelocity_cutoff_hz=", "--velocity-cutoff "),
     (r"(?<!\S)--(counts|torque|rated)_(\w+)", lambda found: f"--{found[1]}-{found[2].replace('_', '-')}"),
     (r" +(?=[,;)](?:\s|$)|$)", ""),
 )

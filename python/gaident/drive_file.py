@@ -183,9 +183,15 @@ def read_drive_file(path: str) -> dict[str, dict[str, Any]]:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ReadError(f"{path}: this is not TOML ({error}); see gaident identify --help") from None
+    if not data:
+        raise ReadError(
+            f"{path}: this drive file is empty: it holds {_SECTIONS} and {', '.join(KEYS[''])}; leave it out otherwise"
+        )
+    _misplaced(data, path, "")
     top = known_keys(data, path, [*KEYS[""], *(s for s in KEYS if s)], (), ReadError)
     sections: dict[str, dict[str, Any]] = {"": {k: v for k, v in top.items() if k not in KEYS or not k}}
     for name in (s for s in KEYS if s):
+        _misplaced(top.get(name, {}), path, name)
         sections[name] = known_keys(top.get(name, {}), f"{path}: [{name}]", KEYS[name], (), ReadError)
     for name, values in sections.items():
         where = f"{path}: [{name}] " if name else f"{path}: "
@@ -195,3 +201,16 @@ def read_drive_file(path: str) -> dict[str, dict[str, Any]]:
             except ReadError as error:
                 raise ReadError(f"{where}{error}") from None
     return sections
+
+
+_SECTIONS = ", ".join(f"[{name}]" for name in KEYS if name)
+
+
+def _misplaced(data: object, path: str, section: str) -> None:
+    """Raises ReadError for a key that another section knows."""
+    for key in data if isinstance(data, Mapping) else ():
+        homes = [name for name in KEYS if key in KEYS[name]]
+        if homes and section not in homes:
+            where = " or ".join(f"below the line [{name}]" if name else "at the top, above the first [section]" for name in homes)
+            found = f"in [{section}]" if section else "at the top"
+            raise ReadError(f"{path}: {key} stands {found}: put it {where}")

@@ -278,6 +278,14 @@ WRONG_DRIVE_FILES = [
     ("skip = true", "skip is True", "whole number"),
     ('axis = "linaer"', "axis is 'linaer'", "did you mean 'linear'?"),
     ("dt = = 3", "this is not TOML", "line 1"),
+    ("kp = 0.1", "kp stands at the top", "put it below the line [controller]"),
+    ("[controller]\nvelocity = 'w'", "velocity stands in [controller]", "below the line [columns] or below the line [units]"),
+    ("[controller]\ndt = 1e-3", "dt stands in [controller]", "at the top, above the first [section]"),
+    (
+        "# nothing\n",
+        "this drive file is empty",
+        "it holds [columns], [units], [controller], [space] and axis, dt, velocity_cutoff_hz",
+    ),
 ]
 
 
@@ -289,6 +297,20 @@ def test_drive_file_names_key_value_and_remedy(text: str, what: str, remedy: str
         read_drive_file(str(path))
     assert str(caught.value).startswith(str(path))
     assert what in str(caught.value) and remedy in str(caught.value)
+
+
+def test_the_drive_file_of_the_readme_is_one(tmp_path: Path) -> None:
+    (tmp_path / "drive.toml").write_text((ROOT / "README.md").read_text().split("```toml\n")[1].split("```")[0])
+    sections = read_drive_file(str(tmp_path / "drive.toml"))
+    assert sections["controller"] == {"kp": 0.0232, "ki": 1.367} and sections["columns"]["torque"] == "M"
+
+
+def test_a_drive_file_is_spoken_of_in_its_own_keys(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Not in the command line's options, and no word is suggested that looks nothing like the one that was written."""
+    Path("drive.toml").write_text("zz = 0.1\n")
+    said = refusal(["identify", "step.csv", "--drive", "drive.toml"], capsys)
+    assert "has the key 'zz'" in said and "dt, velocity_cutoff_hz, counts_per_turn" in said
+    assert "--velocity-cutoff" not in said and "did you mean" not in said
 
 
 def test_no_utf8_is_no_drive_file(tmp_path: Path) -> None:

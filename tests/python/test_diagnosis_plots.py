@@ -66,6 +66,15 @@ def test_an_order_line_stands_at_its_order_with_its_amplitude() -> None:
     for seed in range(5):
         noise = np.random.default_rng(seed).standard_normal(N)
         assert order_lines(position, noise, velocity).peaks == []
+    # Coloured noise over little more than a turn: a level that falls with it, no order that the travel does not hold.
+    for seed in range(5):
+        short = position[: int(1.3 * math.tau / 30.0 / DT)]
+        coloured = 1e-5 * np.cumsum(np.random.default_rng(seed).standard_normal(len(short)))
+        found = order_lines(short, coloured, velocity[: len(short)])
+        assert found.peaks == [] and found.order[0] >= 1.0 / found.turns > 0.5
+        assert found.level[0] > 2.0 * found.level[-1]
+        ripple = order_lines(short, coloured + 0.01 * np.sin(6.0 * short), velocity[: len(short)])
+        assert len(ripple.peaks) == 1 and ripple.peaks[0][0] == pytest.approx(6.0, abs=0.4)
     assert len(order_lines(0.01 * POSITION[:100], NOISE[:100], VELOCITY[:100]).order) == 0
 
 
@@ -98,6 +107,7 @@ def test_torque_against_velocity_draws_both_branches_and_the_named_curve() -> No
     )
     (ax,) = figure.axes
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert ax.get_legend().get_window_extent().y0 >= ax.get_window_extent().y1  # no point is covered
     assert sorted(labels) == sorted(["+-2 std", "accelerating", "decelerating", "Coulomb friction", "mean +- sd"])
     assert ax.get_ylabel() == "missing torque [N m]" and ax.get_xlabel() == "velocity [rad/s]"
     rendered(figure)
@@ -131,6 +141,8 @@ def test_the_evidence_at_a_glance() -> None:
         TIME, VELOCITY, simulated, before["dhat"], POSITION, 2.0 * FRICTION, 0.1, std=0.01, extended=VELOCITY + 0.1 * NOISE,
         title="Test drive: explained",
     )  # fmt: skip
+    rendered(figure)
+    assert not any(ax.yaxis.get_offset_text().get_text() for ax in figure.axes)  # it would stand in the legend
     assert len(figure.axes) == 6 and figure.get_suptitle() == "Test drive: explained"
     heads = [ax.get_title(loc="left") for ax in figure.axes]
     assert [head[0] for head in heads] == list("abcdef")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,7 +16,9 @@ import pytest
 import gaident as ga
 from gaident.diagnosis.evidence import velocity_curve
 from gaident.diagnosis.result import Finding, Fitness
+from gaident.diagnosis.wording import evidence_of
 from gaident.errors import GaidentError, RecordError, SettingsError
+from gaident.show.wording import certainty, sentence
 
 GOLDEN = Path(__file__).parent / "golden" / "diagnosis.txt"
 DT = 1e-3
@@ -63,7 +66,7 @@ def fake() -> Any:
                 0.43,
                 812.4,
                 0.01,
-                "Dry friction of constant size: without it the model is 812 BIC units worse.",
+                "Dry friction of constant size: beyond doubt (the model without it is 812 BIC units worse).",
             ),
             Finding(
                 "cogging",
@@ -76,12 +79,12 @@ def fake() -> Any:
                 0.2,
                 55.0,
                 None,
-                "Torque ripple n times per turn: without it the model is 55 BIC units worse, but these data cannot tell it from "
-                "velocity ripple.",
+                "Torque ripple n times per turn, or velocity ripple: one of these is there, beyond doubt (the model without it "
+                "is 55 BIC units worse); these data do not say which.",
             ),
         ),
         not_testable={"backlash": "the torque never changes its sign: the coupling stays on one flank"},
-        model=SimpleNamespace(effects=("coulomb_friction", "cogging")),
+        model=SimpleNamespace(effects=("coulomb_friction", "cogging"), poles=(-1.0, -1.0 + 2.0j, -1.0 - 2.0j)),
         before=Fitness(0.5, 97.1, 0.1),
         after=Fitness(0.2, 98.84, 0.1),
         driver="time",
@@ -90,11 +93,10 @@ def fake() -> Any:
         held_out="validation records",
         base_shift={
             "gain": (9000.0, 9790.0),
-            "pole": (20.0, 16.0),
-            "pole_pair_e1": (30.0, 28.8),
-            "pole_pair_e0": (29000.0, 29670.0),
-            "zero_pair_e1": (8.0, 7.5),
-            "zero_pair_e0": (4300.0, 4405.0),
+            "inertia": (7.4935e-4, 6.88e-4),
+            "viscous_friction": (0.014987, 0.011),
+            "resonance": (27.103, 27.414),
+            "resonance_damping": (0.088083, 0.0836),
         },
         notes=("The closest description leaves an error of 0.1 rad/s at 0.02 N m.",),
         controller=CONTROLLER,
@@ -104,6 +106,21 @@ def fake() -> Any:
         samples=4000,
         digests=("c0ffee" * 4, "beef" * 4),
         version="0.1.0",
+        bootstrap=99,
+        torque_logged=True,
+        loop_follows=True,
+        line=(37.0, 0.0512),
+        mechanics={
+            "inertia": ga.Estimate(6.88e-4, 1.2e-6, "kg m^2"),
+            "viscous_friction": ga.Estimate(0.011, 0.0002, "N m s/rad"),
+            "motor_inertia": ga.Estimate(1.02e-4, 3e-7, "kg m^2"),
+            "load_inertia": ga.Estimate(5.86e-4, 1.3e-6, "kg m^2"),
+            "stiffness": ga.Estimate(2.581, 0.012, "N m/rad"),
+            "resonance": ga.Estimate(27.414, 0.033, "Hz"),
+            "resonance_damping": ga.Estimate(0.0836, 0.0011, "1"),
+            "antiresonance": ga.Estimate(10.563, 0.014, "Hz"),
+            "antiresonance_damping": ga.Estimate(0.0565, 0.07, "1", identifiable=False),
+        },
     )
 
 
@@ -121,17 +138,91 @@ def test_the_summary_reads_as_agreed() -> None:
 
 def test_a_linear_axis_is_spoken_of_in_metres_and_newtons() -> None:
     text = summary(fake(), "linear")
-    assert "0.1 m/s at 0.02 N." in text and "mass [kg]" in text and "N s/m" in text
+    assert "0.1 m/s at 0.02 N." in text and "motor mass" in text and " kg\n" in text and "N s/m" in text
     assert "rad/s" not in text and "N m" not in text and "turn " not in text.replace("per turn", "")
     assert f"{12.0 / math.tau:.5g}" in text  # 12 per turn are 12/(2 pi) per metre
+
+
+def flat(text: str) -> str:
+    return " ".join(text.split())
 
 
 def test_a_gain_that_is_none_is_not_called_one() -> None:
     result = fake()
     result.after = Fitness(0.501, 97.0, 0.1)
-    assert "hardly changes (+0.2 %)" in summary(result)
+    assert "hardly changes (+0.2 %): the loop's integrator hides this effect in the velocity, the torque shows it." in flat(
+        summary(result)
+    )
+    assert "the force shows it" in flat(summary(result, "linear"))
+    result.torque_logged = False
+    assert "in the velocity." in flat(summary(result)) and "shows it" not in summary(result)
+    result.before = Fitness(0.5, 97.0, 0.49)
+    assert "it is at the noise with and without" in flat(summary(result))
     result.held_out = "in-sample"
     assert "IN-SAMPLE" in summary(result)
+
+
+def test_an_error_that_grows_is_said_to_and_not_to_be_compared() -> None:
+    result = fake()
+    result.after = Fitness(1.5, 80.0, 0.1)
+    text = flat(summary(result))
+    assert "The error of the velocity grows by 200 %: this comparison is not valid" in text and "hardly" not in text
+    result.loop_follows = False
+    text = flat(summary(result))
+    assert "not valid, the simulated controller is not the drive's." in text
+    assert "The simulated controller is not the drive's (see above): these figures include its errors." in text
+
+
+def test_the_verdict_names_what_is_found_and_what_is_one_of_several() -> None:
+    result = fake()
+    result.driver = result.line = None
+    friction, ripple = result.findings[1:]
+    heads = {
+        (friction,): "the cause is found, and with it nothing significant is left. Cause: coulomb friction.",
+        (friction, replace(friction, effect="load_torque")): "the causes are found, and with them nothing significant is left. "
+        "Causes: coulomb friction, load torque.",
+        (
+            replace(ripple, alternatives=("velocity_ripple", "unbalance")),
+        ): "The model was wrong. What is missing is one of: cogging, "
+        "velocity ripple or unbalance. These data do not tell them apart. With that nothing significant is left.",
+        (friction, ripple): "The model was wrong. Cause: coulomb friction. What is also missing is one of: cogging or velocity "
+        "ripple. These data do not tell them apart. With that nothing significant is left.",
+    }
+    for found, words in heads.items():
+        result.verdict, result.findings = "explained", found
+        assert words in flat(summary(result)), flat(summary(result))[:400]
+
+
+def test_figures_of_chance_are_given_as_what_they_are() -> None:
+    assert "(bootstrap): at most 0.01." in flat(summary(fake()))
+    result = fake()
+    result.bootstrap = 999
+    assert "(bootstrap): 0.01." in flat(summary(result))
+    assert [certainty(x) for x in (412.0, 23.0, 13.0)] == ["beyond doubt", "very likely", "likely"]
+    text = evidence_of("unbalance", 23.4, ("cogging", "load_torque"))
+    assert text.endswith(
+        "or cogging or load torque: one of these is there, very likely (the model without it is 23 BIC units worse); these data "
+        "do not say which."
+    )
+    assert evidence_of("backlash", 412.0, ()).endswith(": beyond doubt (the model without it is 412 BIC units worse).")
+
+
+def test_a_pair_that_does_not_swing_is_no_resonance() -> None:
+    result = fake()
+    result.mechanics = {name: result.mechanics[name] for name in ("inertia", "viscous_friction")}
+    text = summary(result)
+    assert "resonance  " not in text and "damping ratio" not in text
+    assert "a second pair of poles that does not swing" in text
+
+
+def test_sentences_of_a_linear_axis() -> None:
+    assert sentence("The logged torque departs by 0.2 N m; inertia; 5 rad/s.", "linear") == (
+        "The logged force departs by 0.2 N; mass; 5 m/s."
+    )
+    assert sentence("torque saturation or load torque", "linear") == "torque saturation or load torque"
+    assert sentence("the axis turns forwards only", "linear") == "the axis moves forwards only"
+    assert sentence("57.3 degrees of travel", "linear") == "1 m of travel"
+    assert sentence("57.3 degrees of travel", "rotary") == "57.3 degrees of travel"
 
 
 def test_the_file_holds_the_whole_result(dia: ga.Diagnosis, tmp_path: Path) -> None:
@@ -140,6 +231,10 @@ def test_the_file_holds_the_whole_result(dia: ga.Diagnosis, tmp_path: Path) -> N
     back = ga.load(tmp_path / "dia.json")
     assert isinstance(back, ga.Diagnosis)
     assert back == dia and back.to_dict() == dia.to_dict() and back.summary() == dia.summary()
+    assert back.validation_digests == (drive_record(1).digest,) and back.torque_logged and back.loop_follows
+    assert (back.noise, back.bootstrap) == (None, 0)
+    inertia = back.mechanics["inertia"]
+    assert abs(inertia.value - 5e-4) < 5.0 * inertia.std < 5e-6 and inertia.unit == "kg m^2"
     assert back.seed == dia.seed and back.digests == (drive_record().digest,) and back.model.effects == dia.model.effects
     np.testing.assert_array_equal(
         ga.simulate(back.model, drive_record(), CONTROLLER), ga.simulate(dia.model, drive_record(), CONTROLLER)
@@ -237,6 +332,10 @@ def test_records_that_do_not_fit_the_loop_are_refused(rec: ga.Record) -> None:
         ga.diagnose([rec, other], CONTROLLER)
     with pytest.raises(RecordError, match="silent has no command"):
         ga.diagnose(rec, CONTROLLER, validation=silent)
+    with pytest.raises(RecordError, match=r"record 2 has 99 samples: a diagnosis needs 100 or more"):
+        ga.diagnose([rec, ga.Record(DT, rec.command[:99], rec.velocity[:99])], CONTROLLER)
+    with pytest.raises(RecordError, match="validation record levels is one that the model is fitted to"):
+        ga.diagnose(rec, CONTROLLER, validation=[drive_record(1), rec])
 
 
 def test_the_same_seed_and_records_in_any_order_give_the_same_result(rec: ga.Record) -> None:
@@ -244,7 +343,8 @@ def test_the_same_seed_and_records_in_any_order_give_the_same_result(rec: ga.Rec
     one, two = (ga.diagnose(p, CONTROLLER, bootstrap=1, seed=5) for p in (parts, parts[::-1]))
     without = {"seconds": 0.0, "identification": None}  # an identification lists its records as given
     assert one.to_dict() | without == two.to_dict() | without
-    assert one.causes[0].p_value == 0.5  # (1 + 0) / (1 + 1)
+    assert one.causes[0].p_value == 0.5 and one.bootstrap == 1  # (1 + 0) / (1 + 1)
+    assert "(bootstrap): at most 0.5." in flat(one.summary())
 
 
 def test_a_record_may_begin_in_motion(rec: ga.Record) -> None:
@@ -257,7 +357,7 @@ def test_a_record_may_begin_in_motion(rec: ga.Record) -> None:
 def test_standstill_tells_the_noise(rec: ga.Record) -> None:
     rest = ga.Record(DT, command=np.zeros(500), velocity=0.07 * np.random.default_rng(2).standard_normal(500))
     found = ga.diagnose(rec, CONTROLLER, noise=rest)
-    assert found.after.noise_floor == pytest.approx(np.std(rest.velocity))
+    assert found.after.noise_floor == found.noise == pytest.approx(np.std(rest.velocity))
 
 
 def test_progress_is_told_and_an_interrupt_gets_through(rec: ga.Record) -> None:

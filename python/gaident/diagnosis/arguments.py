@@ -11,9 +11,12 @@ from gaident.errors import RecordError, SettingsError
 from gaident.identification.result import Identification
 from gaident.models.controller import PI
 
-__all__ = ["ProgressCallback", "checked", "noise_std_of", "records_of"]
+__all__ = ["LEAST_SAMPLES", "ProgressCallback", "checked", "noise_std_of", "records_of"]
 
 ProgressCallback = Callable[[float, str], None]
+
+LEAST_SAMPLES = 100
+"""Of a record: below, the noise filter and the base parameters alone use up what it knows."""
 
 
 def records_of(rec: Record | Sequence[Record], name: str) -> tuple[Record, ...]:
@@ -45,6 +48,19 @@ def checked(
             raise RecordError(f"record {r.name or '(without a name)'} has no torque: give one, or the controller that makes it")
     if len({r.dt for r in (*records, *held)}) > 1:
         raise RecordError("records have different sample times: a diagnosis needs one; diagnose them apart")
+    for i, r in enumerate(records):
+        if len(r) < LEAST_SAMPLES:
+            raise RecordError(
+                f"record {r.name or i + 1} has {len(r)} samples: a diagnosis needs {LEAST_SAMPLES} or more, thousands are good; "
+                "record a longer motion"
+            )
+    known = {r.digest for r in records}
+    for i, r in enumerate(held):
+        if r.digest in known:
+            raise RecordError(
+                f"validation record {r.name or i + 1} is one that the model is fitted to: give another run, or leave validation "
+                "out, then a part of each record is held out"
+            )
     if progress is not None and not callable(progress):
         raise SettingsError(f"progress is {progress!r}: give a function of (fraction, message), or None")
     for name, value, low, high in (("bootstrap", bootstrap, 0, 100_000), ("seed", seed, 0, 2**63 - 1)):

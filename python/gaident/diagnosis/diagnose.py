@@ -13,12 +13,13 @@ from gaident.data.record import Record
 from gaident.diagnosis.arguments import ProgressCallback, checked, noise_std_of, records_of
 from gaident.diagnosis.bases import linear_bases, without_second_mass
 from gaident.diagnosis.candidates import CANDIDATES, TWINS, Scales, conditional_twins
-from gaident.diagnosis.controller_place import controller_findings
+from gaident.diagnosis.controller_place import as_logged, as_read, controller_findings
 from gaident.diagnosis.driven import AT_CONTROLLER, Driven
 from gaident.diagnosis.excitation import excitation
 from gaident.diagnosis.gains import measured_gains
 from gaident.diagnosis.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.leftover import leftover
+from gaident.diagnosis.mechanics import mechanics_of, moved
 from gaident.diagnosis.problem import Fit, Problem
 from gaident.diagnosis.result import Diagnosis, Finding
 from gaident.diagnosis.stepwise import MARGIN, Rival, Search, with_second_mass
@@ -80,11 +81,13 @@ def diagnose(
     records = records_of(rec, "rec")
     held = () if validation is None else records_of(validation, "validation")
     checked(records, held, controller, identification, bootstrap, seed, progress)
+    noise_std = noise_std_of(noise)
+    controller, notes = as_logged(records, controller)
     note(0.02, "identifying the linear model")
     idn = identification if identification is not None else identify(list(records), controller, seed=seed)
-    work = _Work(records, held, controller, idn, noise_std_of(noise), note)
+    work = _Work(records, held, controller, idn, noise_std, note, notes)
     work.search()
-    result = work.report(seed)
+    result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap)
     if bootstrap:
         from gaident.diagnosis.bootstrap import with_p_value
 
@@ -123,14 +126,18 @@ class _Work:
         hit = [self._spikes(r) for r in self.records]
         clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
         self.clean = tuple(clean)
-        self.driven = Driven.of(clean, self.controller, any(len(h) for h in hit))
+        driven = Driven.of(clean, self.controller, any(len(h) for h in hit), as_read(self.records, clean, self.controller))
+        self.scales = _scales(driven)
+        self.controller_steps, self.at_controller, notes = controller_findings(driven, self.scales)
+        self.notes += notes
+        # Limits that the log shows act in every loop that is closed for a fit.
+        self.driven = replace(driven, controller=self.at_controller.controller or self.controller)
         weight = np.ones(sum(self.driven.lengths))
         at = 0
         for h, n in zip(hit, self.driven.lengths, strict=True):
             weight[at + h] = 0.0
             at += n
         self.problem = Problem(self.driven.predict, self.driven.measured, self.driven.lengths, weight)
-        self.scales = _scales(self.driven)
         self.step = quantisation(self.records)
         self.spoiled = int(sum(len(h) for h in hit))
         self.excited = excitation(self.clean, self.controller)
@@ -144,10 +151,7 @@ class _Work:
         return outliers(rec.velocity)
 
     def search(self) -> None:
-        """Base, controller, stepwise extension, rivals, what is left."""
-        found, self.at_controller, notes = controller_findings(self.driven, self.scales)
-        self.controller_steps = found
-        self.notes += notes
+        """Base, stepwise extension, rivals, what is left."""
         not_testable = dict(self.excited.not_testable)
         allowed = [e for e in CANDIDATES if e not in not_testable and e not in self.at_controller.decided]
         if self.controller is None:
@@ -274,6 +278,8 @@ class _Work:
             held_out=gains.held_out,
             base_shift=self._base_shift(),
             left=self.left.gains,
+            line=self.left.line if driver == "time" else None,
+            mechanics=mechanics_of(self.problem, self.final),
             notes=tuple(self.notes),
             identification=self.idn,
             controller=self.controller,
@@ -282,6 +288,9 @@ class _Work:
             simulations=self.problem.simulations,
             samples=sum(self.driven.lengths),
             digests=tuple(r.digest for r in self.records),
+            validation_digests=tuple(r.digest for r in self.held),
+            torque_logged=self.driven.torque_logged,
+            loop_follows=self.at_controller.follows,
             version=version(),
             records=self.records,
         )
@@ -344,7 +353,8 @@ class _Work:
         names = ("gain", "pole", "pole_pair_e1", "pole_pair_e0", "zero_pair_e1", "zero_pair_e0")
         before = self.base.layout.base_values(self.base.x[None, :])[0]
         after = self.final.layout.base_values(self.final.x[None, :])[0]
-        return {n: (float(b), float(a)) for n, b, a in zip(names, before, after, strict=False)}
+        coefficients = {n: (float(b), float(a)) for n, b, a in zip(names, before, after, strict=False)}
+        return coefficients | moved(self.base, self.final)
 
 
 def _scales(driven: Driven) -> Scales:

@@ -35,7 +35,8 @@ AT_CONTROLLER = ("integrator_clamp", "command_rate_limit")
 class Driven:
     """Records, each also as driven by its torque (`driven`), both with an angle, measured or integrated from the velocity.
 
-    turned: the record itself with that angle; free: torque-driven, without an angle that was not measured.
+    turned: the record itself with that angle; free: torque-driven, without an angle that was not measured; read: the records
+    as the controller read them, which may hold samples that the fit leaves out.
     """
 
     records: tuple[Record, ...]
@@ -45,14 +46,19 @@ class Driven:
     free: tuple[Record, ...]
     moving: tuple[bool, ...]
     spoiled: bool = False
+    read: tuple[Record, ...] = ()
 
     @classmethod
-    def of(cls, records: Sequence[Record], controller: PI | None, spoiled: bool = False) -> Driven:
+    def of(
+        cls, records: Sequence[Record], controller: PI | None, spoiled: bool = False, read: Sequence[Record] | None = None
+    ) -> Driven:
         """The records as driven by their torque; spoiled: some velocities are not what the controller read."""
         driven = tuple(_driven(r, torque_of(r, controller)) for r in records)
         turned = tuple(_with_angle(r, _angle(a)) for r, a in zip(records, driven, strict=True))
         free = tuple(a if r.position is not None else _with_angle(a, None) for r, a in zip(records, driven, strict=True))
-        return cls(tuple(records), controller, driven, turned, free, tuple(starts_moving(r, None) for r in driven), spoiled)
+        moving = tuple(starts_moving(r, None) for r in driven)
+        seen = tuple(records if read is None else read)
+        return cls(tuple(records), controller, driven, turned, free, moving, spoiled, seen)
 
     @property
     def angle_logged(self) -> bool:
@@ -133,8 +139,8 @@ class Driven:
         names, values = layout.values(x[None, :], at_controller)
         steps = self.substeps(layout.effects)
         parts = []
-        for i, r in enumerate(self.records):
-            torque = replayed(r, self.controller, limits)
+        for i, (r, read) in enumerate(zip(self.records, self.read, strict=True)):
+            torque = replayed(read, self.controller, limits)
             states = layout.start_values(x[None, :], i)
             driven = _driven(r, torque)
             parts.append(simulate_values(layout.structure, names, values, driven, initial_states=states, substeps=steps))
@@ -196,7 +202,7 @@ class Driven:
 
     def replayed_error(self, limits: dict[str, float]) -> Vector:
         """Logged torque minus the controller's replay with these limits, records one after the other [N m]."""
-        return np.concatenate([_torque(r) - replayed(r, self.controller, limits) for r in self.records])
+        return np.concatenate([_torque(r) - replayed(r, self.controller, limits) for r in self.read])
 
 
 def replayed(rec: Record, controller: PI | None, limits: dict[str, float]) -> Vector:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
+from gaident.diagnosis.hygiene import quantisation
 from gaident.diagnosis.problem import Fit, Problem
 from gaident.diagnosis.result import Fitness
 from gaident.identification.starts import noise_std, starts_moving
@@ -83,6 +84,7 @@ def measured_gains(
         errors.append(errors[0])
     spread = np.concatenate([r.velocity[first:] for r, first in judged])
     floor = noise if noise is not None else float(np.mean([noise_std(r.velocity) for r, _ in judged]))
+    floor = max(floor, quantisation(tuple(r for r, _ in judged)) / float(np.sqrt(12.0)))
     size = float(np.sqrt(np.mean((spread - spread.mean()) ** 2)))
 
     def fitness(parts: list[Vector]) -> Fitness:

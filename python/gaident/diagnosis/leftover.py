@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.driven import Driven
+from gaident.diagnosis.line import torque_of_line
 from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import Fit, Problem, project_out
 
@@ -31,6 +32,7 @@ class Leftover:
     """Gains [BIC units] by driver, and the strongest where it counts."""
 
     gains: dict[str, float]
+    line: tuple[float, float] | None = None  # (frequency [Hz], torque [N m]) where "time" is one
 
     @property
     def strongest(self) -> str | None:
@@ -68,10 +70,13 @@ def leftover(problem: Problem, driven: Driven, fit: Fit) -> Leftover:
     judge = _Judge(problem, J, error, fit)
     none = judge.bic(np.zeros((0, len(w))))
     gains = {driver: none - judge.bic(rows) for driver, rows in columns.items()}
+    line = None
     for i in range(0, len(lines), 2):
         # A frequency that was searched for counts as a number more.
-        gains["time"] = max(gains["time"], none - judge.bic(lines[i : i + 2]) - np.log(problem.count))
-    return Leftover({driver: float(gain) for driver, gain in gains.items()})
+        gain = none - judge.bic(lines[i : i + 2]) - np.log(problem.count)
+        if gain > gains["time"]:
+            gains["time"], line = gain, torque_of_line(problem, driven, fit, J, error, lines[i : i + 2])
+    return Leftover({driver: float(gain) for driver, gain in gains.items()}, line)
 
 
 class _Judge:

@@ -35,11 +35,13 @@ class Replay:
                 with a free start of the integrator; None: nothing to compare
     cause       what makes it follow: "" (nothing found, or nothing needed), "initial_integral" (the record starts under load),
                 or, where it does not follow as configured, "scale", "gains", "integration_rule", "shift", "torque_limit",
-                "integrator_clamp", "command_rate_limit"
+                "integrator_clamp", "anti_windup" (a torque limit at which the integrator does not wind up),
+                "command_rate_limit"
     value       the number of the cause: initial integral [N m], factor, samples of shift, limit [N m], rate [rad/s^2]; nan for
                 the others
     departs     first sample at which the configured controller departs from the log; None: it does not
     sentence    all this in words
+    controller  as the log shows it, where a PI has what differs: gains and limits; else None
     """
 
     torque: Vector
@@ -52,6 +54,7 @@ class Replay:
     value: float
     departs: int | None
     sentence: str
+    controller: PI | None = None
 
 
 def replay(rec: Record, controller: PI | None) -> Replay:
@@ -101,7 +104,7 @@ def _compared(rec: Record, command: Vector, controller: PI, logged: Vector, repl
         f"{departs} ({departs * rec.dt:.4g} s), by {rms:.2g} N m rms and {maximum:.2g} N m at most"
     )
     if found is not None:
-        return Replay(*figures, False, found.cause, found.value, departs, f"{head}. {found.sentence}")
+        return Replay(*figures, False, found.cause, found.value, departs, f"{head}. {found.sentence}", found.controller)
     text = (
         f"{head}, and none of the simple reasons explains it (start of the integrator, gains, scale, sign, rule of integration, "
         "shift by samples, limits). Is this the controller, and are these the signals it saw?"

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.diagnosis.pi_torque import pi_torque, rate_limited
+from gaident.diagnosis.pi_torque import HOLDS, held_torque, pi_torque, rate_limited
 from gaident.identification.noise import ljung_box
 from gaident.models.controller import PI
 
@@ -19,12 +19,16 @@ Vector = NDArray[np.float64]
 
 SHIFTS = (0, 1, -1, 2, -2)  # samples by which what the controller saw may be older (+) than the log's
 RULES = ("trapezoidal", "rectangular", "rectangular, old error")
+PLATEAU = 5  # samples at the highest torque from which it is a limit
 SAME = 2e-3  # relative difference below which a fitted gain is the configured one
 
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """A changed controller; its torque [N m], shape (n,), but for `edge` samples at both ends. Cause and value as in `Replay`."""
+    """A changed controller; its torque [N m], shape (n,), but for `edge` samples at both ends. Cause and value as in `Replay`.
+
+    controller: the changed one, where a PI has what was changed.
+    """
 
     torque: Vector
     cause: str
@@ -32,6 +36,7 @@ class Explanation:
     sentence: str
     edge: int = 0
     changes: int = 1  # how much of the configured controller is given up; the fewer the better
+    controller: PI | None = None
 
     def off(self, logged: Vector) -> Vector:
         """Logged minus explained torque [N m], without the edges."""
@@ -55,7 +60,7 @@ def explain(command: Vector, velocity: Vector, dt: float, controller: PI, logged
     """The first reason that leaves at most `tolerance` [N m] at every sample; else the best, if it leaves white noise."""
     case = _Case(command, velocity, dt, controller, logged)
     best, least = None, np.inf
-    for reason in (_start, _limits, _rate, _linear):
+    for reason in (_start, _limits, _held, _rate, _linear):
         for found in reason(case):
             off = found.off(logged)
             if float(np.abs(off).max()) <= tolerance:
@@ -86,18 +91,36 @@ def _limits(case: _Case) -> Iterator[Explanation]:
     if controller.torque_limit is None or highest < 0.999 * controller.torque_limit:
         acting = int(np.sum(np.abs(case.logged) >= 0.999 * highest))
         sentence = f"It does with a torque limit of {highest:.4g} N m, which acts at {acting} samples."
-        yield Explanation(case.torque(replace(controller, torque_limit=highest)), "torque_limit", highest, sentence)
+        limited = replace(controller, torque_limit=highest)
+        yield Explanation(case.torque(limited), "torque_limit", highest, sentence, controller=limited)
     proportional = controller.kp * (case.command - case.velocity)
     for torque_limit in (controller.torque_limit, highest):
         free = np.ones(len(proportional), bool) if torque_limit is None else np.abs(case.logged) < 0.999 * torque_limit
         clamp = float(np.abs((case.logged - proportional)[free]).max(initial=0.0))
         if not clamp > 0.0:
             continue
-        torque = case.torque(replace(controller, torque_limit=torque_limit, integrator_limit=clamp))
+        limited = replace(controller, torque_limit=torque_limit, integrator_limit=clamp)
+        torque = case.torque(limited)
         more = "" if torque_limit == controller.torque_limit else f" and a torque limit of {torque_limit:.4g} N m"
         acting = int(np.sum(np.abs(torque - proportional) >= 0.999 * clamp))
         sentence = f"It does with the integral clamped to {clamp:.4g} N m{more}; the clamp acts at {acting} samples."
-        yield Explanation(torque, "integrator_clamp", clamp, sentence)
+        yield Explanation(torque, "integrator_clamp", clamp, sentence, controller=limited)
+
+
+def _held(case: _Case) -> Iterator[Explanation]:
+    """A torque limit, configured or seen as a plateau of the log, at which the integrator does not wind up."""
+    controller, highest = case.controller, float(np.abs(case.logged).max())
+    acting = int(np.sum(np.abs(case.logged) >= 0.999 * highest))
+    if acting < PLATEAU or not controller.ki:
+        return
+    limited = controller
+    if controller.torque_limit is None or highest < 0.999 * controller.torque_limit:
+        limited = replace(controller, torque_limit=highest)
+    value = float(limited.limits[0])
+    for rule, words in HOLDS.items():
+        torque = held_torque(case.command, case.velocity, case.dt, limited, rule)
+        sentence = f"It does with {words} (anti-windup): the limit of {value:.4g} N m acts at {acting} samples."
+        yield Explanation(torque, "anti_windup", value, sentence, controller=limited)
 
 
 def _rate(case: _Case) -> Iterator[Explanation]:
@@ -118,9 +141,10 @@ def _rate(case: _Case) -> Iterator[Explanation]:
     if len(slopes) == 0:
         return
     middle = float(np.median(slopes))
-    rate = float(np.mean(slopes[np.abs(slopes - middle) <= 0.2 * middle]))
-    if not rate > 0.0:
+    near = slopes[np.abs(slopes - middle) <= 0.2 * middle]
+    if len(near) == 0 or not middle > 0.0:
         return
+    rate = float(np.mean(near))
     for start in (float(case.command[0]), 0.0):
         limited = rate_limited(case.command, rate, case.dt, start)
         torque = pi_torque(limited, case.velocity, case.dt, case.controller)
@@ -180,7 +204,9 @@ def _named(controller: PI, kp: float, ki: float, start: float, shift: int, rule:
         if not cause:
             cause, value = "initial_integral", start
     sentence = f"It does with {', and '.join(differs) or 'these gains'}."
-    return Explanation(torque, cause or "gains", value, sentence, abs(shift), len(differs) + 2 * (cause == "gains"))
+    known = cause in ("gains", "scale") and rule == RULES[0] and kp >= 0.0 and ki >= 0.0
+    found = replace(controller, kp=kp, ki=ki) if known else None
+    return Explanation(torque, cause or "gains", value, sentence, abs(shift), len(differs) + 2 * (cause == "gains"), found)
 
 
 def _sum(e: Vector, rule: str) -> Vector:

@@ -65,7 +65,11 @@ class Diagnosis:
 
     gain_interval: 95 % interval of the fall of the error from before to after, a fraction. held_out: how the figures of
     `before` and `after` were held out ("in-sample" where they could not be). base_shift: parameter -> (before, after) of the
-    linear part. left: gain in BIC units of each driver of what is left. notes: what to keep in mind, in plain sentences.
+    linear part. left: gain in BIC units of each driver of what is left; line: where that is time and one frequency, (frequency
+    [Hz], amplitude of the torque [N m]). mechanics: name -> Estimate of the linear part, fitted together with the effects.
+    noise [rad/s] and bootstrap as they were asked for; controller as it was used: with the gains that the logged torque shows.
+    torque_logged: whether all records hold the torque; loop_follows: False where it does not follow from command and velocity
+    through the simulated controller, whose free runs are then not the drive's. notes: what to keep in mind, in plain sentences.
     """
 
     verdict: str
@@ -89,6 +93,13 @@ class Diagnosis:
     samples: int
     digests: tuple[str, ...]
     version: str = ""
+    validation_digests: tuple[str, ...] = ()
+    noise: float | None = None
+    bootstrap: int = 0
+    torque_logged: bool = False
+    loop_follows: bool = True
+    line: tuple[float, float] | None = None
+    mechanics: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
     def __repr__(self) -> str:
@@ -148,6 +159,13 @@ class Diagnosis:
             "simulations": self.simulations,
             "samples": self.samples,
             "digests": list(self.digests),
+            "validation_digests": list(self.validation_digests),
+            "noise": self.noise,
+            "bootstrap": self.bootstrap,
+            "torque_logged": self.torque_logged,
+            "loop_follows": self.loop_follows,
+            "line": None if self.line is None else list(self.line),
+            "mechanics": {n: asdict(e) for n, e in self.mechanics.items()},
         }
 
     @classmethod
@@ -190,6 +208,14 @@ class Diagnosis:
                 samples=data["samples"],
                 digests=tuple(data["digests"]),
                 version=data["gaident_version"],
+                # Files of gaident 0.1.0 may lack these.
+                validation_digests=tuple(data.get("validation_digests", ())),
+                noise=data.get("noise"),
+                bootstrap=data.get("bootstrap", 0),
+                torque_logged=data.get("torque_logged", False),
+                loop_follows=data.get("loop_follows", True),
+                line=None if data.get("line") is None else (data["line"][0], data["line"][1]),
+                mechanics={n: Estimate(**e) for n, e in data.get("mechanics", {}).items()},
             )
         except (KeyError, TypeError, AttributeError, IndexError) as error:
             raise GaidentError(f"the saved diagnosis is damaged: {error!r}; save it again") from error

@@ -10,9 +10,12 @@ __all__ = ["evidence_of"]
 
 
 def evidence_of(effect: str, gain: float, alternatives: Sequence[str]) -> str:
-    """What speaks for a finding: what it does, the BIC units that it is worth, what these data cannot tell from it."""
+    """What speaks for a finding: what it does, how sure that is, what these data cannot tell from it."""
+    from gaident.show.wording import certainty
+
     meaning = next(row.meaning for row in table() if row.name == effect).split(";")[0].replace(" (Dahl)", "")
-    worth = f"{meaning[0].upper()}{meaning[1:]}: without it the model is {gain:.0f} BIC units worse"
+    what, units = f"{meaning[0].upper()}{meaning[1:]}", f"(the model without it is {gain:.0f} BIC units worse)"
     if alternatives:
-        return f"{worth}, but these data cannot tell it from {' or '.join(a.replace('_', ' ') for a in alternatives)}."
-    return f"{worth}."
+        others = " or ".join(a.replace("_", " ") for a in alternatives)
+        return f"{what}, or {others}: one of these is there, {certainty(gain)} {units}; these data do not say which."
+    return f"{what}: {certainty(gain)} {units}."

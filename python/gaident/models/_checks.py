@@ -48,7 +48,7 @@ def known_keys(
 
 
 def _nearest(value: object, names: list[str]) -> str:
-    close = difflib.get_close_matches(str(value).lower(), [name.lower() for name in names], n=1)
+    close = difflib.get_close_matches(str(value).lower(), [name.lower() for name in names], n=1, cutoff=0.7)
     if not close:
         return ""
     return f" (did you mean {next(name for name in names if name.lower() == close[0])!r}?)"

@@ -40,11 +40,14 @@ class Binned:
 
 @dataclass(frozen=True, eq=False)
 class OrderLines:
-    """Amplitude [N m] per order (lines per turn), the level that chance passes in one spectrum of a hundred, turns travelled."""
+    """Amplitude [N m] per order (lines per turn), the level that chance passes in one spectrum of a hundred, turns travelled.
+
+    level has a value per order: that of the noise around it.
+    """
 
     order: Vector
     amplitude: Vector
-    level: float
+    level: Vector
     turns: float
 
     @property
@@ -54,8 +57,8 @@ class OrderLines:
         An order is whole where the turns travelled do not tell it from a whole one.
         """
         a = self.amplitude
-        least = max(1.2 * self.level, 0.25 * float(a.max(initial=0.0)))
-        tops = [i for i in range(1, len(a) - 1) if a[i] > least and a[i] >= a[i - 1] and a[i] > a[i + 1]]
+        least = np.maximum(1.2 * self.level, 0.25 * float(a.max(initial=0.0)))
+        tops = [i for i in range(1, len(a) - 1) if a[i] > least[i] and a[i] >= a[i - 1] and a[i] > a[i + 1]]
         tops.sort(key=lambda i: -a[i])
         kept: list[int] = []
         for i in tops:
@@ -128,7 +131,7 @@ def order_lines(position: Vector, torque: Vector, velocity: Vector, highest: flo
     theta, d, speed = position[moving], torque[moving], w[moving]
     turns = float(np.ptp(theta)) / math.tau if len(theta) else 0.0
     if turns < 0.05 or len(theta) < 50:
-        return OrderLines(np.zeros(0), np.zeros(0), 0.0, turns)
+        return OrderLines(np.zeros(0), np.zeros(0), np.zeros(0), turns)
     top = float(np.abs(speed).max()) * (1.0 + 1e-9)
     index = ((speed / top + 1.0) * 20.0).astype(int)
     count = np.maximum(np.bincount(index, minlength=40), 1)
@@ -141,11 +144,29 @@ def order_lines(position: Vector, torque: Vector, velocity: Vector, highest: flo
     size = 1 << max(len(course), math.ceil(per_turn / 0.25), math.ceil(4.0 * turns * per_turn)).bit_length()
     orders = np.arange(size // 2 + 1, dtype=np.float64) * (per_turn / size)
     lines = 2.0 * np.abs(np.fft.rfft(course, size))
-    shown = (orders >= max(0.5, 0.5 / turns)) & (orders <= highest)
+    shown = (orders >= max(0.5, 1.0 / turns)) & (orders <= highest)  # of less than a period the travel shows nothing
     orders, lines = orders[shown], lines[shown]
     # Of noise the amplitudes are Rayleigh: median sigma sqrt(2 ln 2), passed by one of K with 1 % at sigma sqrt(2 ln(K/0.01)).
-    sigma = float(np.median(lines)) / math.sqrt(2.0 * math.log(2.0))
+    sigma = _falling_median(orders, lines) / math.sqrt(2.0 * math.log(2.0))
     return OrderLines(orders, lines, sigma * math.sqrt(2.0 * math.log(max(len(orders), 2) / 0.01)), turns)
+
+
+def _falling_median(orders: Vector, lines: Vector) -> Vector:
+    """The level of a coloured noise: c order^-s, 0 <= s <= 2, with half of the amplitudes below; lines hardly move it.
+
+    Least absolute deviations of the logarithms, by reweighted least squares.
+    """
+    if len(lines) < 8:
+        return np.full(len(lines), float(np.median(lines)) if len(lines) else 0.0)
+    x, y = np.log(orders), np.log(np.maximum(lines, 1e-12 * float(lines.max()) + 1e-300))
+    weight = np.ones_like(y)
+    slope = 0.0
+    for _ in range(12):
+        mean_x, mean_y = (float(np.average(v, weights=weight)) for v in (x, y))
+        slope = float(np.clip(np.sum(weight * (x - mean_x) * (y - mean_y)) / np.sum(weight * (x - mean_x) ** 2), -2.0, 0.0))
+        weight = 1.0 / np.maximum(np.abs(y - mean_y - slope * (x - mean_x)), 0.05)
+    level: Vector = np.exp(slope * x + np.median(y - slope * x))
+    return level
 
 
 def reversal_averages(velocity: Vector, torque: Vector, drive_torque: Vector, dt: float, half_window: float = 0.05) -> Reversals:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ Vector = NDArray[np.float64]
 Curve = tuple[Vector, Vector, str]
 
 CLOUD = 4000  # points drawn of a cloud
+ROW = 62  # letters of a legend in one row
 
 
 def plot_torque_velocity(
@@ -39,7 +40,7 @@ def plot_torque_velocity(
     fig = _figure(7.5, 4.8)
     ax = fig.subplots()
     _torque_velocity(ax, velocity, dhat, dt, std, curve, axis)
-    _head(ax, f"Missing {_kind(axis)} against velocity", "upper right")
+    _head(ax, f"Missing {_kind(axis)} against velocity")
     _tidy(fig)
     return fig
 
@@ -127,7 +128,7 @@ def plot_evidence(
         (turning, f"Missing {_kind(axis)} around reversals"),
     )
     for letter, (ax, head) in zip("abcdef", heads, strict=True):
-        _head(ax, f"{letter}  {head}", "upper right" if ax is cloud else "above", bold=True)
+        _head(ax, f"{letter}  {head}", bold=True)
     if title:
         fig.suptitle(title)
     _tidy(fig)
@@ -159,6 +160,7 @@ def _torque_velocity(
     if curve is not None:
         ax.plot(curve[0], curve[1], color=GREEN, linewidth=2.0, label=curve[2])
     ax.set_ylim(*_robust(dhat))
+    _plain_numbers(ax)
     ax.set_xlabel(f"velocity [{velocity_unit(axis)}]")
     ax.set_ylabel(_torque_label(axis))
 
@@ -179,7 +181,7 @@ def _orders(ax: Axes, position: Vector, dhat: Vector, velocity: Vector, highest:
     ax.fill_between(orders, lines.amplitude, color=BLUE, alpha=0.25, linewidth=0)
     travel = f"{lines.turns:.1f} turns" if axis == "rotary" else f"{scale:.3g} m"
     ax.plot(orders, lines.amplitude, color=BLUE, linewidth=0.8, label=travel)
-    ax.axhline(lines.level, color=ORANGE, linewidth=1.2, linestyle="--", label="1 % level of chance")
+    ax.plot(orders, lines.level, color=ORANGE, linewidth=1.2, linestyle="--", label="1 % level of chance")
     labelled: list[float] = []
     for order, amplitude in lines.peaks:
         if any(abs(order - other) < 0.06 * highest for other in labelled):
@@ -188,7 +190,9 @@ def _orders(ax: Axes, position: Vector, dhat: Vector, velocity: Vector, highest:
         where, text = (order / scale, amplitude), f"{order / scale:.3g}"
         ax.annotate(text, where, xytext=(0, 3), textcoords="offset points", ha="center", fontsize="small")
     ax.set_xlim(0.0, highest / scale)
-    ax.set_ylim(0.0, 1.18 * max(float(lines.amplitude.max()), lines.level) or 1.0)
+    top = int(np.argmax(lines.amplitude))
+    ax.set_ylim(0.0, 1.18 * max(float(lines.amplitude[top]), float(lines.level[top])) or 1.0)
+    _plain_numbers(ax)
 
 
 def _reversals(ax: Axes, velocity: Vector, dhat: Vector, drive_torque: Vector, dt: float, axis: str, low: Axes | None) -> None:
@@ -212,6 +216,7 @@ def _reversals(ax: Axes, velocity: Vector, dhat: Vector, drive_torque: Vector, d
         ax.text(0.5, 0.5, "the velocity never reverses", transform=ax.transAxes, ha="center", va="center", color=GREY)
         ax.set_yticks([])
     ax.margins(x=0.0)
+    _plain_numbers(ax)
     ax.set_xlabel("time from the reversal [ms], the new direction positive")
     ax.set_ylabel(_torque_label(axis))
 
@@ -223,6 +228,7 @@ def _residual_time(ax: Axes, time: Vector, residual: Vector, noise_std: float, a
         _line(ax, time, after, color=BLACK, linewidth=0.6, label="extended model")
     ax.axhline(0.0, color=BLACK, linewidth=0.5)
     ax.margins(x=0.01)
+    _plain_numbers(ax)
     ax.set_xlabel("time [s]")
     ax.set_ylabel(f"residual [{velocity_unit(axis)}]")
 
@@ -240,6 +246,13 @@ def _residual_frequency(ax: Axes, time: Vector, residual: Vector, noise_std: flo
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel(f"residual [{velocity_unit(axis)} / Hz$^{{1/2}}$]")
     _plain_decades(ax)
+
+
+def _plain_numbers(ax: Axes) -> None:
+    """A vertical scale without a common factor, which would stand where the legend does."""
+    from matplotlib.ticker import FuncFormatter
+
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def _plain_decades(ax: Axes) -> None:
@@ -272,23 +285,24 @@ def _robust(values: Vector) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _head(ax: Axes, text: str, legend: str = "above", bold: bool = False) -> None:
-    """Title, and the legend in one line below it where no curve is covered, or inside the axes at the place `legend` names."""
-    ax.set_title(
-        text, loc="left", pad=20.0 if legend == "above" else 6.0, fontsize="medium", fontweight="bold" if bold else "normal"
-    )
+def _head(ax: Axes, text: str, bold: bool = False) -> None:
+    """Title, and the legend in a line or two below it, where no curve is covered."""
     handles, labels = ax.get_legend_handles_labels()
+    rows = 2 if sum(map(len, labels)) > ROW else 1
+    pad = 6.0 + 14.0 * rows * bool(handles)
+    ax.set_title(text, loc="left", pad=pad, fontsize="medium", fontweight="bold" if bold else "normal")
     if not handles:
         return
-    style: dict[str, Any] = {"fontsize": "small", "handlelength": 1.5, "columnspacing": 1.2}
-    if legend == "above":
-        style |= {
-            "loc": "lower left",
-            "bbox_to_anchor": (0.0, 1.0),
-            "frameon": False,
-            "borderaxespad": 0.2,
-            "ncols": len(handles),
-        }
-    else:
-        style |= {"loc": legend, "framealpha": 0.85, "edgecolor": "none", "labelspacing": 0.25}
-    ax.legend(handles, labels, **style)
+    ax.legend(
+        handles,
+        labels,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        frameon=False,
+        borderaxespad=0.2,
+        ncols=-(-len(handles) // rows),
+        fontsize="small",
+        handlelength=1.5,
+        columnspacing=1.2,
+        labelspacing=0.2,
+    )

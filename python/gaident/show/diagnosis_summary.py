@@ -6,17 +6,11 @@ import math
 import textwrap
 from typing import Any
 
-from gaident.show.wording import number, table, unit, velocity_unit, with_std
+from gaident.show.wording import certainty, number, sentence, table, unit, velocity_unit, with_std
 
 __all__ = ["diagnosis_summary"]
 
 WIDTH = 100
-VERDICTS = {
-    "adequate": "The linear model is adequate: nothing significant is left that could be blamed on the drive.",
-    "explained": "The model was wrong, the cause is found, and with it nothing significant is left.",
-    "partly explained": "Part of what the model gets wrong is explained; something significant is left.",
-    "unexplained": "The model is wrong, and no effect of the library fits what is left.",
-}
 LINEAR = {"N m s^2/rad^2": "N s^2/m^2", "N m/rad^3": "N/m^3", "rad/s": "m/s", "rad": "m"}
 DRIVERS = {
     "velocity": "on the velocity",
@@ -37,7 +31,8 @@ def diagnosis_summary(dia: Any, axis: str = "rotary") -> str:
         _verdict(dia, axis),
         _causes(dia, axis),
         _gain(dia, axis),
-        _next(dia),
+        _next(dia, axis),
+        _mechanics(dia, axis),
         _base(dia, axis),
         _record(dia, axis),
         _untested(dia, axis),
@@ -55,27 +50,46 @@ def _wrapped(text: str, indent: str = "", hanging: str = "") -> list[str]:
     return lines or [""]
 
 
-def _sentence(text: str, axis: str) -> str:
-    """A sentence with the units of the axis."""
-    text = unit(text, axis)
-    return text.replace("rad/s", "m/s") if axis == "linear" else text
+def _either(finding: Any) -> str:
+    """ "a, b or c" of a finding and what these data cannot tell from it."""
+    names = [_words(name) for name in (finding.effect, *finding.alternatives)]
+    return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def _verdict(dia: Any, axis: str) -> list[str]:
-    causes = [f for f in dia.findings if not f.is_noise]
-    named = [_words(f.effect) for f in causes if not f.alternatives]
-    open_ = [" or ".join(map(_words, (f.effect, *f.alternatives))) for f in causes if f.alternatives]
-    head = VERDICTS[dia.verdict]
-    if named:
-        head += f" Cause{'s' if len(named) > 1 else ''}: {', '.join(named)}."
-    if open_:
-        head += f" Not told apart by these data: {'; '.join(open_)}."
+    head = _head(dia)
     if dia.driver is not None:
-        head += f" What is left depends {DRIVERS[dia.driver]}."
+        head += f" What is left depends {DRIVERS[dia.driver]}"
+        if dia.line is not None:
+            frequency, amplitude = dia.line
+            kind = "torque" if axis == "rotary" else "force"
+            head += f": like a {kind} of {number(frequency, 3)} Hz and {number(amplitude, 2)} {unit('N m', axis)} at the motor"
+        head += "."
     lines = [f"Verdict: {dia.verdict}", *_wrapped(head)]
     for note in dia.notes:
-        lines += _wrapped(_sentence(note, axis))
+        lines += _wrapped(sentence(note, axis))
     return lines
+
+
+def _head(dia: Any) -> str:
+    """The verdict in words, with the names."""
+    if dia.verdict == "adequate":
+        return "The linear model is adequate: nothing significant is left that could be blamed on the drive."
+    if dia.verdict == "unexplained":
+        return "The model is wrong, and no effect of the library fits what is left."
+    causes = [f for f in dia.findings if not f.is_noise]
+    named = [_words(f.effect) for f in causes if not f.alternatives]
+    open_ = [_either(f) for f in causes if f.alternatives]
+    parts = [f"{'Cause' if len(named) == 1 else 'Causes'}: {', '.join(named)}."] if named else []
+    parts += [
+        f"What is {'also ' if named else ''}missing is one of: {names}. These data do not tell them apart." for names in open_
+    ]
+    if dia.verdict == "partly explained":
+        return " ".join(["Part of what the model gets wrong is explained; something significant is left.", *parts])
+    if open_:
+        return " ".join(["The model was wrong.", *parts, "With that nothing significant is left."])
+    found = "the cause is found, and with it" if len(named) == 1 else "the causes are found, and with them"
+    return " ".join([f"The model was wrong, {found} nothing significant is left.", *parts])
 
 
 def _causes(dia: Any, axis: str) -> list[str]:
@@ -85,9 +99,11 @@ def _causes(dia: Any, axis: str) -> list[str]:
             continue
         lines.append(_words(f.effect) + "".join(f", or {_words(a)}" for a in f.alternatives))
         lines += table([_parameter(n, e, axis) for n, e in f.parameters.items()], "    ")
-        lines += _wrapped(_sentence(f.evidence, axis), "    ")
+        lines += _wrapped(sentence(f.evidence, axis), "    ")
         if f.p_value is not None:
-            lines += _wrapped(f"Chance of such a finding where there is no effect at all (bootstrap): {f.p_value:.2g}.", "    ")
+            most = "at most " if f.p_value * (dia.bootstrap + 1) <= 1.0 + 1e-9 else ""  # none of the draws came as far
+            chance = f"{most}{f.p_value:.2g}"
+            lines += _wrapped(f"Chance of such a finding where there is no effect at all (bootstrap): {chance}.", "    ")
     return ["What was found", *(line if line.startswith(" ") else f"  {line}" for line in lines)] if lines else []
 
 
@@ -114,8 +130,11 @@ def _gain(dia: Any, axis: str) -> list[str]:
     in_sample = dia.held_out == "in-sample"
     where = "IN-SAMPLE: too little data to hold any out" if in_sample else f"on {dia.held_out}"
     lines = [f"Free-run simulation, {where}", *table(rows if extended else [rows[0], rows[1], rows[3]])]
+    if not dia.loop_follows:
+        text = "The simulated controller is not the drive's (see above): these figures include its errors."
+        lines += _wrapped(text, "  ")
     if extended and dia.before.rmse > 0.0:
-        lines += _wrapped(_fall(dia), "  ")
+        lines += _wrapped(sentence(_fall(dia), axis), "  ")
         steps = [f"{_words(f.effect)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
         if len(steps) > 1:
             lines += _wrapped(f"One after the other, each of what was left before it: {', '.join(steps)}.", "  ")
@@ -126,64 +145,84 @@ def _fall(dia: Any) -> str:
     """By how much the error falls, in words."""
     fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)
     low, high = (100.0 * x for x in dia.gain_interval)
-    if fall < 1.0:
-        hidden = (
-            "" if dia.controller is None else ": the loop's integrator hides this effect in the velocity, the torque shows it"
+    if fall < -1.0:
+        why = (
+            "the simulated controller is not the drive's"
+            if not dia.loop_follows
+            else "the effects were found on the error of the model driven by the torque; closed over this controller (its gains, "
+            "rule and limits) or over other records they do not hold"
         )
+        return f"The error of the velocity grows by {-fall:.0f} %: this comparison is not valid, {why}."
+    if fall < 1.0:
+        if dia.before.rmse < 1.2 * dia.before.noise_floor:
+            hidden = ": it is at the noise with and without"
+        elif dia.controller is None:
+            hidden = ""
+        else:
+            hidden = ": the loop's integrator hides this effect in the velocity"
+            hidden += ", the torque shows it" if dia.torque_logged else ""
         return f"The error of the velocity hardly changes ({-fall:+.1f} %){hidden}."
     interval = f" (95 % interval {low:.0f} to {high:.0f} %)" if math.isfinite(low) else ""
     return f"The error falls by {fall:.0f} %{interval}."
 
 
-def _base(dia: Any, axis: str) -> list[str]:
-    if not dia.base_shift or not dia.model.effects:
+def _mechanics(dia: Any, axis: str) -> list[str]:
+    """The linear part of the reported model as a mechanic calls it."""
+    if not dia.mechanics:
         return []
-    before, after = (_mechanical({n: v[i] for n, v in dia.base_shift.items()}, axis) for i in (0, 1))
-    rows = [("", "linear fit", "with the effects", "moved")]
-    for name, old in before.items():
-        moved = f"{100.0 * (after[name] / old - 1.0):+.1f} %" if old else ""
-        rows.append((name, number(old, 5), number(after[name], 5), moved))
-    return ["How far the effects had bent the linear model", *table(rows)]
+    head = "Mechanics, bent by what is left" if dia.driver is not None else "Mechanics"
+    head += ", fitted together with the effects" if dia.model.effects else ""
+    rows = []
+    for name, e in dia.mechanics.items():
+        u = "" if e.unit == "1" else unit(e.unit, axis)
+        rows.append((_mechanical(name, axis), with_std(e.value, e.std), u, "" if e.identifiable else "not determined"))
+    lines = [head, *table(rows)]
+    if "resonance" not in dia.mechanics and len(dia.model.poles) > 1:
+        lines.append("  a second pair of poles that does not swing: no resonance of a shaft")
+    return lines
 
 
-def _mechanical(base: dict[str, float], axis: str) -> dict[str, float]:
-    """Parameters of K / (s + a), or K (s^2 + f1 s + f0) / ((s + a) (s^2 + e1 s + e0)), as a mechanic calls them."""
-    K, a = base["gain"], base["pole"]
-    e0, f0 = base.get("pole_pair_e0", 1.0), base.get("zero_pair_e0", 1.0)
-    inertia = abs(e0 / (K * f0)) if K and f0 else math.nan
-    kind = "inertia" if axis == "rotary" else "mass"
-    found = {f"{kind} [{unit('kg m^2', axis)}]": inertia, f"viscous friction [{unit('N m s/rad', axis)}]": a * inertia}
-    if "pole_pair_e0" in base and e0 > 0.0 and f0 > 0.0:
-        found["resonance [Hz]"] = math.sqrt(e0) / math.tau
-        found["  its damping ratio"] = 0.5 * base["pole_pair_e1"] / math.sqrt(e0)
-        found["antiresonance [Hz]"] = math.sqrt(f0) / math.tau
-        found["  its damping ratio "] = 0.5 * base["zero_pair_e1"] / math.sqrt(f0)
-    return found
+def _mechanical(name: str, axis: str) -> str:
+    return "  its damping ratio" if name.endswith("_damping") else sentence(_words(name), axis)
+
+
+def _base(dia: Any, axis: str) -> list[str]:
+    rows = [("", "linear fit", "with the effects", "moved", "")]
+    for name, e in dia.mechanics.items():
+        if name in dia.base_shift:
+            old, new = dia.base_shift[name]
+            change = f"{100.0 * (new / old - 1.0):+.1f} %" if old else ""
+            u = "" if e.unit == "1" else unit(e.unit, axis)
+            rows.append((_mechanical(name, axis), number(old, 5), number(new, 5), change, u))
+    return ["How far the effects had bent the linear model", *table(rows)] if len(rows) > 1 and dia.model.effects else []
 
 
 def _record(dia: Any, axis: str) -> list[str]:
     lines = []
     for f in dia.findings:
         if f.is_noise:
-            lines += _wrapped(f"{_words(f.effect)}: {_sentence(f.evidence, axis)}", "  ", "  ")
+            lines += _wrapped(f"{_words(f.effect)}: {sentence(f.evidence, axis)}", "  ", "  ")
     return ["About the record", *lines] if lines else []
 
 
 def _untested(dia: Any, axis: str) -> list[str]:
     lines = []
     for effect, reason in dia.not_testable.items():
-        lines += _wrapped(f"{_words(effect)}: {_sentence(reason, axis)}", "  ", "  ")
+        lines += _wrapped(f"{_words(effect)}: {sentence(reason, axis)}", "  ", "  ")
     return ["Not testable with this record", *lines] if lines else []
 
 
-def _next(dia: Any) -> list[str]:
+def _next(dia: Any, axis: str) -> list[str]:
     p = dia.next_experiment
     if p is None:
         return []
-    text = f"{p.reason} It separates {' from '.join(map(_words, p.separates))}"
-    text += f" by {p.margin:.0f} BIC units (10 are enough)." if math.isfinite(p.margin) else "."
+    margin = f", {certainty(p.margin)} ({p.margin:.0f} BIC units, 10 are enough)" if math.isfinite(p.margin) else ""
+    text = f"{p.reason} It tells {' from '.join(map(_words, p.separates))}{margin}."
+    rest = dict.fromkeys(a for f in dia.findings for a in f.alternatives if a not in p.separates)
+    if rest:
+        text += f" It was not chosen for {' or '.join(map(_words, rest))}."
     size = f"The command: {len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s."
-    return ["Next experiment", *_wrapped(text, "  "), f"  {size}"]
+    return ["Next experiment", *_wrapped(sentence(text, axis), "  "), f"  {size}"]
 
 
 def _how(dia: Any) -> list[str]:

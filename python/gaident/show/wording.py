@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 
 from gaident.errors import SettingsError
 
-__all__ = ["AXES", "number", "structure_words", "table", "unit", "velocity_unit", "with_std"]
+__all__ = ["AXES", "certainty", "number", "sentence", "structure_words", "table", "unit", "velocity_unit", "with_std"]
 
 AXES = ("rotary", "linear")
 
@@ -20,6 +21,14 @@ _LINEAR = (
     ("rad/s/(", "m/s/("),
     ("(N m)", "N"),
     ("N m", "N"),
+)
+_LINEAR_WORDS = (
+    ("rad/s", "m/s"),
+    (r"(?<!load )\btorque\b(?! saturation| dead band| lag)", "force"),
+    (r"(?<!load )\bTorque\b(?! saturation| dead band| lag)", "Force"),
+    (r"\bturns (forwards|backwards|slower)", r"moves \1"),
+    (r"\baxis turns\b", "axis moves"),
+    (r"\binertia\b", "mass"),
 )
 
 
@@ -39,6 +48,24 @@ def unit(text: str, axis: str = "rotary") -> str:
 def velocity_unit(axis: str = "rotary") -> str:
     """rad/s or m/s."""
     return "rad/s" if unit("N m", axis) == "N m" else "m/s"
+
+
+def sentence(text: str, axis: str = "rotary") -> str:
+    """A plain sentence with the units and words of the axis; names of effects ("torque saturation") stay.
+
+    Raises SettingsError for another axis.
+    """
+    text = unit(text, axis)
+    if axis == "rotary":
+        return text
+    for rotary, linear in _LINEAR_WORDS:
+        text = re.sub(rotary, linear, text)
+    return re.sub(r"([\d.e+-]+) degrees of travel", lambda m: f"{math.radians(float(m[1])):.2g} m of travel", text)
+
+
+def certainty(bic: float) -> str:
+    """What a difference of so many BIC units means: 2 ln of the odds."""
+    return next(words for least, words in ((50.0, "beyond doubt"), (20.0, "very likely"), (-math.inf, "likely")) if bic >= least)
 
 
 def structure_words(p: int, q: int) -> str:

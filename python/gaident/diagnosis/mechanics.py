@@ -1,0 +1,94 @@
+"""The linear part of an extended model as a mechanic calls it, with standard deviations.
+
+One mass: J = 1/|K|, D = a/|K|. Two masses, motor and load on a damped shaft, with c2, c1, c0 of (s + a)(s^2 + e1 s + e0):
+
+    JM = 1/|K|,   KG = f0 JL,   DL + DG = f1 JL,   DM + DG = (c2 - f1) JM,   DM + DL = c0 JM / f0,
+    c1 = KG/JM + f0 + (DM DL + DG (DM + DL)) / (JM JL)
+
+are six equations for six numbers; the last one is solved for JL by iteration, its damping products being small.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.diagnosis.problem import Fit, Problem
+from gaident.diagnosis.uncertainty import covariance_of
+from gaident.identification.covariance import Estimate
+
+__all__ = ["MECHANICS", "mechanics_of", "moved"]
+
+Vector = NDArray[np.float64]
+
+MECHANICS = {
+    "inertia": "kg m^2",
+    "viscous_friction": "N m s/rad",
+    "motor_inertia": "kg m^2",
+    "load_inertia": "kg m^2",
+    "stiffness": "N m/rad",
+    "resonance": "Hz",
+    "resonance_damping": "1",
+    "antiresonance": "Hz",
+    "antiresonance_damping": "1",
+}
+"""Names and units; inertia and viscous friction are of the whole axis."""
+WHOLE = 2  # of these, what every axis has
+
+
+def mechanics_of(problem: Problem, fit: Fit) -> dict[str, Estimate]:
+    """Name -> Estimate, fitted together with the effects; deviations to first order.
+
+    Of a pair of poles or zeros that does not swing (damping ratio 1 or more), or where a mass or the stiffness would be
+    negative, only inertia and viscous friction of the whole are given.
+    """
+    layout = fit.layout
+    cov = covariance_of(problem, fit)[: layout.base, : layout.base]
+    found = _numbers(layout.base_values(fit.x[None, :])[0])
+    h = 1e-6 * np.maximum(np.abs(fit.x[: layout.base]), 1.0)
+    X = np.repeat(fit.x[None, :], len(h), axis=0)
+    X[np.arange(len(h)), np.arange(len(h))] += h
+    slopes = np.array([(_numbers(row) - found) / step for row, step in zip(layout.base_values(X), h, strict=True)])
+    known = np.isfinite(np.diag(cov))
+    variances = np.einsum("ij,ik,kj->j", slopes, np.where(known[:, None] & known[None, :], cov, 0.0), slopes)
+    lost = np.any((np.abs(slopes) > 0.0) & ~known[:, None], axis=0)
+    std = np.where(lost, np.inf, np.sqrt(np.maximum(variances, 0.0)))
+    return {
+        name: Estimate(float(value), float(s), MECHANICS[name], False, bool(s < abs(value)))
+        for name, value, s in zip(MECHANICS, found, std, strict=False)
+        if np.isfinite(value)
+    }
+
+
+def moved(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:
+    """Name -> (before, after) of what both have."""
+    pair = [_numbers(fit.layout.base_values(fit.x[None, :])[0]) for fit in (before, after)]
+    return {name: (float(b), float(a)) for name, b, a in zip(MECHANICS, *pair, strict=False) if np.isfinite(b) and np.isfinite(a)}
+
+
+def _numbers(values: Vector) -> Vector:
+    """In the order of MECHANICS, from [K, a] or [K, a, e1, e0, f1, f0]; nan where there is none."""
+    K, a, *pairs = (float(v) for v in values)
+    JM = 1.0 / abs(K)
+    if not pairs:
+        return np.array([JM, a * JM])
+    e1, e0, f1, f0 = pairs
+    none = np.full(len(MECHANICS), np.nan)
+    if f0 == 0.0:
+        return none
+    D, q = a * e0 * JM / f0, (a + e1 - f1) * JM
+    none[:WHOLE] = abs(e0 * JM / f0), D
+    if not (e1 * e1 < 4.0 * e0 and f1 * f1 < 4.0 * f0):
+        return none
+    stiff = JM * (e0 + a * e1 - f0)
+    JL = stiff / f0
+    for _ in range(30):
+        if not JL > 0.0:
+            return none
+        p = f1 * JL
+        DG, DL, DM = 0.5 * (p + q - D), 0.5 * (p + D - q), 0.5 * (q + D - p)
+        JL = (stiff - (DM * DL + DG * D) / JL) / f0
+    if not JL > 0.0:
+        return none
+    wp, wz, turn = np.sqrt(e0), np.sqrt(f0), 2.0 * np.pi
+    return np.array([JM + JL, D, JM, JL, f0 * JL, wp / turn, 0.5 * e1 / wp, wz / turn, 0.5 * f1 / wz])

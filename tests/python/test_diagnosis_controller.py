@@ -1,0 +1,127 @@
+"""What the logged torque tells a diagnosis before any plant: gains, limits, anti-windup; and which samples are outliers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from gaident.diagnosis.hygiene import outliers
+from gaident.diagnosis.pi_torque import held_torque
+from gaident.diagnosis.replay import replay
+from test_diagnosis_result import CONTROLLER, DRIVE, DT, drive_record
+
+J, D = 5e-4, 2e-3
+LEVELS = np.repeat((60.0, -60.0, 20.0, -40.0, 60.0, -20.0), 120)
+
+
+def limited_drive(limit: float, hold: str = "", noise: float = 0.02, seed: int = 0) -> ga.Record:
+    """One mass behind a torque limit, noise inside the loop; hold: how the integrator is kept from winding up (text of HOLDS).
+
+    The controller's equations once more, sample by sample, with the exact step of the mass.
+    """
+    rng = np.random.default_rng(seed)
+    decay = math.exp(-D / J * DT)
+    w = integral = last = 0.0
+    seen, torques = [], []
+    for command in LEVELS:
+        y = w + noise * rng.standard_normal()
+        e = command - y
+        new = integral + 0.5 * CONTROLLER.ki * DT * (e + last)
+        v = CONTROLLER.kp * e + new
+        u = min(max(v, -limit), limit)
+        if not hold or u == v or (hold == "held_back" and e * v <= 0.0):
+            integral = new
+        elif hold == "tracked":
+            integral = u - CONTROLLER.kp * e
+        last = e
+        seen.append(y)
+        torques.append(u)
+        w = decay * w + (1.0 - decay) * u / D
+    return ga.Record(DT, command=LEVELS, velocity=np.array(seen), torque=np.array(torques))
+
+
+def test_corners_impacts_tops_and_delays_are_no_outliers() -> None:
+    rng = np.random.default_rng(0)
+    n = np.arange(400)
+    rough = 0.02 * rng.standard_normal(400)
+    corner = np.where(n < 200, 20.0, 20.0 - 4.0 * (n - 200))
+    impact = np.where(n < 200, 0.0, 5.0 * np.exp(-(n - 200) / 3.0))
+    top = -0.4 * np.abs(n - 200.0) ** 1.5
+    flat_then_error = np.where(n == 200, 1.2, 0.0)  # what a model makes of a delay that it does not know
+    for signal in (corner, impact, top):
+        assert len(outliers(signal + rough)) == 0
+        assert len(outliers(signal + rough, rough + flat_then_error)) == 0
+
+
+def test_outliers_are_found_on_slopes_and_side_by_side_and_only_where_the_model_does_not_follow() -> None:
+    rng = np.random.default_rng(1)
+    n = np.arange(600)
+    noise = 0.02 * rng.standard_normal(600)
+    signal = 20.0 * np.sin(n / 15.0)
+    at = np.array([50, 120, 121, 300, 455])
+    spikes = np.zeros(600)
+    spikes[at] = (3.0, 8.0, 5.0, -4.0, -9.0)
+    np.testing.assert_array_equal(outliers(signal + noise + spikes, noise + spikes), at)
+    assert len(outliers(signal + noise + spikes, noise)) == 0  # the model does the same
+
+
+def test_a_log_that_follows_from_the_recorded_velocity_is_not_held_against_the_cleaned_one() -> None:
+    """Glitches of the sensor that the controller read are left out of the fit, not out of the replay."""
+    asked = drive_record().command
+    assert asked is not None
+    glitch = np.zeros(len(asked))
+    glitch[[150, 700, 1333]] = (9.0, -12.0, 10.0)
+    noise = 0.05 * np.random.default_rng(3).standard_normal(len(asked)) + glitch
+    done = ga.run(DRIVE, ga.Record(DT, command=asked - noise, velocity=np.zeros(len(asked))), CONTROLLER)
+    seen = ga.Record(DT, command=asked, velocity=done.velocity + noise, torque=done.torque)
+    found = ga.diagnose(seen, CONTROLLER)
+    assert [f.effect for f in found.findings] == ["outliers", "coulomb_friction"], found.summary()
+    assert not any("does not follow" in note for note in found.notes)
+    # Spoiled behind the controller, in the log alone, the cleaned velocity is what it read.
+    good = drive_record()
+    spoiled = ga.Record(DT, command=good.command, velocity=good.velocity + glitch, torque=good.torque)
+    found = ga.diagnose(spoiled, CONTROLLER)
+    assert found.findings[0].parameters["fraction"].value == 3 / len(asked)
+    assert [f.effect for f in found.causes] == ["coulomb_friction"], found.summary()
+
+
+def test_gains_that_the_log_shows_take_the_place_of_the_given_ones() -> None:
+    wrong = ga.PI(kp=1.3 * CONTROLLER.kp, ki=CONTROLLER.ki)
+    found = ga.diagnose(drive_record(), wrong, validation=drive_record(1))
+    assert found.controller is not None and found.controller.kp == pytest.approx(CONTROLLER.kp, rel=1e-4)
+    assert any("All simulations use these (kp = 0.05 N m s/rad, ki = 1.5 N m/rad)" in note for note in found.notes)
+    assert [f.effect for f in found.causes] == ["coulomb_friction"]
+    assert found.after.rmse < 1.1 * found.after.noise_floor < found.before.rmse
+
+
+@pytest.mark.parametrize("hold", ["held", "held_back", "tracked"])
+def test_an_anti_windup_is_named(hold: str) -> None:
+    rec = limited_drive(0.5, hold)
+    assert rec.command is not None and rec.torque is not None
+    known = ga.PI(CONTROLLER.kp, CONTROLLER.ki, torque_limit=0.5)
+    np.testing.assert_allclose(held_torque(rec.command, rec.velocity, DT, known, hold), rec.torque, atol=1e-12)
+    for controller in (CONTROLLER, known):
+        found = replay(rec, controller)
+        assert found.cause == "anti_windup" and "(anti-windup)" in found.sentence, found.sentence
+        assert found.value == 0.5 and found.controller == known
+
+
+def test_a_limit_that_the_log_shows_is_a_finding_and_part_of_the_model() -> None:
+    found = ga.diagnose(limited_drive(0.5), CONTROLLER, validation=limited_drive(0.5, seed=1))
+    assert found.verdict == "explained" and [f.effect for f in found.findings] == ["torque_saturation"], found.summary()
+    (limit,) = found.findings
+    assert limit.parameters["limit"].value == 0.5 and "which acts at" in limit.evidence
+    assert [e.name for e in found.model.effects] == ["torque_saturation"]
+    assert found.after.rmse < 1.2 * found.after.noise_floor < 0.1 * found.before.rmse
+
+
+def test_an_anti_windup_is_said_and_its_free_run_not_trusted() -> None:
+    found = ga.diagnose(limited_drive(0.5, "held"), CONTROLLER)
+    assert [f.effect for f in found.findings] == ["torque_saturation"]
+    assert "the integrator held while the torque is limited" in found.findings[0].evidence
+    assert any("does not hold its integrator" in note for note in found.notes)
+    configured = ga.diagnose(limited_drive(0.5, "held"), ga.PI(CONTROLLER.kp, CONTROLLER.ki, torque_limit=0.5))
+    assert configured.findings == () and any("(anti-windup)" in note for note in configured.notes)
