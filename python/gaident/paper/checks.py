@@ -67,10 +67,13 @@ def identified_mechanics(mechanism: Mechanism) -> IdentifiedMechanics:
     if not isinstance(found, TwoMass):
         return IdentifiedMechanics(OneMass.from_model(model))
     c = two_mass.coefficients_of_parameters(factor_parameters(model)[1], Structure.of(model))
-    product, pairwise = (
-        TwoMass(*(float(v) for v in two_mass.mechanics_of_phi(phi(c)))) for phi in (two_mass.phi_by_product, two_mass.phi_by_pairwise)
-    )
+    product, pairwise = (_mechanism(way(c)) for way in (two_mass.phi_by_product, two_mass.phi_by_pairwise))
     return IdentifiedMechanics(product, pairwise, found, found.with_shaft_damping)
+
+
+def _mechanism(phi: Vector) -> TwoMass:
+    JM, DM, JL, DL, KG, _ = (float(value) for value in two_mass.mechanics_of_phi(phi))
+    return TwoMass(JM, DM, JL, DL, KG)
 
 
 @dataclass(frozen=True)

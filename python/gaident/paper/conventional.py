@@ -47,14 +47,17 @@ class Method:
 
     def bias(self, truth: Vector) -> Vector:
         """Mean deviation of the coefficients from the truth, over the seeds that have some."""
-        deviation: Vector = np.nanmean(self.coefficients, axis=0) - truth
-        return deviation
+        return self._known.mean(axis=0) - truth if len(self._known) else np.full(len(truth), np.nan)
 
     @property
     def spread(self) -> Vector:
         """Standard deviation of the coefficients over the seeds."""
-        deviation: Vector = np.nanstd(self.coefficients, axis=0)
-        return deviation
+        return self._known.std(axis=0) if len(self._known) else np.full(self.coefficients.shape[1], np.nan)
+
+    @property
+    def _known(self) -> Vector:
+        known: Vector = self.coefficients[np.all(np.isfinite(self.coefficients), axis=1)]
+        return known
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ class Engine:
 
     history: mean over the trials of the best fitness (6) so far, by generation; final: each trial's fitness as reported, after
     the local fits where the engine has them. right: trials with the true (p, q); optimal: those that also reach the optimum.
-    seconds: of one trial in one thread, the fastest; generations: of that trial.
+    seconds: processor time of one trial in one thread, the fastest of three; generations: of that trial.
     """
 
     key: str
@@ -131,10 +131,10 @@ def _engine(
 
 
 def _fastest(rec: Record, rig: Rig, settings: Settings, seed: int) -> tuple[float, int]:
-    """(seconds, generations) of the fastest of three runs in one thread: what else the machine does only adds to it."""
+    """(processor time [s], generations) of the fastest of three runs in one thread: what else the machine does adds to it."""
     clocks = []
     for _ in range(3):
-        began = time.perf_counter()
+        began = time.process_time()
         idn = identify(rec, rig.controller, SPACE, settings, seed=seed, workers=1)
-        clocks.append((time.perf_counter() - began, idn.trials[0].generations))
+        clocks.append((time.process_time() - began, idn.trials[0].generations))
     return min(clocks)

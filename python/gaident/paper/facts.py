@@ -51,6 +51,11 @@ class Mechanism:
         return len(self.proposed[1])
 
     @property
+    def words(self) -> str:
+        """What tables call it."""
+        return {"one": "one mass", "two": "two masses"}[self.key]
+
+    @property
     def names(self) -> tuple[str, ...]:
         """The mechanical parameters' names in the package."""
         return ("J", "D") if isinstance(self.sheet, OneMass) else ("JM", "DM", "JL", "DL", "KG")
