@@ -25,7 +25,7 @@ from gaident.models.mechanics import OneMass, TwoMass
 __all__ = ["Friction", "Rig"]
 
 Vector = NDArray[np.float64]
-SUBSTEPS = 40
+SUBSTEPS = 20
 
 
 @dataclass(frozen=True)
