@@ -63,8 +63,8 @@ two-mass column is no two-mass system without shaft damping: the product of its 
 m/rad (printed: 1.96), the sum of their pairwise products $KG_pairwise. (3) The two methods of Table V agree in their
 coefficients to $apart_percent %, which the paper takes for precision. The mechanics behind the coefficients do not agree: J
 is $J_proposed by one and $J_conventional kg&thinsp;m<sup>2</sup> by the other for one mass, J<sub>L</sub> $JL_proposed and
-$JL_conventional for two. (4) Table III and the nominal column of Table IV differ by up to $nominal_percent %: Table IV was
-computed from inertias with more digits.</p>
+$JL_conventional for two. (4) Table III and the nominal column of Table IV differ by up to $nominal_percent %: Table IV
+presumably comes from values with more digits.</p>
 
 <h2>1. From the paper&rsquo;s own numbers</h2>
 <h3>Table III to the nominal column of Table IV</h3>
@@ -118,7 +118,7 @@ $bias_one_mass
 $conventional_two
 $bias_two_masses
 <p>Noise on the velocity stands in the regressors of equation (7), and at this sampling it bends plain least squares beyond
-use; the paper&rsquo;s columns agree with each other, so its records must have been cleaner than $noise rad/s or averaged,
+use; the paper&rsquo;s columns agree with each other, so its records were presumably cleaner than $noise rad/s or averaged,
 which it does not say. Without friction the two unbiased methods agree with each other and with the truth. With friction every
 linear method is bent, the genetic one too: the damping by $damping_one % and $damping_two %.</p>
 
