@@ -27,6 +27,7 @@ from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.identification.plant_of_discrete import plant_of_discrete
 from gaident.models.controller import PI
+from gaident.models.factors import Structure, factor_parameters
 from gaident.models.mechanics import Mechanics, mechanics_from_model
 from gaident.models.model import Discrete, Model
 
@@ -47,7 +48,7 @@ class LeastSquares:
     noise_std         of the equation error v, with whitening of e [rad/s]
     rounds, converged of the iteration (plain least squares needs one round)
     model             the plant behind the polynomial, p = 1, or None where there is none; `note` says why
-    mechanics         OneMass or TwoMass of the model, or None
+    mechanics         OneMass or TwoMass of the model with standard deviations, or None
     """
 
     alpha: Vector
@@ -114,7 +115,9 @@ def least_squares(
     theta, covariance, noise_std, rounds, converged = _iterate(source, rec.velocity, N, instruments, whitening)
     alpha, beta = theta[: N + 1], theta[N + 1 :]
     found = plant_of_discrete(alpha, beta, rec.dt, controller, covariance)
-    mechanics = None if found.model is None else mechanics_from_model(found.model)
+    mechanics = None
+    if found.model is not None:
+        mechanics = mechanics_from_model(found.model, _model_covariance(found.model, theta, covariance, rec.dt, controller))
     return LeastSquares(
         alpha, beta, covariance, noise_std, rounds, converged, rec.dt, controller, found.model, found.note, mechanics
     )
@@ -173,6 +176,29 @@ def _stabilised(beta: Vector) -> Vector:
     inside = np.where(size > 1.0, roots / np.maximum(size, 1.0) ** 2, roots)
     polynomial: Vector = np.poly(inside).real.astype(np.float64)
     return polynomial
+
+
+def _model_covariance(model: Model, theta: Vector, covariance: Vector, dt: float, controller: PI | None) -> Vector | None:
+    """Of the model's natural parameters x: sum_k d_k d_k', d_k the change of x with theta along cov^(1/2)_k.
+
+    None where x does not follow smoothly, and where no noise is left to speak of.
+    """
+    N, structure = len(theta) // 2, Structure.of(model)
+    variance, directions = np.linalg.eigh(covariance)
+    if variance[-1] < 1e-16 * float(theta @ theta):
+        return None
+    columns = []
+    for step in (directions * np.sqrt(np.maximum(variance, 0.0))).T:
+        ends = []
+        for moved in (theta + 0.1 * step, theta - 0.1 * step):
+            near = plant_of_discrete(moved[: N + 1], moved[N + 1 :], dt, controller, covariance).model
+            if near is None or Structure.of(near) != structure:
+                return None
+            ends.append(factor_parameters(near)[1])
+        columns.append((ends[0] - ends[1]) / 0.2)
+    found = np.column_stack(columns) @ np.array(columns)
+    symmetric: Vector = 0.5 * (found + found.T)
+    return symmetric if np.all(np.isfinite(symmetric)) else None
 
 
 def _source(rec: Record, controller: PI | None) -> Vector:

@@ -97,8 +97,11 @@ def compare(mechanism: Mechanism, friction: Friction, seeds: int, seed: int, wor
         return found.discrete(rec.dt, controller) if same else None, mechanics_from_model(found) if same else None
 
     def run(key: str, method: Callable[[Record], tuple[Discrete | None, Mechanics | None]]) -> Method:
-        with ThreadPoolExecutor(workers) as pool:
+        pool = ThreadPoolExecutor(workers)
+        try:
             found = list(pool.map(method, records))
+        finally:
+            pool.shutdown(cancel_futures=True)  # after Ctrl-C those that wait are not begun
         size = 2 * mechanism.order + 1
         rows = [np.full(size, np.nan) if d is None else np.r_[d.alpha, d.beta] for d, _ in found]
         kind = type(mechanism.sheet)

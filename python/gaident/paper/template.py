@@ -53,18 +53,18 @@ $table_v_worst of the largest coefficient), if the loop gain is scaled: see (1).
 
 <p class="box"><b>Simulated in place of the original rig</b>, whose measurements are not published: everything that needs a
 record, that is Figs. 6, 7 and 8, the fitness figures and identified columns of Table IV, the least-squares columns of Table
-V, the friction, and the times. The masses, the shaft and the controller are those of Table III; the friction and the noise
-are our choice.</p>
+V, and the friction; times are measured here. The masses, the shaft and the controller are those of Table III; the friction
+and the noise are our choice.</p>
 
 <p class="box wrong"><b>Where the paper disagrees with itself.</b> (1) With the printed gains K<sub>PV</sub>, K<sub>IV</sub>,
 Table V does not follow from Table IV. With the loop gain times $factor_one (one mass) and $factor_two (two masses) it does,
 all coefficients at once: the gains of the experiment were others than those printed, or in other units. (2) The identified
 two-mass column is no two-mass system without shaft damping: the product of its poles gives K<sub>G</sub> = $KG_product N
 m/rad (printed: 1.96), the sum of their pairwise products $KG_pairwise. (3) The two methods of Table V agree in their
-coefficients to $apart_percent %, which the paper takes for precision. The mechanics behind the coefficients do not agree: J
-is $J_proposed by one and $J_conventional kg&thinsp;m<sup>2</sup> by the other for one mass, J<sub>L</sub> $JL_proposed and
-$JL_conventional for two. (4) Table III and the nominal column of Table IV differ by up to $nominal_percent %: Table IV
-presumably comes from values with more digits.</p>
+coefficients to $apart_percent % of the largest, which the paper takes for precision. The mechanics behind the coefficients do
+not agree: J is $J_proposed by one and $J_conventional kg&thinsp;m<sup>2</sup> by the other for one mass, J<sub>L</sub>
+$JL_proposed and $JL_conventional for two. (4) Table III and the nominal column of Table IV differ by up to $nominal_percent
+%: Table IV presumably comes from values with more digits.</p>
 
 <h2>1. From the paper&rsquo;s own numbers</h2>
 <h3>Table III to the nominal column of Table IV</h3>
