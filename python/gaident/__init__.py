@@ -14,7 +14,16 @@ from typing import TYPE_CHECKING
 from gaident.data import Record, differentiate, read, read_columns
 from gaident.diagnosis import Diagnosis, Finding, Limits, Proposal, diagnose, first_experiment
 from gaident.errors import GaidentError
-from gaident.identification import Estimate, Identification, SearchSpace, Settings, identify
+from gaident.identification import (
+    Estimate,
+    Identification,
+    LeastSquares,
+    SearchSpace,
+    Settings,
+    identify,
+    least_squares,
+    m_sequence,
+)
 from gaident.models import (
     PI,
     Discrete,
@@ -46,6 +55,7 @@ __all__ = [
     "Finding",
     "GaidentError",
     "Identification",
+    "LeastSquares",
     "Limits",
     "Model",
     "OneMass",
@@ -62,7 +72,9 @@ __all__ = [
     "first_experiment",
     "identify",
     "initial_state",
+    "least_squares",
     "load",
+    "m_sequence",
     "mechanics_from_model",
     "model_from_factor_parameters",
     "read",

@@ -350,4 +350,30 @@ def _diagnose(args: argparse.Namespace) -> None:
         print(f"\nwritten: {', '.join(map(str, written))}")
 
 
-COMMANDS = {"identify": _identify, "diagnose": _diagnose, "simulate": _simulate, "effects": _effects, "demo": _demo}
+def _reproduce(args: argparse.Namespace) -> None:
+    from gaident import paper
+
+    folder = Path(args.out)
+    folder.mkdir(parents=True, exist_ok=True)
+    with Progress(sys.stderr) as progress:
+        result = paper.reproduce(args.trials, args.seeds, args.seed, args.workers, progress)
+    pictures = paper.figures(result)
+    for name, png in pictures.items():
+        write(folder / f"{name}.png", png)
+    target = folder / "paper.html"
+    write(target, paper.page(result, pictures).encode())
+    if args.json:
+        _print_json(result.to_dict())
+        return
+    print(paper.summary(result))
+    print(f"\nwritten: {target}, and its pictures beside it: {', '.join(f'{name}.png' for name in pictures)}")
+
+
+COMMANDS = {
+    "identify": _identify,
+    "diagnose": _diagnose,
+    "simulate": _simulate,
+    "effects": _effects,
+    "demo": _demo,
+    "reproduce": _reproduce,
+}

@@ -41,8 +41,9 @@ ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "store": ({"errors", "identification", "diagnosis"}, set()),
     "show": ({"errors"}, set()),
     "drive_file": (DESK, set()),
+    "paper": (DESK | {"diagnosis", "version"}, {"show"}),
     "demo": (DESK | {"diagnosis"}, {"show"}),
-    "cli": (DESK | {"diagnosis", "store", "drive_file", "demo"}, {"show", "_core"}),
+    "cli": (DESK | {"diagnosis", "store", "drive_file", "demo"}, {"show", "_core", "paper"}),
     "__main__": ({"cli"}, set()),
     "__init__": (DESK | {"diagnosis", "store"}, {"show", "version"}),
 }

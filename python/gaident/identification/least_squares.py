@@ -1,0 +1,209 @@
+"""The conventional identification (equation 7): linear regression in a difference equation of a given order.
+
+    w(n) = sum_{i=0..N} alpha_i r(n-i) + sum_{i=1..N} beta_i w(n-i) + v(n) = phi(n)' theta + v(n)
+    theta = (alpha_0..alpha_N, beta_1..beta_N),   D(z) = 1 - beta_1/z - ... - beta_N/z^N
+
+Plain        sum_n phi(n) v(n) = 0, least squares. Noise on w stands in phi as well and bends theta (errors in variables); the
+             finer the sampling, the more.
+Instruments  sum_n z(n) v(n) = 0, z(n) = phi(n) of the noise-free answer of the last estimate: no bias from noise that is
+             independent of r.
+Whitening    white noise e on w makes v = D e, far from white: r and w are first filtered by 1/D of the last estimate
+             (Steiglitz and McBride, IEEE Trans. Automatic Control 10, 1965).
+Both         the refined instrumental variables of Young and Jakeman (Int. J. Control 29, 1979), for white noise on w as good as
+             the fit of a free run.
+
+Nothing here comes from the core, which it is compared with: numpy and scipy only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from numbers import Integral
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.errors import RecordError, SettingsError
+from gaident.identification.plant_of_discrete import plant_of_discrete
+from gaident.models.controller import PI
+from gaident.models.factors import Structure, factor_parameters
+from gaident.models.mechanics import Mechanics, mechanics_from_model
+from gaident.models.model import Discrete, Model
+
+__all__ = ["LeastSquares", "least_squares"]
+
+Vector = NDArray[np.float64]
+ROUNDS = 50
+CONVERGED = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class LeastSquares:
+    """What a regression in equation (7) found.
+
+    alpha, beta       N + 1 and N coefficients, see `Discrete`
+    covariance        (2N+1, 2N+1) of (alpha, beta), as the regression itself sees it: without the bias that noise brings to
+                      plain least squares
+    noise_std         of the equation error v, with whitening of e [rad/s]
+    rounds, converged of the iteration (plain least squares needs one round)
+    model             the plant behind the polynomial, p = 1, or None where there is none; `note` says why
+    mechanics         OneMass or TwoMass of the model with standard deviations, or None
+    """
+
+    alpha: Vector
+    beta: Vector
+    covariance: Vector
+    noise_std: float
+    rounds: int
+    converged: bool
+    dt: float
+    controller: PI | None
+    model: Model | None
+    note: str
+    mechanics: Mechanics | None
+
+    @property
+    def order(self) -> int:
+        """N of equation (7)."""
+        return len(self.beta)
+
+    @property
+    def discrete(self) -> Discrete:
+        """The same as `Model.discrete` gives it."""
+        return Discrete(self.alpha, self.beta)
+
+    @property
+    def stable(self) -> bool:
+        """Whether equation (7) forgets its beginning: all roots of its polynomial inside the unit circle."""
+        return bool(np.all(np.abs(np.roots(np.r_[1.0, -self.beta])) < 1.0))
+
+    def simulate(self, rec: Record) -> Vector:
+        """Free run of equation (7) from rest on a record's command, without a controller on its torque [rad/s]."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return _from_rest(self.alpha, np.r_[1.0, -self.beta], _source(rec, self.controller))
+
+
+def least_squares(
+    rec: Record, order: int, controller: PI | None = None, *, instruments: bool = False, whitening: bool = False
+) -> LeastSquares:
+    """Coefficients of equation (7) by linear regression on one record, and the plant and mechanics behind them.
+
+    rec          with a controller its command is r, without one its torque. The first equation is that of sample N: what lies
+                 before the record is not assumed to be rest, but instruments and whitening start there
+    order        N: 2 for one mass and 4 for two in the velocity loop, one less from torque to velocity
+    controller   the loop that r went through; only the way back to the plant uses its values (limits are left out)
+    instruments  noise-free answers of the last estimate as instruments, instead of phi itself
+    whitening    filter by the last estimate's 1/D
+
+    The module's docstring has the equations and sources. An iteration that does not settle and a polynomial without a plant
+    behind it are data of the result. Raises SettingsError and RecordError.
+    """
+    if not isinstance(rec, Record):
+        raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record")
+    lowest = 1 if controller is None else 2
+    if isinstance(order, bool) or not isinstance(order, Integral) or order < lowest:
+        more = "" if controller is None else " + 1"
+        raise SettingsError(f"order is {order!r}: give a whole number N >= {lowest}, p + q{more} of the drive")
+    N = int(order)
+    enough = 2 * (2 * N + 1) + N
+    if len(rec) < enough:
+        raise RecordError(f"rec has {len(rec)} samples, too few for order {N}: give at least {enough}")
+    source = _source(rec, controller)
+    if np.ptp(source) == 0.0:
+        raise RecordError(f"rec has a constant input of {source[0]:g}: a regression needs one that changes, see ga.m_sequence")
+    theta, covariance, noise_std, rounds, converged = _iterate(source, rec.velocity, N, instruments, whitening)
+    alpha, beta = theta[: N + 1], theta[N + 1 :]
+    found = plant_of_discrete(alpha, beta, rec.dt, controller, covariance)
+    mechanics = None
+    if found.model is not None:
+        mechanics = mechanics_from_model(found.model, _model_covariance(found.model, theta, covariance, rec.dt, controller))
+    return LeastSquares(
+        alpha, beta, covariance, noise_std, rounds, converged, rec.dt, controller, found.model, found.note, mechanics
+    )
+
+
+def regressors(source: Vector, velocity: Vector, N: int) -> Vector:
+    """phi(n)' = (r(n)..r(n-N), w(n-1)..w(n-N)) as rows, n = N..S-1: shape (S - N, 2N + 1)."""
+    rows = len(source) - N
+    columns = [source[N - i : N - i + rows] for i in range(N + 1)]
+    columns += [velocity[N - i : N - i + rows] for i in range(1, N + 1)]
+    return np.column_stack(columns)
+
+
+def _iterate(source: Vector, y: Vector, N: int, instruments: bool, whitening: bool) -> tuple[Vector, Vector, float, int, bool]:
+    """(theta, covariance, deviation of v, rounds, converged)."""
+    phi = regressors(source, y, N)
+    theta, covariance, noise_std = _solve(phi, phi, y[N:])
+    if not (instruments or whitening):
+        return theta, covariance, noise_std, 1, True
+    for rounds in range(2, ROUNDS + 1):
+        before, polynomial = theta, _stabilised(theta[N + 1 :])
+        one = np.ones(1)
+        r, w = (_from_rest(one, polynomial, x) for x in (source, y)) if whitening else (source, y)
+        phi = z = regressors(r, w, N)
+        if instruments:
+            z = regressors(r, _from_rest(before[: N + 1], polynomial, r), N)
+        theta, covariance, noise_std = _solve(phi, z, w[N:])
+        if np.linalg.norm(theta - before) <= CONVERGED * np.linalg.norm(theta):
+            return theta, covariance, noise_std, rounds, True
+    return theta, covariance, noise_std, ROUNDS, False
+
+
+def _solve(phi: Vector, z: Vector, y: Vector) -> tuple[Vector, Vector, float]:
+    """theta with z'(y - phi theta) = 0, its covariance s^2 (Q'phi)^-1 (Q'phi)^-T with Q R = z, and s."""
+    size: Vector = np.sqrt(np.einsum("ij,ij->j", phi, phi))
+    size[size == 0.0] = 1.0
+    Q, _ = np.linalg.qr(z)
+    inverse = np.linalg.pinv(Q.T @ (phi / size), rcond=1e-13) / size[:, None]
+    theta = inverse @ (Q.T @ y)
+    error = y - phi @ theta
+    variance = float(error @ error) / (len(y) - len(theta))
+    return theta, variance * inverse @ inverse.T, variance**0.5
+
+
+def _from_rest(alpha: Vector, polynomial: Vector, source: Vector) -> Vector:
+    from scipy.signal import lfilter
+
+    answer: Vector = lfilter(alpha, polynomial, source)
+    return answer
+
+
+def _stabilised(beta: Vector) -> Vector:
+    """The polynomial 1 - beta_1/z - ..., roots outside the unit circle mirrored into it: instruments must not grow."""
+    roots = np.roots(np.r_[1.0, -beta])
+    size = np.abs(roots)
+    inside = np.where(size > 1.0, roots / np.maximum(size, 1.0) ** 2, roots)
+    polynomial: Vector = np.poly(inside).real.astype(np.float64)
+    return polynomial
+
+
+def _model_covariance(model: Model, theta: Vector, covariance: Vector, dt: float, controller: PI | None) -> Vector | None:
+    """Of the model's natural parameters x: sum_k d_k d_k', d_k the change of x with theta along cov^(1/2)_k.
+
+    None where x does not follow smoothly, and where no noise is left to speak of.
+    """
+    N, structure = len(theta) // 2, Structure.of(model)
+    variance, directions = np.linalg.eigh(covariance)
+    if variance[-1] < 1e-16 * float(theta @ theta):
+        return None
+    columns = []
+    for step in (directions * np.sqrt(np.maximum(variance, 0.0))).T:
+        ends = []
+        for moved in (theta + 0.1 * step, theta - 0.1 * step):
+            near = plant_of_discrete(moved[: N + 1], moved[N + 1 :], dt, controller, covariance).model
+            if near is None or Structure.of(near) != structure:
+                return None
+            ends.append(factor_parameters(near)[1])
+        columns.append((ends[0] - ends[1]) / 0.2)
+    found = np.column_stack(columns) @ np.array(columns)
+    symmetric: Vector = 0.5 * (found + found.T)
+    return symmetric if np.all(np.isfinite(symmetric)) else None
+
+
+def _source(rec: Record, controller: PI | None) -> Vector:
+    source, name = (rec.torque, "torque") if controller is None else (rec.command, "command")
+    if source is None:
+        other = "controller=PI(...) to use the command" if controller is None else "controller=None to use the torque"
+        raise RecordError(f"the record has no {name}, the input of the regression: give Record({name}=...), or {other}")
+    return source

@@ -1,0 +1,55 @@
+"""Beyond the paper: its step hides the friction that it suspects; a command that reverses shows it, and diagnose names it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gaident.data.record import Record
+from gaident.diagnosis.diagnose import diagnose
+from gaident.diagnosis.result import Diagnosis
+from gaident.models.mechanics import Mechanics, mechanics_from_model
+from gaident.paper.experiment import rig_of
+from gaident.paper.facts import SAMPLES, STEP, Mechanism
+from gaident.paper.rig import Friction
+
+__all__ = ["FrictionTest", "friction_test"]
+
+LEVELS = (STEP, -STEP, 20.0, -20.0, 0.0, 10.0, -10.0, 30.0)  # rad/s, SAMPLES each
+
+
+@dataclass(frozen=True)
+class FrictionTest:
+    """Diagnoses of one mechanism: on the paper's step alone, and with a record of reversals beside it.
+
+    linear, extended: mechanics of the linear identification of these records and of the extended model's linear part, or None
+    """
+
+    mechanism: Mechanism
+    truth: Friction
+    reversals: Record
+    step_only: Diagnosis
+    diagnosis: Diagnosis
+    linear_step: Mechanics | None
+    linear: Mechanics | None
+    extended: Mechanics | None
+
+
+def friction_test(mechanism: Mechanism, step: Record, seed: int) -> FrictionTest:
+    """step: the record of the paper's experiment on the same rig."""
+    rig = rig_of(mechanism)
+    command = np.repeat(LEVELS, SAMPLES)
+    reversals = rig.record(command, seed + 1, f"reversals, {mechanism.title}")
+    alone = diagnose(step, rig.controller, seed=seed)
+    found = diagnose([step, reversals], rig.controller, seed=seed)
+    return FrictionTest(
+        mechanism,
+        rig.friction,
+        reversals,
+        alone,
+        found,
+        alone.identification.mechanics,
+        found.identification.mechanics,
+        mechanics_from_model(found.model.linear),
+    )

@@ -1,0 +1,70 @@
+"""The page's pictures as PNG: what they show is worked out here, how it is drawn stands in `gaident.show`."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.models.simulate import simulate
+from gaident.paper.friction import FrictionTest
+from gaident.paper.reproduction import Reproduction
+from gaident.paper.rig import Friction
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["CAPTIONS", "figures"]
+
+Vector = NDArray[np.float64]
+
+CAPTIONS = {
+    "fig6_nominal": "Fig. 6 on the simulated rig: velocity step of 43.6 rad/s; model with the nominal parameters of Table III.",
+    "fig7_generations": "Fig. 7 on the simulated rig: best fitness so far, mean of the trials. The dot is what the default "
+    "engine reports after the local fits at its end.",
+    "fig8_identified": "Fig. 8 on the simulated rig: the identified models, the best trial of each engine.",
+    "bias_one_mass": "One mass: deviation of the mechanical parameters from the truth, mean and two standard deviations over the "
+    "noise seeds. The axis is linear within 1 % and logarithmic beyond.",
+    "bias_two_masses": "Two masses, the same. Plain least squares mostly has no physical two masses behind its polynomial.",
+    "friction_one_mass": "One mass, the record of reversals: linear model, model extended by what diagnose named, friction law.",
+    "friction_two_masses": "Two masses, the same.",
+}
+
+
+def figures(result: Reproduction) -> dict[str, bytes]:
+    """File name without suffix -> PNG, for each of CAPTIONS."""
+    from gaident.show.paper_plots import plot_bias, plot_engines, plot_friction, plot_identified, plot_nominal
+
+    tests = [part.step for part in result.parts]
+    drawn: dict[str, Figure] = {
+        "fig6_nominal": plot_nominal(tests),
+        "fig7_generations": plot_engines(tests),
+        "fig8_identified": plot_identified(tests),
+    }
+    for part, name in zip(result.parts, ("one_mass", "two_masses"), strict=True):
+        drawn[f"bias_{name}"] = plot_bias(part.comparisons, ("rig without friction", "rig with friction"))
+        drawn[f"friction_{name}"] = plot_friction(*_friction_curves(part.friction))
+    return {name: _png(drawn[name]) for name in CAPTIONS}
+
+
+def _friction_curves(f: FrictionTest) -> tuple[Record, Vector, Vector, tuple[Vector, Vector, Vector]]:
+    """(record, linear and extended velocity, friction law)."""
+    w = np.linspace(0.0, 50.0, 501)
+    found = np.zeros_like(w)
+    for finding in f.diagnosis.findings:
+        values = {name: e.value for name, e in finding.parameters.items()}
+        if finding.effect == "coulomb_friction":
+            found = found + values["torque"]
+        elif finding.effect == "stribeck_friction":
+            found = found + Friction(values["torque"], values["static_torque"], values["stribeck_velocity"]).level(w)
+    extended = simulate(f.diagnosis.model, f.reversals, f.diagnosis.controller)
+    return f.reversals, f.diagnosis.identification.simulate(f.reversals), extended, (w, f.truth.level(w), found)
+
+
+def _png(drawn: Figure) -> bytes:
+    out = io.BytesIO()
+    drawn.savefig(out, format="png")
+    return out.getvalue()
