@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.candidates import CANDIDATES, FRICTION, Scales
 from gaident.diagnosis.driven import Driven
-from gaident.diagnosis.layout import Layout, described, two_masses
+from gaident.diagnosis.layout import Layout, described, is_mechanism, two_masses
 from gaident.diagnosis.noise_filter import WHITE, ShaftNoise
 from gaident.diagnosis.problem import WORST, Fit, Problem, project_out
 from gaident.diagnosis.screening import Screening
 from gaident.diagnosis.stepwise import Search, with_second_mass
 from gaident.models.model import Model
 
-__all__ = ["linear_bases", "without_second_mass"]
+__all__ = ["base_fit", "linear_bases", "one_mass", "without_second_mass"]
 
 Vector = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]
     like a resonance as long as nothing else is tried, and a load or a saturation hides one.
     """
     problem, driven = search.problem, search.driven
-    one = _fit(problem, driven, scales, one_mass(driven, identified))
+    one = base_fit(problem, driven, scales, one_mass(driven, identified))
     known = _fits(problem, driven, scales, reduced(identified))
     fits = known + _fits(problem, driven, scales, resonant(problem, one))
     one = problem.settled(one)
@@ -60,7 +60,8 @@ def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]
     return [two]
 
 
-def _fit(problem: Problem, driven: Driven, scales: Scales, model: Model, iterations: int = 20) -> Fit:
+def base_fit(problem: Problem, driven: Driven, scales: Scales, model: Model, iterations: int = 20) -> Fit:
+    """A mechanism fitted to the records' plain errors."""
     layout = Layout.of(model, described(scales, model), driven.moving, driven.loop_only)
     x = np.concatenate([layout.base_vector(model), np.zeros(sum(layout.starts))])
     return problem.fit(layout, x, WHITE, iterations)
@@ -74,7 +75,9 @@ def resonates(fit: Fit) -> bool:
 
 def _fits(problem: Problem, driven: Driven, scales: Scales, starts: list[Model]) -> list[Fit]:
     """Short fits of two masses."""
-    return [f for f in (_fit(problem, driven, scales, m, 6) for m in starts) if f.cost < WORST]
+    return [
+        f for f in (base_fit(problem, driven, scales, m, 6) for m in starts) if f.cost < WORST and is_mechanism(f.layout, f.x)
+    ]
 
 
 def reduced(identified: Model) -> list[Model]:

@@ -35,6 +35,12 @@ class Scales:
     resonance: float  # rad/s of the model's fastest pole pair; nan where it has none
     two_masses: bool
     integral: float  # N m, largest integrator state of the controller's replay; nan without a controller
+    blocks: int = 1  # samples of the log in one of dt: a long record is searched on a coarser grid first
+
+    @property
+    def log_dt(self) -> float:
+        """Sample time of the log [s]: what the bounds of delays and lags are made of."""
+        return self.dt / self.blocks
 
 
 Natural = Callable[[Matrix], Matrix]
@@ -283,12 +289,12 @@ CANDIDATES: dict[str, Candidate] = {
                 lambda s: tuple(s.torque * np.array([0.97, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2]))),
         _single("torque_dead_band", "actuator", "width", lambda s: 1e-4 * s.torque, lambda s: 0.7 * s.torque,
                 lambda s: tuple(s.torque * np.geomspace(0.003, 0.3, 7))),
-        _single("transport_delay", "actuator", "delay", lambda s: 0.02 * s.dt, lambda s: 10.0 * s.dt,
-                lambda s: tuple(s.dt * np.array([0.3, 0.7, 1.0, 1.5, 2.2, 3.2, 4.5, 7.0]))),
-        _single("torque_lag", "actuator", "time_constant", lambda s: 0.02 * s.dt, lambda s: 30.0 * s.dt,
-                lambda s: tuple(s.dt * np.geomspace(0.25, 16.0, 6))),
-        _single("velocity_filter", "sensor", "time_constant", lambda s: 0.02 * s.dt, lambda s: 30.0 * s.dt,
-                lambda s: tuple(s.dt * np.geomspace(0.25, 16.0, 6))),
+        _single("transport_delay", "actuator", "delay", lambda s: 0.02 * s.log_dt, lambda s: 10.0 * s.log_dt,
+                lambda s: tuple(s.log_dt * np.array([0.3, 0.7, 1.0, 1.5, 2.2, 3.2, 4.5, 7.0]))),
+        _single("torque_lag", "actuator", "time_constant", lambda s: 0.02 * s.log_dt, lambda s: 30.0 * s.log_dt,
+                lambda s: tuple(s.log_dt * np.geomspace(0.25, 16.0, 6))),
+        _single("velocity_filter", "sensor", "time_constant", lambda s: 0.02 * s.log_dt, lambda s: 30.0 * s.log_dt,
+                lambda s: tuple(s.log_dt * np.geomspace(0.25, 16.0, 6))),
         _single("integrator_clamp", "controller", "limit", lambda s: 1e-3 * s.integral, lambda s: s.integral,
                 lambda s: tuple(s.integral * np.geomspace(5e-3, 0.95, 14)), rough=True),
         _single("command_rate_limit", "controller", "rate", lambda s: 1e-3 * s.acceleration, lambda s: s.acceleration,

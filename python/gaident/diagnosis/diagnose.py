@@ -11,18 +11,21 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.diagnosis.arguments import ProgressCallback, checked, noise_std_of, records_of
-from gaident.diagnosis.bases import linear_bases, without_second_mass
 from gaident.diagnosis.candidates import CANDIDATES, TWINS, Scales, conditional_twins
 from gaident.diagnosis.controller_place import as_logged, as_read, controller_findings
 from gaident.diagnosis.driven import AT_CONTROLLER, Driven
 from gaident.diagnosis.excitation import excitation
-from gaident.diagnosis.gains import measured_gains
+from gaident.diagnosis.extension import Extension, extended
+from gaident.diagnosis.folded import ADVICE, FOLDED, folded
+from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.leftover import leftover
 from gaident.diagnosis.mechanics import mechanics_of, moved
-from gaident.diagnosis.problem import Fit, Problem
+from gaident.diagnosis.offset import offset_of
+from gaident.diagnosis.problem import Problem
 from gaident.diagnosis.result import Diagnosis, Finding
-from gaident.diagnosis.stepwise import MARGIN, Rival, Search, with_second_mass
+from gaident.diagnosis.standing import only_describes, simplified
+from gaident.diagnosis.stepwise import Rival
 from gaident.diagnosis.uncertainty import estimates_of
 from gaident.diagnosis.wording import evidence_of
 from gaident.identification.covariance import Estimate
@@ -36,19 +39,6 @@ __all__ = ["diagnose"]
 
 Vector = NDArray[np.float64]
 GATE = 1.5  # times the noise of the measured velocity: what an explained record may leave, whitened
-OF_ITS_SIZE = 0.25  # part of a finding's gain that a free function may still find beside it
-SWAP = 2.0  # BIC units by which a rival has to be better to take a finding's seat
-# What a driver of a remaining error is the domain of: a finding there only describes, it does not name.
-DOMAINS: dict[str, str] = {
-    **dict.fromkeys(("coulomb_friction", "stribeck_friction", "asymmetric_friction", "quadratic_drag"), "velocity"),
-    "presliding_friction": "past",
-    "friction_drift": "time",
-    "load_torque": "time",
-    **dict.fromkeys(("unbalance", "cogging", "velocity_ripple"), "position"),
-    **dict.fromkeys(("torque_saturation", "torque_dead_band"), "torque"),
-    **dict.fromkeys(("backlash", "hardening_stiffness"), "past"),
-}
-FRICTION_DOMAIN = {"velocity", "position", "past", "time"}
 
 
 def diagnose(
@@ -91,7 +81,8 @@ def diagnose(
     if bootstrap:
         from gaident.diagnosis.bootstrap import with_p_value
 
-        result = with_p_value(result, work.seeker, work.base, work.final, bootstrap, seed, lambda message: note(None, message))
+        search = work.found.search
+        result = with_p_value(result, search, work.base, work.final, bootstrap, seed, lambda message: note(None, message))
     object.__setattr__(result, "seconds", time.perf_counter() - began)
     return result
 
@@ -153,85 +144,51 @@ class _Work:
     def search(self) -> None:
         """Base, stepwise extension, rivals, what is left."""
         not_testable = dict(self.excited.not_testable)
+        if any(folded(r) for r in self.records):
+            not_testable = dict.fromkeys(CANDIDATES, FOLDED)
+            self.notes.append(ADVICE)
         allowed = [e for e in CANDIDATES if e not in not_testable and e not in self.at_controller.decided]
         if self.controller is None:
             allowed = [e for e in allowed if e not in AT_CONTROLLER]
         self.not_testable = not_testable
-        self.seeker = search = Search(self.problem, self.driven, allowed, lambda message: self.note(None, message))
-        bases = linear_bases(search, self.scales, self.idn.model)
-        ends: list[tuple[Fit, Fit]] = []
-        for base in bases:
-            ends.append((without_second_mass(search, search.run(base)), base))
-            if search.only_noise(ends[-1][0]):
-                break
-        final, self.base = min(ends, key=lambda e: e[0].bic)
-        self.rivals: dict[str, tuple[float, list[Rival]]] = {}
-        for swaps_left in (2, 1, 0):
-            final, again = self.with_rivals(search, final, swaps_left > 0)
-            if not again:
-                break
-        thinned = search.thinned(final, every=True)
-        if thinned is not final:  # gains and rivals are those of the model that is reported
-            final, _ = self.with_rivals(search, thinned, False)
-        self.final = final
-        self.adequate = search.only_noise(final, GATE)
+        self.found = extended(
+            self.problem,
+            self.driven,
+            self.scales,
+            self.idn.model,
+            allowed,
+            self._twins_here,
+            lambda message: self.note(None, message),
+        )
+        self.problem, self.driven = self.found.search.problem, self.found.search.driven
         self.note(0.85, "looking for what is left")
-        self.left = leftover(self.problem, self.driven, final)
-        simpler = self._without_doubtful_detail(search, final)
-        if simpler is not final:
-            self.final, _ = self.with_rivals(search, simpler, False)
-            self.adequate = search.only_noise(self.final, GATE)
-            self.left = leftover(self.problem, self.driven, self.final)
+        self.take(self.found)
+        simpler = simplified(self.found.search, self.found.decided, self.left)
+        if simpler is not self.found.decided:
+            self.found = self.found.instead(simpler, self._twins_here, lambda message: self.note(None, message))
+            self.take(self.found)
 
-    def _without_doubtful_detail(self, search: Search, final: Fit) -> Fit:
-        """A generalisation back to the simpler effect, where as much is left as the detail explains: it describes the rest."""
-        driver = self.left.driver
-        if driver is None:
-            return final
-        for effect in final.effects:
-            for parent in CANDIDATES[effect].parents:
-                level = final.x[final.layout.slot(effect)][:1]
-                layout = final.layout.without(effect).extended(parent)
-                x = layout.without(parent).inserted(final.layout.removed(final.x, effect), level)
-                simpler = self.problem.settled(self.problem.fit(layout, x, final.noise, 12))
-                if self.left.gains[driver] > OF_ITS_SIZE * (simpler.bic - final.bic):
-                    return simpler
-        return final
-
-    def with_rivals(self, search: Search, final: Fit, may_swap: bool) -> tuple[Fit, bool]:
-        """Each finding's rivals in the final model; a better one takes the seat, and the round has to be run again."""
-        self.rivals = {}
-        for effect in final.effects:
-            self.note(None, f"rivals of {effect.replace('_', ' ')}")
-            gain, rivals = search.rivals(final, effect, self._twins_here(effect))
-            self.rivals[effect] = (gain, rivals)
-            if not rivals:
-                continue
-            contained = effect in CANDIDATES[rivals[0].effect].parents
-            if may_swap and rivals[0].behind < -(search.threshold if contained else SWAP):
-                return search.thinned(with_second_mass(self.problem, rivals[0].fit)), True
-        return final, False
+    def take(self, found: Extension) -> None:
+        """The result of a search, and what it leaves."""
+        self.base, self.final, self.rivals = found.base, found.final, found.rivals
+        self.adequate = found.search.only_noise(self.final, GATE)
+        self.left = leftover(self.problem, self.driven, self.final)
 
     def report(self, seed: int) -> Diagnosis:
         """Everything the user sees."""
         self.note(0.9, "measuring the gain")
+        gains = self._accepted_gains()
         driver = self.left.driver if self.adequate else self.left.strongest
-        causes = [e for e in self.final.effects if not self._only_describes(e, driver)]
+        search = self.found.search
+        causes = [
+            e for e in self.final.effects if not only_describes(search, self.final, e, self.rivals[e][0], driver, self.left)
+        ]
+        offset = offset_of(search, self.found.decided)
         estimates = estimates_of(self.problem, self.final)
-        gains = measured_gains(
-            self.clean,
-            self.held,
-            self.controller,
-            self.idn.model,
-            self.final,
-            self.problem,
-            self.noise,
-            self.at_controller.effects,
-        )
         findings = [*self._noise_findings(), *(replace(f, gain=gains.of(f.effect)) for f in self.controller_steps)]
         for effect in causes:
             gain, rivals = self.rivals[effect]
-            alternatives = self._alternatives(effect, rivals)
+            alternatives = self._alternatives(effect, rivals, offset is None)
             findings.append(
                 Finding(
                     effect=effect,
@@ -239,7 +196,7 @@ class _Work:
                     alternatives=alternatives,
                     gain=gains.of(effect),
                     delta_bic=gain,
-                    evidence=evidence_of(effect, gain, alternatives),
+                    evidence=evidence_of(effect, gain, alternatives, offset),
                 )
             )
         model = self.final.layout.model(self.final.x)
@@ -295,27 +252,36 @@ class _Work:
             records=self.records,
         )
 
-    def _only_describes(self, effect: str, driver: str | None) -> bool:
-        """Whether a finding describes something that is not in the library.
+    def _accepted_gains(self) -> Gains:
+        """The gains, once every effect that makes held-out data worse is out of the model."""
+        while True:
+            gains = measured_gains(
+                self.clean,
+                self.held,
+                self.controller,
+                self.idn.model,
+                self.final,
+                self.problem,
+                self.noise,
+                self.at_controller.effects,
+            )
+            if not gains.harmful:
+                return gains
+            effect = gains.harmful[-1]
+            self.notes.append(
+                f"{effect.replace('_', ' ').capitalize()} would come closer to these records, but makes the held-out data worse: "
+                "it is not accepted."
+            )
+            self.final = self.found.search.without(self.final, effect)
+            self.left = leftover(self.problem, self.driven, self.final)
+            self.adequate = self.found.search.only_noise(self.final, GATE)
 
-        So it is where a free function of one signal in its place explains more, and where what is left, in the finding's own
-        domain, is of the finding's size.
-        """
-        gain = self.rivals[effect][0]
-        instead = leftover(self.problem, self.driven, self.seeker.without(self.final, effect)).gains
-        if max(instead.values()) > gain + MARGIN:
-            return True
-        if driver is None or self.left.gains[driver] < OF_ITS_SIZE * gain:
-            return False
-        domain = DOMAINS.get(effect)
-        return domain == driver or (domain in FRICTION_DOMAIN and driver in FRICTION_DOMAIN)
-
-    def _alternatives(self, effect: str, rivals: Sequence[Rival]) -> tuple[str, ...]:
-        """Statistical rivals and structural twins."""
+    def _alternatives(self, effect: str, rivals: Sequence[Rival], even: bool) -> tuple[str, ...]:
+        """Statistical rivals and structural twins; even: friction of two levels has one viscous part, and is a load as well."""
         names = [r.effect for r in rivals]
         names += sorted(self._twins_here(effect))
         for twins in TWINS:
-            if effect in twins:
+            if effect in twins and (even or effect != "asymmetric_friction"):
                 names += [t for t in sorted(twins) if t != effect]
         return tuple(dict.fromkeys(names))
 

@@ -36,7 +36,8 @@ class Driven:
     """Records, each also as driven by its torque (`driven`), both with an angle, measured or integrated from the velocity.
 
     turned: the record itself with that angle; free: torque-driven, without an angle that was not measured; read: the records
-    as the controller read them, which may hold samples that the fit leaves out.
+    as the controller read them, which may hold samples that the fit leaves out. finest: no substep of a simulation is much
+    shorter [s]; known_noise: standard deviation of the velocity's noise where the records cannot show it.
     """
 
     records: tuple[Record, ...]
@@ -47,6 +48,8 @@ class Driven:
     moving: tuple[bool, ...]
     spoiled: bool = False
     read: tuple[Record, ...] = ()
+    finest: float = FINEST
+    known_noise: float | None = None
 
     @classmethod
     def of(
@@ -131,7 +134,7 @@ class Driven:
         """As many for every model with effects, so that no candidate is ahead for being simulated more finely."""
         if not set(effects) - {"extra_resonance"}:
             return None
-        return int(2 ** np.clip(np.ceil(np.log2(self.records[0].dt / FINEST)), 0.0, 5.0))
+        return int(2 ** np.clip(np.ceil(np.log2(self.records[0].dt / self.finest)), 0.0, 5.0))
 
     def _predict_one(self, layout: Layout, x: Vector, at_controller: Sequence[str]) -> Matrix:
         """With effects of the controller the torque itself depends on x."""
@@ -149,6 +152,8 @@ class Driven:
     @cached_property
     def noise(self) -> float:
         """Standard deviation of white noise on the velocity, as its third differences show it [rad/s]."""
+        if self.known_noise is not None:
+            return self.known_noise
         rounding = float(quantisation(self.records) / np.sqrt(12.0))
         return max(float(np.mean([noise_std(r.velocity) for r in self.records])), rounding)
 

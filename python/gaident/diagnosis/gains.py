@@ -30,17 +30,23 @@ Vector = NDArray[np.float64]
 SHARE = 0.7  # of a record that parameters are fitted to
 LEAST = 600  # samples of a record from which a part is held out
 BLOCKS = 200  # bootstrap draws
+HARM = 0.02  # of the held-out error, that an effect has to add to it before it is refused
+IN_SAMPLE = "in-sample"
 
 
 @dataclass(frozen=True)
 class Gains:
-    """before, after, interval of the total fall, how it was held out, and each effect's own fall."""
+    """before, after, interval of the total fall, how it was held out, and each effect's own fall.
+
+    harmful: effects without which the extended model is better on the held-out data, beyond chance.
+    """
 
     before: Fitness
     after: Fitness
     interval: tuple[float, float]
     held_out: str
     steps: dict[str, float]
+    harmful: tuple[str, ...] = ()
 
     def of(self, effect: str) -> float:
         """Fall of the error that one effect brought, as a fraction of the error before it."""
@@ -64,7 +70,7 @@ def measured_gains(
         judged = [(r, int(SHARE * len(r))) for r in records]
         words, part = "the last 30 % of the record, parameters fitted to the first 70 %", SHARE
     else:
-        judged, words, part = [(r, 0) for r in records], "in-sample", None
+        judged, words, part = [(r, 0) for r in records], IN_SAMPLE, None
     stages = _stages(final, problem, part)
     chain = [linear]
     if at_controller:
@@ -91,7 +97,30 @@ def measured_gains(
         rmse = float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
         return Fitness(rmse, 100.0 * (1.0 - rmse / size) if size > 0.0 else float("nan"), floor)
 
-    return Gains(fitness(errors[0]), fitness(errors[-1]), _interval(errors[0], errors[-1]), words, steps)
+    harmful = []
+    for effect in final.effects if words != IN_SAMPLE else ():
+        less = stages[0] if len(final.effects) == 1 else _without(stages[-1], effect, _part(problem, part))
+        spared = free_run_errors(_with(less.layout.model(less.x), at_controller), judged, controller)
+        level = float(np.sqrt(np.mean(np.concatenate(spared) ** 2)))
+        if level < (1.0 - HARM) * levels[-1] and _interval(spared, errors[-1])[1] < 0.0:
+            harmful.append(effect)
+    return Gains(fitness(errors[0]), fitness(errors[-1]), _interval(errors[0], errors[-1]), words, steps, tuple(harmful))
+
+
+def _without(fit: Fit, effect: str, problem: Problem) -> Fit:
+    return problem.fit(fit.layout.without(effect), fit.layout.removed(fit.x, effect), fit.noise, 10)
+
+
+def _part(problem: Problem, part: float | None) -> Problem:
+    """The problem with the last of each record left out."""
+    if part is None:
+        return problem
+    weight = problem.weight.copy()
+    at = 0
+    for n in problem.lengths:
+        weight[at + int(part * n) : at + n] = 0.0
+        at += n
+    return replace(problem, weight=weight)
 
 
 def _with(model: Model, effects: dict[str, dict[str, float]]) -> Model:
@@ -102,13 +131,7 @@ def _with(model: Model, effects: dict[str, dict[str, float]]) -> Model:
 
 def _stages(final: Fit, problem: Problem, part: float | None) -> list[Fit]:
     """The final model without its effects, with the first, the first two, ...; each refitted to the part that is not held out."""
-    if part is not None:
-        weight = problem.weight.copy()
-        at = 0
-        for n in problem.lengths:
-            weight[at + int(part * n) : at + n] = 0.0
-            at += n
-        problem = replace(problem, weight=weight)
+    problem = _part(problem, part)
     fits = []
     layout, x = final.layout, final.x
     for e in reversed(final.layout.effects):

@@ -21,7 +21,7 @@ from gaident.models.factors import Structure
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
 
-__all__ = ["Layout", "described", "mechanism", "parameter_names", "two_masses"]
+__all__ = ["Layout", "described", "is_mechanism", "mechanism", "parameter_names", "two_masses"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -213,3 +213,11 @@ def two_masses(layout: Layout, x: Vector) -> Model:
     wp, zp, wz, zz = layout.effect_values(x[None, :], "extra_resonance")[0]
     poles = [complex(-a), *quadratic_roots(2.0 * zp * wp, wp**2)]
     return Model(K * (wp / wz) ** 2, poles, quadratic_roots(2.0 * zz * wz, wz**2))
+
+
+def is_mechanism(layout: Layout, x: Vector) -> bool:
+    """Whether two masses are two masses on a shaft: sum of pairwise A = K_G (1/J_M + 1/J_L) is above prod B = K_G/J_L."""
+    if layout.masses == 1:
+        return True
+    _, a, e1, e0, _, f0 = layout.base_values(x[None, :])[0]
+    return bool(e0 + a * e1 > f0)

@@ -29,9 +29,10 @@ LEFT = 40.0
 
 @dataclass(frozen=True)
 class Leftover:
-    """Gains [BIC units] by driver, and the strongest where it counts."""
+    """Gains [BIC units] by driver, and the strongest where it counts; least: squared plain errors beside each driver's family."""
 
     gains: dict[str, float]
+    least: dict[str, float]
     line: tuple[float, float] | None = None  # (frequency [Hz], torque [N m]) where "time" is one
 
     @property
@@ -76,7 +77,8 @@ def leftover(problem: Problem, driven: Driven, fit: Fit) -> Leftover:
         gain = none - judge.bic(lines[i : i + 2]) - np.log(problem.count)
         if gain > gains["time"]:
             gains["time"], line = gain, torque_of_line(problem, driven, fit, J, error, lines[i : i + 2])
-    return Leftover({driver: float(gain) for driver, gain in gains.items()}, line)
+    least = {driver: problem.plain(np.vstack([J, rows]), error) for driver, rows in columns.items()}
+    return Leftover({driver: float(gain) for driver, gain in gains.items()}, least, line)
 
 
 class _Judge:
@@ -89,7 +91,7 @@ class _Judge:
         sizes = np.sqrt(np.einsum("ij,ij->i", columns, columns))
         columns = columns[sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)]
         rows = np.vstack([self.J, columns])
-        n, noise = self.problem.count, self.noise
+        noise = self.noise
         best = np.inf
         for _ in range(3):
             A, v = self.problem.whitened(rows, noise), self.problem.whitened(self.error[None, :], noise)[0]
@@ -97,7 +99,7 @@ class _Judge:
             scale[scale == 0.0] = 1.0
             coefficients, _, rank, _ = np.linalg.lstsq((A / scale[:, None]).T, v, rcond=1e-8)
             left = v - (coefficients / scale) @ A
-            best = min(best, n * np.log(max(float(left @ left), 1e-300) / n) + (int(rank) + noise.size) * np.log(n))
+            best = min(best, self.problem.bic(float(left @ left), noise, int(rank)))
             noise = self.problem.filter_of(self.error - (coefficients / scale) @ rows, self.looped)
         return float(best)
 

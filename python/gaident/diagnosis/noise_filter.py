@@ -17,13 +17,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.state_space import Discretised, discretised, disturbed, steady_covariance
 from gaident.errors import GaidentError
-from gaident.identification.noise import fit_autoregression
+from gaident.identification.noise import autocorrelation, autoregression_of, fit_autoregression, highest_order
 from gaident.models.controller import PI
 from gaident.models.model import Model
 
@@ -45,6 +46,14 @@ class NoiseFilter:
     b: Vector = field(default_factory=lambda: np.ones(1))
     a: Vector = field(default_factory=lambda: np.ones(1))
     size: int = 0
+
+    @cached_property
+    def power(self) -> float:
+        """Sum of the squared impulse response: what becomes of white noise of variance 1."""
+        if len(self.a) == 1:
+            return float(self.b @ self.b)
+        h = self.of(np.eye(1, 4096), (4096,))
+        return float(h[0] @ h[0])
 
     def of(self, E: Matrix, lengths: Sequence[int]) -> Matrix:
         """Rows of v, each record by itself with its past at 0."""
@@ -72,15 +81,24 @@ class NoiseFilter:
 WHITE = NoiseFilter()
 
 
-def autoregression(parts: Sequence[Vector], highest: int = HIGHEST) -> Vector:
-    """Coefficients by least squares, order by BIC: of strong colour the biased autocovariance takes too little."""
-    order = fit_autoregression(parts, highest).order
+def autoregression(parts: Sequence[Vector], highest: int = HIGHEST, floor: float = 0.0) -> Vector:
+    """Coefficients by least squares, order by BIC: of strong colour the biased autocovariance takes too little.
+
+    floor: variance of white noise that is taken to be on the parts beside what they show.
+    """
+    if floor == 0.0:
+        order = fit_autoregression(parts, highest).order
+    else:
+        total = sum(len(e) for e in parts)
+        products = np.sum([autocorrelation(e, highest_order([len(e) for e in parts], highest)) for e in parts], axis=0)
+        products[0] += floor * total
+        order = autoregression_of(products, total).order
     if order == 0:
         return np.zeros(0)
     gram, right = np.zeros((order, order)), np.zeros(order)
     for e in parts:
         rows = np.lib.stride_tricks.sliding_window_view(e[:-1], order)[:, ::-1]
-        gram += rows.T @ rows
+        gram += rows.T @ rows + floor * len(rows) * np.eye(order)
         right += rows.T @ e[order:]
     return np.asarray(np.linalg.lstsq(gram, right, rcond=1e-13)[0], dtype=np.float64)
 
@@ -121,7 +139,7 @@ class ShaftNoise:
         return NoiseFilter(np.asarray(np.poly(roots).real), np.asarray(np.poly(filtered).real), 2)
 
     def best(self, cost: Callable[[NoiseFilter], float], looped: bool) -> NoiseFilter | None:
-        """The filter of least cost, downhill from the one before, or the first time from the middle of the grid in large steps."""
+        """The filter of least cost, downhill from the one before; the first time from the middle of the grid, in large steps."""
         costs: dict[tuple[int, int], float] = {}
 
         def at(k: tuple[int, int]) -> float:

@@ -11,6 +11,10 @@ Every hypothesis is judged with a noise filter H^-1 of its own, which is part of
     BIC = N ln(V / N) + (k + size of H) ln N
 
 so that no effect is whitened away by a filter that was estimated without it, and none is favoured by one estimated with it.
+
+A velocity of next to no noise would let the filter judge by what is of no account: the exact instant of a reversal, the corner
+that a jump of friction makes there. White noise of a variance f is then added to the account of every hypothesis alike, as if it
+had been on the velocity: H is that of e plus this noise, and V/N above becomes V/N + f |h|^2, h the impulse response of H^-1.
 """
 
 from __future__ import annotations
@@ -58,7 +62,8 @@ class Problem:
     """Errors of many parameter vectors at once.
 
     predict(layout, X) -> simulated velocities (n, N), records one after the other; measured: (N,); lengths: samples of each
-    record; weight: (N,), 0 for samples that are left out; shaft: the noise of torques at the shaft, None: not looked for.
+    record; weight: (N,), 0 for samples that are left out; shaft: the noise of torques at the shaft, None: not looked for; floor:
+    f [(rad/s)^2].
     """
 
     predict: Predict
@@ -67,6 +72,7 @@ class Problem:
     weight: Vector
     shaft: ShaftNoise | None = None
     simulations: int = 0
+    floor: float = 0.0
 
     def errors(self, layout: Layout, X: Matrix) -> Matrix:
         """Rows of plain errors."""
@@ -121,17 +127,14 @@ class Problem:
         if float(np.abs(error).max()) >= LOST:
             return WHITE
         error = self._bridged(error[None, :])
-        plain = WHITE.then(autoregression(self._parts(error[0])))
+        plain = WHITE.then(autoregression(self._parts(error[0]), floor=self.floor))
         if self.shaft is None:
             return plain
-        shaft = self.shaft.best(lambda f: float(_sums(self.whitened(error, f))[0]), looped)
+        shaft = self.shaft.best(lambda f: self._variance(float(_sums(self.whitened(error, f))[0]), f), looped)
         if shaft is None:
             return plain
-        shaft = shaft.then(autoregression(self._parts(shaft.of(error, self.lengths)[0]), ON_TOP))
-        n = self.count
-        return min(
-            (plain, shaft), key=lambda f: n * np.log(max(float(_sums(self.whitened(error, f))[0]), 1e-300)) + f.size * np.log(n)
-        )
+        shaft = shaft.then(autoregression(self._parts(shaft.of(error, self.lengths)[0]), ON_TOP, self.floor * shaft.power))
+        return min((plain, shaft), key=lambda f: self.bic(float(_sums(self.whitened(error, f))[0]), f, 0))
 
     def _parts(self, row: Vector) -> list[Vector]:
         """The records without their heads, where filters begin."""
@@ -226,9 +229,21 @@ class Problem:
         return self._scored(fit.layout, fit.x, noise, float(_sums(self.whitened(error, noise))[0]), fit.converged)
 
     def _scored(self, layout: Layout, x: Vector, noise: NoiseFilter, cost: float, converged: bool) -> Fit:
+        return Fit(layout, x, noise, cost, self.bic(cost, noise, layout.size) if cost < WORST else np.inf, converged)
+
+    def plain(self, rows: Matrix, error: Vector) -> float:
+        """Sum of squared plain errors, beside what the rows can explain."""
+        rest = project_out(self.whitened(rows, WHITE), self.whitened(error[None, :], WHITE))[0]
+        return float(rest @ rest)
+
+    def bic(self, cost: float, noise: NoiseFilter, numbers: int) -> float:
+        """BIC of a cost V under a filter, for so many fitted numbers beside those of the filter."""
         n = self.count
-        bic = n * np.log(max(cost, 1e-300) / n) + (layout.size + noise.size) * np.log(n)
-        return Fit(layout, x, noise, cost, float(bic) if cost < WORST else np.inf, converged)
+        return float(n * np.log(self._variance(cost, noise)) + (numbers + noise.size) * np.log(n))
+
+    def _variance(self, cost: float, noise: NoiseFilter) -> float:
+        """V/N + f |h|^2."""
+        return max(cost, 1e-300) / self.count + (self.floor * noise.power if self.floor else 0.0)
 
 
 def _sums(V: Matrix) -> Vector:

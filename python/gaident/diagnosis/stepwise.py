@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.candidates import CANDIDATES, FRICTION
 from gaident.diagnosis.driven import Driven
-from gaident.diagnosis.layout import Layout, described, two_masses
+from gaident.diagnosis.layout import Layout, described, is_mechanism, two_masses
 from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import WORST, Fit, Problem
 from gaident.diagnosis.screening import Screening
@@ -243,10 +243,15 @@ class Search:
                         short[s.effect] = fit
         best = sorted(short.values(), key=lambda f: f.bic)[:FINISHED]
         fits += [self.finished(f) for f in best]
-        fits = sorted((f for f in fits if f.cost < WORST), key=lambda f: f.bic)
+        fits = sorted((f for f in fits if f.cost < WORST and self.is_mechanism(f)), key=lambda f: f.bic)
         if fits and fits[0].layout.looped:
             fits = sorted((self.in_loop(f) for f in fits[:FITTED]), key=lambda f: f.bic)
         return fits
+
+    def is_mechanism(self, fit: Fit) -> bool:
+        """Whether an extra resonance on one mass is a second mass; else it only absorbs what no mechanism does."""
+        two = with_second_mass(self.problem, fit)
+        return is_mechanism(two.layout, two.x)
 
     def in_loop(self, fit: Fit) -> Fit:
         """The better of both views: where the best candidate was judged in the loop, all have to be."""

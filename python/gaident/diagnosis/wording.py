@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from gaident.diagnosis.offset import Offset
 from gaident.models.effects import table
 
 __all__ = ["evidence_of"]
 
 
-def evidence_of(effect: str, gain: float, alternatives: Sequence[str]) -> str:
+def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None) -> str:
     """What speaks for a finding: what it does, how sure that is, what these data cannot tell from it."""
     from gaident.show.wording import certainty
 
@@ -18,4 +19,6 @@ def evidence_of(effect: str, gain: float, alternatives: Sequence[str]) -> str:
     if alternatives:
         others = " or ".join(a.replace("_", " ") for a in alternatives)
         return f"{what}, or {others}: one of these is there, {certainty(gain)} {units}; these data do not say which."
+    if effect == "asymmetric_friction" and offset is not None:
+        return f"{what}: {certainty(gain)} {units}. {offset.sentence}"
     return f"{what}: {certainty(gain)} {units}."
