@@ -38,6 +38,7 @@ from gaident.version import version
 __all__ = ["diagnose"]
 
 Vector = NDArray[np.float64]
+FREE_RUN = 5.0  # times the noise of the measured velocity: what the free run of an explained record may miss
 GATE = 1.5  # times the noise of the measured velocity: what an explained record may leave, whitened
 
 
@@ -179,6 +180,16 @@ class _Work:
         self.note(0.9, "measuring the gain")
         gains = self._accepted_gains()
         driver = self.left.driver if self.adequate else self.left.strongest
+        after = gains.after
+        if driver is None and after.rmse > FREE_RUN * after.noise_floor:
+            # A filter of coloured noise swallows a slow misfit whole; the free run does not.
+            strongest = self.left.strongest
+            driver = strongest if strongest is not None and self.left.gains[strongest] > 0.0 else "time"
+            self.notes.append(
+                f"The free run misses the velocity by {after.rmse / after.noise_floor:.0f} times its noise. In these data it passes "
+                "for a torque disturbance, but is far too large for noise: a controller or a limit that is not the one given "
+                "here, or a load that changes in time."
+            )
         search = self.found.search
         causes = [
             e for e in self.final.effects if not only_describes(search, self.final, e, self.rivals[e][0], driver, self.left)
