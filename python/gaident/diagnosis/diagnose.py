@@ -176,9 +176,11 @@ class _Work:
         gains = self._accepted_gains()
         driver = self.left.driver if self.adequate else self.left.strongest
         search = self.found.search
-        causes = [
-            e for e in self.final.effects if not only_describes(search, self.final, e, self.rivals[e][0], driver, self.left)
-        ]
+        causes = []
+        for e in self.final.effects:
+            of_class = bool(self._twins_here(e))
+            if not only_describes(search, self.final, e, self.rivals[e][0], driver, self.left, of_class):
+                causes.append(e)
         offset = offset_of(search, self.found.decided)
         estimates = estimates_of(self.problem, self.final)
         findings = [*self._noise_findings(), *(replace(f, gain=gains.of(f.effect)) for f in self.controller_steps)]
