@@ -20,7 +20,7 @@ from gaident.diagnosis.screening import Screening
 from gaident.diagnosis.stepwise import Search, with_second_mass
 from gaident.models.model import Model
 
-__all__ = ["base_fit", "linear_bases", "one_mass", "without_second_mass"]
+__all__ = ["base_fit", "linear_bases", "one_mass", "two_mass_fits", "without_second_mass"]
 
 Vector = NDArray[np.float64]
 
@@ -78,6 +78,12 @@ def _fits(problem: Problem, driven: Driven, scales: Scales, starts: list[Model])
     return [
         f for f in (base_fit(problem, driven, scales, m, 6) for m in starts) if f.cost < WORST and is_mechanism(f.layout, f.x)
     ]
+
+
+def two_mass_fits(problem: Problem, driven: Driven, scales: Scales, identified: Model, one: Fit) -> list[Fit]:
+    """Short fits of two masses that resonate as on a shaft."""
+    starts = reduced(identified) + resonant(problem, one)
+    return [f for f in _fits(problem, driven, scales, starts) if resonates(f)]
 
 
 def reduced(identified: Model) -> list[Model]:

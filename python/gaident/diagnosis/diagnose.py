@@ -191,9 +191,11 @@ class _Work:
                 "here, or a load that changes in time."
             )
         search = self.found.search
-        causes = [
-            e for e in self.final.effects if not only_describes(search, self.final, e, self.rivals[e][0], driver, self.left)
-        ]
+        causes = []
+        for e in self.final.effects:
+            of_class = bool(self._twins_here(e))
+            if not only_describes(search, self.final, e, self.rivals[e][0], driver, self.left, of_class):
+                causes.append(e)
         offset = offset_of(search, self.found.decided)
         estimates = estimates_of(self.problem, self.final)
         findings = [*self._noise_findings(), *(replace(f, gain=gains.of(f.effect)) for f in self.controller_steps)]

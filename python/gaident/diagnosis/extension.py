@@ -6,8 +6,9 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gaident.diagnosis.bases import base_fit, linear_bases, one_mass, without_second_mass
+from gaident.diagnosis.bases import base_fit, linear_bases, one_mass, two_mass_fits, without_second_mass
 from gaident.diagnosis.candidates import CANDIDATES, FRICTION, Scales
 from gaident.diagnosis.coarse import Coarse, blocks_of, moved_to
 from gaident.diagnosis.driven import AT_CONTROLLER, Driven
@@ -19,7 +20,7 @@ from gaident.models.model import Model
 __all__ = ["Extension", "extended", "numbered"]
 
 IMMATERIAL = 0.02
-"""Part of the rms error of a single linear mass that counts as noise, however little noise there is."""
+"""Part of the rms error of the linear mechanism that counts as noise, however little noise there is."""
 
 MATERIAL = 0.01
 """BIC units per sample of a long record: less, half a per cent of the whitened rms error, is significant there and no cause."""
@@ -29,6 +30,7 @@ SEEN = 0.8  # of half the sampling frequency: how far up a coarse grid shows a r
 ROUNDS = 4  # of fits and filters, at most, until the final numbers stand
 CLOSE = 4  # rivals on the coarse grid that are fitted to all samples
 
+Vector = NDArray[np.float64]
 Twins = Callable[[str], Collection[str]]
 
 
@@ -59,9 +61,7 @@ def extended(
     """The search over all samples, or on the coarse grid and then over all samples."""
     one = base_fit(problem, driven, scales, one_mass(driven, model))
     error = problem.errors(one.layout, one.x[None, :])[0]
-    immaterial = IMMATERIAL**2 * float(np.mean(error[problem.weight > 0.0] ** 2))
-    if np.isfinite(immaterial):
-        problem.floor = max(immaterial - driven.noise**2, 0.0)
+    problem.floor = _floor(problem, driven, scales, model, one, error)
     blocks = blocks_of(driven, error)
     if blocks == 1:
         search = Search(problem, driven, allowed, note)
@@ -101,6 +101,20 @@ def extended(
     done.final = numbered(problem, done.decided)
     search.problem.simulations += coarse.problem.simulations
     return done
+
+
+def _floor(problem: Problem, driven: Driven, scales: Scales, model: Model, one: Fit, error: Vector) -> float:
+    """Variance of what counts as noise beside the noise that the velocity shows [(rad/s)^2]."""
+
+    def beyond(power: float) -> float:
+        return max(IMMATERIAL**2 * power - driven.noise**2, 0.0)
+
+    floor = beyond(float(np.mean(error[problem.weight > 0.0] ** 2)))
+    if not np.isfinite(floor):
+        return 0.0
+    if floor > 0.0:  # a shaft that resonates is no misfit
+        floor = min([floor, *(beyond(f.cost / problem.count) for f in two_mass_fits(problem, driven, scales, model, one))])
+    return floor
 
 
 def numbered(problem: Problem, fit: Fit) -> Fit:

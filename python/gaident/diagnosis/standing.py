@@ -27,6 +27,9 @@ __all__ = ["only_describes", "share", "simplified"]
 STANDS = 0.95
 """Share of what a free function of the driver could explain from which a finding stands as a cause."""
 
+CLASS_STANDS = 0.5
+"""The same for a class of effects that the record cannot split: it is no name, and nothing else in the library does as much."""
+
 OF_ITS_SIZE = 0.25  # part of a finding's gain that a free function may still find beside it
 
 DOMAINS: dict[str, str] = {
@@ -41,15 +44,20 @@ DOMAINS: dict[str, str] = {
 FRICTION_DOMAIN = {"velocity", "position", "past", "time"}
 
 
-def only_describes(search: Search, final: Fit, effect: str, gain: float, driver: str | None, left: Leftover) -> bool:
-    """Whether a finding of this gain [BIC units] describes something that is not in the library."""
+def only_describes(
+    search: Search, final: Fit, effect: str, gain: float, driver: str | None, left: Leftover, of_class: bool
+) -> bool:
+    """Whether a finding of this gain [BIC units] describes something that is not in the library.
+
+    of_class: the record cannot split it from other effects, whatever its noise, and it is reported with them.
+    """
     without = search.without(final, effect)
     instead = leftover(search.problem, search.driven, without).gains
     doubtful = max(instead.values()) > gain + MARGIN
     if not doubtful and driver is not None and left.gains[driver] >= OF_ITS_SIZE * gain:
         domain = DOMAINS.get(effect)
         doubtful = domain == driver or (domain in FRICTION_DOMAIN and driver in FRICTION_DOMAIN)
-    return doubtful and share(search, without, final, left) < STANDS
+    return doubtful and share(search, without, final, left) < (CLASS_STANDS if of_class else STANDS)
 
 
 def simplified(search: Search, final: Fit, left: Leftover) -> Fit:
