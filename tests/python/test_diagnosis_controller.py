@@ -107,6 +107,16 @@ def test_an_anti_windup_is_named(hold: str) -> None:
         found = replay(rec, controller)
         assert found.cause == "anti_windup" and "(anti-windup)" in found.sentence, found.sentence
         assert found.value == 0.5 and found.controller == known
+    # A measured torque has a noisy plateau.
+    measured = rec.torque + 0.005 * np.random.default_rng(4).standard_normal(len(rec))
+    found = replay(ga.Record(DT, command=rec.command, velocity=rec.velocity, torque=measured), CONTROLLER)
+    assert found.cause == "anti_windup" and found.value == pytest.approx(0.5, rel=0.005), found.sentence
+
+
+def test_a_torque_channel_of_zeros_is_no_controller() -> None:
+    rec = limited_drive(0.5)
+    found = replay(ga.Record(DT, command=rec.command, velocity=rec.velocity, torque=np.zeros(len(rec))), CONTROLLER)
+    assert found.follows is False and found.controller is None
 
 
 def test_a_limit_that_the_log_shows_is_a_finding_and_part_of_the_model() -> None:
