@@ -17,17 +17,19 @@ J, D = 5e-4, 2e-3
 LEVELS = np.repeat((60.0, -60.0, 20.0, -40.0, 60.0, -20.0), 120)
 
 
-def limited_drive(limit: float, hold: str = "", noise: float = 0.02, seed: int = 0) -> ga.Record:
+def limited_drive(limit: float, hold: str = "", hum: float = 0.0, step: float = 0.0, seed: int = 0) -> ga.Record:
     """One mass behind a torque limit, noise inside the loop; hold: how the integrator is kept from winding up (text of HOLDS).
 
-    The controller's equations once more, sample by sample, with the exact step of the mass.
+    hum: a torque of 37 Hz at the shaft [N m]; step: resolution of the velocity [rad/s]. The controller's equations once more, sample by
+    sample, with the exact step of the mass.
     """
     rng = np.random.default_rng(seed)
     decay = math.exp(-D / J * DT)
     w = integral = last = 0.0
     seen, torques = [], []
-    for command in LEVELS:
-        y = w + noise * rng.standard_normal()
+    for n, command in enumerate(LEVELS):
+        y = w + 0.02 * rng.standard_normal()
+        y = round(y / step) * step if step else y
         e = command - y
         new = integral + 0.5 * CONTROLLER.ki * DT * (e + last)
         v = CONTROLLER.kp * e + new
@@ -39,7 +41,7 @@ def limited_drive(limit: float, hold: str = "", noise: float = 0.02, seed: int =
         last = e
         seen.append(y)
         torques.append(u)
-        w = decay * w + (1.0 - decay) * u / D
+        w = decay * w + (1.0 - decay) * (u + hum * math.sin(math.tau * 37.0 * n * DT)) / D
     return ga.Record(DT, command=LEVELS, velocity=np.array(seen), torque=np.array(torques))
 
 
@@ -107,6 +109,16 @@ def test_an_anti_windup_is_named(hold: str) -> None:
         found = replay(rec, controller)
         assert found.cause == "anti_windup" and "(anti-windup)" in found.sentence, found.sentence
         assert found.value == 0.5 and found.controller == known
+    # A measured torque has a noisy plateau.
+    measured = rec.torque + 0.005 * np.random.default_rng(4).standard_normal(len(rec))
+    found = replay(ga.Record(DT, command=rec.command, velocity=rec.velocity, torque=measured), CONTROLLER)
+    assert found.cause == "anti_windup" and found.value == pytest.approx(0.5, rel=0.005), found.sentence
+
+
+def test_a_torque_channel_of_zeros_is_no_controller() -> None:
+    rec = limited_drive(0.5)
+    found = replay(ga.Record(DT, command=rec.command, velocity=rec.velocity, torque=np.zeros(len(rec))), CONTROLLER)
+    assert found.follows is False and found.controller is None
 
 
 def test_a_limit_that_the_log_shows_is_a_finding_and_part_of_the_model() -> None:
@@ -125,3 +137,12 @@ def test_an_anti_windup_is_said_and_its_free_run_not_trusted() -> None:
     assert any("does not hold its integrator" in note for note in found.notes)
     configured = ga.diagnose(limited_drive(0.5, "held"), ga.PI(CONTROLLER.kp, CONTROLLER.ki, torque_limit=0.5))
     assert configured.findings == () and any("(anti-windup)" in note for note in configured.notes)
+
+
+def test_a_hum_gets_its_frequency_and_size_and_a_lattice_its_noise() -> None:
+    found = ga.diagnose(limited_drive(math.inf, hum=0.03, step=0.1), CONTROLLER)
+    assert found.verdict == "unexplained" and found.driver == "time" and found.line is not None, found.summary()
+    frequency, torque = found.line
+    assert frequency == pytest.approx(37.0, abs=0.3) and torque == pytest.approx(0.03, rel=0.1)
+    assert "like a torque of 37 Hz and 0.03" in " ".join(found.summary().split())
+    assert found.before.noise_floor >= 0.1 / math.sqrt(12.0)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gaident.data.record import Record
 from gaident.diagnosis.candidates import CANDIDATES, Scales
 from gaident.diagnosis.driven import AT_CONTROLLER, Driven
+from gaident.diagnosis.pi_torque import HOLDS, held_torque, pi_torque
 from gaident.diagnosis.replay import Replay, replay
 from gaident.diagnosis.replay_causes import white_noise
 from gaident.diagnosis.result import Finding
@@ -129,7 +130,7 @@ def _limit_findings(
     """What the limits that the log shows are findings of; the note that the replay wrote is their evidence."""
     given = driven.controller
     assert given is not None
-    n, before = len(plain), float(plain @ plain)
+    n, before, after = len(plain), float(plain @ plain), _left_with(driven, shown)
     held = any(r.cause == "anti_windup" for r in off)
     at = AtController((*AT_CONTROLLER, "torque_saturation"), controller=shown, follows=not held)
     if not held and shown.limits[1] == given.limits[1]:
@@ -144,8 +145,8 @@ def _limit_findings(
         at.effects[effect] = {"limit": value}
         name = "plateau of the logged torque" if effect == "torque_saturation" else "highest integral that the log shows"
         text = f"{off[0].sentence} The limit is the {name}; no model of the plant is involved."
-        resolution = max(r.resolution for r in off)
-        findings.append(_finding(effect, "limit", Estimate(value, resolution, "N m"), before, floor, floor, n, text))
+        std = max(*(r.resolution for r in off), float(np.sqrt(after / n)))
+        findings.append(_finding(effect, "limit", Estimate(value, std, "N m"), before, after, floor, n, text))
     if held:
         notes = [] if findings else notes
         notes.append(
@@ -153,6 +154,17 @@ def _limit_findings(
             "not, and says nothing about the mechanics there."
         )
     return findings, at, notes
+
+
+def _left_with(driven: Driven, controller: PI) -> float:
+    """Squared error of the logged torques that a limited controller leaves, with or without an anti-windup [(N m)^2]."""
+    total = 0.0
+    for r in driven.read:
+        assert r.command is not None and r.torque is not None
+        made = [pi_torque(r.command, r.velocity, r.dt, controller)]
+        made += [held_torque(r.command, r.velocity, r.dt, controller, rule) for rule in HOLDS]
+        total += min(float(np.sum((r.torque - u) ** 2)) for u in made)
+    return total
 
 
 def _finding(effect: str, name: str, estimate: Estimate, before: float, after: float, floor: float, n: int, text: str) -> Finding:

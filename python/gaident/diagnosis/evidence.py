@@ -84,6 +84,6 @@ def velocity_curve(dia: Diagnosis, low: float, high: float) -> Curve | None:
 
 
 def _title(dia: Diagnosis, rec: Record, count: int) -> str:
-    found = ", ".join(f.effect.replace("_", " ") + ("" if f.named else " (or another)") for f in dia.causes)
+    found = ", ".join(" or ".join((f.effect, *f.alternatives)).replace("_", " ") for f in dia.causes)
     of = f"{rec.name or 'record'}, the longest of {count}: " if count > 1 else f"{rec.name}: " if rec.name else ""
     return f"{of}{dia.verdict}{f' - {found}' if found else ''}"

@@ -19,7 +19,7 @@ Vector = NDArray[np.float64]
 
 SHIFTS = (0, 1, -1, 2, -2)  # samples by which what the controller saw may be older (+) than the log's
 RULES = ("trapezoidal", "rectangular", "rectangular, old error")
-PLATEAU = 5  # samples at the highest torque from which it is a limit
+PLATEAU = 5  # samples at a limit from which it is one that an integrator is held at
 SAME = 2e-3  # relative difference below which a fitted gain is the configured one
 
 
@@ -88,11 +88,12 @@ def _start(case: _Case) -> Iterator[Explanation]:
 def _limits(case: _Case) -> Iterator[Explanation]:
     """Clamps that are not configured act where the log shows their plateaus."""
     controller, highest = case.controller, float(np.abs(case.logged).max())
-    if controller.torque_limit is None or highest < 0.999 * controller.torque_limit:
-        acting = int(np.sum(np.abs(case.logged) >= 0.999 * highest))
-        sentence = f"It does with a torque limit of {highest:.4g} N m, which acts at {acting} samples."
-        limited = replace(controller, torque_limit=highest)
-        yield Explanation(case.torque(limited), "torque_limit", highest, sentence, controller=limited)
+    if not highest > 0.0:
+        return
+    for limited in _limited(case):
+        limit, torque = float(limited.limits[0]), case.torque(limited)
+        sentence = f"It does with a torque limit of {limit:.4g} N m, which acts at {_acting(torque, limit)} samples."
+        yield Explanation(torque, "torque_limit", limit, sentence, controller=limited)
     proportional = controller.kp * (case.command - case.velocity)
     for torque_limit in (controller.torque_limit, highest):
         free = np.ones(len(proportional), bool) if torque_limit is None else np.abs(case.logged) < 0.999 * torque_limit
@@ -107,20 +108,32 @@ def _limits(case: _Case) -> Iterator[Explanation]:
         yield Explanation(torque, "integrator_clamp", clamp, sentence, controller=limited)
 
 
+def _limited(case: _Case) -> list[PI]:
+    """The controller with limits that are not configured: the log's highest torque, the middle of its noisy plateau."""
+    size = np.abs(case.logged)
+    highest = float(size.max())
+    if case.controller.torque_limit is not None and highest >= 0.999 * case.controller.torque_limit:
+        return []
+    middle = float(np.median(size[size > 0.95 * highest]))
+    return [replace(case.controller, torque_limit=limit) for limit in dict.fromkeys((highest, middle))]
+
+
+def _acting(torque: Vector, limit: float) -> int:
+    return int(np.sum(np.abs(torque) >= 0.999 * limit))
+
+
 def _held(case: _Case) -> Iterator[Explanation]:
     """A torque limit, configured or seen as a plateau of the log, at which the integrator does not wind up."""
-    controller, highest = case.controller, float(np.abs(case.logged).max())
-    acting = int(np.sum(np.abs(case.logged) >= 0.999 * highest))
-    if acting < PLATEAU or not controller.ki:
+    if not case.controller.ki or not np.any(case.logged):
         return
-    limited = controller
-    if controller.torque_limit is None or highest < 0.999 * controller.torque_limit:
-        limited = replace(controller, torque_limit=highest)
-    value = float(limited.limits[0])
-    for rule, words in HOLDS.items():
-        torque = held_torque(case.command, case.velocity, case.dt, limited, rule)
-        sentence = f"It does with {words} (anti-windup): the limit of {value:.4g} N m acts at {acting} samples."
-        yield Explanation(torque, "anti_windup", value, sentence, controller=limited)
+    for limited in _limited(case) or [case.controller]:
+        limit = float(limited.limits[0])
+        for rule, words in HOLDS.items():
+            torque = held_torque(case.command, case.velocity, case.dt, limited, rule)
+            acting = _acting(torque, limit)
+            if acting >= PLATEAU:
+                sentence = f"It does with {words} (anti-windup): the limit of {limit:.4g} N m acts at {acting} samples."
+                yield Explanation(torque, "anti_windup", limit, sentence, controller=limited)
 
 
 def _rate(case: _Case) -> Iterator[Explanation]:
@@ -204,7 +217,7 @@ def _named(controller: PI, kp: float, ki: float, start: float, shift: int, rule:
         if not cause:
             cause, value = "initial_integral", start
     sentence = f"It does with {', and '.join(differs) or 'these gains'}."
-    known = cause in ("gains", "scale") and rule == RULES[0] and kp >= 0.0 and ki >= 0.0
+    known = cause in ("gains", "scale") and rule == RULES[0] and kp >= 0.0 and ki >= 0.0 and kp + ki > 0.0
     found = replace(controller, kp=kp, ki=ki) if known else None
     return Explanation(torque, cause or "gains", value, sentence, abs(shift), len(differs) + 2 * (cause == "gains"), found)
 
