@@ -98,8 +98,9 @@ def _part_words(part: Part, seeds: int) -> dict[str, str]:
 def _friction_words(f: FrictionTest) -> str:
     before, after = f.diagnosis.before, f.diagnosis.after
     return (
-        f"The step alone: {f.step_only.verdict}. With reversals: {named(f)}. Free-run error on {f.diagnosis.held_out}: "
-        f"{before.rmse:.3f} rad/s with the linear model, {after.rmse:.3f} with the extended one; the noise leaves {after.noise_floor:.3f}."
+        f"The step alone: {f.step_only.verdict}. With reversals: {named(f)}. "
+        f"Free-run error on {f.diagnosis.held_out}: {before.rmse:.3f} rad/s with the linear model, {after.rmse:.3f} with the "
+        f"extended one; the noise leaves {after.noise_floor:.3f}."
     )
 
 
