@@ -12,7 +12,8 @@ from scipy import io
 
 import gaident as ga
 from gaident.paper.experiment import rig_of
-from gaident.paper.facts import MECHANISMS
+from gaident.paper.facts import MECHANISMS, SAMPLES
+from gaident.paper.friction import LEVELS, OTHER_LEVELS
 
 Vector = np.ndarray
 
@@ -52,8 +53,7 @@ def rig_tasks() -> list[Task]:
     tasks = []
     for mechanism in MECHANISMS:
         rig = rig_of(mechanism)
-        train = np.repeat([43.6, -43.6, 20.0, -20.0, 0.0, 10.0, -10.0, 30.0], 250)
-        test = np.repeat([-30.0, 15.0, -5.0, 40.0, -40.0, 5.0, 25.0, 0.0], 250)
+        train, test = np.repeat(LEVELS, SAMPLES), np.repeat(OTHER_LEVELS, SAMPLES)
         name = f"rig, {mechanism.words}"
         tasks.append(Task(name, rig.record(train, 1), rig.record(test, 2), rig.controller, "rad/s", 1.0, (1, 4, 16)))
     return tasks

@@ -175,6 +175,9 @@ def test_the_friction_is_named_and_the_mechanics_return(made: tuple[Path, dict[s
     assert finding["parameters"]["torque"] == pytest.approx(FRICTION.coulomb, rel=0.02)
     assert finding["parameters"]["static_torque"] == pytest.approx(FRICTION.static, rel=0.05)
     assert finding["parameters"]["stribeck_velocity"] == pytest.approx(FRICTION.stribeck_velocity, rel=0.2)
+    assert found["held_out"] == "validation records"
+    before, after = found["rmse"]
+    assert before > 2.0 * after and after == pytest.approx(0.3, rel=0.1)
     damping = "D" if mechanism is ONE_MASS else "DM"
     assert found["linear"][damping] > 1.4 * found["nominal"][damping]
     assert found["linear_on_the_step"][damping] > 1.4 * found["nominal"][damping]

@@ -16,12 +16,16 @@ from gaident.paper.rig import Friction
 
 __all__ = ["FrictionTest", "friction_test"]
 
-LEVELS = (STEP, -STEP, 20.0, -20.0, 0.0, 10.0, -10.0, 30.0)  # rad/s, SAMPLES each
+# rad/s, SAMPLES each
+LEVELS = (STEP, -STEP, 20.0, -20.0, 0.0, 10.0, -10.0, 30.0)
+OTHER_LEVELS = (-30.0, 15.0, -5.0, 40.0, -40.0, 5.0, 25.0, 0.0)
 
 
 @dataclass(frozen=True)
 class FrictionTest:
     """Diagnoses of one mechanism: on the paper's step alone, and with a record of reversals beside it.
+
+    The second is judged on another record of reversals, which no fit sees.
 
     linear, extended: mechanics of the linear identification of these records and of the extended model's linear part, or None
     """
@@ -39,10 +43,10 @@ class FrictionTest:
 def friction_test(mechanism: Mechanism, step: Record, seed: int) -> FrictionTest:
     """step: the record of the paper's experiment on the same rig."""
     rig = rig_of(mechanism)
-    command = np.repeat(LEVELS, SAMPLES)
-    reversals = rig.record(command, seed + 1, f"reversals, {mechanism.title}")
+    reversals = rig.record(np.repeat(LEVELS, SAMPLES), seed + 1, f"reversals, {mechanism.title}")
+    others = rig.record(np.repeat(OTHER_LEVELS, SAMPLES), seed + 2, f"other reversals, {mechanism.title}")
     alone = diagnose(step, rig.controller, seed=seed)
-    found = diagnose([step, reversals], rig.controller, seed=seed)
+    found = diagnose([step, reversals], rig.controller, validation=others, seed=seed)
     return FrictionTest(
         mechanism,
         rig.friction,

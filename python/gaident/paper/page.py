@@ -91,12 +91,17 @@ def _part_words(part: Part, seeds: int) -> dict[str, str]:
         "conventional": tables.conventional_table(part, seeds),
         "damping": _mean_deviation(part, damping),
         "friction_table": tables.friction_table(part),
-        "friction_words": html.escape(
-            f"The step alone: {f.step_only.verdict}. With reversals: {named(f)}. Free-run error {f.diagnosis.before.rmse:.3f} "
-            f"rad/s with the linear model, {f.diagnosis.after.rmse:.3f} with the extended one ({f.diagnosis.held_out}); the "
-            f"noise leaves {f.diagnosis.after.noise_floor:.3f}."
-        ),
+        "friction_words": html.escape(_friction_words(f).replace("+-", "\N{PLUS-MINUS SIGN}")),
     }
+
+
+def _friction_words(f: FrictionTest) -> str:
+    before, after = f.diagnosis.before, f.diagnosis.after
+    return (
+        f"The step alone: {f.step_only.verdict}. With reversals: {named(f)}. "
+        f"Free-run error on {f.diagnosis.held_out}: {before.rmse:.3f} rad/s with the linear model, {after.rmse:.3f} with the "
+        f"extended one; the noise leaves {after.noise_floor:.3f}."
+    )
 
 
 def _bilinear(step: StepTest) -> str:

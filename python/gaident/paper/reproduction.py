@@ -164,6 +164,8 @@ def _part_dict(part: Part) -> dict[str, Any]:
                 }
                 for f in friction.diagnosis.findings
             ],
+            "held_out": friction.diagnosis.held_out,
+            "rmse": [friction.diagnosis.before.rmse, friction.diagnosis.after.rmse],
             "nominal": values(part.mechanism.sheet),
             "linear_on_the_step": values(friction.linear_step),
             "linear": values(friction.linear),
