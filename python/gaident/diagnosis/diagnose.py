@@ -187,8 +187,8 @@ class _Work:
             driver = strongest if strongest is not None and self.left.gains[strongest] > 0.0 else "time"
             self.notes.append(
                 f"The free run misses the velocity by {after.rmse / after.noise_floor:.0f} times its noise. In these data that "
-                "passes for a torque disturbance, but is far too large for noise: a controller or a limit that is not the one given "
-                "here, or a load that changes in time."
+                "passes for a torque disturbance, but is far too large for noise: a controller or a limit that is not the one "
+                "given here, or a load that changes in time."
             )
         search = self.found.search
         causes = []
