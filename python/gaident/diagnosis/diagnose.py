@@ -74,16 +74,21 @@ def diagnose(
     checked(records, held, controller, identification, bootstrap, seed, progress)
     noise_std = noise_std_of(noise)
     controller, notes = as_logged(records, controller)
-    note(0.02, "identifying the linear model")
-    idn = identification if identification is not None else identify(list(records), controller, seed=seed)
-    work = _Work(records, held, controller, idn, noise_std, note, notes)
-    work.search()
-    result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap)
-    if bootstrap:
-        from gaident.diagnosis.bootstrap import with_p_value
+    import scipy.linalg  # noqa: F401  brings a BLAS of its own, to be limited too
+    from threadpoolctl import threadpool_limits
 
-        search = work.found.search
-        result = with_p_value(result, search, work.base, work.final, bootstrap, seed, lambda message: note(None, message))
+    # A sum that several threads share is rounded otherwise with each number of them, and a search follows the last digit.
+    with threadpool_limits(1, user_api="blas"):
+        note(0.02, "identifying the linear model")
+        idn = identification if identification is not None else identify(list(records), controller, seed=seed)
+        work = _Work(records, held, controller, idn, noise_std, note, notes)
+        work.search()
+        result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap)
+        if bootstrap:
+            from gaident.diagnosis.bootstrap import with_p_value
+
+            search = work.found.search
+            result = with_p_value(result, search, work.base, work.final, bootstrap, seed, lambda message: note(None, message))
     object.__setattr__(result, "seconds", time.perf_counter() - began)
     return result
 
