@@ -53,8 +53,8 @@ def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]
     for noise in (WHITE, two.noise):
         for s in screening.ranked(noise)[:3]:
             if s.effect not in tried:
-                near = problem.judged(problem.fit(s.layout, s.starts[0], noise, 5)).bic - two.bic < NEAR * problem.count
-                if near:
+                short = problem.judged(problem.fit(s.layout, s.starts[0], noise, 5))
+                if short.bic - two.bic < NEAR * problem.count:
                     return [one, two]
             tried.add(s.effect)
     return [two]

@@ -177,7 +177,7 @@ class _Work:
     def take(self, found: Extension) -> None:
         """The result of a search, and what it leaves."""
         self.base, self.final, self.rivals = found.base, found.final, found.rivals
-        self.adequate = found.search.only_noise(self.final, GATE)
+        self.adequate = found.search.fitter.only_noise(self.final, GATE)
         self.left = leftover(self.problem, self.driven, self.final)
 
     def report(self, seed: int) -> Diagnosis:
@@ -292,7 +292,7 @@ class _Work:
             )
             self.final = self.found.search.without(self.final, effect)
             self.left = leftover(self.problem, self.driven, self.final)
-            self.adequate = self.found.search.only_noise(self.final, GATE)
+            self.adequate = self.found.search.fitter.only_noise(self.final, GATE)
 
     def _alternatives(self, effect: str, rivals: Sequence[Rival], even: bool) -> tuple[str, ...]:
         """Statistical rivals and structural twins; even: friction of two levels has one viscous part, and is a load as well."""

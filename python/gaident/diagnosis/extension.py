@@ -148,7 +148,7 @@ def _found(search: Search, scales: Scales, model: Model) -> tuple[Fit, Fit]:
         # On a coarse grid a resonance beyond what it shows is some other thing of short times: all samples will tell.
         if not ends or scales.blocks == 1 or _resonance(end) < SEEN * np.pi / scales.dt:
             ends.append((base, end))
-        if search.only_noise(end):
+        if search.fitter.only_noise(end):
             break
     return min(ends, key=lambda e: e[1].bic)
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.candidates import CANDIDATES, FRICTION
 from gaident.diagnosis.driven import Driven
+from gaident.diagnosis.fitter import Fitter
 from gaident.diagnosis.layout import Layout, described, is_mechanism, two_masses
 from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import WORST, Fit, Problem
@@ -36,8 +37,6 @@ SHORT = 400.0
 
 HINT = 8.0
 """Fall of N ln V from which a generalisation is no longer ruled out by the simpler effect it contains."""
-
-OF_ANGLE = ("unbalance", "cogging", "velocity_ripple")
 
 MOST = 4  # effects in one model
 SHARE, ROUGH_SHARE = 0.1, 0.5
@@ -63,6 +62,7 @@ class Search:
         self.problem, self.driven, self.allowed, self.note = problem, driven, tuple(allowed), note
         caution = 1.0 + SHORT / problem.count
         self.threshold, self.margin = THRESHOLD * caution, MARGIN * caution
+        self.fitter = Fitter(problem, driven)
         self.known: dict[tuple[int, frozenset[str]], list[Fit]] = {}
 
     def run(self, base: Fit) -> Fit:
@@ -76,14 +76,17 @@ class Search:
                 best = other
                 continue
             if found is not None and found.layout.looped:
-                best = self.in_loop(best)
+                best = self.fitter.in_loop(best)
             if found is None or best.bic - found.bic < self.threshold or not self.material(best, found):
                 break
-            best = self.polished(self.thinned(with_second_mass(self.problem, found)))
-            if set(best.effects) & set(FRICTION) and not self.only_noise(best):
+            best = self.fitter.polished(self.thinned(with_second_mass(self.problem, found)))
+            if set(best.effects) & set(FRICTION) and not self.fitter.only_noise(best):
                 # Driven by the torque, what nobody commanded adds up between the stops; the loop does not let it.
-                best = self.in_loop(best)
-        return best if self.only_noise(best) else self.rescued(best, base)
+                best = self.fitter.in_loop(best)
+        if self.fitter.only_noise(best):
+            return best
+        rough = [e for e in self.candidates(base.layout) if CANDIDATES[e].rough and e not in best.effects]
+        return self.fitter.rescued(best, base, rough, self.threshold)
 
     def material(self, best: Fit, found: Fit) -> bool:
         """Whether an extension explains a fair part of what the model leaves beyond the noise, or all of it.
@@ -93,7 +96,7 @@ class Search:
         """
         if set(CANDIDATES[found.effects[-1]].parents) & set(best.effects) and not self.in_both_views(best, found):
             return False
-        if self.only_noise(found, 1.15):
+        if self.fitter.only_noise(found, 1.15):
             return True
         floor = self.problem.count * self.driven.noise**2
         rough = any(CANDIDATES[e].rough for e in best.effects)
@@ -127,68 +130,6 @@ class Search:
             return None
         self.known.clear()
         return self.thinned(fit, every=True)
-
-    def rescued(self, best: Fit, base: Fit) -> Fit:
-        """Where more than noise is left at the end: a global search for each rough effect alone."""
-        for effect in (e for e in self.candidates(base.layout) if CANDIDATES[e].rough and e not in best.effects):
-            layout = replace(base.layout.extended(effect), looped=self.driven.loopable)
-            rows = np.array(CANDIDATES[effect].starts(layout.scales))
-            X = np.vstack([base.layout.inserted(base.x, z) for z in rows])
-            x = X[int(np.argmin(self.problem.costs(layout, X, WHITE)))]
-            fit = self.searched(self.problem.judged(self.problem.fit(layout, x, WHITE, 5)))
-            if best.bic - fit.bic > self.threshold:
-                best = fit
-        return best
-
-    def polished(self, fit: Fit) -> Fit:
-        """Where more than noise is left: every effect from all of its starts again, rough ones by a global search nearby."""
-        for effect in fit.effects[::-1]:
-            if self.only_noise(fit):
-                break
-            fit = min((fit, self.restarted(fit, effect)), key=lambda f: f.bic)
-            if CANDIDATES[effect].rough and not self.only_noise(fit):
-                fit = min((fit, self.searched(fit)), key=lambda f: f.bic)
-        return fit
-
-    def restarted(self, fit: Fit, effect: str) -> Fit:
-        """The best fit from an effect's starts, with the rest as it stands: the first began far from the rest's final values."""
-        rows = CANDIDATES[effect].starts(fit.layout.scales)
-        if len(rows) == 0:
-            return fit
-        limits = np.array(CANDIDATES[effect].limits(fit.layout.scales)).T
-        X = np.repeat(fit.x[None, :], len(rows), axis=0)
-        X[:, fit.layout.slot(effect)] = np.clip(np.array(rows), *limits)
-        order = np.argsort(self.problem.costs(fit.layout, X, fit.noise))[:3]
-        tries = [self.problem.judged(self.problem.fit(fit.layout, X[i], WHITE, 8)) for i in order]
-        best = min(tries, key=lambda f: f.bic)
-        return self.problem.settled(self.problem.fit(best.layout, best.x, WHITE, 12))
-
-    def searched(self, fit: Fit) -> Fit:
-        """Differential evolution around a fit: a stop or an impact more or less makes valleys that no slope leads out of."""
-        from scipy.optimize import differential_evolution
-
-        layout = replace(fit.layout, looped=self.driven.loopable)
-        limits, steps = layout.limits(), layout.steps()
-        reach = np.where(np.arange(layout.size) < layout.base, 0.15 * np.maximum(np.abs(fit.x), 0.3), 0.7 * steps)
-        reach[0] = 0.15
-        moved = np.flatnonzero(steps > 0.0)
-        low, high = np.maximum(fit.x - reach, limits[0])[moved], np.minimum(fit.x + reach, limits[1])[moved]
-        if np.any(low >= high) or not np.all(np.isfinite(fit.x)):
-            return fit
-        start = low + (high - low) * np.clip((fit.x[moved] - low) / (high - low), 1e-6, 1.0 - 1e-6)
-
-        def costs(columns: NDArray[np.float64]) -> Vector:
-            X = np.repeat(fit.x[None, :], columns.shape[1], axis=0)
-            X[:, moved] = columns.T
-            return np.log(self.problem.costs(layout, X, WHITE))
-
-        found = differential_evolution(
-            costs, list(zip(low, high, strict=True)), popsize=6, maxiter=50, x0=start, rng=0, vectorized=True,
-            updating="deferred", polish=False, tol=1e-4, mutation=(0.4, 0.9), recombination=0.9,
-        )  # fmt: skip
-        x = fit.x.copy()
-        x[moved] = found.x
-        return self.finished(self.problem.fit(layout, x, WHITE, 15))
 
     def best_gain(self, now: Fit) -> float:
         """What the best extension is worth, in BIC units."""
@@ -228,7 +169,7 @@ class Search:
             start = next(s for s in screening.ranked(WHITE) if s.effect == "coulomb_friction")
             fits.append(self.problem.settled(self.problem.fit(start.layout, start.starts[0], WHITE, 8)))
             self.add_generalisations(screening, fits[0], "coulomb_friction")
-        if self.only_noise(now):
+        if self.fitter.only_noise(now):
             # Where nothing but noise is left the linearised gains are near enough.
             hopes = [s.hope for noise in (now.noise, None) for s in screening.ranked(noise)]
             if max(hopes, default=0.0) < 0.5 * self.threshold:
@@ -242,37 +183,16 @@ class Search:
                     if s.effect not in short or fit.bic < short[s.effect].bic:
                         short[s.effect] = fit
         best = sorted(short.values(), key=lambda f: f.bic)[:FINISHED]
-        fits += [self.finished(f) for f in best]
+        fits += [self.fitter.finished(f) for f in best]
         fits = sorted((f for f in fits if f.cost < WORST and self.is_mechanism(f)), key=lambda f: f.bic)
         if fits and fits[0].layout.looped:
-            fits = sorted((self.in_loop(f) for f in fits[:FITTED]), key=lambda f: f.bic)
+            fits = sorted((self.fitter.in_loop(f) for f in fits[:FITTED]), key=lambda f: f.bic)
         return fits
 
     def is_mechanism(self, fit: Fit) -> bool:
         """Whether an extra resonance on one mass is a second mass; else it only absorbs what no mechanism does."""
         two = with_second_mass(self.problem, fit)
         return is_mechanism(two.layout, two.x)
-
-    def in_loop(self, fit: Fit) -> Fit:
-        """The better of both views: where the best candidate was judged in the loop, all have to be."""
-        if fit.layout.looped or not self.driven.loopable:
-            return fit
-        looped = replace(fit.layout, looped=True)
-        return min((fit, self.problem.settled(self.problem.fit(looped, fit.x, WHITE, 8))), key=lambda f: f.bic)
-
-    def finished(self, fit: Fit) -> Fit:
-        """A short fit taken to the end, under the filter of what it leaves itself."""
-        fit = self.problem.settled(fit if fit.converged else self.problem.fit(fit.layout, fit.x, fit.noise, 8))
-        # Found in the loop's grip or with the measured angle, the parameters may be good enough for a view that sees more.
-        views = [replace(fit.layout, looped=False)] if fit.layout.looped and not self.driven.loop_only else []
-        if not fit.layout.own_angle and not self.driven.angle_logged and set(fit.effects) & set(OF_ANGLE):
-            views.append(replace(fit.layout, own_angle=True))
-        tries = [self.problem.settled(self.problem.fit(view, fit.x, WHITE, 8)) for view in views]
-        return min((fit, *tries), key=lambda f: f.bic)
-
-    def only_noise(self, fit: Fit, slack: float = 1.1) -> bool:
-        """Whether a fit leaves, whitened, no more than `slack` times the noise that the measured velocity itself shows."""
-        return bool(np.sqrt(fit.cost / self.problem.count) < slack * self.driven.noise)
 
     def add_generalisations(self, screening: Screening, source: Fit, seat: str) -> None:
         """The rest of the friction family in the seat's place, at its level."""
@@ -362,7 +282,7 @@ class Search:
     def rivals(self, final: Fit, effect: str, twins: Collection[str] = ()) -> tuple[float, list[Rival]]:
         """(gain of `effect` in the final model, other effects in its place that come within reach, or are its twins here)."""
         less = self.without(final, effect)
-        gain = (self.in_loop(less) if final.layout.looped else less).bic - final.bic
+        gain = (self.fitter.in_loop(less) if final.layout.looped else less).bic - final.bic
         found = []
         for f in self.extensions(less):
             name = f.effects[-1]
