@@ -78,7 +78,7 @@ def diagnose(
     from threadpoolctl import threadpool_limits
 
     # A sum that several threads share is rounded otherwise with each number of them, and a search follows the last digit.
-    with threadpool_limits(1, user_api="blas"):
+    with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.02, "identifying the linear model")
         idn = identification if identification is not None else identify(list(records), controller, seed=seed)
         work = _Work(records, held, controller, idn, noise_std, note, notes)
@@ -129,6 +129,9 @@ class _Work:
         self.notes += notes
         # Limits that the log shows act in every loop that is closed for a fit.
         self.driven = replace(driven, controller=self.at_controller.controller or self.controller)
+        rate = self.at_controller.effects.get("command_rate_limit")
+        if rate is not None:
+            self.driven = self.driven.commanded(rate["rate"])
         weight = np.ones(sum(self.driven.lengths))
         at = 0
         for h, n in zip(hit, self.driven.lengths, strict=True):

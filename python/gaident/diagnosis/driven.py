@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from gaident.data.record import Record
 from gaident.diagnosis.hygiene import quantisation
 from gaident.diagnosis.layout import Layout
+from gaident.diagnosis.pi_torque import rate_limited
 from gaident.identification.space import torque_of
 from gaident.identification.starts import noise_std, starts_moving
 from gaident.models.controller import PI
@@ -205,6 +206,17 @@ class Driven:
         parts = np.split(rows, np.cumsum(self.lengths)[:-1], axis=1)
         return np.concatenate([np.asarray(lfilter(b.ravel(), a, part, axis=1)) for part in parts], axis=1)
 
+    def commanded(self, rate: float) -> Driven:
+        """The same with commands that change by `rate` [rad/s^2] at most, as the controller of a closed loop then reads them."""
+
+        def limited(records: tuple[Record, ...]) -> tuple[Record, ...]:
+            commands = [None if r.command is None else rate_limited(r.command, rate, r.dt, 0.0) for r in records]
+            return tuple(
+                Record(r.dt, c, r.velocity, r.torque, r.position, r.name) for r, c in zip(records, commands, strict=True)
+            )
+
+        return replace(self, records=limited(self.records), turned=limited(self.turned))
+
     def replayed_error(self, limits: dict[str, float]) -> Vector:
         """Logged torque minus the controller's replay with these limits, records one after the other [N m]."""
         return np.concatenate([_torque(r) - replayed(r, self.controller, limits) for r in self.read])
@@ -215,21 +227,11 @@ def replayed(rec: Record, controller: PI | None, limits: dict[str, float]) -> Ve
     assert controller is not None and rec.command is not None
     command = rec.command
     if "command_rate_limit" in limits:
-        command = rate_limited(command, limits["command_rate_limit"] * rec.dt)
+        command = rate_limited(command, limits["command_rate_limit"], rec.dt, 0.0)
     if "integrator_clamp" in limits:
         clamp = min(limits["integrator_clamp"], controller.limits[1])
         controller = replace(controller, integrator_limit=clamp)
     return torque_of(Record(rec.dt, command=command, velocity=rec.velocity), controller)
-
-
-def rate_limited(command: Vector, step: float) -> Vector:
-    """r_lim(n) = r_lim(n-1) + clip(r(n) - r_lim(n-1), +-step), from 0."""
-    out = np.empty_like(command)
-    last = 0.0
-    for n, target in enumerate(command.tolist()):
-        last += min(max(target - last, -step), step)
-        out[n] = last
-    return out
 
 
 def _with_angle(rec: Record, angle: Vector | None) -> Record:

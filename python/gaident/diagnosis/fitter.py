@@ -52,6 +52,8 @@ class Fitter:
         for effect in rough:
             layout = replace(base.layout.extended(effect), looped=self.driven.loopable)
             rows = np.array(CANDIDATES[effect].starts(layout.scales))
+            if len(rows) == 0:
+                continue
             X = np.vstack([base.layout.inserted(base.x, z) for z in rows])
             x = X[int(np.argmin(self.problem.costs(layout, X, WHITE)))]
             fit = self.searched(self.problem.judged(self.problem.fit(layout, x, WHITE, 5)))

@@ -26,21 +26,20 @@ __all__ = ["HINT", "MARGIN", "THRESHOLD", "Rival", "Search", "with_second_mass"]
 
 Vector = NDArray[np.float64]
 
-THRESHOLD = 12.0
-"""Gain in BIC units from which an extension counts in a long record; not calibrated yet."""
+THRESHOLD, SHORT = 25.0, 200.0
+"""Gain in BIC units from which an extension counts in a long record; samples of a record that needs twice that, as its noise
+filter is uncertain itself. A filter that fits the noise less than perfectly brings gains up to 25, too: beside friction, which
+lets no disturbance through at rest, and under a coarse encoder."""
 
-MARGIN = 10.0
-"""Rivals closer than this many BIC units cannot be told apart in a long record."""
-
-SHORT = 400.0
-"""Samples: a record of so few needs twice the gain and the margin, as its noise filter is uncertain itself."""
+MARGIN, MARGIN_SHORT = 10.0, 400.0
+"""Rivals closer than this many BIC units cannot be told apart in a long record; samples of a record that needs twice that."""
 
 HINT = 8.0
 """Fall of N ln V from which a generalisation is no longer ruled out by the simpler effect it contains."""
 
 MOST = 4  # effects in one model
-SHARE, ROUGH_SHARE = 0.1, 0.5
-"""Part of what a model leaves beyond the noise that an extension has to explain; the second beyond stops and impacts."""
+SHARE, BACKLASH_SHARE = 0.1, 0.5
+"""Part of what a model leaves beyond the noise that an extension has to explain; the second beside a gap."""
 
 FITTED = 6  # candidates that each of the two rankings sends into a short fit
 FINISHED = 5  # of these, how many are fitted to the end
@@ -60,8 +59,8 @@ class Search:
 
     def __init__(self, problem: Problem, driven: Driven, allowed: Sequence[str], note: Callable[[str], None]) -> None:
         self.problem, self.driven, self.allowed, self.note = problem, driven, tuple(allowed), note
-        caution = 1.0 + SHORT / problem.count
-        self.threshold, self.margin = THRESHOLD * caution, MARGIN * caution
+        self.threshold = THRESHOLD * (1.0 + SHORT / problem.count)
+        self.margin = MARGIN * (1.0 + MARGIN_SHORT / problem.count)
         self.fitter = Fitter(problem, driven)
         self.known: dict[tuple[int, frozenset[str]], list[Fit]] = {}
 
@@ -96,11 +95,11 @@ class Search:
         """
         if set(CANDIDATES[found.effects[-1]].parents) & set(best.effects) and not self.in_both_views(best, found):
             return False
-        if self.fitter.only_noise(found, 1.15):
+        if self.fitter.only_noise(found, 1.05):
             return True
         floor = self.problem.count * self.driven.noise**2
-        rough = any(CANDIDATES[e].rough for e in best.effects)
-        return best.cost - found.cost > (ROUGH_SHARE if rough else SHARE) * (best.cost - floor)
+        share = BACKLASH_SHARE if "backlash" in best.effects else SHARE
+        return best.cost - found.cost > share * (best.cost - floor)
 
     def resettled(self, found: Fit, best: Fit) -> Fit | None:
         """The two masses with the resonance that was found as their own, where that or a simple effect on it does as well.
