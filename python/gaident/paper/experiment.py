@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +72,8 @@ class StepTest:
     nominal_fitness: float
     engines: tuple[Engine, ...]
     bilinear: Identification  # the default engine with the paper's model of the loop
+    scaled_nominal: float  # fitness of the nominal model on the same rig with the loop gain of Table V
+    scaled_final: tuple[float, ...]  # and of the paper's algorithm there, each trial
 
     def engine(self, key: str) -> Engine:
         return next(e for e in self.engines if e.key == key)
@@ -90,7 +92,8 @@ def fitness(rec: Record, velocity: Vector, structure: tuple[int, int]) -> float:
 def step_test(mechanism: Mechanism, trials: int, seed: int, workers: int | None, say: Say) -> StepTest:
     """The paper's experiment: 250 samples of a step of 43.6 rad/s."""
     rig = rig_of(mechanism)
-    rec = rig.record(np.full(SAMPLES, STEP), seed, f"step, {mechanism.title}")
+    command = np.full(SAMPLES, STEP)
+    rec = rig.record(command, seed, f"step, {mechanism.title}")
     model = mechanism.sheet.model()
     nominal = simulate(model, rec, rig.controller)
     runs: dict[str, list[Identification]] = {}
@@ -103,7 +106,21 @@ def step_test(mechanism: Mechanism, trials: int, seed: int, workers: int | None,
         for key, title, settings in ENGINES
     )
     bilinear = identify(rec, mechanism.controller(), SPACE, seed=seed, workers=workers)
-    return StepTest(mechanism, rig, rec, nominal, fitness(rec, nominal, (model.p, model.q)), engines, bilinear)
+    say(f"{mechanism.title}: {trials} trials with the loop gain of Table V")
+    scaled = replace(rig, controller=mechanism.scaled_controller("sampled"))
+    other = scaled.record(command, seed, f"step with the loop gain of Table V, {mechanism.title}")
+    found = [identify(other, scaled.controller, SPACE, Settings.paper(), seed=seed + k, workers=workers) for k in range(trials)]
+    return StepTest(
+        mechanism,
+        rig,
+        rec,
+        nominal,
+        fitness(rec, nominal, (model.p, model.q)),
+        engines,
+        bilinear,
+        fitness(other, simulate(model, other, scaled.controller), (model.p, model.q)),
+        tuple(idn.fitness for idn in found),
+    )
 
 
 def error_sum(idn: Identification) -> float:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.models.simulate import simulate
+from gaident.paper.facts import STEP
 from gaident.paper.friction import FrictionTest
 from gaident.paper.reproduction import Reproduction
 from gaident.paper.rig import Friction
@@ -22,7 +23,8 @@ __all__ = ["CAPTIONS", "figures"]
 Vector = NDArray[np.float64]
 
 CAPTIONS = {
-    "fig6_nominal": "Fig. 6 on the simulated rig: velocity step of 43.6 rad/s; model with the nominal parameters of Table III.",
+    "fig6_nominal": f"Fig. 6 on the simulated rig: velocity step of {STEP:g} rad/s; model with the nominal parameters of "
+    "Table III.",
     "fig7_generations": "Fig. 7 on the simulated rig: best fitness so far, mean of the trials. The dot is what the default "
     "engine reports after the local fits at its end.",
     "fig8_identified": "Fig. 8 on the simulated rig: the identified models, the best trial of each engine.",

@@ -92,7 +92,7 @@ def reproduce(
 
     parts = []
     for mechanism in MECHANISMS:
-        step = step_test(mechanism, trials, seed, workers, lambda message: say(message, 0.03))
+        step = step_test(mechanism, trials, seed, workers, lambda message: say(message, 0.02))
         say(f"{mechanism.title}: least squares and genetic identification, {seeds} noise seeds", 0.34)
         comparisons = both(mechanism, FRICTION, seeds, seed, workers)
         say(f"{mechanism.title}: diagnosis", 0.1)
@@ -142,6 +142,11 @@ def _part_dict(part: Part) -> dict[str, Any]:
         "rig": {
             "nominal_fitness": part.step.nominal_fitness,
             "engines": {e.key: _engine_dict(e) for e in part.step.engines},
+            "with_the_loop_gain_of_table_5": {
+                "nominal_fitness": part.step.scaled_nominal,
+                "mean_fitness": float(np.mean(part.step.scaled_final)),
+                "best_fitness": min(part.step.scaled_final),
+            },
         },
         "conventional": [
             {

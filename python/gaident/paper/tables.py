@@ -28,7 +28,10 @@ Parts = tuple[Part, Part]
 def nominal_table(parts: Parts) -> str:
     """Table III's sheet values as K, A, B beside the nominal column of Table IV."""
     blocks = [
-        [(p.mechanism.words, name, ours, theirs, f"{100.0 * off:.3f} %") for name, ours, theirs, off in p.nominal.rows]
+        [
+            (p.mechanism.words, name, *map(_printed, (ours, theirs)), f"{100.0 * off:.3f} %")
+            for name, ours, theirs, off in p.nominal.rows
+        ]
         for p in parts
     ]
     return table(("", "", "from Table III", "printed", "deviation"), blocks)
@@ -147,6 +150,11 @@ def friction_table(part: Part) -> str:
 
 def _with_unit(name: str, mechanism: Mechanism) -> str:
     return f"{name} [{mechanism.sheet.UNITS[name].replace('^2', chr(0xB2))}]"
+
+
+def _printed(value: complex) -> Cell:
+    """K with the paper's six digits, roots with four."""
+    return f"{value.real:.2f}" if abs(value) >= 1e3 else value
 
 
 def _value(mechanics: Mechanics | None, name: str) -> float | None:
