@@ -20,7 +20,7 @@ from gaident.diagnosis.screening import Screening
 from gaident.diagnosis.stepwise import Search, with_second_mass
 from gaident.models.model import Model
 
-__all__ = ["base_fit", "linear_bases", "one_mass", "two_mass_fits", "without_second_mass"]
+__all__ = ["base_fit", "linear_bases", "one_mass", "resonates", "two_mass_fits", "without_second_mass"]
 
 Vector = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.diagnosis.bases import base_fit, linear_bases, one_mass, two_mass_fits, without_second_mass
+from gaident.diagnosis.bases import base_fit, linear_bases, one_mass, resonates, two_mass_fits, without_second_mass
 from gaident.diagnosis.candidates import CANDIDATES, FRICTION, Scales
 from gaident.diagnosis.coarse import Coarse, blocks_of, moved_to
 from gaident.diagnosis.driven import AT_CONTROLLER, Driven
@@ -146,7 +146,9 @@ def _found(search: Search, scales: Scales, model: Model) -> tuple[Fit, Fit]:
     for base in bases:
         end = without_second_mass(search, search.run(base))
         # On a coarse grid a resonance beyond what it shows is some other thing of short times: all samples will tell.
-        if not ends or scales.blocks == 1 or _resonance(end) < SEEN * np.pi / scales.dt:
+        # Two masses that do not swing describe something else, which one mass leaves for all to see.
+        swings = end.layout.masses == 1 or resonates(end)
+        if not ends or (swings and (scales.blocks == 1 or _resonance(end) < SEEN * np.pi / scales.dt)):
             ends.append((base, end))
         if search.fitter.only_noise(end):
             break
