@@ -112,6 +112,9 @@ def _floor(problem: Problem, driven: Driven, scales: Scales, model: Model, one: 
     floor = beyond(float(np.mean(error[problem.weight > 0.0] ** 2)))
     if not np.isfinite(floor):
         return 0.0
+    if floor > 0.0 and driven.loopable:  # what the loop does not let through is none either, as a load that adds up without it
+        inside = problem.errors(replace(one.layout, looped=True), one.x[None, :])[0]
+        floor = min(floor, beyond(float(np.mean(inside[problem.weight > 0.0] ** 2))))
     if floor > 0.0:  # a shaft that resonates is no misfit
         floor = min([floor, *(beyond(f.cost / problem.count) for f in two_mass_fits(problem, driven, scales, model, one))])
     return floor

@@ -95,7 +95,7 @@ class Search:
         """
         if set(CANDIDATES[found.effects[-1]].parents) & set(best.effects) and not self.in_both_views(best, found):
             return False
-        if self.fitter.only_noise(found, 1.05):
+        if self.fitter.only_noise(found, 1.15):
             return True
         floor = self.problem.count * self.driven.noise**2
         share = BACKLASH_SHARE if "backlash" in best.effects else SHARE
