@@ -14,7 +14,7 @@ from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import Fit
 
 NAN = math.nan
-SCALES = Scales(1e-3, 1.0, 50.0, 1.0, 1e3, 10.0, 0.02, NAN, NAN, NAN, True, 1.0)
+SCALES = Scales(1e-3, 1.0, 50.0, 1.0, 1e3, 10.0, 0.02, NAN, NAN, True, 1.0)
 
 
 def fit(model: ga.Model) -> Fit:

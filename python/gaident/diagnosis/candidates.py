@@ -31,7 +31,6 @@ class Scales:
     travel: float  # rad
     friction: float  # N m, Coulomb level as fitted alone, else a guess
     stiffness: float  # N m/rad of the shaft; nan where the model has one mass
-    load_inertia: float  # kg m^2; nan where the model has one mass
     resonance: float  # rad/s of the model's fastest pole pair; nan where it has none
     two_masses: bool
     integral: float  # N m, largest integrator state of the controller's replay; nan without a controller
@@ -75,7 +74,7 @@ class Candidate:
         return len(self.limits(_UNIT))
 
 
-_UNIT = Scales(1e-3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 100.0, True, 1.0)
+_UNIT = Scales(1e-3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 100.0, True, 1.0)
 
 FRICTION = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "presliding_friction", "friction_drift")
 """Dry friction and its generalisations: a model holds one of them."""

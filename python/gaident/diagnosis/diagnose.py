@@ -360,7 +360,6 @@ def _scales(driven: Driven) -> Scales:
         travel=float(np.ptp(angle)),
         friction=0.02 * torque,
         stiffness=float("nan"),
-        load_inertia=float("nan"),
         resonance=float("nan"),
         two_masses=False,
         integral=integral,

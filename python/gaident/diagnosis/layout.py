@@ -53,9 +53,7 @@ def described(scales: Scales, model: Model) -> Scales:
     # sum of pairwise A = K_G (1/J_M + 1/J_L) and prod B = K_G/J_L, dampings left out
     load = max(e0 + a * e1 - f0, 1e-3 * abs(e0))
     KG = JM * load
-    return replace(
-        scales, two_masses=True, stiffness=KG, load_inertia=KG / max(abs(f0), 1e-12), resonance=float(np.sqrt(abs(e0)))
-    )
+    return replace(scales, two_masses=True, stiffness=KG, resonance=float(np.sqrt(abs(e0))))
 
 
 @dataclass(frozen=True)

@@ -125,10 +125,13 @@ class Search:
                 start = X[int(np.argmin(self.problem.costs(longer, X, WHITE)))]
                 tries.append(self.problem.settled(self.problem.fit(longer, start, WHITE, 20)))
         fit = min(tries, key=lambda f: f.bic)
-        if fit.bic > min(found.bic + self.margin, best.bic - self.threshold):
+        if fit.bic > found.bic + self.margin:
+            return None
+        fit = self.thinned(fit, every=True)
+        if best.bic - fit.bic < self.threshold:  # thinned as well: each round is better than the last, and there is an end
             return None
         self.known.clear()
-        return self.thinned(fit, every=True)
+        return fit
 
     def best_gain(self, now: Fit) -> float:
         """What the best extension is worth, in BIC units."""
