@@ -9,85 +9,15 @@ print(idn.summary())
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import lazy_loader
 
-from gaident.data import Record, differentiate, read, read_columns
-from gaident.diagnosis import Diagnosis, Finding, Limits, Proposal, diagnose, first_experiment
-from gaident.errors import GaidentError
-from gaident.identification import (
-    Estimate,
-    Identification,
-    LeastSquares,
-    SearchSpace,
-    Settings,
-    identify,
-    least_squares,
-    m_sequence,
-)
-from gaident.models import (
-    PI,
-    Discrete,
-    Effect,
-    Model,
-    OneMass,
-    Run,
-    TwoMass,
-    effects,
-    factor_parameters,
-    initial_state,
-    mechanics_from_model,
-    model_from_factor_parameters,
-    run,
-    simulate,
-    simulate_many,
-)
-from gaident.store import load
-
-if TYPE_CHECKING:
-    __version__: str
-
-__all__ = [
-    "PI",
-    "Diagnosis",
-    "Discrete",
-    "Effect",
-    "Estimate",
-    "Finding",
-    "GaidentError",
-    "Identification",
-    "LeastSquares",
-    "Limits",
-    "Model",
-    "OneMass",
-    "Proposal",
-    "Record",
-    "Run",
-    "SearchSpace",
-    "Settings",
-    "TwoMass",
-    "diagnose",
-    "differentiate",
-    "effects",
-    "factor_parameters",
-    "first_experiment",
-    "identify",
-    "initial_state",
-    "least_squares",
-    "load",
-    "m_sequence",
-    "mechanics_from_model",
-    "model_from_factor_parameters",
-    "read",
-    "read_columns",
-    "run",
-    "simulate",
-    "simulate_many",
-]
+# The public names stand in __init__.pyi; a name's module is imported when the name is first used.
+_of_stub, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 
-def __getattr__(name: str) -> str:
+def __getattr__(name: str) -> object:
     if name == "__version__":
         from gaident.version import version
 
         return version()
-    raise AttributeError(f"module 'gaident' has no attribute {name!r}")
+    return _of_stub(name)

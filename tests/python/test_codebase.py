@@ -45,7 +45,7 @@ ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "demo": (DESK | {"diagnosis"}, {"show"}),
     "cli": (DESK | {"diagnosis", "store", "drive_file", "demo"}, {"show", "_core", "paper"}),
     "__main__": ({"cli"}, set()),
-    "__init__": (DESK | {"diagnosis", "store"}, {"show", "version"}),
+    "__init__": (set(), {"version"}),  # the rest is imported by name when it is used
 }
 
 

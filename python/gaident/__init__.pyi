@@ -1,0 +1,73 @@
+from . import errors
+from .data import Record, differentiate, read, read_columns
+from .diagnosis import Diagnosis, Finding, Limits, Proposal, diagnose, first_experiment
+from .errors import GaidentError
+from .identification import (
+    Estimate,
+    Identification,
+    LeastSquares,
+    SearchSpace,
+    Settings,
+    identify,
+    least_squares,
+    m_sequence,
+)
+from .models import (
+    PI,
+    Discrete,
+    Effect,
+    Model,
+    OneMass,
+    Run,
+    TwoMass,
+    effects,
+    factor_parameters,
+    initial_state,
+    mechanics_from_model,
+    model_from_factor_parameters,
+    run,
+    simulate,
+    simulate_many,
+)
+from .store import load
+
+__all__ = [
+    "PI",
+    "Diagnosis",
+    "Discrete",
+    "Effect",
+    "Estimate",
+    "Finding",
+    "GaidentError",
+    "Identification",
+    "LeastSquares",
+    "Limits",
+    "Model",
+    "OneMass",
+    "Proposal",
+    "Record",
+    "Run",
+    "SearchSpace",
+    "Settings",
+    "TwoMass",
+    "diagnose",
+    "differentiate",
+    "effects",
+    "errors",
+    "factor_parameters",
+    "first_experiment",
+    "identify",
+    "initial_state",
+    "least_squares",
+    "load",
+    "m_sequence",
+    "mechanics_from_model",
+    "model_from_factor_parameters",
+    "read",
+    "read_columns",
+    "run",
+    "simulate",
+    "simulate_many",
+]
+
+__version__: str
