@@ -43,9 +43,9 @@ install: .venv/.installed ## set up .venv and install the package into it
 demo: .venv/.installed ## identify a two-mass drive, find a hidden friction; text on the screen, pictures in build/demo
 	@$(BIN)/gaident demo --out "$(DEMO_DIR)"
 
-# What needs one processor (pip, mypy) and what needs all of them (the builds) side by side; alone what measures speed.
-test: ## every check: ruff, mypy, C++ tests (plain and sanitized), Python tests
-	@$(MAKE) --no-print-directory --jobs=3 --output-sync=target SIDE_BY_SIDE=yes test-sanitized lint build-checked
+# What needs one processor (mypy) beside what needs all of them (the build); alone what measures speed.
+test: ## every test, C++ and Python, and ruff and mypy
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target SIDE_BY_SIDE=yes lint build-checked
 	@$(MAKE) --no-print-directory test-checked test-python
 
 lint: .venv/.tested
@@ -61,10 +61,10 @@ build-checked: .venv/.tested
 test-checked: build-checked
 	$(CTEST) build/checked
 
-test-sanitized: .venv/.tools
+test-sanitized: .venv/.tools ## the C++ tests again under AddressSanitizer and UBSan, and every header compiled alone
 	@mkdir -p build/sanitized
 	$(CMAKE) -B build/sanitized -DGAIDENT_SANITIZE=ON -DGAIDENT_BENCH=OFF > build/sanitized/configure.log || { cat build/sanitized/configure.log; exit 1; }
-	$(BIN)/cmake --build build/sanitized
+	$(BIN)/cmake --build build/sanitized --target all all_verify_interface_header_sets
 	$(CTEST) build/sanitized
 
 test-python: .venv/.tested
