@@ -51,8 +51,8 @@ TABLES: dict[str, list[Row]] = {
     "number type": [Row("float", arithmetic="float"), Row("float, population 500", arithmetic="float", population=500)],
 }
 THREADS: list[Row] = [
-    Row("8 trials, 250 samples", trials=8, threaded=True, repeats=200),
-    Row("one trial, 25 000 samples", samples=25_000, threaded=True, repeats=200),
+    Row("8 trials, 250 samples", trials=8, threaded=True, repeats=50),
+    Row("one trial, 25 000 samples", samples=25_000, threaded=True, repeats=50),
     Row("identify(), 25 000 samples", samples=25_000, identify=True, threaded=True, repeats=30),
 ]
 
@@ -132,9 +132,9 @@ def measure(row: Row) -> dict[str, float]:
     assert abs(first.best_fitness - expected) <= tolerance * expected, f"wrong answer: {first.best_fitness}, not {expected}"
 
     estimate = time_of(lambda: search(4), clock) / 4.0
-    # Where threads are compared the shortest of many short runs counts: it finds a moment in which both processors are free.
+    # Where threads are compared the shortest of many runs counts: it finds a moment in which both processors are free.
     few = 2 if row.threaded else max(2, int(0.01 / estimate))
-    many = few + max(2, int((0.005 if row.threaded else 0.1) / estimate))
+    many = few + max(2, int((0.05 if row.threaded else 0.1) / estimate))
     pairs = [(time_of(lambda: search(few), clock), time_of(lambda: search(many), clock)) for _ in range(row.repeats)]
     middle = min if row.threaded else statistics.median  # on the wall, whatever else runs can only add
     short, long = (middle(column) for column in zip(*pairs, strict=True))
