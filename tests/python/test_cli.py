@@ -518,7 +518,7 @@ def test_examples_run(path: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "buffered"),
     # argparse itself ignores that an unbuffered --version or --help cannot be written
-    [(["--version"], True), (["--help"], True), (["demo", "--out", "."], True), (["demo", "--out", "."], False)],
+    [(["--version"], True), (["--help"], True), (["effects"], True), (["effects"], False)],
 )
 def test_a_full_output_is_1_with_buffering_and_without(arguments: list[str], buffered: bool, tmp_path: Path) -> None:
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"}
