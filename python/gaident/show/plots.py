@@ -145,7 +145,7 @@ def plot_poles_zeros(idn: Any) -> Figure:
     ax = fig.subplots()
     highest = 0.0
     for kind, marker, color in (("pole", "x", VERMILION), ("zero", "o", BLUE)):
-        points = _roots(idn.parameters, kind)
+        points = roots_of(idn.parameters, kind)
         if not points:
             continue
         x, y, dx, dy = (np.array(values) for values in zip(*points, strict=True))
@@ -245,7 +245,7 @@ def envelope(time: Vector, values: Vector, bins: int = BINS) -> tuple[Vector, Ve
     return time[picked], values[picked]
 
 
-def _roots(parameters: Any, kind: str) -> list[tuple[float, float, float, float]]:
+def roots_of(parameters: Any, kind: str) -> list[tuple[float, float, float, float]]:
     """(real, imaginary, their deviations) of every pole or zero; 0 where no deviation is known."""
     points = []
     for name, e in parameters.items():
