@@ -14,6 +14,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.evidence import velocity_curve
 from gaident.diagnosis.excitation import position_of
 from gaident.diagnosis.gains import IN_SAMPLE, SHARE, free_run_errors
+from gaident.diagnosis.hygiene import cleaned, outliers
 from gaident.diagnosis.missing_torque import missing_torque
 from gaident.diagnosis.replay import replay
 from gaident.diagnosis.result import Diagnosis
@@ -75,7 +76,7 @@ def view_of(result: Diagnosis | Identification, records: Records, validation: Re
     if not isinstance(result, Diagnosis | Identification):
         raise GaidentError(f"result is {type(result).__name__}: give a Diagnosis or an Identification")
     given = _records(records, result.records, "records")
-    held = _records(validation, getattr(result, "validation_records", ()), "validation")
+    held = _records(validation, result.validation_records if isinstance(result, Diagnosis) else (), "validation")
     known = {r.digest for r in given}
     runs = [_run(result, rec) for rec in (*given, *(r for r in held if r.digest not in known))]
     fitted = [rec for rec in given if rec.digest in result.digests] or list(given)
@@ -123,7 +124,8 @@ def _run(result: Diagnosis | Identification, rec: Record) -> Run:
     torque = replay(rec, controller).torque
     dhat, std = None, 0.0
     try:
-        missing = missing_torque(linear, rec, controller, torque)
+        hit = outliers(rec.velocity, rec.velocity - before if np.all(np.isfinite(before)) else None)
+        missing = missing_torque(linear, cleaned(rec, hit), controller, torque)
         dhat, std = missing.dhat, float(np.median(missing.std))
     except GaidentError as error:
         notes.append(f"The missing torque cannot be worked out: {error}")

@@ -101,6 +101,7 @@ class Diagnosis:
     line: tuple[float, float] | None = None
     mechanics: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
+    validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
     def __repr__(self) -> str:
         named = ", ".join(f.effect + ("" if f.named else "?") for f in self.findings if not f.is_noise)
@@ -128,6 +129,26 @@ class Diagnosis:
         if not given:
             raise GaidentError("records: a loaded diagnosis holds no data; give plot(records)")
         return overview(self, given, axis)
+
+    def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str = "rotary") -> Figure:
+        """The extended model against the frequency response of the longest record, with coherence; see Identification.plot_bode.
+
+        Friction and other effects bend the record's response; the model, simulated and estimated the same way, has them too.
+        Raises GaidentError where a loaded diagnosis is given no records, RecordError where they show no frequency response.
+        """
+        from gaident.identification.frequency import response_of
+        from gaident.show import plot_response
+
+        given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
+        if not given:
+            raise GaidentError("records: a loaded diagnosis holds no data; give plot_bode(records)")
+        return plot_response(response_of(max(given, key=len), self.model, self.controller), hz, axis)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        from gaident.show.notebook import diagnosis_html
+
+        return diagnosis_html(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, without the records."""

@@ -166,5 +166,13 @@ def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> Freque
     known = np.isfinite(value) & np.isfinite(coherence)
     frequency = np.add.reduceat(f, first) / count
     threshold = 1.0 - CHANCE ** (1.0 / np.maximum(averages - 1.0, 1.0))
-    kept = (x[known] for x in (frequency, value, np.nan_to_num(std), np.minimum(coherence, 1.0), threshold))
-    return FrequencyResponse(*kept, instrument, len(starts), 1.0 / (size * dt))
+    return FrequencyResponse(
+        frequency=frequency[known],
+        value=value[known],
+        std=np.nan_to_num(std)[known],
+        coherence=np.minimum(coherence, 1.0)[known],
+        threshold=threshold[known],
+        instrument=instrument,
+        windows=len(starts),
+        resolution=1.0 / (size * dt),
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -47,9 +48,12 @@ def run_chart(run: Run, noise: float, key: str, axis: str) -> Chart:
         top.append(series(run.time, run.extended, "extended model", "extended", dash="dash"))
         low.append(series(run.time, run.measured - run.extended, "", "extended", width=1.0))
     text = "Error: measured minus simulated. Drag over a stretch of time to zoom all panels, double-click to come back."
+    models = (run.linear, run.extended)
+    limits, said = _error_limits([run.measured - m for m in models if m is not None])
+    text += said
     panels = [
         Panel(f"velocity [{v}]", tuple(top), height=1.7),
-        Panel(f"error [{v}]", tuple(low), (Band(-2.0 * noise, 2.0 * noise, "±2 std of the noise"),)),
+        Panel(f"error [{v}]", tuple(low), (Band(-2.0 * noise, 2.0 * noise, "±2 std of the noise"),), limits=limits),
     ]
     if run.torque is not None:
         panels.append(
@@ -95,7 +99,7 @@ def missing_over_velocity(run: Run, dhat: Vector, curve: Curve | None, axis: str
         "viscous friction, a hump beside standstill Stribeck friction, an even offset a load; a gap between the two branches is "
         "an inertia that is not right, or a delay."
     )
-    panel = Panel(missing_label(axis), tuple(traces), band(run), limits=robust_limits(dhat))
+    panel = Panel(missing_label(axis), tuple(traces), band(run), limits=_with_band(robust_limits(dhat), run.std))
     return Chart("missing-velocity", f"velocity [{velocity_unit(axis)}]", (panel,), text, height=420)
 
 
@@ -199,8 +203,10 @@ def held_out_chart(run: Run, noise: float, key: str, axis: str) -> Chart:
     if run.extended is not None:
         traces.append(series(t, (run.measured - run.extended)[first:], "extended model", "extended", width=1.0))
     v = velocity_unit(axis)
-    panel = Panel(f"error [{v}]", tuple(traces), (Band(-2.0 * noise, 2.0 * noise, "±2 std of the noise"),))
-    text = "Measured minus simulated velocity, one continuous free run."
+    models = (run.linear, run.extended)
+    limits, said = _error_limits([(run.measured - m)[first:] for m in models if m is not None])
+    panel = Panel(f"error [{v}]", tuple(traces), (Band(-2.0 * noise, 2.0 * noise, "±2 std of the noise"),), limits=limits)
+    text = f"Measured minus simulated velocity, one continuous free run.{said}"
     if first:
         text += (
             " The curves are those of the reported model, which has seen these samples; the figures in the table are of a model "
@@ -244,7 +250,7 @@ def response_chart(r: Any, axis: str) -> Chart:
 
 def command_chart(command: Vector, dt: float, axis: str) -> Chart:
     """The proposed experiment."""
-    time = dt * np.arange(len(command))
+    time: Vector = dt * np.arange(len(command), dtype=np.float64)
     panel = Panel(f"command [{velocity_unit(axis)}]", (series(time, command, "", "effect", width=1.5),))
     return Chart("next-command", "time [s]", (panel,), "The velocity command of the next experiment.", height=260, shared=True)
 
@@ -252,6 +258,24 @@ def command_chart(command: Vector, dt: float, axis: str) -> Chart:
 def band(run: Run) -> tuple[Band, ...]:
     """What the missing torque cannot be told from zero."""
     return (Band(-2.0 * run.std, 2.0 * run.std, "±2 std of the estimate"),) if run.std > 0.0 else ()
+
+
+def _with_band(limits: tuple[float, float], std: float) -> tuple[float, float]:
+    """Limits that hold the band of what cannot be told from zero too."""
+    return min(limits[0], -2.6 * std), max(limits[1], 2.6 * std)
+
+
+def _error_limits(errors: Sequence[Vector]) -> tuple[tuple[float, float] | None, str]:
+    """Limits that outliers do not stretch, and what is said then; (None, "") where nothing stands out."""
+    size = np.max([np.abs(np.nan_to_num(e)) for e in errors], axis=0)
+    usual = float(np.quantile(size, 0.995))
+    if not float(size.max()) > 6.0 * usual > 0.0:
+        return None, ""
+    limit = 3.0 * usual
+    return (
+        -limit,
+        limit,
+    ), f" {int(np.sum(size > limit))} samples leave the panel of the error, the largest is {number(float(size.max()), 2)}."
 
 
 def missing_label(axis: str) -> str:

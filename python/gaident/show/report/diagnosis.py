@@ -42,9 +42,9 @@ __all__ = ["chapters", "headline", "mark", "tiles"]
 
 CANNOT_TELL = (
     "Each of these explanations, its parameters and the mechanism fitted anew, reproduces this record about as well as the "
-    "others: within 10 BIC units, odds of 150 to 1, or they act alike by their nature wherever this record went. One of them is there; "
-    "which, this record does not show. Taking the first for granted may give a model that fails in another motion. The values in "
-    "the table are those of the first."
+    "others: within 10 BIC units, odds of 150 to 1, or they act alike by their nature wherever this record went. One of them is "
+    "there; which, this record does not show. Taking the first for granted may give a model that fails in another motion. The "
+    "values in the table are those of the first."
 )
 GOOD, HALF, BAD = ("good", "✓"), ("half", "◐"), ("bad", "✗")
 MARKS = {"adequate": GOOD, "explained": GOOD, "partly explained": HALF, "unexplained": BAD}

@@ -98,7 +98,9 @@ def _parameters(idn: Any, view: View, drawn: Charts) -> Section:
             cell = "0 (set)" if name == "DG" and value == 0.0 else estimate(value, m.std.get(name))
             beside = () if damped is None else (estimate(getattr(damped, name), damped.std.get(name)),)
             rows.append((name, cell, *beside, typeset(unit(rotary, axis)), meaning_of(name, hasattr(m, "KG"), axis)))
-        head = ("", "value", "unit", "") if damped is None else ("", "no shaft damping", "with shaft damping", "unit", "")
+        head: tuple[str, ...] = (
+            ("", "value", "unit", "") if damped is None else ("", "no shaft damping", "with shaft damping", "unit", "")
+        )
         parts.append(table(head, [rows]))
         if hasattr(m, "resonance"):
             high, low = (plain_number(x / math.tau) for x in (m.resonance, m.antiresonance))
@@ -110,8 +112,8 @@ def _parameters(idn: Any, view: View, drawn: Charts) -> Section:
         tag("p", "Gain K = ", estimate(gain.value, gain.std), " ", typeset(unit(gain.unit, axis)), ". ", flags_of([gain]))
     )
     stems = dict.fromkeys(stem_of(name) for name in idn.parameters if name != "gain")
-    head = ("", "real part [rad/s]", "imaginary part [rad/s]", "frequency [Hz]", "damping ratio", "")
-    parts.append(table(head, [[_root(idn.parameters, stem) for stem in stems]]))
+    columns = ("", "real part [rad/s]", "imaginary part [rad/s]", "frequency [Hz]", "damping ratio", "")
+    parts.append(table(columns, [[_root(idn.parameters, stem) for stem in stems]]))
     parts.append(tag("p", tag("small", "± is one standard deviation, the colour of the noise taken into account.")))
     parts.append(drawn.put(roots_chart(idn)))
     parts.append(response_part(view, drawn))
@@ -146,15 +148,18 @@ def _structures(idn: Any, view: View, drawn: Charts) -> Section:
     return Section("structure", "How sure the structure is", *parts)
 
 
+def _low_high(pair: tuple[float, float]) -> str:
+    return f"{plain_number(pair[0])} to {plain_number(pair[1])}"
+
+
 def _how(idn: Any, view: View) -> Section:
     s, space, axis = idn.settings, idn.space, view.axis
-    low_high = lambda pair: f"{plain_number(pair[0])} to {plain_number(pair[1])}"  # noqa: E731
     rows: dict[str, str | None] = {
         "controller": typeset(controller_words(idn.controller, axis)),
         "searched": typeset(
-            f"K {low_high(space.gain)} {unit('rad/s^2/(N m)', axis)}, real parts {low_high((-space.real[1], -space.real[0]))} "
-            f"rad/s, "
-            f"imaginary parts {low_high(space.imaginary)} rad/s, p {space.p[0]} to {space.p[1]}, q {space.q[0]} to {space.q[1]}, "
+            f"K {_low_high(space.gain)} {unit('rad/s^2/(N m)', axis)}, real parts {_low_high((-space.real[1], -space.real[0]))} "
+            f"rad/s, imaginary parts {_low_high(space.imaginary)} rad/s, "
+            f"p {space.p[0]} to {space.p[1]}, q {space.q[0]} to {space.q[1]}, "
             f"{space.bits} bits a number"
         ),
         "ranges from": space.source,

@@ -22,7 +22,7 @@ SYMBOLS = {"means": ("o", 3.2), "crosses": ("x", 7.0), "rings": ("o", 7.0)}
 
 def picture(chart: Chart) -> bytes:
     """PNG."""
-    fig = _figure(WIDTH, 0.6 * chart.height / 72.0)
+    fig = _figure(WIDTH, 0.5 * chart.height / 72.0)
     axes = fig.subplots(len(chart.panels), 1, sharex=True, squeeze=False, height_ratios=[p.height for p in chart.panels])[:, 0]
     for ax, panel in zip(axes, chart.panels, strict=True):
         _draw(ax, panel)
@@ -71,8 +71,7 @@ def _draw(ax: Axes, panel: Panel) -> None:
     for mark in panel.marks:
         if mark.y is None:
             ax.axvline(mark.x, color=colours["faint"], linewidth=0.8, linestyle=":")
-            where = {"xycoords": ax.get_xaxis_transform(), "xytext": (3, -2), "va": "top", "ha": "left"}
-            ax.annotate(_plain(mark.text), (mark.x, 1.0), textcoords="offset points", fontsize="small", **where)
+            ax.text(mark.x, 0.98, _plain(mark.text), transform=ax.get_xaxis_transform(), va="top", fontsize="small")
         else:
             ax.annotate(
                 _plain(mark.text), (mark.x, mark.y), xytext=(0, 3), textcoords="offset points", ha="center", fontsize="small"
