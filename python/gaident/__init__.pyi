@@ -29,6 +29,7 @@ from .models import (
     simulate,
     simulate_many,
 )
+from .reporting import report
 from .store import load
 
 __all__ = [
@@ -65,6 +66,7 @@ __all__ = [
     "model_from_factor_parameters",
     "read",
     "read_columns",
+    "report",
     "run",
     "simulate",
     "simulate_many",

@@ -33,16 +33,18 @@ DESK = {"errors", "data", "models", "identification"}
 ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "errors": (set(), set()),
     "version": (set(), set()),
+    "files": (set(), set()),
     "data": ({"errors"}, set()),
     "models": ({"errors", "data", "_core"}, set()),
-    "identification": ({"errors", "version", "data", "models", "_core"}, {"show"}),
-    "diagnosis": ({"errors", "version", "data", "models", "identification"}, {"show"}),
+    "identification": ({"errors", "version", "files", "data", "models", "_core"}, {"show"}),
+    "diagnosis": ({"errors", "version", "files", "data", "models", "identification"}, {"show"}),
     "store": ({"errors", "identification", "diagnosis"}, set()),
     "show": ({"errors"}, set()),
     "drive_file": (DESK, set()),
-    "paper": (DESK | {"diagnosis", "version"}, {"show"}),
+    "paper": (DESK | {"diagnosis", "version", "show"}, set()),
+    "reporting": (DESK | {"diagnosis", "files", "version", "show"}, set()),
     "demo": (DESK | {"diagnosis"}, {"show"}),
-    "cli": (DESK | {"diagnosis", "store", "drive_file", "demo"}, {"show", "_core", "paper"}),
+    "cli": (DESK | {"diagnosis", "store", "drive_file", "demo", "files", "reporting"}, {"show", "_core", "paper"}),
     "__main__": ({"cli"}, set()),
     "__init__": (set(), {"version"}),  # the rest is imported by name when it is used
 }

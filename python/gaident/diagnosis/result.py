@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gaident.data.record import Record
 from gaident.diagnosis.experiments import Proposal
 from gaident.errors import GaidentError
+from gaident.files import write_whole
 from gaident.identification.covariance import Estimate
 from gaident.identification.result import Identification, json_text
 from gaident.models.controller import PI
@@ -247,10 +247,4 @@ class Diagnosis:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes JSON; the file appears whole or not at all."""
-        target = Path(path)
-        temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
-        try:
-            temporary.write_text(self.to_json(), encoding="utf-8")
-            temporary.replace(target)
-        finally:
-            temporary.unlink(missing_ok=True)
+        write_whole(path, self.to_json().encode())

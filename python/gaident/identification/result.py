@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.errors import GaidentError
+from gaident.files import write_whole
 from gaident.identification.adequacy import Adequacy
 from gaident.identification.covariance import Estimate
 from gaident.identification.settings import Settings
@@ -274,14 +274,7 @@ class Identification:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes JSON; the file appears whole or not at all."""
-        target = Path(path)
-        text = self.to_json()
-        temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
-        try:
-            temporary.write_text(text, encoding="utf-8")
-            temporary.replace(target)
-        finally:
-            temporary.unlink(missing_ok=True)
+        write_whole(path, self.to_json().encode())
 
 
 def json_text(data: Mapping[str, Any]) -> str:
