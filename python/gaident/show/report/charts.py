@@ -47,7 +47,7 @@ def run_chart(run: Run, noise: float, key: str, axis: str) -> Chart:
     if run.extended is not None:
         top.append(series(run.time, run.extended, "extended model", "extended", dash="dash"))
         low.append(series(run.time, run.measured - run.extended, "", "extended", width=1.0))
-    text = "Error: measured minus simulated. Drag over a stretch of time to zoom all panels, double-click to come back."
+    text = "Error: measured minus simulated. Drag (or use the figure's buttons) to zoom all panels, double-click to come back."
     models = (run.linear, run.extended)
     limits, said = _error_limits([run.measured - m for m in models if m is not None])
     text += said

@@ -18,7 +18,6 @@ __all__ = ["bar_width", "figure", "script_json"]
 GAP = 0.04  # of the height, between two panels
 DIGITS = 6  # significant ones of what is drawn
 SYMBOLS = {"means": ("circle", 5), "crosses": ("x-thin-open", 11), "rings": ("circle-open", 11)}
-RIM: dict[str, Any] = {"line": {"width": 1.8}}  # of symbols that are open
 
 
 def figure(chart: Chart) -> dict[str, Any]:
@@ -133,7 +132,8 @@ def _traces(t: Trace, y: str) -> list[dict[str, Any]]:
         symbol, size = SYMBOLS[t.kind]
         bars = {"type": "data", "array": _numbers(t.spread), "thickness": 1, "width": 2, "color": colour}
         error = {"error_y": bars} if t.spread is not None else {}
-        return [{**base, "mode": "markers", "marker": {"color": colour, "size": size, "symbol": symbol, **RIM}, **error}]
+        marker = {"color": colour, "size": size, "symbol": symbol, "line": {"width": 1.8 if symbol.endswith("open") else 0}}
+        return [{**base, "mode": "markers", "marker": marker, **error}]
     return [{**base, "mode": "lines", "line": {"color": colour, "width": t.width, "dash": t.dash}}]
 
 

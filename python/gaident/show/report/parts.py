@@ -129,7 +129,7 @@ def missing_section(view: View, noise: float, drawn: Charts, *before: str) -> Se
         parts.append(tag("h3", "Against the velocity"))
         parts.append(drawn.put(charts.missing_over_velocity(run, run.dhat, view.curve, axis)))
     if run.dhat is not None and float(np.abs(run.dhat).max()) <= 2.0 * run.std:
-        text = f"All of the missing {charts.torque_word(axis)} cannot be told from zero: there is nothing to show."
+        text = f"None of the missing {charts.torque_word(axis)} can be told from zero: there is no more to show."
         parts.append(tag("p", text))
     elif run.dhat is not None:
         turning = drawn.put(charts.missing_reversals(run, run.dhat, axis))
