@@ -159,6 +159,7 @@ def test_a_loaded_result_says_what_needs_the_record(dia: ga.Diagnosis, fast: Non
     seen = Reader(report_page(back))
     assert seen.text.count("gaident report RESULT.json LOG") == 4 and charts_of(report_page(back))["charts"] == {}
     assert "inertia" in seen.text and dia.digests[0] in seen.text and "not at hand" in seen.text
+    assert "plotly()" in report_page(dia) and "plotly()" not in report_page(back)  # nothing to draw: 5 MB less
     whole = Reader(report_page(back, drive_record(), drive_record(1)))
     assert whole.text == Reader(report_page(dia)).text
     other = Reader(report_page(back, drive_record(5)))

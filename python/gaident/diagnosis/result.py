@@ -70,6 +70,7 @@ class Diagnosis:
     noise [rad/s] and bootstrap as they were asked for; controller as it was used: with the gains that the logged torque shows.
     torque_logged: whether all records hold the torque; loop_follows: False where it does not follow from command and velocity
     through the simulated controller, whose free runs are then not the drive's. notes: what to keep in mind, in plain sentences.
+    records and validation_records: the data, empty where the diagnosis was loaded from a file.
     """
 
     verdict: str

@@ -54,7 +54,7 @@ def page(result: Any, view: View, plotly_js: str) -> str:
         tag("header", tag("div", tag("p", "gaident report", class_="brand"), tag("h1", title)), _switch()),
         tag("main", verdict, contents, *(tag("section", tag("h2", c.title), c.body, id=c.key) for c in chapters)),
         tag("footer", tag("p", "Everything in this page is in this file: it needs no network. Figures: plotly.js, MIT licence.")),
-        tag("script", Html(plotly_js.replace("</script", "<\\/script"))),
+        tag("script", Html(plotly_js.replace("</script", "<\\/script"))) if drawn.all else "",
         tag("script", script_json(data), type="application/json", id="figures"),
         tag("script", _asset("page.js")),
     )

@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from gaident.show.plots import _figure, _tidy
 from gaident.show.report.chart import PALETTES, Chart, Panel, Trace
 from gaident.show.report.live import bar_width
@@ -56,9 +58,11 @@ def _png(fig: Figure) -> bytes:
     """With a palette: a third of the size."""
     from PIL import Image
 
-    drawn, small = io.BytesIO(), io.BytesIO()
-    fig.savefig(drawn, format="png", dpi=DPI)
-    Image.open(drawn).convert("RGB").quantize(64, dither=Image.Dither.NONE).save(small, "png", optimize=True)
+    fig.dpi = DPI
+    fig.canvas.draw()
+    drawn = Image.fromarray(np.asarray(fig.canvas.buffer_rgba()))  # type: ignore[attr-defined]
+    small = io.BytesIO()
+    drawn.convert("RGB").quantize(64, dither=Image.Dither.NONE).save(small, "png", optimize=True)
     return small.getvalue()
 
 
