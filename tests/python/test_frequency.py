@@ -71,8 +71,11 @@ def test_the_torque_is_made_where_it_is_not_logged_and_a_dead_command_is_refused
     with pytest.raises(RecordError, match="no controller to make it from"):
         measured_response(without)
     dead = ga.Record(DT, command=np.full(len(rec), 20.0), velocity=rec.velocity, torque=rec.torque)
-    with pytest.raises(RecordError, match="never changes"):
+    with pytest.raises(RecordError, match="command of this loop never changes"):
         measured_response(dead, CONTROLLER)
+    even = ga.Record(DT, velocity=rec.velocity, torque=np.full(len(rec), 0.06))
+    with pytest.raises(RecordError, match="torque never changes"):
+        measured_response(even)
 
 
 def test_a_bilinear_loop_has_its_own_response() -> None:

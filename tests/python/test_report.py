@@ -83,7 +83,8 @@ def test_a_diagnosis_reads_from_verdict_to_how_it_was_computed(dia: ga.Diagnosis
     seen = Reader(page)
     assert [a["id"] for a in seen.found("section")] == ["verdict", *CHAPTERS]
     for words in (
-        "The model lacks one of coulomb friction, load torque or stribeck friction, which these data do not tell apart.",
+        "The model lacks one of coulomb friction, load torque or stribeck friction, which these data do not tell apart; with it "
+        "nothing significant is left.",
         "What “cannot be told apart” means.",
         "Chance of such a finding where there is no effect at all (bootstrap): at most 0.01.",
         "inertia", "kg m", "Free-run simulation on validation records.", "the torque never changes its sign",

@@ -99,10 +99,10 @@ def response_of(rec: Record, model: Model, controller: PI | None = None) -> Resp
 def measured_response(rec: Record, controller: PI | None = None) -> FrequencyResponse:
     """The response that a record shows. controller: of its loop, makes the torque where none is logged; None: open loop.
 
-    Raises RecordError where there is neither a torque nor command and controller, and for a loop whose command never changes:
-    torque and velocity then show the controller, not the drive.
+    Raises RecordError where there is neither a torque nor command and controller, for a torque that never changes, and for a loop
+    whose command never does: torque and velocity then show the controller, not the drive.
     """
-    if controller is not None and (rec.command is None or float(np.ptp(rec.command)) == 0.0):
+    if controller is not None and (rec.command is None or _constant(rec.command)):
         raise RecordError(
             "the command of this loop never changes: torque and velocity then show minus the inverse of the controller as much "
             "as the drive; use a record whose command changes after its start"
@@ -112,6 +112,8 @@ def measured_response(rec: Record, controller: PI | None = None) -> FrequencyRes
         if controller is None or rec.command is None:
             raise RecordError("the record has no torque, and no controller to make it from: give Record(torque=...) or PI(...)")
         torque = pi_torque(rec.command, rec.velocity, rec.dt, controller)
+    if _constant(torque):
+        raise RecordError("the torque never changes, so that it excites no frequency; use a record whose torque changes")
     return _estimate(torque, rec.velocity, rec.command, rec.dt)
 
 
@@ -131,12 +133,17 @@ def sampled_response(model: Model, frequency: Vector, dt: float, controller: PI 
     return response
 
 
+def _constant(x: Vector) -> bool:
+    """But for the rounding of its numbers."""
+    return float(np.ptp(x)) <= 1e-9 * float(np.abs(x).max())
+
+
 def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> FrequencyResponse:
     """From torque u to velocity w; a command that never changes is no instrument."""
     n = len(w)
     size = max(16, min(2 * n // (WINDOWS + 1), LONGEST))
     starts = range(0, n - size + 1, max(1, size // 2))
-    instrument = command is not None and float(np.ptp(command)) > 0.0
+    instrument = command is not None and not _constant(command)
     window = np.hanning(size + 2)[1:-1]
 
     def spectra(x: Vector) -> Complex:

@@ -63,8 +63,8 @@ def headline(dia: Any) -> str:
     lacks += [f"one of {either(f)}, which these data do not tell apart" for f in causes if f.alternatives]
     text = f"The model lacks {'; and '.join(lacks)}"
     if dia.verdict == "partly explained":
-        return f"{text}. This explains part of what it gets wrong; something significant is left."
-    return f"{text}. With {'it' if len(causes) == 1 else 'them'} nothing significant is left."
+        return f"{text}; this explains a part of what it gets wrong, and something significant is left."
+    return f"{text}; with {'it' if len(causes) == 1 else 'them'} nothing significant is left."
 
 
 def mark(dia: Any) -> tuple[str, str, str]:
@@ -82,8 +82,10 @@ def tiles(dia: Any, view: View) -> Html:
     shown.append(tile("noise of the measured velocity", number(dia.after.noise_floor), v))
     if dia.model.effects and dia.before.rmse > 0.0:
         low, high = dia.gain_interval
-        interval = typeset(f"95 % interval {percent(low)} to {percent(high)} %") if math.isfinite(low) else ""
-        shown.append(tile("the error falls by", typeset(f"{percent(1.0 - dia.after.rmse / dia.before.rmse)} %"), interval))
+        interval = typeset(f"95 % interval of the fall: {percent(low)} to {percent(high)} %") if math.isfinite(low) else ""
+        fall = 1.0 - dia.after.rmse / dia.before.rmse
+        label = "the error grows by" if fall < -0.005 else "the error falls by"
+        shown.append(tile(label, typeset(f"{percent(abs(fall))} %"), interval))
     return joined(shown)
 
 
@@ -172,7 +174,7 @@ def _parameters(dia: Any, view: View, drawn: Charts) -> Section:
         else:
             parts.append(table(("", "value", "unit", ""), [[(*r[:3], r[5]) for r in rows]]))
         parts.append(tag("p", tag("small", "± is one standard deviation, the colour of the noise taken into account.")))
-    if dia.model.effects:
+    if any(not f.is_noise for f in dia.findings):
         parts.append(tag("p", "The parameters of the effects stand with their cause above."))
     parts += [tag("h3", "Torque to velocity, linear part" if axis == "rotary" else "Force to velocity, linear part")]
     roots = [(kind, r, "unstable" if r.real > 0.0 and kind == "pole" else "") for kind, group in

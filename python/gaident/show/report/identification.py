@@ -77,7 +77,7 @@ def _cause(idn: Any) -> Section:
     return Section(
         "cause",
         "Cause and evidence",
-        tag("p", text, tag("code", "gaident diagnose LOG --drive drive.toml --report report.html"), "."),
+        tag("p", text, tag("code", "gaident diagnose LOG --drive drive.toml --report report.html", class_="command")),
     )
 
 

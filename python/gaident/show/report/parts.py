@@ -88,7 +88,7 @@ def needs_record(view: View, what: str) -> Html:
     """Said instead of curves where a saved result comes without its record."""
     if view.runs:
         return Html()
-    command = tag("code", "gaident report RESULT.json LOG --drive drive.toml --out report.html")
+    command = tag("code", "gaident report RESULT.json LOG --drive drive.toml --out report.html", class_="command")
     return box(
         tag("p", f"{what} A saved result holds no samples; with the record beside it this part is filled: ", command),
         kind="quiet",

@@ -51,7 +51,20 @@ def picture(chart: Chart) -> bytes:
     if chart.limits is not None:
         axes[-1].set_xlim(*chart.limits)
     _tidy(fig)
+    for ax in axes:
+        _plain_decades(ax)
     return _png(fig)
+
+
+def _plain_decades(ax: Axes) -> None:
+    """Logarithmic axes with plain numbers, at 1, 2, 5 where few decades are shown."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    for each, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
+        if each.get_scale() == "log":
+            each.set_major_locator(LogLocator(subs=(1.0,) if high > 300.0 * low else (1.0, 2.0, 5.0)))
+            each.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            each.set_minor_formatter(NullFormatter())
 
 
 def _png(fig: Figure) -> bytes:
