@@ -165,7 +165,7 @@ def _how(idn: Any, view: View) -> Section:
         "ranges from": space.source,
         "engine": f"{s.engine}, population {s.population}, {s.code} code, {s.scale} scale",
         "seed": str(idn.seed),
-        "work": f"{len(idn.trials)} trials, {sum(t.generations for t in idn.trials)} generations, "
+        "work": f"{len(idn.trials)} trial{'s' * (len(idn.trials) > 1)}, {sum(t.generations for t in idn.trials)} generations, "
         f"{sum(t.evaluations for t in idn.trials)} candidates, {idn.seconds:.2f} s",
         "made with": f"gaident {idn.version or 'of unknown version'}",
         "page made with": ", ".join(f"{k} {v}" for k, v in view.made_with.items()),
