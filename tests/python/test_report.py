@@ -23,6 +23,7 @@ from gaident.reporting import report_page, view_of
 from gaident.show.html import Html, tag, typeset
 from gaident.show.report import parts
 from gaident.show.report.chart import BINS, PALETTES, Band, Chart, Mark, Panel, Trace, cloud, series
+from gaident.show.report.charts import held_out_chart, residual_spectrum, run_chart
 from gaident.show.report.command import proposal_csv
 from gaident.show.report.live import figure, script_json
 from gaident.show.report.still import picture
@@ -184,9 +185,22 @@ def test_wrong_use_is_refused_and_leaves_no_file(dia: ga.Diagnosis, tmp_path: Pa
 
 
 def test_a_run_that_runs_away_is_drawn_up_to_there(dia: ga.Diagnosis) -> None:
-    wild = replace(dia, model=ga.Model(dia.model.gain, [400.0]), records=dia.records, validation_records=())
-    (run,) = view_of(replace(wild, identification=replace(dia.identification, model=wild.model)), None, (), "rotary").runs
+    model = ga.Model(dia.model.gain, [400.0])
+    wild = replace(dia, model=model, identification=replace(dia.identification, model=model), validation_records=())
+    (run,) = view_of(wild, None, (), "rotary").runs
     assert "runs away" in run.notes[0] and np.isnan(run.linear[-1]) and np.all(np.isfinite(run.linear[:10]))
+    for chart in (run_chart(run, 0.05, "run", "rotary"), residual_spectrum(run, 0.05, "rotary")):
+        assert picture(chart).startswith(b"\x89PNG")
+        assert any(y is not None for y in figure(chart)["data"][-1]["y"])
+
+
+def test_the_last_part_of_a_record_is_marked_where_it_is_held_out(dia: ga.Diagnosis) -> None:
+    alone = replace(dia, validation_digests=(), validation_records=(), held_out="the last 30 % of the record")
+    (run,) = view_of(alone, None, None, "rotary").runs
+    assert run.used == "fitted" and run.held_from == 1120
+    (mark,) = run_chart(run, 0.05, "run", "rotary").panels[0].marks
+    assert mark.x == pytest.approx(1.12) and mark.text == "held out from here"
+    assert held_out_chart(run, 0.05, "run", "rotary").panels[0].traces[0].x[0] == pytest.approx(1.12)
 
 
 def test_long_signals_keep_their_peaks_and_clouds_are_thinned() -> None:

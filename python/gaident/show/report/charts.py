@@ -51,8 +51,9 @@ def run_chart(run: Run, noise: float, key: str, axis: str) -> Chart:
     models = (run.linear, run.extended)
     limits, said = _error_limits([run.measured - m for m in models if m is not None])
     text += said
+    held = (Mark(float(run.time[run.held_from]), "held out from here"),) if run.held_from else ()
     panels = [
-        Panel(f"velocity [{v}]", tuple(top), height=1.7),
+        Panel(f"velocity [{v}]", tuple(top), marks=held, height=1.7),
         Panel(f"error [{v}]", tuple(low), (Band(-2.0 * noise, 2.0 * noise, "±2 std of the noise"),), limits=limits),
     ]
     if run.torque is not None:
@@ -185,7 +186,9 @@ def residual_spectrum(run: Run, noise: float, axis: str) -> Chart:
     traces = []
     for values, role, label in ((run.linear, "linear", "linear model"), (run.extended, "extended", "extended model")):
         if values is not None:
-            lines = spectrum(run.measured - values, run.dt)
+            error = run.measured - values
+            # Of a run that runs away, what there is of it.
+            lines = spectrum(error[: max(int(np.argmax(~np.isfinite(np.append(error, np.nan)))), 32)], run.dt)
             traces.append(Trace(lines.frequency, lines.density, label, role))
     f = traces[0].x
     floor = np.full(2, noise * math.sqrt(2.0 * run.dt))
