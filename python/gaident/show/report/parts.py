@@ -102,6 +102,8 @@ def measured_section(view: View, noise: float, drawn: Charts) -> Section:
         label = {"fitted": "parameters were fitted to it", "held out": "no parameter was fitted to it"}.get(
             run.used, "another record"
         )
+        if run.held_from:
+            label += "; for the comparison of before and after, to its first part only"
         parts.append(tag("h3", run.name or f"record {i + 1}", " ", tag("small", label)))
         if run.used == "new":
             text = "This is not a record of this result: its hash is another one. The curves show how the models do on it."
