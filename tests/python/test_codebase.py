@@ -23,7 +23,19 @@ CORE_ORDER = [
     *("rng", "arithmetic", "float_pair", "lanes", "denormals", "chromosome", "genome", "factors", "decode"),
     *("decoder", "parameters", "neighbours", "delta", "bilinear", "held", "controller", "closed_loop", "loop", "record"),
     *("fitness", "kernels/", "elementary", "effects/", "friction", "two_mass", "effect_constants", "effect_plant"),
-    *("effect_loop", "effect_kernels/", "advance", "parallel", "batch", "simulate", "linear", "sweep", "refine", "statistics"),
+    *(
+        "own_effects",
+        "effect_loop",
+        "effect_kernels/",
+        "advance",
+        "parallel",
+        "batch",
+        "simulate",
+        "linear",
+        "sweep",
+        "refine",
+        "statistics",
+    ),
     *("settings", "operators", "breeder", "island", "species", "engine", "reference/", "effect_prepare", "effect_batch"),
 ]
 
@@ -33,11 +45,12 @@ DESK = {"errors", "data", "models", "identification"}
 ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "errors": (set(), set()),
     "version": (set(), set()),
-    "data": ({"errors"}, set()),
-    "models": ({"errors", "data", "_core"}, set()),
-    "identification": ({"errors", "version", "data", "models", "_core"}, {"show"}),
-    "diagnosis": ({"errors", "version", "data", "models", "identification"}, {"show"}),
-    "store": ({"errors", "identification", "diagnosis"}, set()),
+    "data": ({"errors"}, {"version"}),
+    "models": ({"errors", "data", "_core"}, {"export"}),
+    "export": ({"errors", "models", "_core"}, {"version"}),  # called by methods of models and results
+    "identification": ({"errors", "version", "data", "models", "_core"}, {"show", "export"}),
+    "diagnosis": ({"errors", "version", "data", "models", "identification"}, {"show", "export"}),
+    "store": ({"errors", "data", "identification", "diagnosis"}, set()),
     "show": ({"errors"}, set()),
     "drive_file": (DESK, set()),
     "paper": (DESK | {"diagnosis", "version"}, {"show"}),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from gaident.data.record import Record
 from gaident.diagnosis.experiments import Proposal
-from gaident.errors import GaidentError
+from gaident.errors import GaidentError, check_schema
 from gaident.identification.covariance import Estimate
 from gaident.identification.result import Identification, json_text
 from gaident.models.controller import PI
@@ -129,6 +129,15 @@ class Diagnosis:
             raise GaidentError("records: a loaded diagnosis holds no data; give plot(records)")
         return overview(self, given, axis)
 
+    def to_pandas(self) -> Any:
+        """The findings as a pandas DataFrame: a row per (effect, parameter), with what speaks for it.
+
+        Raises ImportError with the way to get pandas.
+        """
+        from gaident.export.tables import diagnosis_table
+
+        return diagnosis_table(self)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, without the records."""
         proposal = self.next_experiment
@@ -171,11 +180,7 @@ class Diagnosis:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Diagnosis:
         """The inverse of to_dict. Raises GaidentError where the data are something else or of a newer schema."""
-        if data.get("schema") != SCHEMA or data.get("schema_version") != SCHEMA_VERSION:
-            raise GaidentError(
-                f"schema is {data.get('schema')!r}, version {data.get('schema_version')!r}: "
-                "this is no diagnosis that this gaident reads"
-            )
+        check_schema(data, SCHEMA, SCHEMA_VERSION)
         try:
             return cls(
                 verdict=data["verdict"],
