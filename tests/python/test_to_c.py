@@ -98,7 +98,7 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
             f"    for (i = 0; i < n; ++i) {{ velocity[i] = {name}_step(&s, input[i]); torque[i] = s.torque; }}\n}}\n"
         )
     (folder / "runs.c").write_text("\n".join(runs))
-    flags = "-std=c99 -O0 -Wall -Wextra -Wpedantic -Werror -Wshadow -shared -fPIC".split()
+    flags = ["-std=c99", "-O0", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wshadow", "-shared", "-fPIC"]
     sources = [str(folder / f"{name}.c") for name in (*CASES, "runs")]
     done = subprocess.run([compiler, *flags, *sources, "-lm", "-o", str(folder / "all.so")], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -111,9 +111,8 @@ def test_c_is_what_is_simulated(compiled: ctypes.CDLL, name: str) -> None:
     source = TORQUE if controller is None else COMMAND
     still = np.zeros(N)
     rec = ga.Record(DT, command=source, velocity=still) if controller else ga.Record(DT, torque=source, velocity=still)
-    substeps = options.get(
-        "substeps", 16 if any(e.name in ("cogging", "unbalance", "velocity_ripple") for e in model.effects) else None
-    )
+    turning = any(e.name in ("cogging", "unbalance", "velocity_ripple") for e in model.effects)
+    substeps = options.get("substeps", 16 if turning else None)
     expected = ga.run(model, rec, controller, substeps=substeps)  # type: ignore[arg-type]
     velocity, torque = np.empty(N), np.empty(N)
     pointer = ctypes.POINTER(ctypes.c_double)
@@ -137,7 +136,7 @@ def test_the_file_says_what_it_is(tmp_path: Path) -> None:
 
 
 def test_what_c_refuses() -> None:
-    with pytest.raises(ModelError, match="coulomb_friction.*continuous loop"):
+    with pytest.raises(ModelError, match=r"coulomb_friction.*continuous loop"):
         ONE.with_effect("coulomb_friction", torque=0.1).to_c(None, DT, ga.PI(1.0, 1.0, loop="continuous"))
     with pytest.raises(ModelError, match="dt is 0"):
         ONE.to_c(None, 0.0)

@@ -183,7 +183,8 @@ class Record:
         missing = [key for key in ("dt", "name", *CHANNELS) if key not in data]
         if missing:
             raise RecordError(f"the saved record lacks {', '.join(missing)}; save it again")
-        return cls(data["dt"], *(data[key] for key in CHANNELS), name=data["name"])
+        command, velocity, torque, position = (data[key] for key in CHANNELS)
+        return cls(data["dt"], command, velocity, torque, position, data["name"])
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes JSON, all digits, for `gaident.load`; the file appears whole or not at all."""

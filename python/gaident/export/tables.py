@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from math import nan
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from gaident.diagnosis.result import Diagnosis
-    from gaident.identification.result import Identification
+from typing import Any
 
 __all__ = ["diagnosis_table", "identification_table"]
 
@@ -21,20 +17,20 @@ def _pandas() -> Any:
     return pandas
 
 
-def identification_table(idn: Identification) -> Any:
+def identification_table(idn: Any) -> Any:
     """One row per parameter, those of the mechanics behind those of the model; see `Identification.to_pandas`."""
     rows = [{"of": "model", "parameter": name, **asdict(e)} for name, e in idn.parameters.items()]
     drive = idn.mechanics
-    for name, unit in {} if drive is None else drive.UNITS.items():
-        value, std = getattr(drive, name), drive.std.get(name, nan)
-        sure = std < abs(value)
-        rows.append({"of": "mechanics", "parameter": name, "value": value, "std": std, "unit": unit, "at_bound": False,
-                     "identifiable": sure})  # fmt: skip
+    if drive is not None:
+        for name, unit in drive.UNITS.items():
+            value, std = getattr(drive, name), drive.std.get(name, nan)
+            estimate = {"value": value, "std": std, "unit": unit, "at_bound": False, "identifiable": std < abs(value)}
+            rows.append({"of": "mechanics", "parameter": name, **estimate})
     columns = ["of", "parameter", "value", "std", "unit", "at_bound", "identifiable"]
     return _pandas().DataFrame(rows, columns=columns).set_index(["of", "parameter"])
 
 
-def diagnosis_table(dia: Diagnosis) -> Any:
+def diagnosis_table(dia: Any) -> Any:
     """One row per parameter of each finding; see `Diagnosis.to_pandas`."""
     rows = []
     for order, finding in enumerate(dia.findings, 1):

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from gaident.errors import ModelError
 
-__all__ = ["OWN", "Function", "Own", "Parameter", "Signals", "checked"]
+__all__ = ["OWN", "PLACES", "Function", "Own", "Parameter", "Signals", "checked", "starts"]
 
 Signal = NDArray[np.float64]
 Function = Callable[..., Any]
@@ -102,6 +102,17 @@ OWN: dict[str, Own] = {}
 """The registered effects, in the order of their registration."""
 
 
+def starts(p: Parameter, count: int = 5) -> tuple[float, ...]:
+    """Where a search begins: as given, or spread between the bounds, the neutral value left out."""
+    if p.starts:
+        return p.starts
+    shares = [(i + 0.5) / count for i in range(count)]
+    if p.logarithmic:
+        return tuple(p.lowest * (p.highest / p.lowest) ** share for share in shares)
+    values = [p.lowest + (p.highest - p.lowest) * share for share in shares]
+    return tuple(v for v in values if abs(v - p.neutral) > 0.01 * (p.highest - p.lowest) or math.isnan(p.neutral))
+
+
 def checked(own: Own) -> Own:
     """The effect, if names, bounds and function are as they have to be; raises ModelError."""
     if not own.name.isidentifier():
@@ -109,9 +120,7 @@ def checked(own: Own) -> Own:
     if not isinstance(own.meaning, str) or not own.meaning.strip():
         raise ModelError(f"meaning of {own.name} is {own.meaning!r}: say in one line what the effect does")
     if not callable(own.function):
-        raise ModelError(
-            f"{own.acts} of {own.name} is {own.function!r}: give a function of (signals, one argument per parameter)"
-        )
+        raise ModelError(f"{own.acts} of {own.name} is {own.function!r}: give a function of (signals, one keyword per parameter)")
     if not own.parameters:
         raise ModelError(f"{own.name} has no parameters: give at least one, without which it cannot be absent")
     names = [p.name for p in own.parameters]
@@ -135,7 +144,7 @@ def _check_parameter(effect: str, p: Parameter) -> None:
         raise ModelError(f'the unit of {what} is {p.unit!r}: give its SI unit, "1" for none')
     if not (math.isfinite(p.lowest) and math.isfinite(p.highest) and p.lowest < p.highest):
         raise ModelError(
-            f"{what} is bound to {p.lowest:g} .. {p.highest:g}: give lowest < highest, both finite; between them a diagnosis looks"
+            f"{what} is bound to {p.lowest:g} .. {p.highest:g}: give lowest < highest, both finite: a diagnosis looks there"
         )
     if p.logarithmic and p.lowest <= 0.0:
         raise ModelError(f"{what} is logarithmic with lowest {p.lowest:g}: give lowest > 0, or leave logarithmic out")
@@ -151,12 +160,7 @@ def _check_function(own: Own) -> None:
     n = 24
     w, theta, u = (scale * rng.standard_normal(n) for scale in (30.0, 3.0, 0.5))
     w[0], u[1] = 0.0, 0.0
-    middle = [
-        np.full(
-            n, p.starts[0] if p.starts else math.sqrt(p.lowest * p.highest) if p.logarithmic else 0.5 * (p.lowest + p.highest)
-        )
-        for p in own.parameters
-    ]
+    middle = [np.full(n, starts(p)[len(starts(p)) // 2]) for p in own.parameters]
     with np.errstate(all="ignore"):
         answer = _answer(own, w, theta, u, middle)
         alone = [_answer(own, w[i : i + 1], theta[i : i + 1], u[i : i + 1], [v[:1] for v in middle])[0] for i in range(n)]
@@ -179,9 +183,7 @@ def _check_function(own: Own) -> None:
     if not np.array_equal(nothing, identity):
         values = ", ".join(f"{p.name} {v[0]:g}" for p, v in zip(own.parameters, still, strict=True))
         wanted = {"actuator": "signals.torque", "sensor": "signals.velocity"}.get(own.acts, "0")
-        raise ModelError(
-            f"{own.acts} of {own.name} is not {wanted} where its parameters are neutral ({values}): correct one of them"
-        )
+        raise ModelError(f"{own.acts} of {own.name} is not {wanted} where its parameters are neutral ({values}): correct either")
 
 
 def _answer(own: Own, w: Signal, theta: Signal, u: Signal, values: Sequence[Signal]) -> Signal:
@@ -194,7 +196,5 @@ def _answer(own: Own, w: Signal, theta: Signal, u: Signal, values: Sequence[Sign
     except (TypeError, ValueError):
         raise ModelError(f"{own.acts} of {own.name} gives {found!r}: give an array of numbers like signals.velocity") from None
     if answer.size not in (1, len(w)):
-        raise ModelError(
-            f"{own.acts} of {own.name} gives the shape {answer.shape}: give an array like signals.velocity, {w.shape}"
-        )
+        raise ModelError(f"{own.acts} of {own.name} gives the shape {answer.shape}: give one like signals.velocity, {w.shape}")
     return np.broadcast_to(answer.ravel(), w.shape).copy()
