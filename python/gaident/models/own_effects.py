@@ -123,6 +123,9 @@ def checked(own: Own) -> Own:
         raise ModelError(f"{own.acts} of {own.name} is {own.function!r}: give a function of (signals, one keyword per parameter)")
     if not own.parameters:
         raise ModelError(f"{own.name} has no parameters: give at least one, without which it cannot be absent")
+    for p in own.parameters:
+        if not isinstance(p, Parameter):
+            raise ModelError(f"a parameter of {own.name} is {p!r}: give gaident.effects.Parameter(name, unit, lowest=, highest=)")
     names = [p.name for p in own.parameters]
     for p in own.parameters:
         _check_parameter(own.name, p)
@@ -136,8 +139,6 @@ def checked(own: Own) -> Own:
 
 def _check_parameter(effect: str, p: Parameter) -> None:
     what = f"{p.name} of {effect}"
-    if not isinstance(p, Parameter):
-        raise ModelError(f"a parameter of {effect} is {p!r}: give gaident.effects.Parameter(name, unit, lowest=, highest=, ...)")
     if not (isinstance(p.name, str) and p.name.isidentifier()):
         raise ModelError(f"a parameter of {effect} is named {p.name!r}: give letters, digits and _, as of a variable")
     if not isinstance(p.unit, str) or not p.unit:
