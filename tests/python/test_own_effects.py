@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import runpy
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -122,31 +123,29 @@ def test_many_at_once_are_as_each_alone() -> None:
 
 
 def test_a_diagnosis_finds_it_and_saves_it_by_name(tmp_path: Path) -> None:
-    registered_spring()
-    truth = ONE.with_effect("return_spring", stiffness=0.05)
-    noise = 0.1 * np.random.default_rng(3).standard_normal(N)
-    still = ga.Record(DT, command=COMMAND, velocity=np.zeros(N))
-    rec = ga.Record(DT, command=COMMAND, velocity=ga.simulate(truth, still, CONTROLLER) + noise)
-    space = ga.SearchSpace(gain=(5e2, 1e4), real=(0.0, 100.0), imaginary=(0.0, 100.0), p=(1, 1), q=(0, 0))
-    dia = ga.diagnose(rec, CONTROLLER, identification=ga.identify(rec, CONTROLLER, space))
+    example = runpy.run_path(str(Path(__file__).resolve().parents[2] / "examples" / "08_own_effect.py"))
+    assert not OWN
+    dia: ga.Diagnosis = example["dia"]
     (finding,) = dia.causes
-    estimate = finding.parameters["stiffness"]
-    assert (dia.verdict, finding.effect, estimate.unit) == ("explained", "return_spring", "N m/rad")
-    assert abs(estimate.value - 0.05) < 4.0 * estimate.std < 0.005
-    assert finding.evidence.startswith("A spring to the start angle")
-    assert "return spring" in dia.summary() and "stiffness" in dia.summary()
-    dia.plot()
+    estimate = finding.parameters["share"]
+    assert (dia.verdict, finding.effect, finding.named, estimate.unit) == ("explained", "gear_friction", True, "1")
+    assert abs(estimate.value - 0.3) < 4.0 * estimate.std < 0.03
+    assert finding.evidence.startswith("Dry friction in proportion to the torque transmitted: beyond doubt")
 
+    share = parameter("share", "1", highest=0.9)
+    effects.register("gear_friction", [share], meaning="gears", friction=example["gear_friction"])
+    assert "gear friction" in dia.summary() and "share" in dia.summary()
+    dia.plot()
     path = tmp_path / "dia.json"
     dia.save(path)
     assert ga.load(path) == dia
     (stored,) = json.loads(path.read_text())["model"]["effects"]
     assert stored["own"] is True
-    effects.unregister("return_spring")
-    with pytest.raises(ga.GaidentError, match=r"dia\.json: 'return_spring' is an effect of your own.*register"):
+    effects.unregister("gear_friction")
+    with pytest.raises(ga.GaidentError, match=r"dia\.json: 'gear_friction' is an effect of your own.*register"):
         ga.load(path)
-    with pytest.raises(ModelError, match=r"'return_spring' is an effect of your own that is not registered"):
-        ga.simulate(dia.model, rec, CONTROLLER)
+    with pytest.raises(ModelError, match=r"'gear_friction' is an effect of your own that is not registered"):
+        ga.simulate(dia.model, example["rec"], example["controller"])
 
 
 def test_the_table_has_it_as_long_as_it_is_registered() -> None:
