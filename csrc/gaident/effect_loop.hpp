@@ -62,6 +62,7 @@ public:
         if (run.own != nullptr) {
             own_torque_ = run.own->at(OwnPlace::torque);
             own_friction_ = run.own->at(OwnPlace::friction);
+            own_shaft_ = own_torque_ || own_friction_;
             own_actuator_ = run.own->at(OwnPlace::actuator);
             own_sensor_ = run.own->at(OwnPlace::sensor);
             friction_ = friction_ || own_friction_;
@@ -190,7 +191,7 @@ private:
         return pi_.step(r - y);
     }
 
-    R asked(OwnPlace place, R w, R u, double t) const {
+    [[gnu::noinline]] R asked(OwnPlace place, R w, R u, double t) const {
         Pack<R>::store(w, run_.own_signals.velocity);
         Pack<R>::store(theta_, run_.own_signals.angle);
         Pack<R>::store(u, run_.own_signals.torque);
@@ -236,19 +237,11 @@ private:
         if (set_.has(cogging)) T = T - Cogging::torque(c_.cogging_amplitude, c_.cogging_order, c_.cogging_phase, theta_);
 
         const R w = plant_.velocity();
-        R own_level = R(0.0);
-        if (own_torque_ || own_friction_) {
-            // At the mean velocity, which is foreseen.
-            const R middle = w + (w - own_w_before_) * R(0.5), u = T;
-            const double at = t > 0.0 ? t : 0.0;
-            own_w_before_ = w;
-            if (own_friction_) own_level = asked(OwnPlace::friction, middle, u, at);
-            if (own_torque_) T = T + asked(OwnPlace::torque, middle, u, at);
-        }
+        if (own_shaft_) T = with_own(w, T, t);
         const R w_free = plant_.free_velocity(T, friction_torque_);
         R w_next = w_free;
         if (friction_) {
-            w_next = under_friction(w, w_free, own_level, t);
+            w_next = under_friction(w, w_free, t);
             friction_torque_ = (w_free - w_next) * per_beta_;
             T = T - friction_torque_;
         }
@@ -256,11 +249,21 @@ private:
         angle_ = angle_ + (w + w_next) * R(0.5 * h_);
     }
 
-    [[gnu::always_inline]] R under_friction(R w, R w_free, R own_level, double t) {
+    // The torque with effects of one's own, asked at the mean velocity, which is foreseen. Apart, because it is seldom there.
+    [[gnu::noinline]] R with_own(R w, R T, double t) {
+        const R middle = w + (w - own_w_before_) * R(0.5);
+        own_w_before_ = w;
+        if (own_friction_) own_level_ = asked(OwnPlace::friction, middle, T, t > 0.0 ? t : 0.0);
+        return own_torque_ ? T + asked(OwnPlace::torque, middle, T, t > 0.0 ? t : 0.0) : T;
+    }
+
+    [[gnu::always_inline]] R under_friction(R w, R w_free, double t) {
         using enum Effect;
         FrictionLaw<R> law = c_.law;
-        law.level_positive = law.level_positive + own_level;
-        law.level_negative = law.level_negative + own_level;
+        if (own_friction_) {
+            law.level_positive = law.level_positive + own_level_;
+            law.level_negative = law.level_negative + own_level_;
+        }
         R beta = plant_.beta();
         const bool bristle = set_.has(presliding_friction);
         if (bristle) bristle_.join(R(h_), w, other_friction_, w_free, beta);
@@ -294,7 +297,7 @@ private:
     Controller<R> pi_;
     double h_;
     bool friction_, steep_, actuator_in_time_, turning_;
-    bool own_torque_ = false, own_friction_ = false, own_actuator_ = false, own_sensor_ = false;
+    bool own_shaft_ = false, own_torque_ = false, own_friction_ = false, own_actuator_ = false, own_sensor_ = false;
     double time_ = 0.0;
 
     R angle_, theta_ = R(0.0), theta_middle_;
@@ -302,7 +305,8 @@ private:
     R filtered_, filter_input_;
     R limited_command_;
     R friction_torque_ = R(0.0), per_beta_;
-    R w_before_, own_w_before_, other_friction_ = R(0.0);
+    R w_before_, other_friction_ = R(0.0);
+    R own_w_before_, own_level_ = R(0.0);
     Bristle<R> bristle_;
     std::size_t issued_ = 0;
 };

@@ -145,8 +145,8 @@ class Model:
             raise ModelError(f"{what} is of a linear model, and this one has effects ({names}): use model.linear")
 
     def __getstate__(self) -> dict[str, Any]:
-        # The core's object is not part of the value.
-        return {name: value for name, value in self.__dict__.items() if name != "_core_model"}
+        # What was made once is not part of the value.
+        return {name: value for name, value in self.__dict__.items() if name not in ("_core_model", "_own")}
 
     @property
     def p(self) -> int:
@@ -293,6 +293,14 @@ class Model:
     def __repr__(self) -> str:
         effects = f", effects={list(self.effects)!r}" if self.effects else ""
         return f"Model(gain={self.gain!r}, poles={_list(self.poles)}, zeros={_list(self.zeros)}{effects})"
+
+    def own_effects(self) -> tuple[Effect, ...]:
+        """Those of one's own that act; raises ModelError where one is no longer registered."""
+        own: tuple[Effect, ...] | None = self.__dict__.get("_own")
+        if own is None:
+            own = tuple(effect for effect in self.effects if effect.row.own)
+            object.__setattr__(self, "_own", own)
+        return tuple(effect for effect in own if not effect.neutral) if own else own
 
     def core(self) -> _core.EffectModel:
         """The model as the core takes it, without effects of one's own; made once."""

@@ -221,7 +221,7 @@ def _simulate(
     record: _core.EffectRecord, plants: Sequence[Model], starts: Signal, steps: int, workers: int, every: bool
 ) -> tuple[Signal, Signal, Signal]:
     """The core's simulation of models, those with the same effects of one's own at once."""
-    acting = [tuple(e.name for e in plant.effects if e.row.own and not e.neutral) for plant in plants]
+    acting = [tuple(e.name for e in plant.own_effects()) for plant in plants]
     if not any(acting):
         return record.simulate([plant.core() for plant in plants], starts, steps, workers, every)
     found: list[Signal] | None = None
