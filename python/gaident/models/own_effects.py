@@ -33,8 +33,11 @@ PLACES = {"torque": "shaft", "friction": "shaft", "actuator": "actuator", "senso
 class Signals(NamedTuple):
     """What an effect of one's own may look at; arrays of one number per drive that is simulated beside others, read only.
 
-    velocity [rad/s] and angle [rad] of the motor; torque [N m]: at the shaft what saturation, dead band, delay and lag left of
-    the command, at the actuator the command, at the sensor the torque held; time [s] since the record's start, one number.
+    velocity  of the motor [rad/s]; at the shaft that in the middle of the substep
+    angle     of the motor [rad]
+    torque    [N m]: at the shaft what saturation, dead band, delay and lag left of the command, at the actuator the command, at
+              the sensor the torque held
+    time      since the record's start [s], one number
     """
 
     velocity: Signal
@@ -44,16 +47,24 @@ class Signals(NamedTuple):
 
 
 class Parameter(NamedTuple):
-    """One parameter of an effect."""
+    """One parameter of an effect.
+
+    name, unit       SI, rad; "1" for none
+    neutral          with every neutral value the effect is the identity; nan: any value is
+    lowest, highest  physical bounds; of effects of one's own they are finite, and a diagnosis looks between them
+    above_lowest     the lowest value itself is not allowed
+    logarithmic      of effects of one's own: a diagnosis moves it by its logarithm
+    starts           of effects of one's own: where a diagnosis begins; (): values spread between the bounds
+    """
 
     name: str
-    unit: str  # SI, rad; "1" for none
-    neutral: float = math.nan  # with every neutral value the effect is the identity; nan: any value
-    lowest: float = -math.inf  # physical bounds
+    unit: str
+    neutral: float = math.nan
+    lowest: float = -math.inf
     highest: float = math.inf
-    above_lowest: bool = False  # the lowest value itself is not allowed
-    logarithmic: bool = False  # of effects of one's own: a diagnosis searches over its logarithm
-    starts: tuple[float, ...] = ()  # of effects of one's own: where a diagnosis begins; (): chosen between the bounds
+    above_lowest: bool = False
+    logarithmic: bool = False
+    starts: tuple[float, ...] = ()
 
     @property
     def bounds(self) -> str:
