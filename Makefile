@@ -81,11 +81,11 @@ tidy: .venv/.tidied ## repair and format the Python and C++ sources
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i $$(find csrc bench tests/cpp -name '*.?pp')
 
-# Pictures and formulas from the core, the tutorial run; warnings are errors.
+# Pictures and formulas from the core, the tutorial run; warnings are errors (but not with --quiet, which hides them from --strict).
 docs: .venv/.documented ## build the documentation into build/docs
 	$(BIN)/python -W error docs/tools/pictures.py docs/pictures
 	$(BIN)/python -W error docs/tools/run_pages.py
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo "written: build/docs/index.html"
 
 clean: ## remove everything that these commands made

@@ -41,7 +41,11 @@ def on_page_markdown(markdown: str, page: Page, config: Config, files: Any) -> s
 
     def outside(link: re.Match[str]) -> str:
         target = (here / link[0].rsplit("(", 1)[1].rstrip(")").split("#")[0]).resolve()
-        return link[0] if docs.resolve() in target.parents else f"`{link[2]}`"  # a file of the repository: its name
+        if docs.resolve() in target.parents:
+            return link[0]
+        if not target.exists():
+            raise ValueError(f"docs/{page.file.src_path}: {link[0]} names no file of the repository")
+        return f"`{link[2]}`"
 
     markdown = OUTSIDE.sub(outside, markdown)
     markdown = "".join(part if part.startswith("`") else _formulas(part) for part in CODE.split(markdown))
