@@ -132,12 +132,12 @@ def test_a_diagnosis_finds_it_and_saves_it_by_name(tmp_path: Path) -> None:
     assert abs(estimate.value - 0.3) < 4.0 * estimate.std < 0.03
     assert finding.evidence.startswith("Dry friction in proportion to the torque transmitted: beyond doubt")
 
-    share = parameter("share", "1", highest=0.9)
-    effects.register("gear_friction", [share], meaning="gears", friction=example["gear_friction"])
     assert "gear friction" in dia.summary() and "share" in dia.summary()
-    dia.plot()
     path = tmp_path / "dia.json"
     dia.save(path)
+    share = parameter("share", "1", highest=0.9)
+    effects.register("gear_friction", [share], meaning="gears", friction=example["gear_friction"])
+    dia.plot()
     assert ga.load(path) == dia
     (stored,) = json.loads(path.read_text())["model"]["effects"]
     assert stored["own"] is True

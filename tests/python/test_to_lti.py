@@ -87,7 +87,7 @@ def test_python_control_gets_the_same() -> None:
     np.testing.assert_allclose(theirs(1j * OMEGA), ours.freqresp(OMEGA)[1], rtol=1e-6)
     sampled = model.to_control(DT)
     assert isinstance(sampled, control.StateSpace) and sampled.dt == DT
-    found = control.forced_response(sampled, inputs=U).outputs
+    found = control.forced_response(sampled, None, U).outputs
     np.testing.assert_allclose(found, signal.dlsim(model.to_scipy(DT), U)[1].ravel(), rtol=0.0, atol=1e-9)
 
 

@@ -89,7 +89,7 @@ def _checked(model: Model, dt: float, controller: PI | None, name: str, substeps
         raise ModelError(f"controller is a {type(controller).__name__}: give gaident.PI(...), or None for the drive alone")
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
         raise ModelError(f"name is {name!r}: give what C takes as a name, letters, digits and _")
-    own = [effect.name for effect in model.effects if effect.row.own]
+    own = [effect.name for effect in model.effects if effect.own]
     if own:
         raise ModelError(
             f"{', '.join(own)} is an effect of your own, a Python function that C cannot call: take it out with without_effect "

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -148,6 +148,7 @@ class Effect:
 
     name: str
     parameters: Mapping[str, float]
+    own: bool = field(init=False, repr=False)  # one's own, registered from Python
 
     def __post_init__(self) -> None:
         one_of(self.name, "the effect's name", _by_name(), ModelError)
@@ -166,6 +167,7 @@ class Effect:
                 shown = ", ".join(f"{k} {v:g}" for k, v in values.items())
                 raise ModelError(f"effect {self.name} has {shown}: {broken}")
         object.__setattr__(self, "parameters", MappingProxyType(values))
+        object.__setattr__(self, "own", row.own)
 
     @property
     def row(self) -> Row:
@@ -187,7 +189,7 @@ class Effect:
     def to_dict(self) -> dict[str, Any]:
         """{"name": ..., "parameters": {...}} for JSON; an infinite limit is None, an effect of one's own has "own": true."""
         data = {"name": self.name, "parameters": {k: v if math.isfinite(v) else None for k, v in self.parameters.items()}}
-        return {**data, "own": True} if self.row.own else data
+        return {**data, "own": True} if self.own else data
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Effect:

@@ -298,7 +298,7 @@ class Model:
         """Those of one's own that act; raises ModelError where one is no longer registered."""
         own: tuple[Effect, ...] | None = self.__dict__.get("_own")
         if own is None:
-            own = tuple(effect for effect in self.effects if effect.row.own)
+            own = tuple(effect for effect in self.effects if effect.own)
             object.__setattr__(self, "_own", own)
         return tuple(effect for effect in own if not effect.neutral) if own else own
 
@@ -307,7 +307,7 @@ class Model:
         made: _core.EffectModel | None = self.__dict__.get("_core_model")
         if made is None:
             poles, zeros = (np.array(roots, dtype=np.complex128) for roots in (self.poles, self.zeros))
-            built_in = [(effect.name, effect.values) for effect in self.effects if not effect.row.own]
+            built_in = [(effect.name, effect.values) for effect in self.effects if not effect.own]
             made = _core.EffectModel(self.gain, poles, zeros, built_in)
             object.__setattr__(self, "_core_model", made)
         return made
