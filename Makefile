@@ -32,7 +32,7 @@ SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
 endif
-.PHONY: help install demo test bench tidy lint test-cpp test-python clean build-checked test-checked test-sanitized
+.PHONY: help install demo test bench tidy docs lint test-cpp test-python clean build-checked test-checked test-sanitized
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -81,8 +81,15 @@ tidy: .venv/.tidied ## repair and format the Python and C++ sources
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i $$(find csrc bench tests/cpp -name '*.?pp')
 
+# Pictures and formulas from the core, the tutorial run; warnings are errors (but not with --quiet, which hides them from --strict).
+docs: .venv/.documented ## build the documentation into build/docs
+	$(BIN)/python -W error docs/tools/pictures.py docs/pictures
+	$(BIN)/python -W error docs/tools/run_pages.py
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	@echo "written: build/docs/index.html"
+
 clean: ## remove everything that these commands made
-	rm -rf build .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf build docs/pictures .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find python tests bench -name __pycache__ -prune -exec rm -rf {} +
 
 # The environment, in steps. A stamp is renewed when what it was made from changes.
@@ -103,6 +110,11 @@ clean: ## remove everything that these commands made
 .venv/.tested: .venv/.tools $(SOURCES)
 	$(PIP_INSTALL) $(CHECKED) ".[test]"
 	@touch .venv/.installed $@
+
+.venv/.documented: .venv/.installed
+	@$(BIN)/python -c 'import ast, re; text = open("pyproject.toml").read(); print(*ast.literal_eval(re.search(r"(?ms)^docs = (\[.*?\])", text)[1]), sep="\n")' > .venv/docs-requires.txt
+	$(PIP_INSTALL) -r .venv/docs-requires.txt
+	@touch $@
 
 .venv/.tidied: .venv/.tools
 	@$(BIN)/python -c 'import ast, re; text = open("pyproject.toml").read(); print(*ast.literal_eval(re.search(r"(?ms)^tidy = (\[.*?\])", text)[1]), sep="\n")' > .venv/tidy-requires.txt

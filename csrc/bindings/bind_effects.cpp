@@ -111,8 +111,97 @@ struct PyRecord {
     }
 };
 
+// One of a user's own effects: how it is asked, and its parameters, (models, parameters).
+struct OwnEffect {
+    OwnPlace place;
+    py::function function;
+    RealArray values;
+};
+
+OwnPlace own_place_named(const std::string& name) {
+    if (name == "torque") return OwnPlace::torque;
+    if (name == "friction") return OwnPlace::friction;
+    if (name == "actuator") return OwnPlace::actuator;
+    if (name == "sensor") return OwnPlace::sensor;
+    throw std::invalid_argument("own: '" + name + "' is no place for an effect of one's own");
+}
+
+// Python functions as own effects: function(velocity, angle, torque, time, *parameters), arrays of one number per lane, read only but for
+// the answer. To be used with the GIL held.
+class PyOwnEffects : public OwnEffects {
+public:
+    PyOwnEffects(const std::vector<std::tuple<std::string, py::function, RealArray>>& effects, std::size_t models) {
+        for (const auto& [place, function, values] : effects) {
+            if (values.ndim() != 2 || static_cast<std::size_t>(values.shape(0)) != models)
+                throw std::invalid_argument("own: one row of parameters per model is needed");
+            effects_.push_back({own_place_named(place), function, values});
+        }
+    }
+
+    bool at(OwnPlace place) const override {
+        return std::any_of(effects_.begin(), effects_.end(), [&](const OwnEffect& e) { return e.place == place; });
+    }
+
+    void begin(std::span<const std::size_t> models, const OwnSignals& signals, double* answer) override {
+        width_ = models.size();
+        signals_ = signals;
+        answer_ = answer;
+        velocity_ = seen(signals.velocity);
+        angle_ = seen(signals.angle);
+        torque_ = seen(signals.torque);
+        parameters_.clear();
+        for (const OwnEffect& e : effects_) {
+            py::list lanes;
+            for (py::ssize_t k = 0; k < e.values.shape(1); ++k) {
+                RealArray column(static_cast<py::ssize_t>(width_));
+                for (std::size_t lane = 0; lane < width_; ++lane)
+                    column.mutable_data()[lane] = e.values.at(static_cast<py::ssize_t>(models[lane]), k);
+                column.attr("setflags")(py::arg("write") = false);
+                lanes.append(column);
+            }
+            parameters_.push_back(py::tuple(lanes));
+        }
+    }
+
+    void ask(OwnPlace place, double time) override {
+        const bool chained = place == OwnPlace::actuator || place == OwnPlace::sensor;
+        double* const signal = place == OwnPlace::actuator ? signals_.torque : signals_.velocity;
+        if (!chained) std::fill(answer_, answer_ + width_, 0.0);
+        for (std::size_t i = 0; i < effects_.size(); ++i) {
+            if (effects_[i].place != place) continue;
+            const RealArray found = RealArray::ensure(effects_[i].function(velocity_, angle_, torque_, time, *parameters_[i]));
+            if (!found || (found.size() != 1 && static_cast<std::size_t>(found.size()) != width_)) {
+                PyErr_Clear();
+                throw std::invalid_argument("own: an effect's function has to give one number per lane");
+            }
+            for (std::size_t lane = 0; lane < width_; ++lane) {
+                const double value = found.data()[found.size() == 1 ? 0 : lane];
+                if (chained) signal[lane] = value;
+                else answer_[lane] += value;
+            }
+        }
+        if (chained) std::copy(signal, signal + width_, answer_);
+    }
+
+private:
+    RealArray seen(double* lanes) const {
+        RealArray view(static_cast<py::ssize_t>(width_), lanes, py::none());
+        view.attr("setflags")(py::arg("write") = false);
+        return view;
+    }
+
+    std::vector<OwnEffect> effects_;
+    std::vector<py::tuple> parameters_;
+    RealArray velocity_, angle_, torque_;
+    OwnSignals signals_{};
+    double* answer_ = nullptr;
+    std::size_t width_ = 0;
+};
+
+using OwnList = std::vector<std::tuple<std::string, py::function, RealArray>>;
+
 py::tuple simulate_models(const PyRecord& record, const std::vector<EffectModel>& models, const RealArray& initial_states,
-                          int substeps, int workers, bool all, const std::string& kernel, bool lanes) {
+                          int substeps, int workers, bool all, const std::string& kernel, bool lanes, const OwnList& own) {
     EffectJob job = record.job;
     if (substeps < 0 || substeps > max_substeps) throw std::invalid_argument("substeps: 0 (as needed) to 64");
     job.substeps = substeps;
@@ -143,19 +232,24 @@ py::tuple simulate_models(const PyRecord& record, const std::vector<EffectModel>
     RealArray velocity(shape), torque(all ? shape : std::vector<py::ssize_t>{0, 0}),
         angle(all ? shape : std::vector<py::ssize_t>{0, 0});
     const EffectOutputs out{velocity.mutable_data(), all ? torque.mutable_data() : nullptr, all ? angle.mutable_data() : nullptr};
-    {
+    if (own.empty()) {
         const py::gil_scoped_release release;
+        simulate_effects(job, models, starts, out);
+    } else {
+        PyOwnEffects effects(own, count);
+        job.own = &effects;
         simulate_effects(job, models, starts, out);
     }
     return py::make_tuple(velocity, torque, angle);
 }
 
 py::array simulate_values(const PyRecord& record, const RealArray& values, const std::tuple<int, int, int, int>& structure,
-                          const std::vector<std::string>& effects, const RealArray& initial_states, int substeps, int workers) {
+                          const std::vector<std::string>& effects, const RealArray& initial_states, int substeps, int workers,
+                          const OwnList& own) {
     const auto [real_poles, pole_pairs, real_zeros, zero_pairs] = structure;
     const int poles = real_poles + 2 * pole_pairs, zeros = real_zeros + 2 * zero_pairs;
-    if (std::min({real_poles, pole_pairs, real_zeros, zero_pairs}) < 0 || poles > max_plant_order || zeros > max_plant_order / 2 ||
-        zeros > poles)
+    if (std::min({real_poles, pole_pairs, real_zeros, zero_pairs}) < 0 || poles > max_plant_order ||
+        zeros > max_plant_order / 2 || zeros > poles)
         throw std::invalid_argument("structure: at most 14 poles and 7 zeros, and no more zeros than poles");
     const int factors = 1 + real_poles + 2 * pole_pairs + real_zeros + 2 * zero_pairs;
     std::vector<Effect> chosen;
@@ -177,7 +271,7 @@ py::array simulate_values(const PyRecord& record, const RealArray& values, const
         }
         check_structure(m.linear.structure, m.effects);
     }
-    return simulate_models(record, models, initial_states, substeps, workers, false, "", true)[0];
+    return simulate_models(record, models, initial_states, substeps, workers, false, "", true, own)[0];
 }
 
 }  // namespace
@@ -193,7 +287,7 @@ void bind_effects(py::module_& m) {
              py::arg("dt"), py::arg("input"), py::arg("position"), py::arg("velocity"), py::arg("start_angle"), py::arg("loop"),
              py::arg("kp"), py::arg("ki"), py::arg("torque_limit"), py::arg("integrator_limit"))
         .def("simulate", &simulate_models, py::arg("models"), py::arg("initial_states"), py::arg("substeps"), py::arg("workers"),
-             py::arg("all"), py::arg("kernel") = "", py::arg("lanes") = true)
+             py::arg("all"), py::arg("kernel") = "", py::arg("lanes") = true, py::arg("own") = OwnList())
         .def("simulate_values", &simulate_values, py::arg("values"), py::arg("structure"), py::arg("effects"),
-             py::arg("initial_states"), py::arg("substeps"), py::arg("workers"));
+             py::arg("initial_states"), py::arg("substeps"), py::arg("workers"), py::arg("own") = OwnList());
 }

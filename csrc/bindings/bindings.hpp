@@ -31,3 +31,4 @@ void run_interruptibly(std::atomic<bool>& stop, const std::function<void()>& wor
 void bind_simulate(py::module_& m);
 void bind_identify(py::module_& m);
 void bind_effects(py::module_& m);
+void bind_recurrence(py::module_& m);

@@ -5,4 +5,5 @@ PYBIND11_MODULE(_core, m) {
     bind_simulate(m);
     bind_identify(m);
     bind_effects(m);
+    bind_recurrence(m);
 }

@@ -30,8 +30,8 @@ public:
             Planned& p = planned_[i];
             p.start = starts.empty() ? nullptr : starts[i];
             p.model = reduced(models[i], p.start != nullptr);
-            if (p.model.effects.bits != 0)
-                p.substeps = job.substeps > 0 ? job.substeps : substeps_for(p.model, job.record, job.loop);
+            if (p.model.effects.bits != 0 || job.own != nullptr)
+                p.substeps = job.substeps > 0 ? job.substeps : substeps_for(p.model, job.record, job.loop, job.own != nullptr);
         }
         std::iota(order_.begin(), order_.end(), std::size_t{0});
         std::stable_sort(order_.begin(), order_.end(),
@@ -47,15 +47,15 @@ public:
     }
 
     void run() {
-        parallel(groups_.size(), job_.workers, [&](std::size_t i) {
+        parallel(groups_.size(), job_.own != nullptr ? 1 : job_.workers, [&](std::size_t i) {
             const FlushDenormals flush;
             const std::span<const std::size_t> group(&order_[groups_[i].first], groups_[i].second - groups_[i].first);
             const Planned& first = planned_[group[0]];
             if (first.substeps == 0 || job_.loop.kind == LoopKind::continuous) linear(group);
             if (first.substeps == 0) return;
-            if (job_.loop.kind != LoopKind::continuous) return effects(group, first.model.effects, Write::set);
-            effects(group, first.model.effects, Write::add);
-            effects(group, EffectSet{}, Write::subtract);
+            if (job_.loop.kind != LoopKind::continuous) return effects(group, first.model.effects, job_.own, Write::set);
+            effects(group, first.model.effects, job_.own, Write::add);
+            effects(group, EffectSet{}, nullptr, Write::subtract);
         });
     }
 
@@ -129,7 +129,7 @@ private:
         }
     }
 
-    void effects(std::span<const std::size_t> group, EffectSet set, Write write) {
+    void effects(std::span<const std::size_t> group, EffectSet set, OwnEffects* own, Write write) {
         const bool alone = group.size() == 1;
         const std::size_t width = alone ? 1 : effect_lanes;
         const Planned& first = planned_[group[0]];
@@ -172,6 +172,15 @@ private:
         run.velocity = velocity.data();
         run.torque = out_.torque == nullptr ? nullptr : torque.data();
         run.angle = out_.angle == nullptr ? nullptr : angle.data();
+        std::vector<double> asked(own == nullptr ? 0 : 4 * width);
+        if (own != nullptr) {
+            std::vector<std::size_t> models(width);
+            for (std::size_t lane = 0; lane < width; ++lane) models[lane] = group[std::min(lane, group.size() - 1)];
+            run.own = own;
+            run.own_signals = {asked.data(), &asked[width], &asked[2 * width]};
+            run.own_answer = &asked[3 * width];
+            own->begin(models, run.own_signals, &asked[3 * width]);
+        }
         if (alone) run_effects<double>(run, load_constants<double>(constants.data()));
         else job_.kernel->run(run, constants.data());
         spread(group, velocity, out_.velocity, width, write);

@@ -25,7 +25,8 @@ struct EffectJob {
     int substeps = 0;  // 0: as each model needs
     int workers = 1;
     const EffectKernel* kernel = &best_effects();
-    bool lanes = true;  // false: every model alone; the result is the same
+    bool lanes = true;          // false: every model alone; the result is the same
+    OwnEffects* own = nullptr;  // of all models, asked by one thread only: with them `workers` does not count
 };
 
 // `starts`: as EffectModel's linear part takes it in prepare(), one per model or none (rest). Models without any effect give no angle

@@ -10,6 +10,7 @@
 
 #include "effect_plant.hpp"
 #include "friction.hpp"
+#include "own_effects.hpp"
 
 #include <span>
 
@@ -36,6 +37,10 @@ struct EffectRun {
     const DelayTable* delay = nullptr;  // one per lane
     double* history = nullptr;          // past torques: (history_mask + 1) * width numbers
     std::size_t history_mask = 0;
+
+    OwnEffects* own = nullptr;           // asked through these
+    OwnSignals own_signals{};            // width numbers each,
+    const double* own_answer = nullptr;  // and answering there
 };
 
 template <class R, class Plant>
@@ -53,7 +58,15 @@ public:
                                  friction_drift);
         steep_ = set_.has_any(asymmetric_friction, quadratic_drag);
         actuator_in_time_ = set_.has_any(transport_delay, torque_lag);
-        turning_ = set_.has_any(unbalance, cogging, velocity_ripple);
+        turning_ = set_.has_any(unbalance, cogging, velocity_ripple) || run.own != nullptr;
+        if (run.own != nullptr) {
+            own_torque_ = run.own->at(OwnPlace::torque);
+            own_friction_ = run.own->at(OwnPlace::friction);
+            own_shaft_ = own_torque_ || own_friction_;
+            own_actuator_ = run.own->at(OwnPlace::actuator);
+            own_sensor_ = run.own->at(OwnPlace::sensor);
+            friction_ = friction_ || own_friction_;
+        }
         bristle_.torque = c_.bristle_torque;
         bristle_.stiffness = c_.bristle_stiffness;
         bristle_.per_break = c_.bristle_per_break;
@@ -62,7 +75,7 @@ public:
         lagging_ = c_.before;
         filtered_ = filter_input_ = plant_.velocity();
         limited_command_ = R(run.moving && !run.input.empty() ? run.input[0] : 0.0);
-        w_before_ = plant_.velocity();
+        w_before_ = own_w_before_ = plant_.velocity();
         if (set_.has(transport_delay))
             for (std::size_t i = 0; i <= run.history_mask; ++i) Pack<R>::store(c_.before, run.history + i * width);
         // Friction that would push is no friction: such a candidate is as good as diverged.
@@ -84,6 +97,7 @@ private:
         for (std::size_t n = 0; n < run_.input.size(); ++n) {
             const double here = position_at(n), next = position_after(n);
             theta_ = run_.position.empty() ? angle_ : R(here);
+            time_ = static_cast<double>(n) * run_.sample_time;
             const R y = sensor();
             const R u = open ? R(run_.input[n]) : control(R(run_.input[n]), y);
             write(n, y, u);
@@ -93,6 +107,7 @@ private:
                 substep(j, (static_cast<double>(n) + (j + 0.5) * share) * run_.sample_time);
                 if (set_.has(Effect::velocity_filter)) {
                     theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
+                    time_ = (static_cast<double>(n) + (j + 1) * share) * run_.sample_time;
                     filter();
                 }
             }
@@ -114,6 +129,7 @@ private:
                 middle(here, next, (j + 0.5) * share);
                 substep(0, (static_cast<double>(n) - 1.0 + (j + 0.5) * share) * run_.sample_time);
                 theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
+                time_ = (static_cast<double>(n) - 1.0 + (j + 1) * share) * run_.sample_time;
                 if (set_.has(Effect::velocity_filter)) filter();
                 y = sensor();
                 u_long_before = u_before;
@@ -152,7 +168,8 @@ private:
     }
 
     [[gnu::always_inline]] R rippled() const {
-        const R w = plant_.velocity();
+        R w = plant_.velocity();
+        if (own_sensor_) w = asked(OwnPlace::sensor, w, held_, time_);
         if (!set_.has(Effect::velocity_ripple)) return w;
         return VelocityRipple::seen(c_.ripple_amplitude, c_.ripple_order, c_.ripple_phase, theta_, w);
     }
@@ -174,9 +191,18 @@ private:
         return pi_.step(r - y);
     }
 
+    [[gnu::noinline]] R asked(OwnPlace place, R w, R u, double t) const {
+        Pack<R>::store(w, run_.own_signals.velocity);
+        Pack<R>::store(theta_, run_.own_signals.angle);
+        Pack<R>::store(u, run_.own_signals.torque);
+        run_.own->ask(place, t);
+        return Pack<R>::load(run_.own_answer);
+    }
+
     // The torque u is issued, to be held until the next.
     [[gnu::always_inline]] void act(R u) {
         using enum Effect;
+        if (own_actuator_) u = asked(OwnPlace::actuator, plant_.velocity(), u, time_);
         if (set_.has(torque_saturation)) u = clamp(u, -c_.saturation, c_.saturation);
         if (set_.has(torque_dead_band)) u = TorqueDeadBand::step(c_.dead_band, u);
         held_ = u;
@@ -211,6 +237,7 @@ private:
         if (set_.has(cogging)) T = T - Cogging::torque(c_.cogging_amplitude, c_.cogging_order, c_.cogging_phase, theta_);
 
         const R w = plant_.velocity();
+        if (own_shaft_) T = with_own(w, T, t);
         const R w_free = plant_.free_velocity(T, friction_torque_);
         R w_next = w_free;
         if (friction_) {
@@ -222,9 +249,21 @@ private:
         angle_ = angle_ + (w + w_next) * R(0.5 * h_);
     }
 
+    // The torque with effects of one's own, asked at the mean velocity, which is foreseen. Apart, because it is seldom there.
+    [[gnu::noinline]] R with_own(R w, R T, double t) {
+        const R middle = w + (w - own_w_before_) * R(0.5);
+        own_w_before_ = w;
+        if (own_friction_) own_level_ = asked(OwnPlace::friction, middle, T, t > 0.0 ? t : 0.0);
+        return own_torque_ ? T + asked(OwnPlace::torque, middle, T, t > 0.0 ? t : 0.0) : T;
+    }
+
     [[gnu::always_inline]] R under_friction(R w, R w_free, double t) {
         using enum Effect;
         FrictionLaw<R> law = c_.law;
+        if (own_friction_) {
+            law.level_positive = law.level_positive + own_level_;
+            law.level_negative = law.level_negative + own_level_;
+        }
         R beta = plant_.beta();
         const bool bristle = set_.has(presliding_friction);
         if (bristle) bristle_.join(R(h_), w, other_friction_, w_free, beta);
@@ -258,6 +297,8 @@ private:
     Controller<R> pi_;
     double h_;
     bool friction_, steep_, actuator_in_time_, turning_;
+    bool own_shaft_ = false, own_torque_ = false, own_friction_ = false, own_actuator_ = false, own_sensor_ = false;
+    double time_ = 0.0;
 
     R angle_, theta_ = R(0.0), theta_middle_;
     R held_ = R(0.0), lagging_;
@@ -265,6 +306,7 @@ private:
     R limited_command_;
     R friction_torque_ = R(0.0), per_beta_;
     R w_before_, other_friction_ = R(0.0);
+    R own_w_before_, own_level_ = R(0.0);
     Bristle<R> bristle_;
     std::size_t issued_ = 0;
 };

@@ -138,14 +138,15 @@ EffectModel reduced(const EffectModel& model, bool moving) {
     return r;
 }
 
-int substeps_for(const EffectModel& model, const EffectRecord& record, const Loop& loop) {
+int substeps_for(const EffectModel& model, const EffectRecord& record, const Loop& loop, bool own) {
     using enum Effect;
     const Factors<double>& g = model.linear;
     const double Ts = record.sample_time;
     double wanted = 1.0;
-    const bool in_time = model.effects.has_any(coulomb_friction, stribeck_friction, asymmetric_friction, presliding_friction,
-                                               quadratic_drag, unbalance, cogging, friction_drift, backlash, hardening_stiffness,
-                                               transport_delay, torque_lag, velocity_filter);
+    const bool in_time =
+        own || model.effects.has_any(coulomb_friction, stribeck_friction, asymmetric_friction, presliding_friction,
+                                     quadratic_drag, unbalance, cogging, friction_drift, backlash, hardening_stiffness,
+                                     transport_delay, torque_lag, velocity_filter);
     if (in_time) {
         double fastest = 0.0;
         for (int i = 0; i < g.structure.pole_pairs(); ++i) fastest = std::max(fastest, resonance(g.pole_pair[i]));

@@ -21,7 +21,8 @@ struct EffectRecord {
 EffectModel reduced(const EffectModel& model, bool moving);
 
 // Steps per sample that the reduced model needs: a power of two, so that neighbouring models have the same.
-int substeps_for(const EffectModel& model, const EffectRecord& record, const Loop& loop);
+// `own`: effects that the core does not know act as well.
+int substeps_for(const EffectModel& model, const EffectRecord& record, const Loop& loop, bool own = false);
 
 struct PreparedEffects {
     EffectConstants<double> constants;

@@ -1,6 +1,7 @@
 """The core of gaident: recurrences, genetic search and local fit (csrc/bindings); SI units."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -217,8 +218,13 @@ class EffectRecord:
         all: bool,
         kernel: str = "",
         lanes: bool = True,
+        own: Sequence[tuple[str, Callable[..., Any], NDArray[np.float64]]] = [],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """(velocity, torque, angle), models x samples; the last two empty unless `all`. substeps 0: as needed."""
+        """(velocity, torque, angle), models x samples; the last two empty unless `all`. substeps 0: as needed.
+
+        own: effects that the core does not know, each (torque, friction, actuator or sensor; function(velocity, angle, torque,
+        time, *parameters), arrays of one number per model side by side; parameters, models x parameters).
+        """
     def simulate_values(
         self,
         values: NDArray[np.float64],
@@ -227,6 +233,7 @@ class EffectRecord:
         initial_states: NDArray[np.float64],
         substeps: int,
         workers: int,
+        own: Sequence[tuple[str, Callable[..., Any], NDArray[np.float64]]] = [],
     ) -> NDArray[np.float64]:
         """Velocities of models given as rows of natural parameters and effects' parameters."""
 
@@ -234,3 +241,20 @@ def decode(
     words: Sequence[int], ranges: SearchRanges, gray: bool, logarithmic: bool
 ) -> tuple[float, NDArray[np.complex128], NDArray[np.complex128]]:
     """(gain, poles, zeros) of a chromosome."""
+
+def recurrence(
+    model: EffectModel,
+    dt: float,
+    loop: str,
+    kp: float,
+    ki: float,
+    torque_limit: float,
+    integrator_limit: float,
+    substeps: int,
+    top_speed: float,
+) -> dict[str, Any]:
+    """The numbers of the recurrence that simulates a model, for writing it in another language.
+
+    "substeps" 0 where no effect acts, "a" and "b" then in delta = z - 1 at dt; else "effects", "a" and "b" (or "phi", "motor",
+    "coupling", "shaft" of two masses) at the substep, and "delay" where there is one.
+    """

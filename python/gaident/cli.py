@@ -260,6 +260,8 @@ def _load_model(path: str) -> tuple[AnyModel, PI | None, dict[str, tuple[float, 
         raise SettingsError(f"{path}: cannot be read as JSON ({error}); give what identify --out saved") from None
     if isinstance(data, dict) and "schema" in data:
         idn = load(path)
+        if isinstance(idn, Record):
+            raise SettingsError(f"{path}: is a saved record; give a saved identification or a model")
         if not isinstance(idn, Identification):
             return idn.model, idn.controller, {}
         return idn.model, idn.controller, dict(idn.initial_states)

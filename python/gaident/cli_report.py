@@ -11,6 +11,7 @@ from gaident.cli_options import drive_of, in_options
 from gaident.cli_output import target_of, write
 from gaident.data.record import Record
 from gaident.diagnosis.result import Diagnosis
+from gaident.errors import GaidentError
 from gaident.identification.result import Identification, json_text
 from gaident.reporting import report_page
 from gaident.store import load
@@ -38,6 +39,8 @@ def report_command(args: argparse.Namespace) -> None:
     target = target_of(args.out, [args.result, *args.logs, *held])
     assert target is not None
     result = load(args.result)
+    if not isinstance(result, (Diagnosis, Identification)):
+        raise GaidentError(f"{args.result}: a record, no result; give what `gaident identify` or `diagnose` wrote with --out")
     records, validation = ([drive.read(log) for log in logs] for logs in (args.logs, held))
     size = write_report(result, target, records, validation, drive.axis)
     if args.json:

@@ -6,6 +6,8 @@ file and the line), the offending value and the remedy.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 __all__ = [
     "ControllerError",
     "GaidentError",
@@ -14,11 +16,23 @@ __all__ = [
     "RecordError",
     "SettingsError",
     "SpaceError",
+    "check_schema",
 ]
 
 
 class GaidentError(ValueError):
     """Base of everything gaident raises on wrong use."""
+
+
+def check_schema(data: Mapping[str, object], schema: str, version: int) -> None:
+    """Raises GaidentError where saved data are not of this schema and version, saying which they are."""
+    if data.get("schema") != schema:
+        raise GaidentError(f"schema is {data.get('schema')!r}: this is not a saved {schema.removeprefix('gaident/')}")
+    found = data.get("schema_version")
+    if isinstance(found, int) and found > version:
+        raise GaidentError(f"schema_version is {found}: this gaident reads {version}; load it with a newer gaident")
+    if found != version:
+        raise GaidentError(f"schema_version is {found!r}: this gaident reads {version}; save it again as that")
 
 
 class RecordError(GaidentError):

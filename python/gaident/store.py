@@ -8,24 +8,30 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from gaident.data.record import SCHEMA as RECORD
+from gaident.data.record import Record
 from gaident.diagnosis.result import SCHEMA as DIAGNOSIS
 from gaident.diagnosis.result import Diagnosis
 from gaident.errors import GaidentError
 from gaident.identification.result import SCHEMA as IDENTIFICATION
 from gaident.identification.result import Identification, decoded
 
-__all__ = ["load"]
+__all__ = ["load", "schema"]
 
-READERS: dict[str, Callable[[Mapping[str, Any]], Identification | Diagnosis]] = {
+Saved = Identification | Diagnosis | Record
+
+READERS: dict[str, Callable[[Mapping[str, Any]], Saved]] = {
     IDENTIFICATION: Identification.from_dict,
     DIAGNOSIS: Diagnosis.from_dict,
+    RECORD: Record.from_dict,
 }
 
 
-def load(path: str | os.PathLike[str]) -> Identification | Diagnosis:
-    """Reads what `Identification.save` or `Diagnosis.save` wrote.
+def load(path: str | os.PathLike[str]) -> Saved:
+    """Reads what `Identification.save`, `Diagnosis.save` or `Record.save` wrote.
 
-    Raises GaidentError naming the file where it is missing, no JSON, or neither of them.
+    Raises GaidentError naming the file where it is missing, no JSON, none of them, of a newer schema, or names an effect of
+    your own that is not registered.
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -37,8 +43,14 @@ def load(path: str | os.PathLike[str]) -> Identification | Diagnosis:
         raise GaidentError(f"{path}: line {error.lineno} is not JSON ({error.msg}); give a file that save() wrote") from error
     reader = READERS.get(str(data.get("schema"))) if isinstance(data, dict) else None
     if reader is None:
-        raise GaidentError(f"{path}: holds neither a saved identification nor a saved diagnosis; give a file that save() wrote")
+        raise GaidentError(f"{path}: holds no saved identification, diagnosis or record; give a file that save() wrote")
     try:
         return reader(decoded(data))
     except GaidentError as error:
         raise GaidentError(f"{path}: {error}") from error
+
+
+def schema() -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of the files that `load` reads; it stands in the package as results.schema.json."""
+    data: dict[str, Any] = json.loads(Path(__file__).with_name("results.schema.json").read_text(encoding="utf-8"))
+    return data

@@ -306,3 +306,69 @@ TEST_CASE("a record that starts in motion continues the linear loop's own state"
         }
     }
 }
+
+namespace {
+
+// -d w and a level of dry friction, d and the level per model: what the core has itself, asked from outside.
+class Outside : public OwnEffects {
+public:
+    std::vector<double> d, level;
+
+    bool at(OwnPlace place) const override { return place == OwnPlace::torque || place == OwnPlace::friction; }
+    void begin(std::span<const std::size_t> models, const OwnSignals& signals, double* answer) override {
+        models_.assign(models.begin(), models.end());
+        signals_ = signals;
+        answer_ = answer;
+    }
+    void ask(OwnPlace place, double time) override {
+        CHECK(time >= 0.0);
+        for (std::size_t lane = 0; lane < models_.size(); ++lane)
+            answer_[lane] = place == OwnPlace::torque ? -d[models_[lane]] * signals_.velocity[lane] : level[models_[lane]];
+    }
+
+private:
+    std::vector<std::size_t> models_;
+    OwnSignals signals_{};
+    double* answer_ = nullptr;
+};
+
+}  // namespace
+
+TEST_CASE("effects that the core does not know: as its own, in lanes as alone") {
+    const std::vector<double> r = staircase(400);
+    const std::size_t count = 11;  // more than the lanes
+    for (const LoopKind kind : {LoopKind::open, LoopKind::sampled, LoopKind::continuous}) {
+        std::vector<double> input = r;
+        if (kind == LoopKind::open)
+            for (double& u : input) u *= 0.01;
+        EffectJob job = job_of(input, kind);
+        job.substeps = 16;
+        Outside own;
+        std::vector<EffectModel> asked(count), known(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            const double d = 0.002 * static_cast<double>(i % 4), Tc = 0.01 * static_cast<double>(i % 3);
+            own.d.push_back(d);
+            own.level.push_back(Tc);
+            asked[i].linear = one_mass();
+            known[i].linear = kind == LoopKind::continuous ? one_mass() : one_mass(5e-4, 0.005 + d);
+            if (Tc > 0.0) known[i].add(Effect::coulomb_friction, &Tc);
+            if (kind == LoopKind::continuous) own.d[i] = 0.0;
+        }
+        const auto run = [&](const std::vector<EffectModel>& models, OwnEffects* effects, bool lanes) {
+            job.own = effects;
+            job.lanes = lanes;
+            std::vector<double> velocity(count * input.size());
+            simulate_effects(job, models, {}, {velocity.data(), nullptr, nullptr});
+            return velocity;
+        };
+        const std::vector<double> found = run(asked, &own, true), expected = run(known, nullptr, true);
+        CHECK(found == run(asked, &own, false));
+        double top = 0.0, off = 0.0;
+        for (std::size_t k = 0; k < found.size(); ++k) {
+            top = std::max(top, std::abs(expected[k]));
+            off = std::max(off, std::abs(found[k] - expected[k]));
+        }
+        CHECK(top > 1.0);
+        CHECK_NEAR(off / top, 0.0, 2e-4);  // the damping at the foreseen mean velocity, of second order
+    }
+}

@@ -202,7 +202,7 @@ def test_to_control() -> None:
 
 def test_to_control_without_the_package_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "control", None)
-    with pytest.raises(ImportError, match=r"pip install gaident\[control\]"):
+    with pytest.raises(ImportError, match=r'pip install "gaident\[control\]"'):
         TWO_MASS.to_control()
 
 

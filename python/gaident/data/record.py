@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -12,12 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident.data.arrays import MINIMUM_SAMPLES, channel, positive_number
-from gaident.errors import RecordError
+from gaident.errors import RecordError, check_schema
+from gaident.files import write_whole
 
 __all__ = ["CHANNELS", "Record"]
 
 CHANNELS = ("command", "velocity", "torque", "position")
 """The channels of a record, in the order of its arguments."""
+
+SCHEMA = "gaident/record"
+SCHEMA_VERSION = 1
 
 _HASH_BLOCK = 1 << 18
 # A time given as 0.3 s falls on sample 3 of dt = 0.1 s although 0.3 / 0.1 is 2.9999999999999996.
@@ -164,6 +170,27 @@ class Record:
         cut = {key: None if (v := getattr(self, key)) is None else v[start:stop] for key in CHANNELS}
         part._fill(self.dt, cut, self.name)
         return part
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON: dt, name and the channels as lists, None for those that are not there."""
+        held = {key: None if (v := getattr(self, key)) is None else v.tolist() for key in CHANNELS}
+        return {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, "name": self.name, "dt": self.dt, **held}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Record:
+        """The inverse of to_dict. Raises RecordError, and GaidentError where the data are something else or of a newer schema."""
+        check_schema(data, SCHEMA, SCHEMA_VERSION)
+        missing = [key for key in ("dt", "name", *CHANNELS) if key not in data]
+        if missing:
+            raise RecordError(f"the saved record lacks {', '.join(missing)}; save it again")
+        command, velocity, torque, position = (data[key] for key in CHANNELS)
+        return cls(data["dt"], command, velocity, torque, position, data["name"])
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes JSON, all digits, for `gaident.load`; the file appears whole or not at all."""
+        from gaident.version import version
+
+        write_whole(path, json.dumps({**self.to_dict(), "gaident_version": version()}).encode())
 
     def __eq__(self, other: object) -> bool:
         """Same sample time, same name, same channels, same values."""

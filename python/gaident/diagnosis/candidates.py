@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.diagnosis.own_candidates import Library
+
 __all__ = ["CANDIDATES", "FRICTION", "TWINS", "Candidate", "Scales", "conditional_twins"]
 
 Vector = NDArray[np.float64]
@@ -211,7 +213,7 @@ def _of(*names: str) -> Callable[[Mapping[str, float]], Vector]:
     return lambda p: np.array([p[n] for n in names])
 
 
-CANDIDATES: dict[str, Candidate] = {
+_BUILT_IN: dict[str, Candidate] = {
     c.effect: c
     for c in (
         Candidate(
@@ -300,4 +302,6 @@ CANDIDATES: dict[str, Candidate] = {
                 lambda s: tuple(s.acceleration * np.geomspace(2e-3, 0.7, 8)), rough=True),
     )
 }  # fmt: skip
-"""Every effect that a diagnosis can name, in the order of a report's tables."""
+
+CANDIDATES = Library(_BUILT_IN)
+"""Every effect that a diagnosis can name, in the order of a report's tables; those of one's own last."""

@@ -20,6 +20,7 @@ from gaident.diagnosis.layout import Layout
 from gaident.identification.space import torque_of
 from gaident.identification.starts import noise_std, starts_moving
 from gaident.models.controller import PI
+from gaident.models.own_effects import OWN
 from gaident.models.pi_torque import rate_limited
 from gaident.models.simulate import simulate_values
 
@@ -133,7 +134,8 @@ class Driven:
 
     def substeps(self, effects: Sequence[str]) -> int | None:
         """As many for every model with effects, so that no candidate is ahead for being simulated more finely."""
-        if not set(effects) - {"extra_resonance"}:
+        acting = set(effects) - {"extra_resonance"}
+        if not acting or all(e in OWN for e in acting):  # one's own are smooth, and dear to ask
             return None
         return int(2 ** np.clip(np.ceil(np.log2(self.records[0].dt / self.finest)), 0.0, 5.0))
 

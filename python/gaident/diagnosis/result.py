@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from gaident.data.record import Record
 from gaident.diagnosis.experiments import Proposal
-from gaident.errors import GaidentError
+from gaident.errors import GaidentError, check_schema
 from gaident.files import write_whole
 from gaident.identification.covariance import Estimate
 from gaident.identification.result import Identification, json_text
@@ -151,6 +151,15 @@ class Diagnosis:
 
         return diagnosis_html(self)
 
+    def to_pandas(self) -> Any:
+        """The findings as a pandas DataFrame: a row per (effect, parameter), with what speaks for it.
+
+        Raises ImportError with the way to get pandas.
+        """
+        from gaident.export.tables import diagnosis_table
+
+        return diagnosis_table(self)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, without the records."""
         proposal = self.next_experiment
@@ -193,11 +202,7 @@ class Diagnosis:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Diagnosis:
         """The inverse of to_dict. Raises GaidentError where the data are something else or of a newer schema."""
-        if data.get("schema") != SCHEMA or data.get("schema_version") != SCHEMA_VERSION:
-            raise GaidentError(
-                f"schema is {data.get('schema')!r}, version {data.get('schema_version')!r}: "
-                "this is no diagnosis that this gaident reads"
-            )
+        check_schema(data, SCHEMA, SCHEMA_VERSION)
         try:
             return cls(
                 verdict=data["verdict"],

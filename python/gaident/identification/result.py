@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.errors import GaidentError
+from gaident.errors import GaidentError, check_schema
 from gaident.files import write_whole
 from gaident.identification.adequacy import Adequacy
 from gaident.identification.covariance import Estimate
@@ -202,6 +202,15 @@ class Identification:
 
         return identification_html(self)
 
+    def to_pandas(self) -> Any:
+        """The parameters as a pandas DataFrame: rows (model or mechanics, parameter), columns value, std, unit, ...
+
+        Raises ImportError with the way to get pandas.
+        """
+        from gaident.export.tables import identification_table
+
+        return identification_table(self)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, without the records."""
         return {
@@ -235,13 +244,7 @@ class Identification:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Identification:
         """The inverse of to_dict. Raises GaidentError where the data are something else or of a newer schema."""
-        if data.get("schema") != SCHEMA:
-            raise GaidentError(f"schema is {data.get('schema')!r}: this is not a saved identification")
-        if data.get("schema_version") != SCHEMA_VERSION:
-            raise GaidentError(
-                f"schema_version is {data.get('schema_version')!r}: this gaident reads {SCHEMA_VERSION}; "
-                "use the version that wrote the file"
-            )
+        check_schema(data, SCHEMA, SCHEMA_VERSION)
         try:
             return cls(
                 model=Model.from_dict(data["model"]),

@@ -1,13 +1,14 @@
-"""The effects a model can carry beyond its linear part: a view of the core's registry (csrc/gaident/effects).
+"""The effects a model can carry beyond its linear part: the core's registry (csrc/gaident/effects), and those of one's own.
 
-ga.effects.table() lists them: place in the loop, parameters with units, one line of meaning.
+ga.effects.table() lists them: place in the loop, parameters with units, one line of meaning. ga.effects.register(...) adds one
+that is a Python function; it then takes part in simulation, diagnosis and report like the others.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -15,34 +16,9 @@ from typing import Any, NamedTuple
 from gaident import _core
 from gaident.errors import ModelError
 from gaident.models._checks import known_keys, one_of, real_number
+from gaident.models.own_effects import OWN, PLACES, Function, Own, Parameter, Signals, checked
 
-__all__ = ["Effect", "Parameter", "Row", "Table", "table"]
-
-
-class Parameter(NamedTuple):
-    """One parameter of an effect."""
-
-    name: str
-    unit: str  # SI, rad
-    neutral: float  # with every neutral value the effect is the identity; nan: any value
-    lowest: float  # physical bounds
-    highest: float
-    above_lowest: bool  # the lowest value itself is not allowed
-
-    @property
-    def bounds(self) -> str:
-        """The physical bounds in words, empty where there are none."""
-        parts = []
-        if self.lowest > -math.inf:
-            parts.append(f"{'>' if self.above_lowest else '>='} {self.lowest:g}")
-        if self.highest < math.inf:
-            parts.append(f"<= {self.highest:g}")
-        return " and ".join(parts)
-
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON: what is not finite (any value, no bound, no limit) is None."""
-        numbers = {"neutral": self.neutral, "lowest": self.lowest, "highest": self.highest}
-        return {"name": self.name, "unit": self.unit, **{k: v if math.isfinite(v) else None for k, v in numbers.items()}}
+__all__ = ["Effect", "Parameter", "Row", "Signals", "Table", "register", "table", "unregister"]
 
 
 class Row(NamedTuple):
@@ -55,6 +31,7 @@ class Row(NamedTuple):
     simulated: bool  # False: found in records, but not part of a model
     needs_two_masses: bool
     relation: str  # what the parameters have to meet among themselves, empty if nothing
+    own: bool = False  # registered from Python
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -78,17 +55,88 @@ class Table(tuple[Row, ...]):
 
 
 @lru_cache(maxsize=1)
-def table() -> Table:
-    """Name, place, parameters with units and meaning of every effect; `print(ga.effects.table())` shows it."""
+def _built_in() -> tuple[Row, ...]:
     rows = []
     for name, place, meaning, parameters, simulated, two, relation in _core.effect_table():
         rows.append(Row(name, place, tuple(Parameter(*p) for p in parameters), meaning, simulated, two, relation))
-    return Table(rows)
+    return tuple(rows)
+
+
+@lru_cache(maxsize=1)
+def table() -> Table:
+    """Name, place, parameters with units and meaning of every effect; `print(ga.effects.table())` shows it.
+
+    Effects of one's own stand behind the others.
+    """
+    own = (Row(o.name, PLACES[o.acts], o.parameters, o.meaning, True, False, "", own=True) for o in OWN.values())
+    return Table((*_built_in(), *own))
 
 
 @lru_cache(maxsize=1)
 def _by_name() -> dict[str, tuple[int, Row]]:
     return {row.name: (i, row) for i, row in enumerate(table())}
+
+
+def register(
+    name: str,
+    parameters: Sequence[Parameter],
+    *,
+    meaning: str,
+    torque: Function | None = None,
+    friction: Function | None = None,
+    actuator: Function | None = None,
+    sensor: Function | None = None,
+    replace: bool = False,
+) -> Row:
+    """Adds an effect of one's own to the table, for this Python session; returns its row.
+
+    name        as of a variable, not that of a built-in effect
+    parameters  Parameter(name, unit, neutral=, lowest=, highest=, logarithmic=, starts=); bounds are needed, between them
+                `gaident.diagnose` looks, from `starts` or values spread between the bounds; with the neutral values the effect
+                has to do nothing
+    meaning     one line, for tables and reports
+    replace     in place of an effect of one's own that has this name
+
+    Exactly one of these functions of (signals, one keyword per parameter), see `Signals`, says what it does:
+
+    torque    what is added to the motor's torque [N m] (so that a brake is negative for positive velocity)
+    friction  level >= 0 of a dry friction [N m], which stops the motor and holds it (a torque that jumps with the direction of
+              the velocity would ring about standstill instead)
+    actuator  the torque that acts [N m] in place of signals.torque, before saturation, dead band, delay and lag
+    sensor    the velocity that is seen [rad/s] in place of signals.velocity, before ripple, filter and quantisation
+
+    Arguments and answer are arrays: an entry per drive simulated side by side. The function is called at every (sub)step, may be
+    asked about anything that a search tries, and keeps nothing from call to call. A torque is stable where it changes with the
+    velocity by less than the drive's inertia over a substep allows: abs(d torque/d velocity) < J/h.
+
+    Raises ModelError for a name in use, bounds or neutral values that contradict each other, and a function that does not answer
+    as it has to. `unregister` takes it out again. Saved results name it and load only where it is registered.
+    """
+    given = {"torque": torque, "friction": friction, "actuator": actuator, "sensor": sensor}
+    chosen = {acts: function for acts, function in given.items() if function is not None}
+    if len(chosen) != 1:
+        raise ModelError(f"{name} is given {' and '.join(chosen) or 'no function'}: give exactly one of {', '.join(given)}")
+    if any(row.name == name for row in _built_in()):
+        raise ModelError(f"{name!r} is a built-in effect, which cannot be replaced: give another name")
+    if name in OWN and not replace:
+        raise ModelError(f"{name!r} is registered already: unregister it first, or give replace=True")
+    ((acts, function),) = chosen.items()
+    OWN[name] = checked(Own(name, acts, function, tuple(parameters), meaning))
+    _forget()
+    return _by_name()[name][1]
+
+
+def unregister(name: str) -> None:
+    """Takes an effect of one's own out of the table; raises ModelError where there is none of that name."""
+    if name not in OWN:
+        raise ModelError(f"{name!r} is no effect of your own: those are {', '.join(OWN) or 'none'}; built-in ones stay")
+    del OWN[name]
+    _forget()
+
+
+def _forget() -> None:
+    table.cache_clear()
+    _by_name.cache_clear()
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +148,7 @@ class Effect:
 
     name: str
     parameters: Mapping[str, float]
+    own: bool = field(init=False, repr=False)  # one's own, registered from Python
 
     def __post_init__(self) -> None:
         one_of(self.name, "the effect's name", _by_name(), ModelError)
@@ -118,11 +167,19 @@ class Effect:
                 shown = ", ".join(f"{k} {v:g}" for k, v in values.items())
                 raise ModelError(f"effect {self.name} has {shown}: {broken}")
         object.__setattr__(self, "parameters", MappingProxyType(values))
+        object.__setattr__(self, "own", row.own)
 
     @property
     def row(self) -> Row:
-        """The effect's row in the table."""
+        """The effect's row in the table; raises ModelError for an effect of one's own that is no longer registered."""
+        if self.name not in _by_name():
+            raise ModelError(_unknown(self.name))
         return _by_name()[self.name][1]
+
+    @property
+    def neutral(self) -> bool:
+        """Of an effect of one's own: whether its parameters make it the identity."""
+        return self.row.own and OWN[self.name].neutral(self.values)
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -130,14 +187,17 @@ class Effect:
         return tuple(self.parameters.values())
 
     def to_dict(self) -> dict[str, Any]:
-        """{"name": ..., "parameters": {...}} for JSON; an infinite limit is None."""
-        return {"name": self.name, "parameters": {k: v if math.isfinite(v) else None for k, v in self.parameters.items()}}
+        """{"name": ..., "parameters": {...}} for JSON; an infinite limit is None, an effect of one's own has "own": true."""
+        data = {"name": self.name, "parameters": {k: v if math.isfinite(v) else None for k, v in self.parameters.items()}}
+        return {**data, "own": True} if self.own else data
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Effect:
-        """The inverse of `to_dict`."""
+        """The inverse of `to_dict`; raises ModelError for an effect of one's own that is not registered."""
         keys = ("name", "parameters")
-        values: dict[str, Any] = known_keys(data, "an effect", keys, keys, ModelError)
+        values: dict[str, Any] = known_keys(data, "an effect", (*keys, "own"), keys, ModelError)
+        if values.get("own") and values["name"] not in OWN:
+            raise ModelError(_unknown(values["name"]))
         if not isinstance(values["parameters"], Mapping):
             raise ModelError(f"the parameters of an effect are {values['parameters']!r}: give a dictionary, name -> value")
         return cls(values["name"], {k: math.inf if v is None else v for k, v in values["parameters"].items()})
@@ -157,10 +217,14 @@ class Effect:
         return type(self), (self.name, dict(self.parameters))
 
 
+def _unknown(name: object) -> str:
+    return f"{name!r} is an effect of your own that is not registered here: call gaident.effects.register({name!r}, ...) first"
+
+
 def ordered(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     """Effects in the order of the table, a later one of the same name in place of an earlier."""
     latest = {effect.name: effect for effect in effects}
-    return tuple(sorted(latest.values(), key=lambda effect: _by_name()[effect.name][0]))
+    return tuple(sorted(latest.values(), key=lambda effect: (effect.row, _by_name()[effect.name][0])[1]))
 
 
 def _value(row: Row, parameter: Parameter, value: object) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -144,8 +145,8 @@ class Model:
             raise ModelError(f"{what} is of a linear model, and this one has effects ({names}): use model.linear")
 
     def __getstate__(self) -> dict[str, Any]:
-        # The core's object is not part of the value.
-        return {name: value for name, value in self.__dict__.items() if name != "_core_model"}
+        # What was made once is not part of the value.
+        return {name: value for name, value in self.__dict__.items() if name not in ("_core_model", "_own")}
 
     @property
     def p(self) -> int:
@@ -215,24 +216,54 @@ class Model:
 
         return discrete(self, dt, controller)
 
-    def to_scipy(self) -> Any:
-        """The same as scipy.signal.ZerosPolesGain (an lti system); raises ModelError for a model with effects."""
-        self._require_linear("to_scipy")
-        from scipy import signal
+    def to_scipy(self, dt: float | None = None, *, pade: int | None = None) -> Any:
+        """The same as a linear system of scipy.signal, torque [N m] to velocity [rad/s].
 
-        return signal.ZerosPolesGain(list(self.zeros), list(self.poles), self.gain)
+        dt    None: continuous, scipy.signal.ZerosPolesGain; a sample time [s]: sampled behind a zero-order hold,
+              scipy.signal.StateSpace, exact with a delay of any fraction of a sample
+        pade  order, 1 to 10, of the Pade approximation of a transport_delay in the continuous system
 
-    def to_control(self) -> Any:
-        """The same as a control.TransferFunction.
-
-        Raises ImportError with the way to get python-control, ModelError for a model with effects.
+        The linear effects (extra_resonance, transport_delay, torque_lag, velocity_filter) are part of it. Raises ModelError
+        for other effects, for a delay with neither dt nor pade, and for p = 0 with dt.
         """
-        self._require_linear("to_control")
-        try:
-            import control
-        except ImportError as reason:
-            raise ImportError("to_control needs python-control: pip install gaident[control]") from reason
-        return control.zpk(list(self.zeros), list(self.poles), self.gain)
+        from gaident.export.lti import to_scipy
+
+        return to_scipy(self, dt, pade)
+
+    def to_control(self, dt: float | None = None, *, pade: int | None = None) -> Any:
+        """The same as a system of python-control: control.TransferFunction, with a sample time dt [s] control.StateSpace.
+
+        As `to_scipy`. Raises ImportError with the way to get python-control, and ModelError.
+        """
+        from gaident.export.lti import to_control
+
+        return to_control(self, dt, pade)
+
+    def to_c(
+        self,
+        path: str | os.PathLike[str] | None,
+        dt: float,
+        controller: PI | None = None,
+        *,
+        name: str | None = None,
+        substeps: int | None = None,
+    ) -> str:
+        """Writes the model as one C99 file without dependencies, a recurrence of fixed step; returns its text.
+
+        path        file to write; None: none is written
+        dt          sample time [s]
+        controller  with one the file is the closed loop, command [rad/s] to velocity; None: the drive alone, torque [N m]
+                    (held over each sample) to velocity
+        name        beginning of every C name; None: that of the file
+        substeps    per sample, of a model with effects; None: as many as it needs
+
+        From rest it gives what `gaident.simulate` gives for a record without position, up to rounding, all effects of the
+        library included. Raises ModelError for effects of one's own, for effects in the continuous loop, for p = 0 outside
+        it, and for a dt, name or substeps that are none.
+        """
+        from gaident.export.c_source import write_c
+
+        return write_c(self, path, dt, controller, name, substeps)
 
     def to_dict(self) -> dict[str, Any]:
         """The model for JSON: {"gain": K, "poles": [[re, im], ...], "zeros": [[re, im], ...], "effects": [...]}.
@@ -263,12 +294,21 @@ class Model:
         effects = f", effects={list(self.effects)!r}" if self.effects else ""
         return f"Model(gain={self.gain!r}, poles={_list(self.poles)}, zeros={_list(self.zeros)}{effects})"
 
+    def own_effects(self) -> tuple[Effect, ...]:
+        """Those of one's own that act; raises ModelError where one is no longer registered."""
+        own: tuple[Effect, ...] | None = self.__dict__.get("_own")
+        if own is None:
+            own = tuple(effect for effect in self.effects if effect.own)
+            object.__setattr__(self, "_own", own)
+        return tuple(effect for effect in own if not effect.neutral) if own else own
+
     def core(self) -> _core.EffectModel:
-        """The model as the core takes it, made once."""
+        """The model as the core takes it, without effects of one's own; made once."""
         made: _core.EffectModel | None = self.__dict__.get("_core_model")
         if made is None:
             poles, zeros = (np.array(roots, dtype=np.complex128) for roots in (self.poles, self.zeros))
-            made = _core.EffectModel(self.gain, poles, zeros, [(effect.name, effect.values) for effect in self.effects])
+            built_in = [(effect.name, effect.values) for effect in self.effects if not effect.own]
+            made = _core.EffectModel(self.gain, poles, zeros, built_in)
             object.__setattr__(self, "_core_model", made)
         return made
 

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident import _core
 from gaident.data.record import Record
-from gaident.errors import ModelError, RecordError
+from gaident.errors import GaidentError, ModelError, RecordError
 from gaident.models._checks import one_of, real_number
 from gaident.models.controller import PI
+from gaident.models.effects import table as effect_table
 from gaident.models.factors import Structure
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Discrete, Model
+from gaident.models.own_effects import OWN
 
 Signal = NDArray[np.float64]
 AnyModel = Model | OneMass | TwoMass
@@ -120,7 +123,7 @@ def discrete(model: AnyModel, dt: float, controller: PI | None = None) -> Discre
     sample_time = real_number(dt, "dt", ModelError, "give the sample time in s, > 0")
     if sample_time <= 0.0:
         raise ModelError(f"dt is {sample_time:g}: give the sample time in s, > 0")
-    _require_strictly_proper(plant.p, controller)
+    require_strictly_proper(plant.p, controller)
     loop, kp, ki, _, _ = _loop(controller)
     alpha, beta = _core.discrete(plant.gain, _roots(plant.poles), _roots(plant.zeros), sample_time, loop, kp, ki)
     return Discrete(alpha, beta)
@@ -154,7 +157,7 @@ def simulate_many(
         for i, plant in enumerate(plants):
             _check_start(plant, controller, starts[i], "command" if controller is not None else "torque")
     record = _core_record(rec, source, controller)
-    return record.simulate([plant.core() for plant in plants], starts, _steps(substeps), workers, False)[0]
+    return _simulate(record, plants, starts, checked_substeps(substeps), workers, False)[0]
 
 
 def simulate_values(
@@ -178,8 +181,14 @@ def simulate_values(
     source, _ = _input_for(structure.p, rec, controller)
     starts = np.zeros((0, 0)) if initial_states is None else np.ascontiguousarray(initial_states, dtype=np.float64)
     record = _core_record(rec, source, controller)
+    built_in, own = _parted(structure, effects, table)
     try:
-        return record.simulate_values(table, tuple(structure), list(effects), starts, _steps(substeps), workers)
+        with np.errstate(all="ignore"):
+            return record.simulate_values(
+                built_in, tuple(structure), [e for e in effects if e not in OWN], starts, checked_substeps(substeps), workers, own
+            )
+    except GaidentError:
+        raise
     except ValueError as reason:
         raise ModelError(str(reason)) from None
 
@@ -194,18 +203,67 @@ def _simulated(
     start = np.zeros(0) if state is None else np.array(state, dtype=np.float64)
     if state is not None:
         _check_start(plant, controller, start, what)
-    steps = _steps(substeps)
+    steps = checked_substeps(substeps)
     if not plant.effects:
         return *_core_simulate(plant, rec.dt, source, controller, start, arithmetic), None
     if arithmetic != "double":
         raise ModelError(f'arithmetic is {arithmetic!r}: a model with effects is simulated in "double" only')
     starts = start.reshape(1, -1) if state is not None else np.zeros((0, 0))
-    found = _core_record(rec, source, controller).simulate([plant.core()], starts, steps, 1, True)
+    found = _simulate(_core_record(rec, source, controller), [plant], starts, steps, 1, True)
     velocity, torque, angle = (signal[0] for signal in found)
     return velocity, torque, angle
 
 
-def _steps(substeps: int | None) -> int:
+OwnList = list[tuple[str, Callable[..., Any], Signal]]
+
+
+def _simulate(
+    record: _core.EffectRecord, plants: Sequence[Model], starts: Signal, steps: int, workers: int, every: bool
+) -> tuple[Signal, Signal, Signal]:
+    """The core's simulation of models, those with the same effects of one's own at once."""
+    acting = [tuple(e.name for e in plant.own_effects()) for plant in plants]
+    if not any(acting):
+        return record.simulate([plant.core() for plant in plants], starts, steps, workers, every)
+    found: list[Signal] | None = None
+    for names in dict.fromkeys(acting):
+        index = [i for i, mine in enumerate(acting) if mine == names]
+        own: OwnList = []
+        for name in names:
+            rows = [next(e.values for e in plants[i].effects if e.name == name) for i in index]
+            own.append((OWN[name].acts, OWN[name].ask, np.array(rows, dtype=np.float64)))
+        some = starts[index] if starts.size else starts
+        with np.errstate(all="ignore"):
+            parts = record.simulate([plants[i].core() for i in index], some, steps, workers, every, own=own)
+        if found is None:
+            found = [np.empty((len(plants) if part.size else 0, part.shape[1])) for part in parts]
+        for whole, part in zip(found, parts, strict=True):
+            if part.size:
+                whole[index] = part
+    assert found is not None
+    return found[0], found[1], found[2]
+
+
+def _parted(structure: Structure, effects: Sequence[str], values: Signal) -> tuple[Signal, OwnList]:
+    """Rows of values of `simulate_values` without the columns of effects of one's own, and these."""
+    if not any(e in OWN for e in effects):
+        return values, []
+    sizes = {row.name: len(row.parameters) for row in effect_table()}
+    at = 1 + structure.real_poles + 2 * structure.pole_pairs + structure.real_zeros + 2 * structure.zero_pairs
+    kept, own = [values[:, :at]], []
+    for e in effects:
+        columns = values[:, at : at + sizes.get(e, 0)]
+        at += sizes.get(e, 0)
+        if e in OWN:
+            own.append((OWN[e].acts, OWN[e].ask, np.ascontiguousarray(columns)))
+        else:
+            kept.append(columns)
+    if values.shape[1] != at:
+        raise ModelError(f"values has {values.shape[1]} columns: {at} are needed for {structure} with {', '.join(effects)}")
+    return np.ascontiguousarray(np.hstack(kept)), own
+
+
+def checked_substeps(substeps: int | None) -> int:
+    """Substeps per sample as the core takes them, 0 for as many as needed; raises ModelError."""
     if substeps is None:
         return 0
     if isinstance(substeps, bool) or not isinstance(substeps, int) or not 1 <= substeps <= MAX_SUBSTEPS:
@@ -270,7 +328,7 @@ def _input(plant: Model, rec: Record, controller: PI | None) -> tuple[Signal, st
 def _input_for(p: int, rec: Record, controller: PI | None) -> tuple[Signal, str]:
     if not isinstance(rec, Record):
         raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record")
-    _require_strictly_proper(p, controller)
+    require_strictly_proper(p, controller)
     if controller is not None:
         if rec.command is None:
             raise RecordError(
@@ -286,7 +344,8 @@ def _input_for(p: int, rec: Record, controller: PI | None) -> tuple[Signal, str]
     return np.ascontiguousarray(rec.torque, dtype=np.float64), "torque"
 
 
-def _require_strictly_proper(p: int, controller: PI | None) -> None:
+def require_strictly_proper(p: int, controller: PI | None) -> None:
+    """Raises ModelError for p = 0 outside the continuous loop."""
     if p == 0 and (controller is None or controller.loop != "continuous"):
         where = "the sampled loop" if controller is not None else "an open loop"
         raise ModelError(

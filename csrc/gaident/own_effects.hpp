@@ -1,0 +1,36 @@
+// Effects that the core does not know: a user's own functions of the loop's signals, asked at their places in the loop. Slower than the
+// core's own by the call, and without a memory; whoever asks them knows nothing of what they are.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+namespace gaident {
+
+enum class OwnPlace {
+    torque,    // added to the motor's torque at the shaft, N m
+    friction,  // dry friction against the motion, its level >= 0, N m
+    actuator,  // the torque that acts in place of the one commanded, N m
+    sensor,    // the velocity that the sensor shows in place of the true one, rad/s
+};
+
+// What they may ask for, lanes side by side; the arrays stay where they are for as long as a run lasts.
+struct OwnSignals {
+    double* velocity;   // rad/s: at the shaft that in the middle of the substep, foreseen
+    double* angle;      // rad
+    double* torque;     // N m: at the shaft what saturation, dead band, delay and lag left of the command
+    double time = 0.0;  // s since the record's start
+};
+
+class OwnEffects {
+public:
+    virtual ~OwnEffects() = default;
+
+    virtual bool at(OwnPlace place) const = 0;
+    // A run begins: lane i belongs to model models[i]. `answer`: where the answers go.
+    virtual void begin(std::span<const std::size_t> models, const OwnSignals& signals, double* answer) = 0;
+    // Sum over the effects there; at actuator and sensor each takes what the one before it gave.
+    virtual void ask(OwnPlace place, double time) = 0;
+};
+
+}  // namespace gaident

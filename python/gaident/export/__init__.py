@@ -1,0 +1,1 @@
+"""Out to the field's other tools: scipy.signal, python-control, pandas, C. Reached by the methods of models and results."""

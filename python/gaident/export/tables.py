@@ -1,0 +1,55 @@
+"""Results as pandas tables."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from math import nan
+from typing import Any
+
+__all__ = ["diagnosis_table", "identification_table"]
+
+
+def _pandas() -> Any:
+    try:
+        import pandas
+    except ImportError as reason:
+        raise ImportError('to_pandas needs pandas: pip install "gaident[pandas]"') from reason
+    return pandas
+
+
+def identification_table(idn: Any) -> Any:
+    """One row per parameter, those of the mechanics behind those of the model; see `Identification.to_pandas`."""
+    rows = [{"of": "model", "parameter": name, **asdict(e)} for name, e in idn.parameters.items()]
+    drive = idn.mechanics
+    if drive is not None:
+        for name, unit in drive.UNITS.items():
+            value, std = getattr(drive, name), drive.std.get(name, nan)
+            estimate = {"value": value, "std": std, "unit": unit, "at_bound": False, "identifiable": std < abs(value)}
+            rows.append({"of": "mechanics", "parameter": name, **estimate})
+    columns = ["of", "parameter", "value", "std", "unit", "at_bound", "identifiable"]
+    return _pandas().DataFrame(rows, columns=columns).set_index(["of", "parameter"])
+
+
+def diagnosis_table(dia: Any) -> Any:
+    """One row per parameter of each finding; see `Diagnosis.to_pandas`."""
+    rows = []
+    for order, finding in enumerate(dia.findings, 1):
+        for name, estimate in finding.parameters.items():
+            rows.append(
+                {
+                    "order": order,
+                    "effect": finding.effect,
+                    "parameter": name,
+                    **asdict(estimate),
+                    "named": finding.named,
+                    "alternatives": ", ".join(finding.alternatives),
+                    "gain": finding.gain,
+                    "delta_bic": finding.delta_bic,
+                    "p_value": finding.p_value,
+                    "is_noise": finding.is_noise,
+                    "evidence": finding.evidence,
+                }
+            )
+    columns = [*("order", "effect", "parameter", "value", "std", "unit", "at_bound", "identifiable", "named", "alternatives"),
+               *("gain", "delta_bic", "p_value", "is_noise", "evidence")]  # fmt: skip
+    return _pandas().DataFrame(rows, columns=columns).set_index(["effect", "parameter"])

@@ -1,0 +1,212 @@
+"""Effects of one's own: a Python function of the loop's signals, with parameters and units, asked by the core at its place.
+
+    shaft      torque     T + torque(s)                      added to the motor's torque
+               friction   abs(friction torque) <= level(s)   dry friction, which stops the motor and holds it
+    actuator              u' = actuator(s)                   the torque that acts in place of the one commanded
+    sensor                w' = sensor(s)                     the velocity that is seen in place of the true one
+
+Asked once per substep at the shaft (with the velocity in the middle of the substep, so that the answer is of second order), once
+per sample at the actuator; `register` says what a function has to be like.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.errors import ModelError
+
+__all__ = ["OWN", "PLACES", "Function", "Own", "Parameter", "Signals", "checked", "starts"]
+
+Signal = NDArray[np.float64]
+Function = Callable[..., Any]
+
+PLACES = {"torque": "shaft", "friction": "shaft", "actuator": "actuator", "sensor": "sensor"}
+"""Keyword of `register` -> place in the table."""
+
+
+class Signals(NamedTuple):
+    """What an effect of one's own may look at; arrays of one number per drive that is simulated beside others, read only.
+
+    velocity  of the motor [rad/s]; at the shaft that in the middle of the substep
+    angle     of the motor [rad]
+    torque    [N m]: at the shaft what saturation, dead band, delay and lag left of the command, at the actuator the command, at
+              the sensor the torque held
+    time      since the record's start [s], one number
+    """
+
+    velocity: Signal
+    angle: Signal
+    torque: Signal
+    time: float
+
+
+class Parameter(NamedTuple):
+    """One parameter of an effect.
+
+    name, unit       SI, rad; "1" for none
+    neutral          with every neutral value the effect is the identity; nan: any value is
+    lowest, highest  physical bounds; of effects of one's own they are finite, and a diagnosis looks between them
+    above_lowest     the lowest value itself is not allowed
+    logarithmic      of effects of one's own: a diagnosis moves it by its logarithm
+    starts           of effects of one's own: where a diagnosis begins; (): values spread between the bounds
+    """
+
+    name: str
+    unit: str
+    neutral: float = math.nan
+    lowest: float = -math.inf
+    highest: float = math.inf
+    above_lowest: bool = False
+    logarithmic: bool = False
+    starts: tuple[float, ...] = ()
+
+    @property
+    def bounds(self) -> str:
+        """The physical bounds in words, empty where there are none."""
+        parts = []
+        if self.lowest > -math.inf:
+            parts.append(f"{'>' if self.above_lowest else '>='} {self.lowest:g}")
+        if self.highest < math.inf:
+            parts.append(f"<= {self.highest:g}")
+        return " and ".join(parts)
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON: what is not finite (any value, no bound, no limit) is None."""
+        numbers = {"neutral": self.neutral, "lowest": self.lowest, "highest": self.highest}
+        return {"name": self.name, "unit": self.unit, **{k: v if math.isfinite(v) else None for k, v in numbers.items()}}
+
+
+@dataclass(frozen=True)
+class Own:
+    """One registered effect."""
+
+    name: str
+    acts: str  # a key of PLACES
+    function: Function
+    parameters: tuple[Parameter, ...]
+    meaning: str
+
+    def ask(self, velocity: Signal, angle: Signal, torque: Signal, time: float, *values: Signal) -> Any:
+        """As the core asks; what goes wrong in the function is told with the effect's name."""
+        try:
+            return self.function(
+                Signals(velocity, angle, torque, time), **{p.name: v for p, v in zip(self.parameters, values, strict=True)}
+            )
+        except Exception as reason:
+            raise ModelError(
+                f"the effect {self.name!r}: its function raised {type(reason).__name__}: {reason}; it is given arrays, so that "
+                "choices are numpy's where(), minimum(), maximum()"
+            ) from reason
+
+    def neutral(self, values: Sequence[float]) -> bool:
+        """Whether these values make it the identity."""
+        return all(math.isnan(p.neutral) or v == p.neutral for p, v in zip(self.parameters, values, strict=True))
+
+
+OWN: dict[str, Own] = {}
+"""The registered effects, in the order of their registration."""
+
+
+def starts(p: Parameter, count: int = 5) -> tuple[float, ...]:
+    """Where a search begins: as given, or spread between the bounds, the neutral value left out."""
+    if p.starts:
+        return p.starts
+    shares = [(i + 0.5) / count for i in range(count)]
+    if p.logarithmic:
+        return tuple(p.lowest * (p.highest / p.lowest) ** share for share in shares)
+    values = [p.lowest + (p.highest - p.lowest) * share for share in shares]
+    return tuple(v for v in values if abs(v - p.neutral) > 0.01 * (p.highest - p.lowest) or math.isnan(p.neutral))
+
+
+def checked(own: Own) -> Own:
+    """The effect, if names, bounds and function are as they have to be; raises ModelError."""
+    if not own.name.isidentifier():
+        raise ModelError(f"the effect's name is {own.name!r}: give letters, digits and _, as of a variable")
+    if not isinstance(own.meaning, str) or not own.meaning.strip():
+        raise ModelError(f"meaning of {own.name} is {own.meaning!r}: say in one line what the effect does")
+    if not callable(own.function):
+        raise ModelError(f"{own.acts} of {own.name} is {own.function!r}: give a function of (signals, one keyword per parameter)")
+    if not own.parameters:
+        raise ModelError(f"{own.name} has no parameters: give at least one, without which it cannot be absent")
+    for p in own.parameters:
+        if not isinstance(p, Parameter):
+            raise ModelError(f"a parameter of {own.name} is {p!r}: give gaident.effects.Parameter(name, unit, lowest=, highest=)")
+    names = [p.name for p in own.parameters]
+    for p in own.parameters:
+        _check_parameter(own.name, p)
+        if names.count(p.name) > 1:
+            raise ModelError(f"{own.name} has two parameters {p.name!r}: give each a name of its own")
+    if all(math.isnan(p.neutral) for p in own.parameters):
+        raise ModelError(f"no parameter of {own.name} has a neutral value: give neutral= to those with which it does nothing")
+    _check_function(own)
+    return own
+
+
+def _check_parameter(effect: str, p: Parameter) -> None:
+    what = f"{p.name} of {effect}"
+    if not (isinstance(p.name, str) and p.name.isidentifier()):
+        raise ModelError(f"a parameter of {effect} is named {p.name!r}: give letters, digits and _, as of a variable")
+    if not isinstance(p.unit, str) or not p.unit:
+        raise ModelError(f'the unit of {what} is {p.unit!r}: give its SI unit, "1" for none')
+    if not (math.isfinite(p.lowest) and math.isfinite(p.highest) and p.lowest < p.highest):
+        raise ModelError(
+            f"{what} is bound to {p.lowest:g} .. {p.highest:g}: give lowest < highest, both finite: a diagnosis looks there"
+        )
+    if p.logarithmic and p.lowest <= 0.0:
+        raise ModelError(f"{what} is logarithmic with lowest {p.lowest:g}: give lowest > 0, or leave logarithmic out")
+    inside = [("neutral", p.neutral)] if not math.isnan(p.neutral) else []
+    for name, value in [*inside, *(("starts", s) for s in p.starts)]:
+        if not p.lowest <= value <= p.highest:
+            raise ModelError(f"{name} of {what} is {value:g}: give it within its bounds, {p.lowest:g} .. {p.highest:g}")
+
+
+def _check_function(own: Own) -> None:
+    """Asks the function about 24 states of a drive: answers in shape, in range, one by one the same, nothing where neutral."""
+    rng = np.random.default_rng(0)
+    n = 24
+    w, theta, u = (scale * rng.standard_normal(n) for scale in (30.0, 3.0, 0.5))
+    w[0], u[1] = 0.0, 0.0
+    middle = [np.full(n, starts(p)[len(starts(p)) // 2]) for p in own.parameters]
+    with np.errstate(all="ignore"):
+        answer = _answer(own, w, theta, u, middle)
+        alone = [_answer(own, w[i : i + 1], theta[i : i + 1], u[i : i + 1], [v[:1] for v in middle])[0] for i in range(n)]
+        still = [np.full(n, v[0] if math.isnan(p.neutral) else p.neutral) for p, v in zip(own.parameters, middle, strict=True)]
+        nothing = _answer(own, w, theta, u, still)
+    if not np.allclose(answer, alone, rtol=1e-9, atol=0.0):
+        raise ModelError(
+            f"{own.acts} of {own.name} answers otherwise for one drive than for several side by side, or at the second time: its "
+            "arguments are arrays, of which each entry stands for itself, and it may keep nothing from call to call"
+        )
+    if not np.all(np.isfinite(answer)):
+        at = int(np.flatnonzero(~np.isfinite(answer))[0])
+        raise ModelError(
+            f"{own.acts} of {own.name} gives {answer[at]} at velocity {w[at]:g}, angle {theta[at]:g}, torque {u[at]:g}: give a "
+            "function that is finite everywhere"
+        )
+    if own.acts == "friction" and np.any(answer < 0.0):
+        raise ModelError(f"friction of {own.name} gives {answer.min():g}: it is the size of a torque against the motion, >= 0")
+    identity = {"actuator": u, "sensor": w}.get(own.acts, np.zeros(n))
+    if not np.array_equal(nothing, identity):
+        values = ", ".join(f"{p.name} {v[0]:g}" for p, v in zip(own.parameters, still, strict=True))
+        wanted = {"actuator": "signals.torque", "sensor": "signals.velocity"}.get(own.acts, "0")
+        raise ModelError(f"{own.acts} of {own.name} is not {wanted} where its parameters are neutral ({values}): correct either")
+
+
+def _answer(own: Own, w: Signal, theta: Signal, u: Signal, values: Sequence[Signal]) -> Signal:
+    views = [a.copy() for a in (w, theta, u, *values)]
+    for view in views:
+        view.setflags(write=False)
+    found = own.ask(views[0], views[1], views[2], 0.25, *views[3:])
+    try:
+        answer = np.asarray(found, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ModelError(f"{own.acts} of {own.name} gives {found!r}: give an array of numbers like signals.velocity") from None
+    if answer.size not in (1, len(w)):
+        raise ModelError(f"{own.acts} of {own.name} gives the shape {answer.shape}: give one like signals.velocity, {w.shape}")
+    return np.broadcast_to(answer.ravel(), w.shape).copy()
