@@ -1,5 +1,5 @@
 from . import errors
-from .data import Record, differentiate, read, read_columns
+from .data import Alignment, Record, align, differentiate, read, read_columns
 from .diagnosis import Diagnosis, Finding, Limits, Proposal, diagnose, first_experiment
 from .errors import GaidentError
 from .identification import (
@@ -33,6 +33,7 @@ from .store import load
 
 __all__ = [
     "PI",
+    "Alignment",
     "Diagnosis",
     "Discrete",
     "Effect",
@@ -50,6 +51,7 @@ __all__ = [
     "SearchSpace",
     "Settings",
     "TwoMass",
+    "align",
     "diagnose",
     "differentiate",
     "effects",

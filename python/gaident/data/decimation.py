@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gaident.errors import RecordError
 
-__all__ = ["Decimator", "decimated", "factor_of"]
+__all__ = ["Decimator", "decimated", "factor_of", "low_passed"]
 
 _HALF = 25
 """Taps on each side, in samples of the decimated signal."""
@@ -42,9 +42,7 @@ class Decimator:
     def __init__(self, factor: int) -> None:
         self.factor = factor_of(factor)
         self.half = _HALF * self.factor if self.factor > 1 else 0
-        j = np.arange(-self.half, self.half + 1)
-        taps = np.sinc(_CORNER * j / self.factor) * np.kaiser(2 * self.half + 1, _KAISER)
-        self.taps = taps / taps.sum()
+        self.taps = _taps(self.half, self.factor)
         # Samples not yet done with; the first stands `half` before the next y, once the start was continued.
         self.kept = np.zeros(0)
         self.begun = self.half == 0
@@ -80,6 +78,22 @@ class Decimator:
         y = upfirdn(self.taps, x[: (count - 1) * self.factor + 2 * self.half + 1], 1, self.factor)
         self.out.append(np.ascontiguousarray(y[2 * _HALF : 2 * _HALF + count]))
         self.kept = x[count * self.factor :]
+
+
+def _taps(half: int, ratio: float) -> NDArray[np.float64]:
+    j = np.arange(-half, half + 1)
+    taps = np.sinc(_CORNER * j / ratio) * np.kaiser(2 * half + 1, _KAISER)
+    return np.asarray(taps / taps.sum())
+
+
+def low_passed(x: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:
+    """x behind the same low-pass, not decimated, for a sample rate `ratio` times as slow; x itself up to 1.05."""
+    if ratio <= 1.05:
+        return x
+    from scipy.signal import oaconvolve
+
+    half = int(np.ceil(_HALF * ratio))
+    return np.asarray(oaconvolve(np.pad(x, half, "reflect", reflect_type="odd"), _taps(half, ratio), "valid"))
 
 
 def decimated(x: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
