@@ -39,10 +39,13 @@ ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "diagnosis": ({"errors", "version", "data", "models", "identification"}, {"show"}),
     "store": ({"errors", "identification", "diagnosis"}, set()),
     "show": ({"errors"}, set()),
-    "drive_file": (DESK, set()),
+    "drive_file": (DESK | {"diagnosis"}, set()),
+    "drive_init": ({"errors", "data"}, set()),
+    "doctor": ({"version"}, {"_core", "demo", "identification"}),
+    "progress": (set(), set()),
     "paper": (DESK | {"diagnosis", "version"}, {"show"}),
     "demo": (DESK | {"diagnosis"}, {"show"}),
-    "cli": (DESK | {"diagnosis", "store", "drive_file", "demo"}, {"show", "_core", "paper"}),
+    "cli": (DESK | {"diagnosis", "store", "drive_file", "drive_init", "doctor", "demo", "progress"}, {"show", "_core", "paper"}),
     "__main__": ({"cli"}, set()),
     "__init__": (set(), {"version"}),  # the rest is imported by name when it is used
 }

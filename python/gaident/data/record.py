@@ -202,6 +202,11 @@ class Record:
         held = ", ".join(f"{key} {values.min() + 0.0:.4g}..{values.max() + 0.0:.4g}" for key, values in self.channels())
         return f"Record({label}{len(self)} samples, dt={self.dt:.6g} s, {self.duration:.4g} s; {held})"
 
+    def _repr_html_(self) -> str:
+        from gaident.data.record_html import record_html
+
+        return record_html(self)
+
     def __reduce__(self) -> tuple[type[Record], tuple[Any, ...]]:
         # Arrays come out of a pickle writable; through the constructor they are checked and locked again.
         return type(self), tuple(getattr(self, field.name) for field in fields(self))

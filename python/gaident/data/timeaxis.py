@@ -180,5 +180,8 @@ def _printed_step(t: NDArray[np.float64]) -> NDArray[np.float64]:
         single = padded.astype(np.float32)
     spacing = np.spacing(np.abs(single).max(axis=1)).astype(np.float64)
     exact = (np.abs(single - padded) <= _SINGLE_PRINTED * np.abs(padded)).all(axis=1)
+    # Stamps of a date look like it too, but differ by less than single precision could tell.
+    steps = np.abs(np.diff(padded, axis=1))
+    exact &= np.where(steps > 0.0, steps, np.inf).min(axis=1) >= 0.5 * spacing
     step = np.where(exact, np.maximum(step, spacing), step)
     return np.repeat(step, _BLOCK)[: t.size]
