@@ -1,5 +1,5 @@
 from . import errors
-from .data import Alignment, Record, align, differentiate, read, read_columns
+from .data import Alignment, Record, align, columns, differentiate, read, read_columns
 from .diagnosis import Diagnosis, Finding, Limits, Proposal, diagnose, first_experiment
 from .errors import GaidentError
 from .identification import (
@@ -29,6 +29,7 @@ from .models import (
     simulate,
     simulate_many,
 )
+from .progress_bar import progress
 from .store import load
 
 __all__ = [
@@ -52,6 +53,7 @@ __all__ = [
     "Settings",
     "TwoMass",
     "align",
+    "columns",
     "diagnose",
     "differentiate",
     "effects",
@@ -65,6 +67,7 @@ __all__ = [
     "m_sequence",
     "mechanics_from_model",
     "model_from_factor_parameters",
+    "progress",
     "read",
     "read_columns",
     "run",

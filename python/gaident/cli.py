@@ -35,7 +35,7 @@ from gaident.models.controller import PI
 from gaident.models.mechanics import mechanics_from_dict
 from gaident.models.model import Model
 from gaident.models.simulate import AnyModel, Run, initial_state, run
-from gaident.progress import Progress
+from gaident.progress_bar import Progress
 from gaident.store import load
 
 if TYPE_CHECKING:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import html.parser
 import io
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -23,7 +22,7 @@ from gaident.data.guess import guess_channels, unit_from_position
 from gaident.data.listing import columns
 from gaident.data.record_html import sparkline
 from gaident.drive_file import read_drive_file
-from gaident.progress import Progress
+from gaident.progress_bar import Progress
 
 SAMPLES = Path(__file__).parent / "samples"
 TRUTH = ga.TwoMass(JM=1.02e-4, DM=0.003, JL=5.815e-4, DL=0.008, KG=2.59)
@@ -248,7 +247,7 @@ def test_progress_is_drawn_on_a_terminal_and_nowhere_else(monkeypatch: pytest.Mo
         stream = Terminal()
         with Progress(stream) as show:
             assert show is not None
-            monkeypatch.setattr("gaident.progress._QUIET", 0.0)
+            monkeypatch.setattr("gaident.progress_bar._QUIET", 0.0)
             show(0.25, "generation 120, best fitness 0.01, species (1, 2) of [bold]10")
         drawn = stream.getvalue()
         assert "25%" in drawn and "species (1, 2) of [bold]10" in drawn and "left" in drawn
@@ -273,7 +272,7 @@ def test_progress_in_a_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
     display.display = lambda page, display_id: Handle()  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "IPython", kernel)
     monkeypatch.setitem(sys.modules, "IPython.display", display)
-    monkeypatch.setattr("gaident.progress._QUIET", 0.0)
+    monkeypatch.setattr("gaident.progress_bar._QUIET", 0.0)
     with Progress(io.StringIO()) as show:
         assert show is not None  # although the stream is no terminal
         show(0.5, "generation 10 <b>")
@@ -322,11 +321,7 @@ def test_quiet_prints_nothing_but_what_json_asks_for(here: Path, capsys: pytest.
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_plain_output_holds_no_colours(here: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "gaident", "columns", "step.csv"],
-        capture_output=True,
-        cwd=here,
-        env={**os.environ, "FORCE_COLOR": "1"},
-    )
-    assert done.returncode == 0 and b"\x1b" not in done.stdout + done.stderr
+def test_plain_output_holds_no_colours(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    assert main(["columns", "step.csv"]) == 0
+    assert "\x1b" not in capsys.readouterr().out

@@ -42,10 +42,13 @@ ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "drive_file": (DESK | {"diagnosis"}, set()),
     "drive_init": ({"errors", "data"}, set()),
     "doctor": ({"version"}, {"_core", "demo", "identification"}),
-    "progress": (set(), set()),
+    "progress_bar": (set(), set()),
     "paper": (DESK | {"diagnosis", "version"}, {"show"}),
     "demo": (DESK | {"diagnosis"}, {"show"}),
-    "cli": (DESK | {"diagnosis", "store", "drive_file", "drive_init", "doctor", "demo", "progress"}, {"show", "_core", "paper"}),
+    "cli": (
+        DESK | {"diagnosis", "store", "drive_file", "drive_init", "doctor", "demo", "progress_bar"},
+        {"show", "_core", "paper"},
+    ),
     "__main__": ({"cli"}, set()),
     "__init__": (set(), {"version"}),  # the rest is imported by name when it is used
 }

@@ -2,7 +2,8 @@
 
 from gaident.data.alignment import Alignment, align
 from gaident.data.conditioning import differentiate
+from gaident.data.listing import Listing, columns
 from gaident.data.readers import read, read_columns
 from gaident.data.record import Record
 
-__all__ = ["Alignment", "Record", "align", "differentiate", "read", "read_columns"]
+__all__ = ["Alignment", "Listing", "Record", "align", "columns", "differentiate", "read", "read_columns"]
