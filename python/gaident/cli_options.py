@@ -22,7 +22,8 @@ Finds structure (p,q), poles, zeros and mechanical parameters of the drive behin
 (one model for all), with their uncertainty, and says whether a linear model holds at all.
 
 With a controller, the log's velocity command drives the simulated loop; without one, its torque drives
-the model. Formats: CSV and other text tables, MAT of version 5, NPZ.
+the model. Formats: CSV and other text tables, MAT, NPZ; HDF5, Parquet, TDMS, MDF with the extra gaident[formats].
+`gaident columns LOG` lists what a log holds, `gaident init LOG` writes its drive.toml.
 """
 IDENTIFY_EXAMPLES = """\
 examples:
@@ -40,7 +41,7 @@ examples:
 
 drive.toml, every part optional:
   axis = "rotary"                 # or "linear"
-  dt = 0.444e-3                   # s; also velocity_cutoff_hz, counts_per_turn, torque_constant, ...
+  dt = 0.444e-3                   # s; also velocity_cutoff_hz, counts_per_turn, torque_constant, gear_ratio, decimate, ...
   [columns]
   command = "w_ref"
   velocity = "w"
@@ -51,6 +52,8 @@ drive.toml, every part optional:
   ki = 1.367                      # N m/rad; also loop, torque_limit, integrator_limit
   [space]
   inertia = [1e-4, 5e-3]          # kg m^2; also resonance_hz, damping, or gain, real, imaginary, p, q, bits
+  [limits]
+  speed = 100                     # rad/s; also torque, travel, duration, for `gaident experiment`
 
 exit codes: 0 done, 1 the work failed, 2 wrong use, 130 interrupted
 """
