@@ -13,13 +13,13 @@ __all__ = ["SHELLS", "add_log_commands", "add_log_options", "number"]
 
 SHELLS = ("bash", "zsh", "fish", "tcsh")
 COLUMNS_HELP = """\
-Lists what a log holds: the names of its columns as --columns takes them, units, range, sample time, and what stands
-in the way of their use. Formats: CSV and other text tables (also of TwinCAT Scope, MR Configurator2, NI loggers, ROS),
-MAT, HDF5, NPZ, Parquet, TDMS, MDF.
+Lists what a log holds: the names of its columns as --columns takes them, units, range, sample time, and what
+stands in the way of their use. Formats: CSV and other text tables (TwinCAT Scope, MR Configurator2, NI loggers
+and ROS among them), MAT, NPZ, HDF5, Parquet, TDMS, MDF.
 """
 INIT_HELP = """\
-Writes a drive.toml for the axis behind LOG: columns, units, sample time as the log shows them, each with its reason,
-and a mark FILL IN where only a person knows (the controller's gains, a rated torque, ...).
+Writes a drive.toml for the axis behind LOG: columns, units and sample time as the log shows them, each with its
+reason, and a mark FILL IN where only a person knows (the controller's gains, a rated torque, ...).
 """
 INIT_EXAMPLES = """\
 examples:
@@ -28,12 +28,12 @@ examples:
   gaident identify run1.csv --drive drive.toml
 """
 EXPERIMENT_HELP = """\
-Proposes the command of a first record, before there is any: it excites every effect of the library within the limits of
-the axis ([limits] of the drive file, or the options), as a CSV of time and velocity command.
+Proposes the command of a first record, before there is any: it excites every effect of the library within the
+limits of the axis ([limits] of the drive file, or the options), as a CSV of time and velocity command.
 """
 DOCTOR_HELP = """\
-Prints versions, the processor's instruction set, threads and optional libraries, and identifies a small drive as a self
-test. Exit code 1 where something that is needed is missing or broken.
+Prints versions, the processor's instruction set, threads and optional libraries, and identifies a small drive
+as a self test. Exit code 1 where something that is needed is missing or broken.
 """
 COMPLETION_HELP = """Prints the shell's completion of gaident's commands, options and files."""
 COMPLETION_EXAMPLES = """\

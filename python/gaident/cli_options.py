@@ -22,8 +22,8 @@ Finds structure (p,q), poles, zeros and mechanical parameters of the drive behin
 (one model for all), with their uncertainty, and says whether a linear model holds at all.
 
 With a controller, the log's velocity command drives the simulated loop; without one, its torque drives
-the model. Formats: CSV and other text tables, MAT, NPZ; HDF5, Parquet, TDMS, MDF with the extra gaident[formats].
-`gaident columns LOG` lists what a log holds, `gaident init LOG` writes its drive.toml.
+the model. Formats: CSV and other text tables, MAT, NPZ; with the extra gaident[formats] also HDF5, Parquet,
+TDMS and MDF. `gaident columns LOG` lists what a log holds, `gaident init LOG` writes its drive.toml.
 """
 IDENTIFY_EXAMPLES = """\
 examples:
@@ -41,7 +41,7 @@ examples:
 
 drive.toml, every part optional:
   axis = "rotary"                 # or "linear"
-  dt = 0.444e-3                   # s; also velocity_cutoff_hz, counts_per_turn, torque_constant, gear_ratio, decimate, ...
+  dt = 0.444e-3                   # s; also velocity_cutoff_hz, counts_per_turn, gear_ratio, decimate, ...
   [columns]
   command = "w_ref"
   velocity = "w"

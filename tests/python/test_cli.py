@@ -359,6 +359,11 @@ def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
         (["identify", "--help"], ("examples:", "--drive", "[controller]", "exit codes")),
         (["simulate", "--help"], ("MODEL.json", "examples:")),
         (["demo", "--help"], ("GAIDENT_DATA",)),
+        (["columns", "--help"], ("TwinCAT", "--quiet")),
+        (["init", "--help"], ("FILL IN", "--force")),
+        (["experiment", "--help"], ("[limits]", "--travel")),
+        (["doctor", "--help"], ("Exit code 1",)),
+        (["completion", "--help"], ("bash", "fish")),
     ):
         assert main(args) == 0
         out, err = capsys.readouterr()
