@@ -51,9 +51,9 @@ def open_parquet(path: str, file: Path, stack: ExitStack) -> Table:
                 values = [_column(column, batch.column(column.key).to_numpy(zero_copy_only=False), origins) for column in wanted]
                 yield Table(path, tuple(values), first=first)
                 first += batch.num_rows
-        except (OSError, ValueError) as error:
-            if isinstance(error, ReadError):
-                raise
+        except ReadError:
+            raise
+        except Exception as error:
             raise ReadError(f"{path}: damaged ({first_line(error)}); copy it again") from None
 
     return Table(path, tuple(columns), others=tuple(others), batches=batches, form="Parquet")

@@ -27,9 +27,9 @@ def open_hdf(path: str, file: Path, stack: ExitStack) -> Table:
     h5py = library("h5py", "hdf5", path, "an HDF5 file (MAT of version 7.3 is one too)")
     try:
         root = stack.enter_context(h5py.File(file, "r"))
-        content = _Content(matlab=_is_matlab(file))
+        content = _Content(path, matlab=_is_matlab(file))
         root.visititems(lambda name, node: content.add(name, node) if isinstance(node, h5py.Dataset) else None)
-    except (OSError, RuntimeError, KeyError, ValueError) as error:
+    except Exception as error:  # whatever a damaged file leads h5py into
         what, remedy = ("HDF5", "export a CSV") if not _is_matlab(file) else ("MAT 7.3", "save it with save('log.mat', '-v7')")
         raise ReadError(f"{path}: not a whole {what} file ({first_line(error)}); copy it again, or {remedy}") from None
     form = "MAT 7.3" if content.matlab else "HDF5"
@@ -44,8 +44,8 @@ def _is_matlab(file: Path) -> bool:
 class _Content:
     """The columns of an open file, sorted as they are found."""
 
-    def __init__(self, matlab: bool) -> None:
-        self.matlab = matlab
+    def __init__(self, path: str, matlab: bool) -> None:
+        self.path, self.matlab = path, matlab
         self.arrays: dict[str, NDArray[Any] | Stored | Matrix] = {}
         self.units: dict[str, str] = {}
         self.others: list[str] = []
@@ -66,9 +66,9 @@ class _Content:
         elif data.size is None or data.size == 0 or "MATLAB_empty" in data.attrs:
             self.others.append(f"{name!r} (empty)")
         elif data.size == max(data.shape, default=1):
-            self.arrays[name] = _flat(data)
+            self.arrays[name] = _flat(self.path, data)
         elif data.ndim == 2:
-            self.arrays[name] = _matrix(data, self.matlab)
+            self.arrays[name] = _matrix(self.path, data, self.matlab)
         else:
             self.others.append(f"{name!r} ({data.ndim}-dimensional)")
 
@@ -76,12 +76,12 @@ class _Content:
         for field in data.dtype.names:
             dtype = data.dtype[field]
             if data.ndim == 1 and data.size and dtype.kind in "iufb" and not dtype.shape:
-                self.arrays[f"{name}/{field}"] = Stored(data.shape[0], dtype, _field_reader(data, field))
+                self.arrays[f"{name}/{field}"] = Stored(self.path, data.shape[0], dtype, _field_reader(data, field))
             else:
                 self.others.append(f"{name}/{field!r} ({dtype})")
 
 
-def _flat(data: Any) -> Stored:
+def _flat(path: str, data: Any) -> Stored:
     axis = int(np.argmax(data.shape)) if data.ndim else 0
 
     def rows(start: int, stop: int) -> NDArray[Any]:
@@ -91,14 +91,14 @@ def _flat(data: Any) -> Stored:
         where[axis] = slice(start, stop)
         return np.asarray(data[tuple(where)]).reshape(-1)
 
-    return Stored(int(data.size), data.dtype, rows)
+    return Stored(path, int(data.size), data.dtype, rows)
 
 
-def _matrix(data: Any, turned: bool) -> Matrix:
+def _matrix(path: str, data: Any, turned: bool) -> Matrix:
     rows, columns = data.shape
     if turned:
-        return Matrix((columns, rows), data.dtype, lambda i, k: np.asarray(data[k, i]))
-    return Matrix((rows, columns), data.dtype, lambda i, k: np.asarray(data[i, k]))
+        return Matrix(path, (columns, rows), data.dtype, lambda i, k: np.asarray(data[k, i]))
+    return Matrix(path, (rows, columns), data.dtype, lambda i, k: np.asarray(data[i, k]))
 
 
 def _field_reader(data: Any, field: str) -> Any:

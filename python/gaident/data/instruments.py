@@ -37,13 +37,13 @@ def open_tdms(path: str, file: Path, stack: ExitStack) -> Table:
             if channel.dtype is None or np.dtype(channel.dtype).kind not in "iufbM" or len(channel) == 0:
                 others.append(f"{key!r} ({'empty' if len(channel) == 0 else channel.dtype})")
                 continue
-            columns.append(_tdms_column(channel, key, long))
-    except (OSError, ValueError, KeyError, RuntimeError, IndexError, TypeError) as error:
+            columns.append(_tdms_column(path, channel, key, long))
+    except Exception as error:  # whatever a damaged file leads nptdms into
         raise ReadError(f"{path}: not a whole TDMS file ({first_line(error)}); copy it again, or export a CSV") from None
     return _table(path, columns, others, "TDMS")
 
 
-def _tdms_column(channel: Any, key: str, long: str) -> Column:
+def _tdms_column(path: str, channel: Any, key: str, long: str) -> Column:
     increment = channel.properties.get("wf_increment")
     period = float(increment) if isinstance(increment, (int, float)) and increment > 0 and math.isfinite(increment) else None
     unit = channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription") or None
@@ -56,7 +56,7 @@ def _tdms_column(channel: Any, key: str, long: str) -> Column:
         return seconds_since(origin, values) if stamps else values
 
     names = tuple({channel.name, long} - {key})
-    stored = Stored(len(channel), np.dtype(np.float64) if stamps else dtype, rows)
+    stored = Stored(path, len(channel), np.dtype(np.float64) if stamps else dtype, rows)
     return Column(key, stored, names, "s" if stamps else unit, period=period)
 
 
@@ -65,7 +65,7 @@ def open_mdf(path: str, file: Path, stack: ExitStack) -> Table:
     asammdf = library("asammdf", "mdf", path, "an MDF measurement")
     flaw = ""
     try:
-        columns, others = _mdf_columns(stack.enter_context(asammdf.MDF(file)))
+        columns, others = _mdf_columns(path, stack.enter_context(asammdf.MDF(file)))
     except Exception as error:  # asammdf raises its own and whatever a damaged file leads it into
         flaw = first_line(error)
         _forget(error)
@@ -86,7 +86,7 @@ def _forget(error: Exception) -> None:
         sys.unraisablehook = hook
 
 
-def _mdf_columns(mdf: Any) -> tuple[list[Column], list[str]]:
+def _mdf_columns(path: str, mdf: Any) -> tuple[list[Column], list[str]]:
     found = [
         (g, c, channel.name, int(group.channel_group.cycles_nr), mdf.masters_db.get(g))
         for g, group in enumerate(mdf.groups)
@@ -104,7 +104,7 @@ def _mdf_columns(mdf: Any) -> tuple[list[Column], list[str]]:
             others.append(f"{name!r} ({'text' if sample.samples.dtype.kind in 'SU' else sample.samples.dtype})")
             continue
         clock = None if master is None or master == c else at[(g, master)]
-        stored = Stored(count, sample.samples.dtype, _mdf_reader(mdf, g, c, is_master=master == c))
+        stored = Stored(path, count, sample.samples.dtype, _mdf_reader(mdf, g, c, is_master=master == c))
         unit = "s" if master == c else sample.unit or None
         columns.append(Column(at[(g, c)], stored, () if at[(g, c)] == name else (name,), unit, clock=clock))
     return columns, others

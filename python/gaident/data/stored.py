@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -20,16 +21,16 @@ _LISTED_COLUMNS = 1000
 class Matrix:
     """A two-dimensional array that stays in its file, as the table addresses it: `m[:, k]`, `m[k, :]`, `m.shape`."""
 
-    def __init__(self, shape: tuple[int, int], dtype: np.dtype[Any], read: Callable[[Any, Any], NDArray[Any]]) -> None:
-        self.shape, self.dtype, self.read = shape, dtype, read
+    def __init__(self, path: str, shape: tuple[int, int], dtype: np.dtype[Any], read: Callable[[Any, Any], NDArray[Any]]) -> None:
+        self.path, self.shape, self.dtype, self.read = path, shape, dtype, read
 
     def __getitem__(self, index: tuple[Any, Any]) -> Stored:
         row, column = index
         if isinstance(row, slice):
             k = column % self.shape[1]
-            return Stored(self.shape[0], self.dtype, lambda a, b: self.read(slice(a, b), k).reshape(-1))
+            return Stored(self.path, self.shape[0], self.dtype, lambda a, b: self.read(slice(a, b), k).reshape(-1))
         k = row % self.shape[0]
-        return Stored(self.shape[1], self.dtype, lambda a, b: self.read(k, slice(a, b)).reshape(-1))
+        return Stored(self.path, self.shape[1], self.dtype, lambda a, b: self.read(k, slice(a, b)).reshape(-1))
 
 
 def array_table(
@@ -73,14 +74,19 @@ def unique_keys(names: list[str]) -> list[str]:
 
 def library(module: str, extra: str, path: str, what: str) -> Any:
     """The module that reads a format, imported; ReadError with the line that installs it where it is missing."""
+    name = module.split(".")[0]
     try:
-        return importlib.import_module(module)
+        found = importlib.import_module(module)
     except ImportError as error:
-        missing = module.split(".")[0]
         raise ReadError(
-            f"{path}: this is {what}, and reading it needs the library {missing}, which cannot be imported ({error}); "
+            f"{path}: this is {what}, and reading it needs the library {name}, which cannot be imported ({error}); "
             f'install it with pip install "gaident[{extra}]"'
         ) from None
+    # What it has to say comes as an error of ours, not as lines of its loggers beside it.
+    for logger in list(logging.root.manager.loggerDict):
+        if logger.split(".")[0] == name:
+            logging.getLogger(logger).setLevel(logging.CRITICAL)
+    return found
 
 
 def midnight(stamps: NDArray[Any]) -> Any:

@@ -25,17 +25,31 @@ _LISTED = 40
 
 
 class Stored:
-    """Values that stay in their file until they are asked for: `stored[a:b]` reads rows a to b-1."""
+    """Values that stay in their file until they are asked for: `stored[a:b]` reads rows a to b-1.
 
-    def __init__(self, length: int, dtype: np.dtype[Any], read: Callable[[int, int], NDArray[Any]]) -> None:
-        self.length, self.dtype, self.read = length, dtype, read
+    Raises ReadError where the library that reads them fails: the file is damaged there.
+    """
+
+    def __init__(self, path: str, length: int, dtype: np.dtype[Any], read: Callable[[int, int], NDArray[Any]]) -> None:
+        self.path, self.length, self.dtype, self.read = path, length, dtype, read
 
     def __len__(self) -> int:
         return self.length
 
     def __getitem__(self, rows: slice) -> NDArray[Any]:
         start, stop, _ = rows.indices(self.length)
-        return self.read(start, stop)
+        try:
+            values = self.read(start, stop)
+        except Exception as error:  # every library has its own
+            reason = (str(error).splitlines() or [type(error).__name__])[0][:120]
+            raise ReadError(
+                f"{self.path}: damaged, rows {start} to {stop - 1} cannot be read ({reason}); copy the file again"
+            ) from None
+        if values.shape != (stop - start,):
+            raise ReadError(
+                f"{self.path}: damaged, it holds {values.size} values where {stop - start} are announced; copy it again"
+            )
+        return values
 
 
 @dataclass(frozen=True)
