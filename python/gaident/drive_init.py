@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.guess import Guess, guess_channels, position_and_velocity, unit_from_position
+from gaident.data.guess import Guess, guess_channels, position_and_velocity, unit_from_position, unit_from_velocity
 from gaident.data.listing import Listing
 from gaident.data.timeaxis import stamp_unit
 from gaident.data.units import Constants, factor, needed_constant
@@ -79,7 +79,9 @@ class _Draft:
         self.dt = (
             next((c.sample_time for c in guess.channels.values() if c.sample_time is not None), None) or self._step_of_time()
         )
-        self.from_position = self._velocity_unit()
+        self.compared: dict[str, tuple[str, str]] = {}  # channel -> (unit, what it was compared with)
+        self._compare_velocity()
+        self._compare_command()
 
     def _step_of_time(self) -> float | None:
         """dt of a time column that was known by its values."""
@@ -89,16 +91,33 @@ class _Draft:
         second = factor("time", time.unit) if time.unit else stamp_unit(time.lowest)
         return float(f"{(time.highest - time.lowest) / (time.samples - 1) * second:.9g}")
 
-    def _velocity_unit(self) -> str | None:
+    def _compare_velocity(self) -> None:
         """The unit of the velocity by comparison with the position, where the log does not say it."""
         held = self.guess.channels
         if self.dt is None or not {"velocity", "position"} <= held.keys() or self.units["velocity"] is not None:
-            return None
+            return
         size = _factor("position", self.units["position"])
         position, velocity = (self.values.get(held[channel].name) for channel in ("position", "velocity"))
         if size is None or position is None or velocity is None or len(position) != len(velocity):
-            return None
-        return unit_from_position(velocity, position * size, self.dt, self.linear)
+            return
+        unit = unit_from_position(velocity, position * size, self.dt, self.linear)
+        if unit is not None:
+            self.compared["velocity"] = unit, "position"
+
+    def _compare_command(self) -> None:
+        """The unit of the command by comparison with the velocity, which follows it."""
+        held = self.guess.channels
+        if not {"velocity", "command"} <= held.keys() or self.units["command"] is not None:
+            return
+        size = _factor("velocity", self.units["velocity"] or self.compared.get("velocity", (None, ""))[0])
+        command, velocity = (self.values.get(held[channel].name) for channel in ("command", "velocity"))
+        if size is None or command is None or velocity is None or len(command) != len(velocity):
+            return
+        if not (np.isfinite(command).all() and np.isfinite(velocity).all()):
+            return
+        unit = unit_from_velocity(command, velocity * size, self.linear)
+        if unit is not None:
+            self.compared["command"] = unit, "velocity"
 
     def done(self) -> DriveDraft:
         top, columns, units = self._top(), self._columns(), self._units()
@@ -196,8 +215,9 @@ class _Draft:
                 )
             elif unit is not None:
                 lines.append(_line(f"{channel} = {_quoted(unit)}", "as the log says"))
-            elif channel in ("velocity", "command") and self.from_position is not None:
-                lines.append(_line(f"{channel} = {_quoted(self.from_position)}", "by comparison with the position"))
+            elif channel in self.compared:
+                known, other = self.compared[channel]
+                lines.append(_line(f"{channel} = {_quoted(known)}", f"by comparison with the {other}"))
             else:
                 lines.append(
                     self._todo(
@@ -247,7 +267,7 @@ class _Draft:
         found = []
         for channel in channels:
             column = self.guess.channels.get(channel)
-            unit = self.units.get(channel) or (self.from_position if channel in ("velocity", "command") else None)
+            unit = self.units.get(channel) or self.compared.get(channel, (None, ""))[0]
             size = _factor(channel, unit)
             if column is None or size is None or (unit and needed_constant(channel, unit)):
                 continue

@@ -18,7 +18,7 @@ import pytest
 import gaident as ga
 from gaident import doctor
 from gaident.cli import main
-from gaident.data.guess import guess_channels, unit_from_position
+from gaident.data.guess import guess_channels, unit_from_position, unit_from_velocity
 from gaident.data.listing import columns
 from gaident.data.record_html import sparkline
 from gaident.drive_file import read_drive_file
@@ -146,6 +146,11 @@ def test_the_unit_of_a_velocity_by_its_position() -> None:
     assert unit_from_position(7.7 * velocity, position, 1e-3, linear=False) is None
     assert unit_from_position(np.cos(np.arange(500)), position, 1e-3, linear=False) is None
     assert unit_from_position(np.ones(500), position, 1e-3, linear=False) is None
+    command = np.roll(velocity, -3)  # which the velocity follows
+    assert unit_from_velocity(command / RPM, velocity, linear=False) == "rpm"
+    assert unit_from_velocity(command, velocity, linear=False) == "rad/s"
+    assert unit_from_velocity(1.7 * command, velocity, linear=False) is None
+    assert unit_from_velocity(np.cos(np.arange(500)), velocity, linear=False) is None
 
 
 @pytest.mark.parametrize(

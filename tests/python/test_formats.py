@@ -58,6 +58,18 @@ def test_channels_of_several_rates_are_joined_only_on_request() -> None:
     check(ga.Record(rec.dt, velocity=rec.velocity, torque=REC.torque[:37] if REC.torque is not None else None))
 
 
+def test_a_given_dt_is_compared_with_the_channels_own_clock(tmp_path: Path) -> None:
+    columns: dict[str, str | int | None] = {"velocity": "ActVelocity", "torque": "ActTorque"}
+    assert read(SAMPLES / "scope.csv", columns=columns, dt=0.5e-3).dt == 0.5e-3
+    with pytest.raises(ReadError, match=r"dt=0\.002 s, but time column 'Time #0' has steps of 0\.0005 s"):
+        read(SAMPLES / "scope.csv", columns=columns, dt=2e-3)
+    assert read(SAMPLES / "scope.csv", columns={**columns, "time": None}, dt=2e-3).dt == 2e-3
+    np.savez(tmp_path / "two.npz", **{"a.t": REC.time, "b.t": REC.time, "w": REC.velocity, "u": REC.torque})
+    assert not any(c.is_time for c in ga.columns(tmp_path / "two.npz").columns)
+    with pytest.raises(ReadError, match="2 columns are called 't'"):
+        read(tmp_path / "two.npz", columns={"velocity": "w", "torque": "u"})
+
+
 def test_irregular_stamps_are_refused_and_resampled_on_request() -> None:
     columns = {**JUGGLER, "command": "/axis/command"}
     with pytest.raises(ReadError, match=r"line 3: velocity column .* is empty.*resample="):

@@ -37,7 +37,7 @@ def common_clock(table: Table, wanted: Wanted, named: Mapping[str, Column]) -> C
         address = columns["time"]
         return None if address is None else table.find(address, "time")
     clocks = {column.clock for column in named.values()}
-    if None not in clocks and wanted.dt is None:
+    if None not in clocks:
         found = [column for column in table.columns if column.key in clocks]
         if len(found) > 1:
             _refuse_two_clocks(table, found)

@@ -14,7 +14,7 @@ from gaident.data.record import CHANNELS
 from gaident.data.units import Constants, factor
 from gaident.errors import ReadError
 
-__all__ = ["Guess", "guess_channels", "position_and_velocity", "unit_from_position"]
+__all__ = ["Guess", "guess_channels", "position_and_velocity", "unit_from_position", "unit_from_velocity"]
 
 # Words in the names of drive logs, English and German; a name is cut at capitals, digits and signs.
 _COMMAND = {
@@ -158,6 +158,18 @@ def unit_from_position(velocity: NDArray[np.float64], position: NDArray[np.float
         return None
     for unit in _VELOCITY_UNITS:
         if unit.startswith("m") == linear and abs(size / factor("velocity", unit) - 1.0) < 0.02:
+            return unit
+    return None
+
+
+def unit_from_velocity(command: NDArray[np.float64], velocity: NDArray[np.float64], linear: bool) -> str | None:
+    """The unit of a velocity command, from a velocity in SI that follows it; None where it does not to within 25 %."""
+    power = float(command @ command)
+    size = float(command @ velocity) / power if power > 0.0 else 0.0
+    if size <= 0.0 or float(command @ velocity) < _ALIKE * np.sqrt(power * float(velocity @ velocity)):
+        return None
+    for unit in _VELOCITY_UNITS:
+        if unit.startswith("m") == linear and abs(np.log(size / factor("velocity", unit))) < np.log(1.25):
             return unit
     return None
 

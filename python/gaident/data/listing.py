@@ -94,7 +94,7 @@ def columns(
     with open_log(path, TextOptions(delimiter, decimal, skip, encoding)) as table:
         real = [column for column in table.columns if column.values.dtype.kind in "iufb"]
         clocks = {column.clock for column in real if column.clock is not None}
-        main = time_column(table) if not clocks else None
+        main = time_column(table, strict=False) if not clocks else None
         gathered = {
             column.key: _Gathered(column, column.key in clocks or (main is not None and column.key == main.key))
             for column in real

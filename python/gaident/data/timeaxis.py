@@ -121,13 +121,20 @@ def stamp_unit(first: float) -> float:
 _TIME_NAMES = ("time", "t", "__time", "timestamp", "stamp", "header.stamp", "field.header.stamp", "header/stamp", "zeit", "index")
 
 
-def time_column(table: Table) -> Column | None:
-    """The column that is called as time is: in SI's language, ROS's or German. None if there is none, or more than one.
+def time_column(table: Table, strict: bool = True) -> Column | None:
+    """The column that is called as time is: in SI's language, ROS's or German. None if there is none.
+
+    Two that are called time are one too many: strict, a ReadError; else None.
 
     ROS: `%time` and `field.header.stamp` of rostopic, `__time` of PlotJuggler, `/topic/header/stamp`.
     """
     for exact in ("time", "t", "Time", "TIME"):
-        column = table.own(exact)
+        try:
+            column = table.own(exact)
+        except ReadError:
+            if strict:
+                raise
+            return None
         if column is not None:
             return column
     for name in _TIME_NAMES:
