@@ -15,7 +15,7 @@ SHELLS = ("bash", "zsh", "fish", "tcsh")
 COLUMNS_HELP = """\
 Lists what a log holds: the names of its columns as --columns takes them, units, range, sample time, and what
 stands in the way of their use. Formats: CSV and other text tables (of TwinCAT Scope, MR Configurator2, NI
-and ROS among others), MAT, NPZ, HDF5, Parquet, TDMS, MDF.
+or ROS as well), MAT, NPZ, HDF5, Parquet, TDMS, MDF.
 """
 INIT_HELP = """\
 Writes a drive.toml for the axis behind LOG: columns, units and sample time as the log shows them, each with its
