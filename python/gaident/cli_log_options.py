@@ -18,8 +18,8 @@ stands in the way of their use. Formats: CSV and other text tables (of TwinCAT S
 or ROS as well), MAT, NPZ, HDF5, Parquet, TDMS, MDF.
 """
 INIT_HELP = """\
-Writes a drive.toml for the axis behind LOG: columns, units and sample time as the log shows them, each with its
-reason, and a mark FILL IN where only a person knows (the controller's gains, a rated torque, ...).
+Writes a drive.toml for the axis behind LOG: columns, units and sample time as the log shows them, each with
+its reason, and a mark FILL IN where only a person knows (the controller's gains, a rated torque, ...).
 """
 INIT_EXAMPLES = """\
 examples:
