@@ -162,7 +162,7 @@ def _best(
     if best.correlation < _LEAST_CORRELATION:
         raise RecordError(
             f"the logs cannot be aligned by {what}: the best correlation is {best.correlation:.2f}; are they of the same run? "
-            "give on= with channels that show the same motion"
+            "give on= with channels that show the same motion; where the logs last many minutes, cut both to a part first"
         )
     for fit in fits:
         apart = abs(fit.offset - best.offset)
