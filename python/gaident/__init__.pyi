@@ -30,6 +30,7 @@ from .models import (
     simulate_many,
 )
 from .progress_bar import progress
+from .reporting import report
 from .store import load
 
 __all__ = [
@@ -70,6 +71,7 @@ __all__ = [
     "progress",
     "read",
     "read_columns",
+    "report",
     "run",
     "simulate",
     "simulate_many",

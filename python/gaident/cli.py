@@ -22,6 +22,7 @@ from gaident import demo as demonstration
 from gaident.cli_logs import log_commands
 from gaident.cli_options import PICTURES, drive_of, in_options, parser_of
 from gaident.cli_output import csv_targets, csv_text, naming, proposal_csv, target_of, write
+from gaident.cli_report import report_command, write_report
 from gaident.data.record import Record
 from gaident.diagnosis.diagnose import diagnose
 from gaident.drive_file import Drive
@@ -98,7 +99,8 @@ def _identify(args: argparse.Namespace) -> None:
     drive = drive_of(args)
     out = target_of(args.out, args.logs)
     plot = target_of(args.plot, args.logs, PICTURES)
-    _apart({"--out": out, "--plot": plot})
+    page = target_of(args.report, args.logs)
+    _apart({"--out": out, "--plot": plot, "--report": page})
     controller = drive.controller()
     records = _read_all(drive, args.logs, controller)
     settings = Settings.paper() if args.paper else Settings()
@@ -122,6 +124,9 @@ def _identify(args: argparse.Namespace) -> None:
     if plot is not None:
         _draw(idn, records, drive.axis, plot)
         written.append(plot)
+    if page is not None:
+        write_report(idn, page, records, (), drive.axis)
+        written.append(page)
     if args.json:
         _print_json(idn.to_dict())
         return
@@ -313,7 +318,8 @@ def _diagnose(args: argparse.Namespace) -> None:
     out = target_of(args.out, sources)
     plot = target_of(args.plot, sources, PICTURES)
     following = target_of(args.next_command, sources)
-    _apart({"--out": out, "--plot": plot, "--next-command": following})
+    page = target_of(args.report, sources)
+    _apart({"--out": out, "--plot": plot, "--report": page, "--next-command": following})
     controller = drive.controller()
     records = _read_all(drive, args.logs, controller)
     validation = _read_all(drive, args.validation, controller) if args.validation else None
@@ -342,6 +348,9 @@ def _diagnose(args: argparse.Namespace) -> None:
     if plot is not None:
         _save_figure(dia.plot(axis=drive.axis), plot)
         written.append(plot)
+    if page is not None:
+        write_report(dia, page, records, validation or (), drive.axis)
+        written.append(page)
     if following is not None and dia.next_experiment is not None:
         write(following, proposal_csv(dia.next_experiment, drive.axis).encode())
         written.append(following)
@@ -378,6 +387,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "identify": _identify,
     "diagnose": _diagnose,
     "simulate": _simulate,
+    "report": report_command,
     "effects": _effects,
     "demo": _demo,
     "reproduce": _reproduce,

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NoReturn
 
 from gaident.cli_log_options import add_log_commands, add_log_options, number
+from gaident.cli_report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
 from gaident.drive_file import COLUMNS, KEYS, Drive, read_drive_file
 from gaident.errors import ControllerError, SettingsError
 from gaident.identification.settings import INITIAL_STATES
@@ -136,6 +137,7 @@ def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], int | None]]
     g = sub.add_argument_group("results")
     g.add_argument("--out", metavar="FILE", help="save the identification (JSON)")
     g.add_argument("--plot", metavar="FILE", help=f"draw measured against simulated ({', '.join(PICTURES)})")
+    add_report_option(g)
     g.add_argument("--json", action="store_true", help="print what --out saves instead of the summary")
 
     sub = command(
@@ -161,6 +163,7 @@ def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], int | None]]
     g = sub.add_argument_group("results")
     g.add_argument("--out", metavar="FILE", help="save the diagnosis (JSON)")
     g.add_argument("--plot", metavar="FILE", help=f"draw what is wrong and what is left ({', '.join(PICTURES)})")
+    add_report_option(g)
     g.add_argument("--next-command", metavar="FILE", help="write the proposed experiment's command (CSV)")
     g.add_argument("--json", action="store_true", help="print what --out saves instead of the summary")
 
@@ -186,6 +189,11 @@ def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], int | None]]
     g.add_argument("--json", action="store_true", help="print everything as JSON instead of CSV")
 
     add_log_commands(command)
+
+    line = "saved result, and its logs -> one HTML page"
+    sub = command("report", "RESULT.json [LOG...] ", line, REPORT_HELP, REPORT_EXAMPLES)
+    add_report_options(sub)
+    add_log_options(sub)
 
     sub = command("effects", "", "what a model can carry beyond its linear part", EFFECTS_HELP)
     sub.add_argument("--json", action="store_true", help="print JSON instead of a table")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 from gaident.data.record import Record
 from gaident.diagnosis.experiments import Proposal
 from gaident.errors import SettingsError
+from gaident.files import write_whole
 from gaident.models.simulate import Run
 
 __all__ = ["csv_targets", "csv_text", "naming", "proposal_csv", "target_of", "write"]
@@ -33,10 +33,9 @@ def csv_text(rec: Record, result: Run | None, axis: str) -> str:
 
 def proposal_csv(proposal: Proposal, axis: str) -> str:
     """A proposed command as a log that a drive's signal generator takes: time and command."""
-    from gaident.show.wording import velocity_unit
+    from gaident.show.report import command
 
-    rows = (f"{n * proposal.dt:.9g},{r:.9g}" for n, r in enumerate(proposal.command.tolist()))
-    return "\n".join([f"time [s],command [{velocity_unit(axis)}]", *rows, ""])
+    return command.proposal_csv(proposal, axis)
 
 
 def target_of(path: str | None, logs: Sequence[str], suffixes: Sequence[str] = ()) -> Path | None:
@@ -72,13 +71,8 @@ def csv_targets(path: str | None, logs: Sequence[str], several: bool) -> list[Pa
 
 def write(target: Path, content: bytes) -> None:
     """The file appears whole or not at all."""
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
     with naming(target):
-        try:
-            temporary.write_bytes(content)
-            temporary.replace(target)
-        finally:
-            temporary.unlink(missing_ok=True)
+        write_whole(target, content)
 
 
 @contextmanager

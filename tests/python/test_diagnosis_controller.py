@@ -9,8 +9,8 @@ import pytest
 
 import gaident as ga
 from gaident.diagnosis.hygiene import outliers
-from gaident.diagnosis.pi_torque import held_torque
 from gaident.diagnosis.replay import replay
+from gaident.models.pi_torque import held_torque
 from test_diagnosis_result import CONTROLLER, DRIVE, DT, drive_record
 
 J, D = 5e-4, 2e-3

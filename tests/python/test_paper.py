@@ -32,8 +32,8 @@ from gaident.paper.facts import (
     TWO_MASSES,
     Mechanism,
 )
-from gaident.paper.html import number, table
 from gaident.paper.rig import NO_FRICTION, Friction, Rig
+from gaident.show.html import number, table
 
 TRIALS, SEEDS = 4, 6
 BOTH = pytest.mark.parametrize("mechanism", MECHANISMS, ids=["one mass", "two masses"])

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from gaident.data.record import Record
 from gaident.diagnosis.candidates import CANDIDATES, Scales
 from gaident.diagnosis.driven import AT_CONTROLLER, Driven
-from gaident.diagnosis.pi_torque import HOLDS, held_torque, pi_torque
 from gaident.diagnosis.replay import Replay, replay
 from gaident.diagnosis.replay_causes import white_noise
 from gaident.diagnosis.result import Finding
 from gaident.identification.covariance import Estimate
 from gaident.models.controller import PI
 from gaident.models.effects import table
+from gaident.models.pi_torque import HOLDS, held_torque, pi_torque
 
 __all__ = ["AtController", "as_logged", "as_read", "controller_findings"]
 

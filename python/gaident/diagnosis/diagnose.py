@@ -271,6 +271,7 @@ class _Work:
             loop_follows=self.at_controller.follows,
             version=version(),
             records=self.records,
+            validation_records=self.held,
         )
 
     def _accepted_gains(self) -> Gains:

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from gaident.data.record import Record
 from gaident.diagnosis.hygiene import quantisation
 from gaident.diagnosis.layout import Layout
-from gaident.diagnosis.pi_torque import rate_limited
 from gaident.identification.space import torque_of
 from gaident.identification.starts import noise_std, starts_moving
 from gaident.models.controller import PI
+from gaident.models.pi_torque import rate_limited
 from gaident.models.simulate import simulate_values
 
 __all__ = ["Driven"]

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.diagnosis.lattice import lattice_step
-from gaident.diagnosis.pi_torque import pi_torque
 from gaident.diagnosis.replay_causes import explain, white_noise
 from gaident.errors import RecordError
 from gaident.models.controller import PI
+from gaident.models.pi_torque import pi_torque
 
 __all__ = ["Replay", "replay"]
 

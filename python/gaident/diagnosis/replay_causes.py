@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.diagnosis.pi_torque import HOLDS, held_torque, pi_torque, rate_limited
 from gaident.identification.noise import ljung_box
 from gaident.models.controller import PI
+from gaident.models.pi_torque import HOLDS, held_torque, pi_torque, rate_limited
 
 __all__ = ["Explanation", "explain", "white_noise"]
 

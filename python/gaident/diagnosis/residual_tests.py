@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from gaident.data.record import Record
 from gaident.diagnosis.directed import torque_columns
 from gaident.diagnosis.excitation import position_of
-from gaident.diagnosis.pi_torque import pi_torque
 from gaident.diagnosis.problem import orthonormal_rows
 from gaident.diagnosis.state_space import discretised, disturbed
 from gaident.errors import RecordError
@@ -31,6 +30,7 @@ from gaident.identification.noise import Autoregression, chi2_tail, fit_autoregr
 from gaident.identification.starts import starts_moving
 from gaident.models.controller import PI
 from gaident.models.model import Model
+from gaident.models.pi_torque import pi_torque
 from gaident.models.simulate import initial_state, simulate
 
 __all__ = ["ResidualTests", "parameter_sensitivities", "residual_tests"]

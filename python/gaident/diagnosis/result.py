@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gaident.data.record import Record
 from gaident.diagnosis.experiments import Proposal
 from gaident.errors import GaidentError
+from gaident.files import write_whole
 from gaident.identification.covariance import Estimate
 from gaident.identification.result import Identification, json_text
 from gaident.models.controller import PI
@@ -70,6 +70,7 @@ class Diagnosis:
     noise [rad/s] and bootstrap as they were asked for; controller as it was used: with the gains that the logged torque shows.
     torque_logged: whether all records hold the torque; loop_follows: False where it does not follow from command and velocity
     through the simulated controller, whose free runs are then not the drive's. notes: what to keep in mind, in plain sentences.
+    records and validation_records: the data, empty where the diagnosis was loaded from a file.
     """
 
     verdict: str
@@ -101,6 +102,7 @@ class Diagnosis:
     line: tuple[float, float] | None = None
     mechanics: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
+    validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
     def __repr__(self) -> str:
         named = ", ".join(f.effect + ("" if f.named else "?") for f in self.findings if not f.is_noise)
@@ -128,6 +130,26 @@ class Diagnosis:
         if not given:
             raise GaidentError("records: a loaded diagnosis holds no data; give plot(records)")
         return overview(self, given, axis)
+
+    def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str = "rotary") -> Figure:
+        """The extended model against the frequency response of the longest record, with coherence; see Identification.plot_bode.
+
+        Friction and other effects bend the record's response; the model, simulated and estimated the same way, has them too.
+        Raises GaidentError where a loaded diagnosis is given no records, RecordError where they show no frequency response.
+        """
+        from gaident.identification.frequency import response_of
+        from gaident.show import plot_response
+
+        given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
+        if not given:
+            raise GaidentError("records: a loaded diagnosis holds no data; give plot_bode(records)")
+        return plot_response(response_of(max(given, key=len), self.model, self.controller), hz, axis)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        from gaident.show.notebook import diagnosis_html
+
+        return diagnosis_html(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, without the records."""
@@ -226,10 +248,4 @@ class Diagnosis:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes JSON; the file appears whole or not at all."""
-        target = Path(path)
-        temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
-        try:
-            temporary.write_text(self.to_json(), encoding="utf-8")
-            temporary.replace(target)
-        finally:
-            temporary.unlink(missing_ok=True)
+        write_whole(path, self.to_json().encode())

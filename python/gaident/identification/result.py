@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.errors import GaidentError
+from gaident.files import write_whole
 from gaident.identification.adequacy import Adequacy
 from gaident.identification.covariance import Estimate
 from gaident.identification.settings import Settings
@@ -163,6 +163,45 @@ class Identification:
             raise GaidentError("records: a loaded identification holds no data; give plot(records)")
         return plot_identification(self, chosen, axis=axis)
 
+    def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str = "rotary") -> Figure:
+        """The model against the frequency response of the longest record (`records` as used unless given), with coherence.
+
+        In a loop with a command it is estimated by the command (joint input-output), else torque to velocity (H1). A loaded
+        identification without records shows the model alone. hz: frequencies in Hz instead of rad/s. Raises RecordError where
+        the record shows no frequency response.
+        """
+        from gaident.identification.frequency import response_of
+        from gaident.show import plot_bode, plot_response
+
+        given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
+        if not given:
+            return plot_bode(self.model, axis=axis, hz=hz)
+        return plot_response(response_of(max(given, key=len), self.model, self.controller), hz, axis)
+
+    def plot_poles(self, hz: bool = False) -> Figure:
+        """Poles and zeros in the s-plane with bars of 2 standard deviations; [rad/s], or divided by 2 pi [Hz]."""
+        from gaident.show import plot_poles_zeros
+
+        return plot_poles_zeros(self, hz)
+
+    def plot_convergence(self) -> Figure:
+        """Best fitness (6) per generation of every trial."""
+        from gaident.show import plot_convergence
+
+        return plot_convergence(self)
+
+    def plot_structures(self) -> Figure:
+        """BIC of every structure (p,q) above the lowest."""
+        from gaident.show import plot_structures
+
+        return plot_structures(self)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        from gaident.show.notebook import identification_html
+
+        return identification_html(self)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, without the records."""
         return {
@@ -235,14 +274,7 @@ class Identification:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes JSON; the file appears whole or not at all."""
-        target = Path(path)
-        text = self.to_json()
-        temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
-        try:
-            temporary.write_text(text, encoding="utf-8")
-            temporary.replace(target)
-        finally:
-            temporary.unlink(missing_ok=True)
+        write_whole(path, self.to_json().encode())
 
 
 def json_text(data: Mapping[str, Any]) -> str:

@@ -13,11 +13,11 @@ from gaident.paper.conventional import AMPLITUDE, HOLD, REGISTER
 from gaident.paper.experiment import FRICTION, NOISE, StepTest
 from gaident.paper.facts import DT, LOOP_GAIN_FACTORS, SECONDS, SECONDS_PER_GENERATION, Mechanism
 from gaident.paper.friction import FrictionTest
-from gaident.paper.html import figure, number
 from gaident.paper.pictures import CAPTIONS
 from gaident.paper.reproduction import Part, Reproduction
 from gaident.paper.rig import SUBSTEPS
 from gaident.paper.template import PAGE
+from gaident.show.html import figure, number
 
 __all__ = ["page", "summary"]
 

@@ -8,8 +8,8 @@ from gaident.models.mechanics import Mechanics
 from gaident.models.model import Model
 from gaident.paper.conventional import METHODS
 from gaident.paper.facts import LOOP_GAIN_FACTORS, Mechanism
-from gaident.paper.html import Cell, Row, table
 from gaident.paper.reproduction import Part
+from gaident.show.html import Cell, Row, table
 
 __all__ = [
     "behind_table",

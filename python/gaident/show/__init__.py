@@ -14,6 +14,7 @@ from gaident.show.plots import (
     plot_poles_zeros,
     plot_structures,
 )
+from gaident.show.response_plots import plot_response
 from gaident.show.summary import identification_summary, mechanics_comparison
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "plot_orders",
     "plot_poles_zeros",
     "plot_residual",
+    "plot_response",
     "plot_reversals",
     "plot_structures",
     "plot_torque_velocity",

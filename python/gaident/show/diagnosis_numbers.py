@@ -16,6 +16,7 @@ __all__ = [
     "binned_mean",
     "branches",
     "order_lines",
+    "over_period",
     "reversal_averages",
     "smoothed",
     "spectrum",
@@ -132,10 +133,7 @@ def order_lines(position: Vector, torque: Vector, velocity: Vector, highest: flo
     turns = float(np.ptp(theta)) / math.tau if len(theta) else 0.0
     if turns < 0.05 or len(theta) < 50:
         return OrderLines(np.zeros(0), np.zeros(0), np.zeros(0), turns)
-    top = float(np.abs(speed).max()) * (1.0 + 1e-9)
-    index = ((speed / top + 1.0) * 20.0).astype(int)
-    count = np.maximum(np.bincount(index, minlength=40), 1)
-    rest = d - (np.bincount(index, d, minlength=40) / count)[index]
+    rest = d - _of_velocity(d, speed)
     weight = np.abs(speed) / float(np.sum(np.abs(speed)))
     # Collected over small steps of angle, the sums over all orders are one Fourier transform.
     per_turn = max(2.0 * highest, min(16.0 * highest, MOST_STEPS / turns))
@@ -208,3 +206,32 @@ def spectrum(x: Vector, dt: float, segments: int = 8) -> Spectrum:
     density = np.sqrt(2.0 * dt * power / np.sum(window**2))
     f = np.arange(1, len(density), dtype=np.float64) / (size * dt)
     return Spectrum(f, density[1:])
+
+
+def over_period(position: Vector, torque: Vector, velocity: Vector, period: float, bins: int = 48) -> Binned:
+    """Mean of the torque per bin of the position within `period`, while the axis moves; x from 0 to period.
+
+    What depends on the velocity alone is taken out first, as in `order_lines`: what is left belongs to the place.
+    """
+    w = smoothed(velocity, max(5, len(velocity) // 300))
+    moving = np.abs(w) > 0.02 * float(np.abs(w).max(initial=0.0))
+    if not np.any(moving):
+        return Binned(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64))
+    d = torque[moving] - _of_velocity(torque[moving], w[moving])
+    place = np.mod(position[moving] - (0.0 if period == math.tau else float(position.min())), period)
+    index = np.minimum((place / period * bins).astype(int), bins - 1)
+    count = np.bincount(index, minlength=bins)
+    kept = count >= LEAST_IN_BIN
+    n = np.maximum(count, 1)
+    mean = np.bincount(index, d, minlength=bins) / n
+    square = np.bincount(index, (d - mean[index]) ** 2, minlength=bins) / n
+    return Binned((np.bincount(index, place, minlength=bins) / n)[kept], mean[kept], np.sqrt(square)[kept], count[kept])
+
+
+def _of_velocity(torque: Vector, velocity: Vector) -> Vector:
+    """The mean torque of each sample's velocity bin, forty over +-max |w|."""
+    top = float(np.abs(velocity).max()) * (1.0 + 1e-9)
+    index = ((velocity / top + 1.0) * 20.0).astype(int)
+    count = np.maximum(np.bincount(index, minlength=40), 1)
+    mean: Vector = (np.bincount(index, torque, minlength=40) / count)[index]
+    return mean

@@ -159,7 +159,7 @@ def _torque_velocity(
     )
     if curve is not None:
         ax.plot(curve[0], curve[1], color=GREEN, linewidth=2.0, label=curve[2])
-    ax.set_ylim(*_robust(dhat))
+    ax.set_ylim(*robust_limits(dhat))
     _plain_numbers(ax)
     ax.set_xlabel(f"velocity [{velocity_unit(axis)}]")
     ax.set_ylabel(_torque_label(axis))
@@ -277,7 +277,7 @@ def _period(axis: str) -> str:
     return "turn" if axis == "rotary" else "metre"
 
 
-def _robust(values: Vector) -> tuple[float, float]:
+def robust_limits(values: Vector) -> tuple[float, float]:
     """Limits that hold all but the wildest half per cent at either end, zero included, with a margin."""
     low, high = (float(x) for x in np.quantile(values, (0.005, 0.995)))
     low, high = min(low, 0.0), max(high, 0.0)

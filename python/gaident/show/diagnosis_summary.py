@@ -8,7 +8,18 @@ from typing import Any
 
 from gaident.show.wording import certainty, number, sentence, table, unit, velocity_unit, with_std
 
-__all__ = ["diagnosis_summary"]
+__all__ = [
+    "chance_words",
+    "diagnosis_summary",
+    "either",
+    "fall_words",
+    "left_words",
+    "mechanical_name",
+    "next_words",
+    "parameter_row",
+    "verdict_words",
+    "words",
+]
 
 WIDTH = 100
 LINEAR = {"N m s^2/rad^2": "N s^2/m^2", "N m/rad^3": "N/m^3", "rad/s": "m/s", "rad": "m"}
@@ -41,7 +52,8 @@ def diagnosis_summary(dia: Any, axis: str = "rotary") -> str:
     return "\n\n".join("\n".join(lines) for lines in sections if lines)
 
 
-def _words(effect: str) -> str:
+def words(effect: str) -> str:
+    """The name of an effect as it is written."""
     return effect.replace("_", " ")
 
 
@@ -50,36 +62,41 @@ def _wrapped(text: str, indent: str = "", hanging: str = "") -> list[str]:
     return lines or [""]
 
 
-def _either(finding: Any) -> str:
+def either(finding: Any) -> str:
     """ "a, b or c" of a finding and what these data cannot tell from it."""
-    names = [_words(name) for name in (finding.effect, *finding.alternatives)]
+    names = [words(name) for name in (finding.effect, *finding.alternatives)]
     return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def _verdict(dia: Any, axis: str) -> list[str]:
-    head = _head(dia)
-    if dia.driver is not None:
-        head += f" What is left depends {DRIVERS[dia.driver]}"
-        if dia.line is not None:
-            frequency, amplitude = dia.line
-            kind = "torque" if axis == "rotary" else "force"
-            head += f": like a {kind} of {number(frequency, 3)} Hz and {number(amplitude, 2)} {unit('N m', axis)} at the motor"
-        head += "."
+    head = " ".join(filter(None, (verdict_words(dia), left_words(dia, axis))))
     lines = [f"Verdict: {dia.verdict}", *_wrapped(head)]
     for note in dia.notes:
         lines += _wrapped(sentence(note, axis))
     return lines
 
 
-def _head(dia: Any) -> str:
+def left_words(dia: Any, axis: str) -> str:
+    """What the error that is left depends on; empty where nothing significant is left."""
+    if dia.driver is None:
+        return ""
+    text = f"What is left depends {DRIVERS[dia.driver]}"
+    if dia.line is not None:
+        frequency, amplitude = dia.line
+        kind = "torque" if axis == "rotary" else "force"
+        text += f": like a {kind} of {number(frequency, 3)} Hz and {number(amplitude, 2)} {unit('N m', axis)} at the motor"
+    return f"{text}."
+
+
+def verdict_words(dia: Any) -> str:
     """The verdict in words, with the names."""
     if dia.verdict == "adequate":
         return "The linear model is adequate: nothing significant is left that could be blamed on the drive."
     if dia.verdict == "unexplained":
         return "The model is wrong, and no effect of the library fits what is left."
     causes = [f for f in dia.findings if not f.is_noise]
-    named = [_words(f.effect) for f in causes if not f.alternatives]
-    open_ = [_either(f) for f in causes if f.alternatives]
+    named = [words(f.effect) for f in causes if not f.alternatives]
+    open_ = [either(f) for f in causes if f.alternatives]
     parts = [f"{'Cause' if len(named) == 1 else 'Causes'}: {', '.join(named)}."] if named else []
     parts += [
         f"What is {'also ' if named else ''}missing is one of: {names}. These data do not tell them apart." for names in open_
@@ -97,17 +114,21 @@ def _causes(dia: Any, axis: str) -> list[str]:
     for f in dia.findings:
         if f.is_noise:
             continue
-        lines.append(_words(f.effect) + "".join(f", or {_words(a)}" for a in f.alternatives))
-        lines += table([_parameter(n, e, axis) for n, e in f.parameters.items()], "    ")
+        lines.append(words(f.effect) + "".join(f", or {words(a)}" for a in f.alternatives))
+        lines += table([parameter_row(n, e, axis) for n, e in f.parameters.items()], "    ")
         lines += _wrapped(sentence(f.evidence, axis), "    ")
         if f.p_value is not None:
-            most = "at most " if f.p_value * (dia.bootstrap + 1) <= 1.0 + 1e-9 else ""  # none of the draws came as far
-            chance = f"{most}{f.p_value:.2g}"
-            lines += _wrapped(f"Chance of such a finding where there is no effect at all (bootstrap): {chance}.", "    ")
+            lines += _wrapped(chance_words(f, dia.bootstrap), "    ")
     return ["What was found", *(line if line.startswith(" ") else f"  {line}" for line in lines)] if lines else []
 
 
-def _parameter(name: str, e: Any, axis: str) -> tuple[str, str, str, str]:
+def chance_words(finding: Any, bootstrap: int) -> str:
+    """The p-value of the bootstrap in words."""
+    most = "at most " if finding.p_value * (bootstrap + 1) <= 1.0 + 1e-9 else ""  # none of the draws came as far
+    return f"Chance of such a finding where there is no effect at all (bootstrap): {most}{finding.p_value:.2g}."
+
+
+def parameter_row(name: str, e: Any, axis: str) -> tuple[str, str, str, str]:
     """Name, value with its standard deviation, unit, remark."""
     value, std, u = e.value, e.std, e.unit
     if axis == "linear" and u == "1/turn":  # a turn is 2 pi m
@@ -115,7 +136,7 @@ def _parameter(name: str, e: Any, axis: str) -> tuple[str, str, str, str]:
     elif axis == "linear" and name not in ("phase", "frequency", "zero_frequency"):
         u = LINEAR.get(u) or unit(u, axis)
     remark = "at a bound" if e.at_bound else "" if e.identifiable else "not determined"
-    return _words(name), with_std(value, std), "" if u == "1" else u, remark
+    return words(name), with_std(value, std), "" if u == "1" else u, remark
 
 
 def _gain(dia: Any, axis: str) -> list[str]:
@@ -134,14 +155,14 @@ def _gain(dia: Any, axis: str) -> list[str]:
         text = "The simulated controller is not the drive's (see above): these figures include its errors."
         lines += _wrapped(text, "  ")
     if extended and dia.before.rmse > 0.0:
-        lines += _wrapped(sentence(_fall(dia), axis), "  ")
-        steps = [f"{_words(f.effect)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
+        lines += _wrapped(sentence(fall_words(dia), axis), "  ")
+        steps = [f"{words(f.effect)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
         if len(steps) > 1:
             lines += _wrapped(f"One after the other, each of what was left before it: {', '.join(steps)}.", "  ")
     return lines
 
 
-def _fall(dia: Any) -> str:
+def fall_words(dia: Any) -> str:
     """By how much the error falls, in words."""
     fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)
     low, high = (100.0 * x for x in dia.gain_interval)
@@ -175,15 +196,16 @@ def _mechanics(dia: Any, axis: str) -> list[str]:
     rows = []
     for name, e in dia.mechanics.items():
         u = "" if e.unit == "1" else unit(e.unit, axis)
-        rows.append((_mechanical(name, axis), with_std(e.value, e.std), u, "" if e.identifiable else "not determined"))
+        rows.append((mechanical_name(name, axis), with_std(e.value, e.std), u, "" if e.identifiable else "not determined"))
     lines = [head, *table(rows)]
     if "resonance" not in dia.mechanics and len(dia.model.poles) > 1:
         lines.append("  a second pair of poles that does not swing: no resonance of a shaft")
     return lines
 
 
-def _mechanical(name: str, axis: str) -> str:
-    return "  its damping ratio" if name.endswith("_damping") else sentence(_words(name), axis)
+def mechanical_name(name: str, axis: str) -> str:
+    """A parameter of the mechanism as it is written; what belongs to the row above is indented."""
+    return "  its damping ratio" if name.endswith("_damping") else sentence(words(name), axis)
 
 
 def _base(dia: Any, axis: str) -> list[str]:
@@ -193,7 +215,7 @@ def _base(dia: Any, axis: str) -> list[str]:
             old, new = dia.base_shift[name]
             change = f"{100.0 * (new / old - 1.0):+.1f} %" if old else ""
             u = "" if e.unit == "1" else unit(e.unit, axis)
-            rows.append((_mechanical(name, axis), number(old, 5), number(new, 5), change, u))
+            rows.append((mechanical_name(name, axis), number(old, 5), number(new, 5), change, u))
     return ["How far the effects had bent the linear model", *table(rows)] if len(rows) > 1 and dia.model.effects else []
 
 
@@ -201,14 +223,14 @@ def _record(dia: Any, axis: str) -> list[str]:
     lines = []
     for f in dia.findings:
         if f.is_noise:
-            lines += _wrapped(f"{_words(f.effect)}: {sentence(f.evidence, axis)}", "  ", "  ")
+            lines += _wrapped(f"{words(f.effect)}: {sentence(f.evidence, axis)}", "  ", "  ")
     return ["About the record", *lines] if lines else []
 
 
 def _untested(dia: Any, axis: str) -> list[str]:
     lines = []
     for effect, reason in dia.not_testable.items():
-        lines += _wrapped(f"{_words(effect)}: {sentence(reason, axis)}", "  ", "  ")
+        lines += _wrapped(f"{words(effect)}: {sentence(reason, axis)}", "  ", "  ")
     return ["Not testable with this record", *lines] if lines else []
 
 
@@ -216,13 +238,17 @@ def _next(dia: Any, axis: str) -> list[str]:
     p = dia.next_experiment
     if p is None:
         return []
-    margin = f", {certainty(p.margin)} ({p.margin:.0f} BIC units, 10 are enough)" if math.isfinite(p.margin) else ""
-    text = f"{p.reason} It tells {' from '.join(map(_words, p.separates))}{margin}."
-    rest = dict.fromkeys(a for f in dia.findings for a in f.alternatives if a not in p.separates)
-    if rest:
-        text += f" It was not chosen for {' or '.join(map(_words, rest))}."
     size = f"The command: {len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s."
-    return ["Next experiment", *_wrapped(sentence(text, axis), "  "), f"  {size}"]
+    return ["Next experiment", *_wrapped(sentence(next_words(dia), axis), "  "), f"  {size}"]
+
+
+def next_words(dia: Any) -> str:
+    """Why the next experiment, what it tells apart and how surely."""
+    p = dia.next_experiment
+    margin = f", {certainty(p.margin)} ({p.margin:.0f} BIC units, 10 are enough)" if math.isfinite(p.margin) else ""
+    text = f"{p.reason} It tells {' from '.join(map(words, p.separates))}{margin}."
+    rest = dict.fromkeys(a for f in dia.findings for a in f.alternatives if a not in p.separates)
+    return f"{text} It was not chosen for {' or '.join(map(words, rest))}." if rest else text
 
 
 def _how(dia: Any) -> list[str]:

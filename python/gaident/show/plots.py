@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_bode", "plot_convergence", "plot_identification", "plot_poles_zeros", "plot_structures"]
+__all__ = ["plot_bode", "plot_convergence", "plot_identification", "plot_poles_zeros", "plot_structures", "roots_of"]
 
 # Okabe and Ito's colours: told apart by every eye, and in grey by their lightness.
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
@@ -139,16 +139,17 @@ def plot_structures(idn: Any) -> Figure:
     return fig
 
 
-def plot_poles_zeros(idn: Any) -> Figure:
-    """Poles and zeros in the s-plane [rad/s], with bars of +-2 standard deviations."""
+def plot_poles_zeros(idn: Any, hz: bool = False) -> Figure:
+    """Poles and zeros in the s-plane [rad/s], or divided by 2 pi [Hz], with bars of +-2 standard deviations."""
+    scale = 1.0 / math.tau if hz else 1.0
     fig = _figure(6.0, 5.0)
     ax = fig.subplots()
     highest = 0.0
     for kind, marker, color in (("pole", "x", VERMILION), ("zero", "o", BLUE)):
-        points = _roots(idn.parameters, kind)
+        points = roots_of(idn.parameters, kind)
         if not points:
             continue
-        x, y, dx, dy = (np.array(values) for values in zip(*points, strict=True))
+        x, y, dx, dy = (scale * np.array(values) for values in zip(*points, strict=True))
         ax.errorbar(x, y, xerr=2.0 * dx, yerr=2.0 * dy, fmt="none", color=color, elinewidth=1.0, capsize=2.5)
         style: dict[str, Any] = {"markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.8}
         ax.plot(x, y, marker, color=color, label=f"{kind}s", **style)
@@ -158,8 +159,9 @@ def plot_poles_zeros(idn: Any) -> Figure:
     ax.axhline(0.0, color=BLACK, linewidth=0.6)
     ax.axvline(0.0, color=BLACK, linewidth=0.6)
     ax.margins(0.15)
-    ax.set_xlabel("real part [rad/s]")
-    ax.set_ylabel("imaginary part [rad/s]")
+    u = "Hz" if hz else "rad/s"
+    ax.set_xlabel(f"real part [{u}]")
+    ax.set_ylabel(f"imaginary part [{u}]")
     ax.set_title("Poles and zeros, bars +-2 std")
     ax.legend()
     _tidy(fig)
@@ -171,8 +173,9 @@ def plot_bode(
     labels: Sequence[str] | None = None,
     frequencies_hz: tuple[float, float] | None = None,
     axis: str = "rotary",
+    hz: bool = True,
 ) -> Figure:
-    """Magnitude and phase of one model or several, torque to velocity, over frequency [Hz].
+    """Magnitude and phase of one model or several, torque to velocity, over frequency [Hz], or [rad/s] for hz=False.
 
     frequencies_hz: (lowest, highest); None: a decade around the roots.
     """
@@ -180,6 +183,7 @@ def plot_bode(
     names = list(labels) if labels is not None else [f"model {i + 1}" for i in range(len(listed))]
     low, high = frequencies_hz if frequencies_hz is not None else _decades(listed)
     f = _frequencies(listed, low, high)
+    scale = 1.0 if hz else math.tau
     fig = _figure(7.0, 5.5)
     top, bottom = fig.subplots(2, 1, sharex=True, height_ratios=(1.4, 1.0))
     for i, (model, name) in enumerate(zip(listed, names, strict=True)):
@@ -189,14 +193,14 @@ def plot_bode(
             "linestyle": ("-", "--", "-.", ":")[i % 4],
             "linewidth": 1.5,
         }
-        top.plot(f, np.abs(response), label=name, **style)
-        bottom.plot(f, np.degrees(np.unwrap(np.angle(response))), **style)
+        top.plot(f * scale, np.abs(response), label=name, **style)
+        bottom.plot(f * scale, np.degrees(np.unwrap(np.angle(response))), **style)
     top.set_xscale("log")
     top.set_yscale("log")
     u = unit("N m", axis)
     top.set_ylabel(f"magnitude [{velocity_unit(axis)}/{'(N m)' if u == 'N m' else u}]")
     bottom.set_ylabel("phase [deg]")
-    bottom.set_xlabel("frequency [Hz]")
+    bottom.set_xlabel("frequency [Hz]" if hz else "frequency [rad/s]")
     bottom.yaxis.set_major_locator(_locator(45.0))
     top.set_title(f"{'Torque' if axis == 'rotary' else 'Force'} to velocity")
     if labels is not None or len(listed) > 1:
@@ -245,7 +249,7 @@ def envelope(time: Vector, values: Vector, bins: int = BINS) -> tuple[Vector, Ve
     return time[picked], values[picked]
 
 
-def _roots(parameters: Any, kind: str) -> list[tuple[float, float, float, float]]:
+def roots_of(parameters: Any, kind: str) -> list[tuple[float, float, float, float]]:
     """(real, imaginary, their deviations) of every pole or zero; 0 where no deviation is known."""
     points = []
     for name, e in parameters.items():

@@ -8,7 +8,14 @@ from typing import Any
 
 from gaident.show.wording import number, structure_words, table, unit, velocity_unit, with_std
 
-__all__ = ["identification_summary", "mechanics_comparison"]
+__all__ = [
+    "flags_of",
+    "identification_summary",
+    "inconsistency_words",
+    "meaning_of",
+    "mechanics_comparison",
+    "stem_of",
+]
 
 WIDTH = 100
 SHOWN_STRUCTURES = 5
@@ -82,13 +89,13 @@ def _loop(controller: Any, axis: str) -> str:
 def _model(idn: Any, axis: str) -> list[str]:
     gain = idn.parameters["gain"]
     rows: list[tuple[str, ...]] = [("", "real part [rad/s]", "imaginary part [rad/s]", "frequency [Hz]", "damping", "")]
-    stems = dict.fromkeys(_stem(name) for name in idn.parameters if name != "gain")
+    stems = dict.fromkeys(stem_of(name) for name in idn.parameters if name != "gain")
     rows += [_root(idn.parameters, stem) for stem in stems]
-    head = f"Model: gain K = {_estimate(gain)} {unit(gain.unit, axis)} {_flags([gain])}".rstrip()
+    head = f"Model: gain K = {_estimate(gain)} {unit(gain.unit, axis)} {flags_of([gain])}".rstrip()
     return [head, *(table(rows) if len(rows) > 1 else [])]
 
 
-def _stem(name: str) -> str:
+def stem_of(name: str) -> str:
     """ "pole_pair_1" of "pole_pair_1_frequency", "pole_1" of itself."""
     return name.rsplit("_", 1)[0] if "_pair_" in name else name
 
@@ -99,18 +106,19 @@ def _root(parameters: Any, stem: str) -> tuple[str, ...]:
     if stem in parameters:
         e = parameters[stem]
         frequency = with_std(abs(e.value) / math.tau, e.std / math.tau) if e.value else ""
-        return (name, _estimate(e), "", frequency, "", _flags([e], e.value))
+        return (name, _estimate(e), "", frequency, "", flags_of([e], e.value))
     parts = [parameters[f"{stem}_{what}"] for what in ("real", "imaginary", "frequency", "damping")]
     real, imaginary, frequency, damping = parts
     in_hz = with_std(frequency.value / math.tau, frequency.std / math.tau)
-    return name, _estimate(real), _estimate(imaginary), in_hz, _estimate(damping), _flags(parts, real.value)
+    return name, _estimate(real), _estimate(imaginary), in_hz, _estimate(damping), flags_of(parts, real.value)
 
 
 def _estimate(e: Any) -> str:
     return with_std(e.value, e.std)
 
 
-def _flags(estimates: list[Any], real_part: float = -1.0) -> str:
+def flags_of(estimates: list[Any], real_part: float = -1.0) -> str:
+    """What to doubt in a root or a parameter."""
     flags = []
     if any(e.at_bound for e in estimates):
         flags.append("at bound")
@@ -138,19 +146,19 @@ def _mechanics(idn: Any, axis: str) -> list[str]:
         value = getattr(m, name)
         cell = "0 (set)" if name == "DG" and value == 0.0 else with_std(value, m.std.get(name))
         beside = "" if damped is None else with_std(getattr(damped, name), damped.std.get(name))
-        rows.append((name, cell, beside, unit(rotary, axis), _meaning(name, hasattr(m, "KG"), axis)))
+        rows.append((name, cell, beside, unit(rotary, axis), meaning_of(name, hasattr(m, "KG"), axis)))
     lines = [head, *table(rows)]
     if hasattr(m, "resonance"):
         lines.append(
             f"  resonance {number(m.resonance / math.tau)} Hz, antiresonance {number(m.antiresonance / math.tau)} Hz (undamped)"
         )
-        lines += [f"  {line}" for line in textwrap.wrap(_inconsistency(m), WIDTH - 2)]
+        lines += [f"  {line}" for line in textwrap.wrap(inconsistency_words(m), WIDTH - 2)]
     if damped is not None:
         lines += [f"  with shaft damping: {note}" for note in damped.notes]
     return lines
 
 
-def _meaning(name: str, two_masses: bool, axis: str) -> str:
+def meaning_of(name: str, two_masses: bool, axis: str) -> str:
     """What a letter of the mechanics table stands for."""
     mass = "mass" if axis == "linear" else "inertia"
     words = {
@@ -166,7 +174,8 @@ def _meaning(name: str, two_masses: bool, axis: str) -> str:
     return words.get(name, "")
 
 
-def _inconsistency(m: Any) -> str:
+def inconsistency_words(m: Any) -> str:
+    """How far the two equations of a stiffness without shaft damping are apart."""
     if m.inconsistency is None:
         return ""
     std = m.std.get("inconsistency", math.nan)

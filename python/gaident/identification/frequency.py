@@ -1,0 +1,185 @@
+"""The frequency response from torque to velocity that a record shows by itself, without a model's structure.
+
+    S_ab(f) = mean over half-overlapping Hann windows of A conj(B), summed over a twelfth of an octave
+
+    G(f)   = S_wr / S_ur                                       r: the command; without one the torque itself, which is H1
+    S_vv   = S_ww - 2 Re(conj(G) S_wu) + |G|^2 S_uu            what G does not explain
+    var G  = S_vv S_rr / (K |S_ur|^2)                          K: independent averages
+    coherence = min(|S_wr|^2 / (S_ww S_rr), |S_ur|^2 / (S_uu S_rr))
+
+Inside a loop, noise on the velocity comes back in the torque, and H1 then tends to -1/C where the noise is large. The command
+does not know the noise: with it as the instrument (joint input-output) that bias is gone. A record has finite windows, and a
+drive is not linear; a model simulated on the same record and put through the same estimate suffers both alike, so that these two
+may be compared where the bare curve of the model may not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.errors import RecordError
+from gaident.models.controller import PI
+from gaident.models.model import Model
+from gaident.models.pi_torque import pi_torque
+from gaident.models.simulate import Run, run
+
+__all__ = ["FrequencyResponse", "Responses", "measured_response", "response_of", "sampled_response", "simulated_response"]
+
+Vector = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+WINDOWS = 8  # at least, half-overlapping
+LONGEST = 4096  # samples of a window
+PER_OCTAVE = 12  # frequencies kept
+CHANCE = 0.05  # of a coherence above `threshold` where there is none
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """An estimate over frequency [Hz], arrays (n,): value [rad/s/(N m)] complex, its standard deviation, coherence 0..1.
+
+    threshold (n,): the coherence that unrelated signals pass once in twenty. instrument: whether the command was used (joint
+    input-output); False: torque to velocity directly (H1). windows: how many; resolution [Hz].
+    """
+
+    frequency: Vector
+    value: Complex
+    std: Vector
+    coherence: Vector
+    threshold: Vector
+    instrument: bool
+    windows: int
+    resolution: float
+
+    @property
+    def sentence(self) -> str:
+        """How it was estimated and what to doubt."""
+        how = f"{self.windows} half-overlapping windows, resolution {self.resolution:.2g} Hz"
+        if self.instrument:
+            return f"Joint input-output estimate: cross spectra with the command, free of the loop's bias by noise; {how}."
+        return (
+            f"H1 estimate from torque to velocity; {how}. If a controller made this torque out of the noisy velocity, the "
+            "estimate is biased towards minus the inverse of the controller where the coherence is low."
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Responses:
+    """A record's response, that of a model simulated on it, and the linear part's own over `fine` [Hz], (m,)."""
+
+    measured: FrequencyResponse
+    simulated: FrequencyResponse | None
+    fine: Vector
+    model: Complex
+
+
+def response_of(rec: Record, model: Model, controller: PI | None = None) -> Responses:
+    """Everything that a Bode diagram of a model against its record shows.
+
+    Raises RecordError as `measured_response`, ModelError for p = 0 outside the continuous loop.
+    """
+    measured = measured_response(rec, controller)
+    with np.errstate(over="ignore", invalid="ignore"):
+        done = run(model, rec, controller)
+    sound = bool(np.all(np.isfinite(done.velocity)) and np.abs(done.velocity).max() < 1e3 * np.abs(rec.velocity).max())
+    low, high = float(measured.frequency[0]), float(measured.frequency[-1])
+    fine = np.geomspace(low, high, 600)
+    roots = [r for r in (*model.poles, *model.zeros) if r.imag > 0.0]
+    near = [(r.imag + max(abs(r.real), 1e-6 * r.imag) * np.linspace(-5.0, 5.0, 61)) / (2.0 * np.pi) for r in roots]
+    fine = np.unique(np.concatenate([fine, *(f[(f > low) & (f < high)] for f in near)]))
+    return Responses(
+        measured, simulated_response(done, rec) if sound else None, fine, sampled_response(model, fine, rec.dt, controller)
+    )
+
+
+def measured_response(rec: Record, controller: PI | None = None) -> FrequencyResponse:
+    """The response that a record shows. controller: of its loop, makes the torque where none is logged; None: open loop.
+
+    Raises RecordError where there is neither a torque nor command and controller, for a torque that never changes, and for a loop
+    whose command never does: torque and velocity then show the controller, not the drive.
+    """
+    if controller is not None and (rec.command is None or _constant(rec.command)):
+        raise RecordError(
+            "the command of this loop never changes: torque and velocity then show minus the inverse of the controller as much "
+            "as the drive; use a record whose command changes after its start"
+        )
+    torque = rec.torque
+    if torque is None:
+        if controller is None or rec.command is None:
+            raise RecordError("the record has no torque, and no controller to make it from: give Record(torque=...) or PI(...)")
+        torque = pi_torque(rec.command, rec.velocity, rec.dt, controller)
+    if _constant(torque):
+        raise RecordError("the torque never changes, so that it excites no frequency; use a record whose torque changes")
+    return _estimate(torque, rec.velocity, rec.command, rec.dt)
+
+
+def simulated_response(run: Run, rec: Record) -> FrequencyResponse:
+    """The same estimate of a simulated run of that record: what the model would have shown."""
+    return _estimate(run.torque, run.velocity, rec.command, rec.dt)
+
+
+def sampled_response(model: Model, frequency: Vector, dt: float, controller: PI | None = None) -> Complex:
+    """The linear part of a model as the loop samples it: zero-order hold, or bilinear; frequency [Hz] (n,), below 1/(2 dt)."""
+    omega = 2.0 * np.pi * frequency
+    if controller is not None and controller.loop == "continuous":
+        return model.linear.frequency_response(2.0 / dt * np.tan(0.5 * omega * dt))
+    equation = model.linear.discrete(dt)
+    back = np.exp(-1j * np.outer(omega * dt, np.arange(len(equation.alpha))))
+    response: Complex = (back @ equation.alpha) / (1.0 - back[:, 1:] @ equation.beta)
+    return response
+
+
+def _constant(x: Vector) -> bool:
+    """But for the rounding of its numbers."""
+    return float(np.ptp(x)) <= 1e-9 * float(np.abs(x).max())
+
+
+def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> FrequencyResponse:
+    """From torque u to velocity w; a command that never changes is no instrument."""
+    n = len(w)
+    size = max(16, min(2 * n // (WINDOWS + 1), LONGEST))
+    starts = range(0, n - size + 1, max(1, size // 2))
+    instrument = command is not None and not _constant(command)
+    window = np.hanning(size + 2)[1:-1]
+
+    def spectra(x: Vector) -> Complex:
+        parts = np.stack([x[a : a + size] for a in starts])
+        found: Complex = np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * window)[:, 1:-1]
+        return found
+
+    W, U = spectra(w), spectra(u)
+    R = spectra(command) if command is not None and instrument else U
+    f = np.arange(1, W.shape[1] + 1) / (size * dt)
+    first = np.flatnonzero(np.diff(np.floor(PER_OCTAVE * np.log2(f)), prepend=-np.inf))
+    count = np.diff(np.append(first, len(f)))
+
+    def cross(a: Complex, b: Complex) -> Complex:
+        summed: Complex = np.add.reduceat(np.mean(a * b.conj(), axis=0), first)
+        return summed
+
+    ww, uu, rr = (cross(x, x).real for x in (W, U, R))
+    wr, ur, wu = cross(W, R), cross(U, R), cross(W, U)
+    # Neighbours of a Hann window share two thirds of what they know.
+    averages = len(starts) * np.maximum(1.0, 2.0 / 3.0 * count)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        value = wr / ur
+        unexplained = np.maximum(ww - 2.0 * (value.conj() * wu).real + np.abs(value) ** 2 * uu, 0.0)
+        std = np.sqrt(unexplained * rr / averages) / np.abs(ur)
+        coherence = np.minimum(np.abs(wr) ** 2 / (ww * rr), np.abs(ur) ** 2 / (uu * rr))
+    known = np.isfinite(value) & np.isfinite(coherence)
+    frequency = np.add.reduceat(f, first) / count
+    threshold = 1.0 - CHANCE ** (1.0 / np.maximum(averages - 1.0, 1.0))
+    return FrequencyResponse(
+        frequency=frequency[known],
+        value=value[known],
+        std=np.nan_to_num(std)[known],
+        coherence=np.minimum(coherence, 1.0)[known],
+        threshold=threshold[known],
+        instrument=instrument,
+        windows=len(starts),
+        resolution=1.0 / (size * dt),
+    )

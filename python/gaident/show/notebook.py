@@ -1,0 +1,62 @@
+"""What a notebook shows of a result: the verdict and the main figures, without scripts, in the notebook's own colours."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gaident.show.html import Html, Row, number, table, tag, typeset
+from gaident.show.report import diagnosis, identification
+from gaident.show.report.parts import estimate
+from gaident.show.summary import meaning_of
+from gaident.show.wording import structure_words
+
+__all__ = ["diagnosis_html", "identification_html"]
+
+FRAME = "border-left: 4px solid #0072b2; padding: 0.2em 1em; max-width: 60em;"
+UNITS = "rmse in rad/s (m/s on a linear axis)"
+
+
+def diagnosis_html(dia: Any) -> Html:
+    """Verdict, causes with their parameters, error before and after."""
+    rows: list[Row] = []
+    for f in (f for f in dia.findings if not f.is_noise):
+        name = " or ".join((f.effect, *f.alternatives)).replace("_", " ")
+        for i, (parameter, e) in enumerate(f.parameters.items()):
+            cells = (parameter.replace("_", " "), estimate(e.value, e.std), typeset("" if e.unit == "1" else e.unit))
+            rows.append((name if i == 0 else "", *cells))
+    causes = table(("cause", "parameter", "value", "unit"), [rows]) if rows else ""
+    errors: list[Row] = [("linear model", number(dia.before.rmse), f"{dia.before.fit_percent:.2f}")]
+    if dia.model.effects:
+        errors.append(("extended model", number(dia.after.rmse), f"{dia.after.fit_percent:.2f}"))
+    errors.append(("noise", number(dia.after.noise_floor), ""))
+    where = f"{UNITS}; {dia.held_out}"
+    return _framed(diagnosis, dia, causes, table(("", "rmse", "fit [%]"), [errors]), where, dia.notes)
+
+
+def identification_html(idn: Any) -> Html:
+    """Verdict, mechanics or structure, fit."""
+    m = idn.mechanics
+    parts: Html | str = f"({idn.p},{idn.q}), {structure_words(idn.p, idn.q)}"
+    if m is not None:
+        rows: list[Row] = [
+            (name, estimate(getattr(m, name), m.std.get(name)), typeset(u), meaning_of(name, hasattr(m, "KG"), "rotary"))
+            for name, u in m.UNITS.items()
+        ]
+        parts = table(("", "value", "unit", ""), [rows])
+    errors: list[Row] = [("model", number(idn.rmse), f"{idn.fit_percent:.2f}"), ("noise", number(idn.adequacy.noise_std), "")]
+    notes = [w for w in idn.warnings if w != idn.adequacy.sentence]
+    return _framed(identification, idn, parts, table(("", "rmse", "fit [%]"), [errors]), f"{UNITS}; in-sample", notes)
+
+
+def _framed(book: Any, result: Any, parts: str, errors: str, small: str, notes: Any) -> Html:
+    _, sign, word = book.mark(result)
+    listed = tag("ul", *(tag("li", typeset(note)) for note in notes)) if notes else ""
+    return tag(
+        "div",
+        tag("p", tag("b", f"{sign} {word}. "), typeset(book.headline(result))),
+        tag("div", parts),
+        errors,
+        tag("p", tag("small", small)),
+        listed,
+        style=FRAME,
+    )

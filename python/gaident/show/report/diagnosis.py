@@ -1,0 +1,292 @@
+"""The chapters of a diagnosis' report, in the order in which a drive engineer asks."""
+
+from __future__ import annotations
+
+import base64
+import math
+from typing import Any
+
+from gaident.show.diagnosis_summary import (
+    DRIVERS,
+    chance_words,
+    either,
+    fall_words,
+    left_words,
+    mechanical_name,
+    next_words,
+    parameter_row,
+    words,
+)
+from gaident.show.html import Html, Row, joined, number, table, tag, typeset
+from gaident.show.report import charts
+from gaident.show.report.command import proposal_csv
+from gaident.show.report.parts import (
+    Charts,
+    Section,
+    box,
+    controller_words,
+    estimate,
+    facts,
+    measured_section,
+    missing_section,
+    needs_record,
+    records_table,
+    response_part,
+    roots_table,
+    tile,
+)
+from gaident.show.report.views import View
+from gaident.show.wording import sentence, unit, velocity_unit
+
+__all__ = ["chapters", "headline", "mark", "tiles"]
+
+CANNOT_TELL = (
+    "Each of these explanations, its parameters and the mechanism fitted anew, reproduces this record about as well as the "
+    "others: within 10 BIC units, odds of 150 to 1, or they act alike by their nature wherever this record went. One of them is "
+    "there; which, this record does not show. Taking the first for granted may give a model that fails in another motion. The "
+    "values in the table are those of the first."
+)
+GOOD, HALF, BAD = ("good", "✓"), ("half", "◐"), ("bad", "✗")
+MARKS = {"adequate": GOOD, "explained": GOOD, "partly explained": HALF, "unexplained": BAD}
+
+
+def headline(dia: Any) -> str:
+    """The verdict in one sentence."""
+    if dia.verdict == "adequate":
+        return "The linear model is adequate: nothing significant is left that could be blamed on the drive."
+    causes = [f for f in dia.findings if not f.is_noise]
+    if not causes:
+        return "The model is wrong, and no effect of the library fits what is left."
+    named = [words(f.effect) for f in causes if not f.alternatives]
+    listed = " and ".join(filter(None, (", ".join(named[:-1]), *named[-1:])))
+    lacks = [listed] if named else []
+    lacks += [f"one of {either(f)}, which these data do not tell apart" for f in causes if f.alternatives]
+    text = f"The model lacks {'; and '.join(lacks)}"
+    if dia.verdict == "partly explained":
+        return f"{text}; this explains a part of what it gets wrong, and something significant is left."
+    return f"{text}; with {'it' if len(causes) == 1 else 'them'} nothing significant is left."
+
+
+def mark(dia: Any) -> tuple[str, str, str]:
+    """(class, sign, word) of the verdict."""
+    return (*MARKS.get(dia.verdict, HALF), dia.verdict)
+
+
+def tiles(dia: Any, view: View) -> Html:
+    """The figures seen first."""
+    v = velocity_unit(view.axis)
+    where = "in-sample" if dia.held_out == "in-sample" else "held-out data"
+    shown = [tile(f"error, linear model ({where})", number(dia.before.rmse), v)]
+    if dia.model.effects:
+        shown.append(tile(f"error, extended model ({where})", number(dia.after.rmse), v))
+    shown.append(tile("noise of the measured velocity", number(dia.after.noise_floor), v))
+    if dia.model.effects and dia.before.rmse > 0.0:
+        low, high = dia.gain_interval
+        interval = typeset(f"95 % interval of the fall: {percent(low)} to {percent(high)} %") if math.isfinite(low) else ""
+        fall = 1.0 - dia.after.rmse / dia.before.rmse
+        label = "the error grows by" if fall < -0.005 else "the error falls by"
+        shown.append(tile(label, typeset(f"{percent(abs(fall))} %"), interval))
+    return joined(shown)
+
+
+def percent(share: float) -> str:
+    """Whole per cents, without a minus before 0."""
+    return f"{round(100.0 * share) + 0:d}"
+
+
+def chapters(dia: Any, view: View, drawn: Charts) -> list[Section]:
+    """All of them."""
+    noise = dia.after.noise_floor
+    left = typeset(sentence(left_words(dia, view.axis), view.axis))
+    return [
+        measured_section(view, noise, drawn),
+        missing_section(view, noise, drawn, tag("p", left) if left else ""),
+        _causes(dia, view),
+        _parameters(dia, view, drawn),
+        _gain(dia, view, drawn),
+        _untested(dia, view),
+        _next(dia, view, drawn),
+        _how(dia, view),
+    ]
+
+
+def _causes(dia: Any, view: View) -> Section:
+    axis = view.axis
+    parts: list[str] = []
+    causes = [f for f in dia.findings if not f.is_noise]
+    if not causes:
+        text = (
+            "None is needed: what the linear model leaves is noise."
+            if dia.verdict == "adequate"
+            else "None is named. Something significant is left, but no effect of the library fits it; naming the closest one "
+            "would be a guess."
+        )
+        parts.append(tag("p", text))
+    for f in causes:
+        name = joined((tag("b", words(f.effect)), *(joined((" or ", tag("b", words(a)))) for a in f.alternatives)))
+        rows: list[Row] = [
+            (n, typeset(value), typeset(u), remark) for n, value, u, remark in map(_row(axis), f.parameters.items())
+        ]
+        held = "in-sample" if dia.held_out == "in-sample" else "held-out"
+        figures = f"{f.delta_bic:.0f} BIC units; the {held} error falls by {percent(f.gain)} % of what was left before it."
+        parts.append(
+            box(
+                tag("h3", name, " ", tag("small", "cannot be told apart" if f.alternatives else "named")),
+                tag("p", typeset(sentence(f.evidence, axis))),
+                table(("parameter", "value", "unit", ""), [rows]) if rows else "",
+                tag("p", tag("small", typeset(figures))),
+                tag("p", tag("small", typeset(chance_words(f, dia.bootstrap)))) if f.p_value is not None else "",
+                kind="cause" if not f.alternatives else "cause warn",
+            )
+        )
+    if any(f.alternatives for f in causes):
+        parts.append(box(tag("p", tag("b", "What “cannot be told apart” means. "), CANNOT_TELL), kind="quiet"))
+    noise = [f for f in dia.findings if f.is_noise]
+    if noise:
+        parts.append(tag("h3", "About the record"))
+        parts.append(tag("ul", *(tag("li", tag("b", words(f.effect)), ": ", typeset(sentence(f.evidence, axis))) for f in noise)))
+    return Section("cause", "Cause and evidence", *parts)
+
+
+def _row(axis: str) -> Any:
+    return lambda item: parameter_row(item[0], item[1], axis)
+
+
+def _parameters(dia: Any, view: View, drawn: Charts) -> Section:
+    axis = view.axis
+    parts: list[str] = []
+    rows: list[Row] = []
+    for name, e in dia.mechanics.items():
+        u = "" if e.unit == "1" else unit(e.unit, axis)
+        old, new = dia.base_shift.get(name, (math.nan, math.nan))
+        moved = typeset(f"{round(100.0 * (new / old - 1.0), 1) + 0.0:+.1f} %") if old and math.isfinite(old) else None
+        remark = "" if e.identifiable else "not determined"
+        rows.append((mechanical_name(name, axis).strip(), estimate(e.value, e.std), typeset(u), number(old), moved, remark))
+    if rows:
+        head = "The mechanism" + (", fitted together with the effects" if dia.model.effects else "")
+        parts.append(tag("h3", head))
+        if dia.driver is not None:
+            parts.append(
+                box(tag("p", "Bent by what is left: do not trust these beyond what the figures below show."), kind="warn")
+            )
+        if dia.model.effects:
+            parts.append(table(("", "value", "unit", "linear fit alone", "moved", ""), [rows]))
+        else:
+            parts.append(table(("", "value", "unit", ""), [[(*r[:3], r[5]) for r in rows]]))
+        parts.append(tag("p", tag("small", "± is one standard deviation, the colour of the noise taken into account.")))
+    if any(not f.is_noise for f in dia.findings):
+        parts.append(tag("p", "The parameters of the effects stand with their cause above."))
+    parts += [tag("h3", "Torque to velocity, linear part" if axis == "rotary" else "Force to velocity, linear part")]
+    roots = [(kind, r, "unstable" if r.real > 0.0 and kind == "pole" else "") for kind, group in
+             (("pole", dia.model.poles), ("zero", dia.model.zeros)) for r in group if r.imag >= 0.0]  # fmt: skip
+    parts.append(tag("p", "Gain K = ", number(dia.model.gain, 5), " ", typeset(unit(_gain_unit(dia.model.p), axis)), "."))
+    parts.append(roots_table(roots))
+    parts.append(response_part(view, drawn))
+    return Section("parameters", "Parameters", *parts)
+
+
+def _gain_unit(p: int) -> str:
+    return "rad/s^2/(N m)" if p == 1 else f"rad/s^{1 + p}/(N m)" if p else "rad/s/(N m)"
+
+
+def _gain(dia: Any, view: View, drawn: Charts) -> Section:
+    axis = view.axis
+    v = velocity_unit(axis)
+    extended = bool(dia.model.effects)
+    rows: list[Row] = [("linear model", number(dia.before.rmse), typeset(f"{dia.before.fit_percent:.2f}"))]
+    if extended:
+        rows.append(("extended model", number(dia.after.rmse), typeset(f"{dia.after.fit_percent:.2f}")))
+    rows.append(("noise of the measured velocity", number(dia.after.noise_floor), ""))
+    parts: list[str] = []
+    if dia.held_out == "in-sample":
+        text = (
+            "In-sample: there were too few data to hold any out. Parameters were fitted to the same samples: this flatters them."
+        )
+        parts.append(box(tag("p", text), kind="warn"))
+    else:
+        parts.append(tag("p", "Free-run simulation on ", dia.held_out, "."))
+    parts.append(table(("", f"rmse [{v}]", "fit [%]"), [rows]))
+    if not dia.loop_follows:
+        parts.append(box(tag("p", "The simulated controller is not the drive's: these figures include its errors."), kind="warn"))
+    if extended and dia.before.rmse > 0.0:
+        parts.append(tag("p", typeset(sentence(fall_words(dia), axis))))
+    held = next((r for r in view.runs if r.used == "held out"), None) or next(
+        (r for r in view.runs if r.held_from is not None), None
+    )
+    if held is not None:
+        if held.used == "held out":
+            parts.append(tag("h3", held.name or "validation record"))
+        parts.append(drawn.put(charts.held_out_chart(held, dia.after.noise_floor, "record", axis)))
+    elif view.runs and dia.validation_digests:
+        parts.append(box(tag("p", "The validation record is not at hand, so its curves are not drawn."), kind="quiet"))
+    else:
+        parts.append(needs_record(view, "The curves of what was held out need the record."))
+    if dia.left:
+        found = sorted(dia.left.items(), key=lambda item: -item[1])
+        lines: list[Row] = [(DRIVERS.get(k, k), typeset(f"{g:.0f}"), "most" if k == dia.driver else "") for k, g in found]
+        parts.append(tag("h3", "What the rest depends on"))
+        verdict = "Nothing of it is significant." if dia.driver is None else typeset(sentence(left_words(dia, axis), axis))
+        parts.append(tag("p", verdict, " BIC units gained by a free function of each; below 0 it is not worth its parameters."))
+        parts.append(table(("", "BIC units", ""), [lines]))
+    return Section("gain", "Before and after", *parts)
+
+
+def _untested(dia: Any, view: View) -> Section:
+    if not dia.not_testable:
+        text = "Every effect of the library could have shown itself in this record."
+        return Section("untested", "What could not be tested", tag("p", text))
+    rows: list[Row] = [(words(effect), typeset(sentence(reason, view.axis))) for effect, reason in dia.not_testable.items()]
+    text = "Of these the record says nothing, neither for nor against: it never went where they act."
+    return Section(
+        "untested", "What could not be tested", tag("p", text), tag("div", table(("effect", "why"), [rows]), class_="text")
+    )
+
+
+def _next(dia: Any, view: View, drawn: Charts) -> Section:
+    title = "Next experiment"
+    p = dia.next_experiment
+    axis = view.axis
+    if p is None:
+        text = {
+            "adequate": "None is needed to explain this record; what could not be tested needs motions that this record has not.",
+            "explained": "None is needed: the cause is named.",
+        }.get(dia.verdict, "None is proposed: no experiment of the menu is known to help.")
+        if any(f.alternatives for f in dia.findings):
+            text = "None is proposed: see the notes under the verdict."
+        return Section("next", title, tag("p", text))
+    low, high = p.reach
+    v, place = velocity_unit(axis), "rad" if axis == "rotary" else "m"
+    size = {
+        "length": f"{len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s",
+        "highest speed": typeset(f"{float(abs(p.command).max()):.4g} {v}"),
+        "travel": typeset(f"{low:.3g} to {high:.3g} {place} from the start, if the drive follows"),
+    }
+    text = base64.b64encode(proposal_csv(p, axis).encode()).decode("ascii")
+    link = tag(
+        "a", "Download the command (CSV)", class_="button", download="next_experiment.csv", href=f"data:text/csv;base64,{text}"
+    )
+    return Section(
+        "next",
+        title,
+        tag("p", typeset(sentence(next_words(dia), axis))),
+        facts(size),
+        tag("p", link),
+        tag("p", tag("small", "Check speed and travel against the axis' limits before it runs.")),
+        drawn.put(charts.command_chart(p.command, p.dt, axis)),
+    )
+
+
+def _how(dia: Any, view: View) -> Section:
+    idn = dia.identification
+    rows: dict[str, str | None] = {
+        "controller": typeset(controller_words(dia.controller, view.axis)),
+        "held out": dia.held_out,
+        "linear model": f"({idn.p},{idn.q}), {idn.settings.engine} engine, seed {idn.seed}",
+        "noise": "from the record" if dia.noise is None else typeset(f"given: {dia.noise:.4g} {velocity_unit(view.axis)}"),
+        "bootstrap": f"{dia.bootstrap} simulated records" if dia.bootstrap else "none asked for",
+        "seed": str(dia.seed),
+        "work": f"{dia.samples} samples, {dia.simulations} simulations, {dia.seconds:.2f} s",
+        "made with": ", ".join(f"{k} {v}" for k, v in {"gaident": dia.version or "of unknown version"}.items()),
+        "page made with": ", ".join(f"{k} {v}" for k, v in view.made_with.items()),
+    }
+    return Section("how", "How this was computed", facts(rows), records_table(view.runs, dia.digests, dia.validation_digests))

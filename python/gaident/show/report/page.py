@@ -1,0 +1,77 @@
+"""The page: head, verdict, chapters, and the figures' data with the library that draws them."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from importlib.resources import files
+from typing import Any
+
+from gaident.show.html import Html, joined, tag, typeset
+from gaident.show.report import diagnosis, identification
+from gaident.show.report.chart import PALETTES
+from gaident.show.report.live import figure, script_json
+from gaident.show.report.parts import Charts, Section, box, sentences, title_of
+from gaident.show.report.views import View
+from gaident.show.wording import sentence
+
+__all__ = ["page"]
+
+# Nothing is fetched, whatever a page holds.
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:"
+
+
+def page(result: Any, view: View, plotly_js: str) -> str:
+    """The whole page of a Diagnosis or an Identification (or what has its attributes); plotly_js: the library's text."""
+    is_diagnosis = hasattr(result, "findings")
+    book: Any = diagnosis if is_diagnosis else identification
+    drawn = Charts()
+    chapters: list[Section] = book.chapters(result, view, drawn)
+    kind, sign, word = book.mark(result)
+    names = title_of(view.fitted)
+    title = f"{'Diagnosis' if is_diagnosis else 'Identification'}{f' of {names}' if names else ''}"
+    notes = tuple(result.notes if is_diagnosis else (w for w in result.warnings if w != result.adequacy.sentence))
+    verdict = tag(
+        "section",
+        tag("p", tag("span", f"{sign} {word}", class_="badge"), class_="badges"),
+        tag("p", typeset(sentence(book.headline(result), view.axis)), class_="headline"),
+        tag("div", book.tiles(result, view), class_="tiles"),
+        box(tag("b", "Keep in mind"), sentences(notes, view.axis), kind="quiet") if notes else "",
+        class_=f"verdict {kind}",
+        id="verdict",
+    )
+    contents = tag("nav", tag("ol", *(tag("li", tag("a", c.title, href=f"#{c.key}")) for c in chapters)), aria_label="Contents")
+    data = {"charts": {c.key: {**figure(c), "link": c.link} for c in drawn.all}, "palettes": PALETTES}
+    head = (
+        tag("meta", charset="utf-8"),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("meta", http_equiv="Content-Security-Policy", content=POLICY),
+        tag("meta", name="color-scheme", content="light dark"),
+        tag("title", f"gaident: {title}"),
+        tag("style", _asset("page.css")),
+        tag("script", Html('document.documentElement.classList.add("js");')),
+    )
+    body = (
+        tag("header", tag("div", tag("p", "gaident report", class_="brand"), tag("h1", title)), _switch()),
+        tag("main", verdict, contents, *(tag("section", tag("h2", c.title), c.body, id=c.key) for c in chapters)),
+        tag("footer", tag("p", "Everything in this page is in this file: it needs no network. Figures: plotly.js, MIT licence.")),
+        tag("script", Html(plotly_js.replace("</script", "<\\/script"))) if drawn.all else "",
+        tag("script", script_json(data), type="application/json", id="figures"),
+        tag("script", _asset("page.js")),
+    )
+    whole = tag("html", Html("\n"), tag("head", joined(head, "\n")), Html("\n"), tag("body", joined(body, "\n")), lang="en")
+    return f"<!DOCTYPE html>\n{whole}\n"
+
+
+def _switch() -> Html:
+    """Light, dark, or as the system says."""
+    options = (("auto", "Auto"), ("light", "Light"), ("dark", "Dark"))
+    buttons = (
+        tag("button", text, type="button", data_set=key, aria_pressed="true" if key == "auto" else "false")
+        for key, text in options
+    )
+    return tag("div", *buttons, class_="switch", role="group", aria_label="Colours of the page")
+
+
+@lru_cache(maxsize=2)
+def _asset(name: str) -> Html:
+    return Html(files("gaident.show.report").joinpath(name).read_text(encoding="utf-8"))

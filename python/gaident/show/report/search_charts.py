@@ -1,0 +1,75 @@
+"""Charts of the search behind an identification: structures, convergence, poles and zeros."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gaident.show.plots import roots_of
+from gaident.show.report.chart import Chart, Panel, Trace
+
+__all__ = ["convergence_chart", "roots_chart", "structures_chart"]
+
+SHOWN = 12
+
+
+def structures_chart(idn: Any) -> Chart:
+    """BIC of the best structures above the lowest, one bar each, with its name on it."""
+    ordered = sorted(idn.structures, key=lambda s: (s.delta_bic, s.p + 2 * s.q))[:SHOWN]
+    chosen, rivals = (idn.p, idn.q), {(r.p, r.q) for r in idn.rivals}
+    kinds = ["reported" if (s.p, s.q) == chosen else "rival" if (s.p, s.q) in rivals else "other" for s in ordered]
+    height = np.array([max(s.delta_bic, 1.0) for s in ordered])
+    place = np.arange(len(ordered), dtype=np.float64)
+    traces = []
+    for kind, role in (("reported", "faster"), ("rival", "noise"), ("other", "faint")):
+        mine = np.array([k == kind for k in kinds])
+        if np.any(mine):
+            traces.append(Trace(place[mine], height[mine], kind, role, "bars"))
+    ends = np.array([-0.6, len(ordered) - 0.4])
+    traces.append(Trace(ends, np.full(2, 10.0), "margin 10", "ink", dash="dash"))
+    names = tuple((x, f"({s.p},{s.q})") for x, s in zip(place.tolist(), ordered, strict=True))
+    text = (
+        f"The best {len(ordered)} of {len(idn.structures)} structures (p,q). The smallest within the margin of the lowest is "
+        "reported; a bar at 1 stands for 0 to 1."
+    )
+    top = 3.0 * max(float(height.max()), 10.0)
+    panel = Panel("BIC above the lowest", tuple(traces), log=True, limits=(0.8, top))
+    return Chart("structures", "structure (p,q)", (panel,), text, limits=(-0.6, len(ordered) - 0.4), ticks=names, height=320)
+
+
+def convergence_chart(idn: Any) -> Chart:
+    """Best fitness (6) per generation, one line per trial."""
+    best = min(range(len(idn.trials)), key=lambda i: float(idn.trials[i].fitness))
+    order = [i for i in range(len(idn.trials)) if i != best] + [best]
+    traces = []
+    for i in order:
+        history = np.asarray(idn.trials[i].history, dtype=np.float64)
+        front = i == best
+        label = "best trial" if front and len(order) > 1 else "other trials" if i == order[0] and len(order) > 1 else ""
+        traces.append(
+            Trace(np.arange(1.0, len(history) + 1.0), history, label, "faster" if front else "faint", width=1.8 if front else 1.0)
+        )
+    positive = all(float(t.y.min(initial=1.0)) > 0.0 for t in traces)
+    panel = Panel("best fitness (6)", tuple(traces), log=positive)
+    return Chart(
+        "convergence", "generation", (panel,), "The genetic search: the best fitness so far, before the local fits.", height=300
+    )
+
+
+def roots_chart(idn: Any) -> Chart:
+    """Poles and zeros in the s-plane with two standard deviations."""
+    traces = []
+    for kind, role in (("pole", "linear"), ("zero", "faster")):
+        points = roots_of(idn.parameters, kind)
+        if not points:
+            continue
+        x, y, dx, dy = (np.array(values) for values in zip(*points, strict=True))
+        traces.append(Trace(x, y, f"{kind}s", role, "crosses" if kind == "pole" else "rings", spread=2.0 * dy))
+        for xi, yi, d in zip(x.tolist(), y.tolist(), dx.tolist(), strict=True):
+            if d > 0.0:
+                traces.append(Trace(np.array([xi - 2.0 * d, xi + 2.0 * d]), np.array([yi, yi]), "", role, width=1.2, hover=False))
+    panel = Panel("imaginary part [rad/s]", tuple(traces))
+    return Chart(
+        "roots", "real part [rad/s]", (panel,), "Poles and zeros in the s-plane, bars of 2 standard deviations.", height=380
+    )

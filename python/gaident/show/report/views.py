@@ -1,0 +1,75 @@
+"""What a report draws, worked out before: plain arrays, no model and no search behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Curve", "Run", "Vector", "View"]
+
+Vector = NDArray[np.float64]
+Curve = tuple[Vector, Vector, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One record and what the models make of it; arrays (n,), None where it is not there.
+
+    name and digest of the record; used: "fitted", "held out" or "new" (not the record of this result).
+    time [s]; measured velocity, command, linear and extended model's velocity [rad/s]; torque of the controller and missing
+    torque dhat with its typical deviation std [N m]; position [rad]. torque_logged: False where it was worked out.
+    held_from: first sample that no parameter of the figures "before and after" was fitted to; None: all were used.
+    notes: what could not be worked out, in plain sentences.
+    """
+
+    name: str
+    digest: str
+    used: str
+    time: Vector
+    measured: Vector
+    position: Vector
+    linear: Vector
+    command: Vector | None = None
+    torque: Vector | None = None
+    torque_logged: bool = True
+    extended: Vector | None = None
+    dhat: Vector | None = None
+    std: float = 0.0
+    held_from: int | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def dt(self) -> float:
+        """[s]."""
+        return float(self.time[1] - self.time[0])
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """All that a report knows beside the result.
+
+    runs: one per record, those that were fitted first. curve: (velocity, torque, label) of named effects. response: of the
+    longest record, see `gaident.identification.frequency.Responses`; without it no_response says why. made_with: what computed
+    and drew the page -> version. axis: "rotary" or "linear".
+    """
+
+    runs: tuple[Run, ...] = ()
+    curve: Curve | None = None
+    response: Any = None
+    no_response: str = ""
+    axis: str = "rotary"
+    made_with: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def fitted(self) -> tuple[Run, ...]:
+        """The records that parameters were fitted to; where none of them is at hand, those that are."""
+        return tuple(r for r in self.runs if r.used == "fitted") or self.runs
+
+    @property
+    def longest(self) -> Run | None:
+        """The longest of the fitted ones: what is wrong is shown on it."""
+        return max(self.fitted, key=lambda r: len(r.time), default=None)
