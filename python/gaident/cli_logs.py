@@ -10,7 +10,7 @@ from typing import Any
 
 from gaident import doctor
 from gaident.cli_output import proposal_csv, target_of, write
-from gaident.data.listing import columns
+from gaident.data.listing import columns, printable
 from gaident.data.readers import read_columns
 from gaident.diagnosis.experiments import first_experiment
 from gaident.drive_file import Drive
@@ -68,7 +68,7 @@ def _init(args: argparse.Namespace) -> None:
         return
     print(f"written: {target}")
     for channel, name in found.channels.items():
-        print(f"  {channel.ljust(9)}{name}")
+        print(f"  {channel.ljust(9)}{printable(name)}")
     if found.fill_in:
         print("to be filled in, marked FILL IN:")
         for line in found.fill_in:

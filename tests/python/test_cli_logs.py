@@ -55,6 +55,18 @@ def test_columns_lists_what_a_log_holds(capsys: pytest.CaptureFixture[str]) -> N
     assert (torque["unit"], torque["sample_time"], torque["lowest"]) == ("Nm", pytest.approx(5e-4), 0.02)
 
 
+def test_names_of_a_file_do_nothing_to_the_terminal(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    t = np.arange(40) * 1e-3
+    np.savez("evil.npz", **{"t": t, "speed \x1b[31m": np.sin(50 * t), 'torque "\n[controller]\nkp = 1': np.cos(50 * t)})
+    assert main(["columns", "evil.npz"]) == 0
+    assert main(["init", "evil.npz"]) == 0
+    shown = capsys.readouterr().out
+    assert "\x1b" not in shown and "speed \\x1b[31m" in shown
+    sections = read_drive_file("drive.toml")
+    assert sections["columns"]["torque"] == 'torque "\n[controller]\nkp = 1' and sections["controller"] == {}
+    assert main(["identify", "evil.npz", "--drive", "drive.toml", "--quiet"]) == 0
+
+
 @pytest.mark.parametrize(
     ("file", "channels", "time"),
     [

@@ -61,7 +61,10 @@ def _tdms_column(path: str, channel: Any, key: str, long: str) -> Column:
 
 
 def open_mdf(path: str, file: Path, stack: ExitStack) -> Table:
-    """Channels of an MDF file of version 3 or 4, each with the master of its group as clock; read when asked for."""
+    """Channels of an MDF file of version 3 or 4, each with the master of its group as clock; read when asked for.
+
+    A file that was cut short is refused; on some other damage asammdf itself ends the process.
+    """
     asammdf = library("asammdf", "mdf", path, "an MDF measurement")
     flaw = ""
     try:

@@ -17,7 +17,7 @@ from gaident.data.timeaxis import TimeAxis, stamp_unit, time_column
 from gaident.data.units import factor
 from gaident.errors import ReadError
 
-__all__ = ["ColumnInfo", "Listing", "columns"]
+__all__ = ["ColumnInfo", "Listing", "columns", "printable"]
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,9 @@ class Listing:
             step = "" if c.sample_time is None else f"{1e3 * c.sample_time:.6g}"
             remark = "rises evenly: a time?" if c.rises_evenly and not timed else ""
             remark = "; ".join(filter(None, ["time" if c.is_time else "", c.note, remark]))
-            rows.append((c.name, c.unit or "-", str(c.samples), _number(c.lowest), _number(c.highest), step, remark))
+            rows.append(
+                (printable(c.name), printable(c.unit or "-"), str(c.samples), _number(c.lowest), _number(c.highest), step, remark)
+            )
         widths = [max(len(row[k]) for row in rows) for k in range(6)]
         lines = [f"{self.path}: {self.form}"]
         for row in rows:
@@ -73,6 +75,11 @@ class Listing:
         if self.others:
             lines.append(f"besides, no columns of numbers: {', '.join(self.others)}")
         return "\n".join(lines)
+
+
+def printable(text: str) -> str:
+    """The text for a terminal: tabs, line ends and control characters of a name as escapes."""
+    return text if text.isprintable() else repr(text)[1:-1]
 
 
 def _number(value: float | None) -> str:
