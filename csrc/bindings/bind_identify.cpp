@@ -64,16 +64,20 @@ RefineOptions options_of(const std::optional<SearchRanges>& ranges, const std::v
     return o;
 }
 
+// (generations done, best fitness, number of species, (p, q) of the one that leads)
+using Report = std::function<void(std::size_t, double, std::size_t, std::pair<int, int>)>;
+
 std::vector<Trial> search_records(PyExperiment& e, const SearchRanges& ranges, const Settings& settings, int trials,
-                                  std::uint64_t seed, int workers,
-                                  const std::optional<std::function<void(std::size_t, double)>>& report) {
+                                  std::uint64_t seed, int workers, const std::optional<Report>& report) {
     std::vector<Trial> result;
     Progress progress;
     e.stop = false;
     run_interruptibly(
         e.stop, [&] { result = search(e.experiment, ranges, settings, trials, seed, workers, progress); },
         [&] {
-            if (report) (*report)(progress.done.load(), progress.best.load());
+            if (report)
+                (*report)(progress.done.load(), progress.best.load(), progress.species.load(),
+                          {progress.leading_p.load(), progress.leading_q.load()});
         });
     return result;
 }

@@ -35,7 +35,7 @@ struct Settings {
 };
 
 struct Trial {
-    std::vector<double> history;  // best fitness (equation 6) in each generation
+    std::vector<double> history;          // best fitness (equation 6) in each generation
     double best_fitness = worst_fitness;  // ever seen by the genetic search
     int best_generation = 0;
     std::vector<Word> best;        // its chromosome
@@ -46,6 +46,8 @@ struct Trial {
 struct Progress {
     std::atomic<std::size_t> done{0};  // generations, of all trials together
     std::atomic<double> best{worst_fitness};
+    std::atomic<std::size_t> species{0};            // structures that compete; 0: none are kept apart
+    std::atomic<int> leading_p{-1}, leading_q{-1};  // the structure of the least error sum so far; -1: none yet
 
     void note(std::size_t generations, double fitness_now) {
         done += generations;
@@ -53,6 +55,20 @@ struct Progress {
         while (fitness_now < seen && !best.compare_exchange_weak(seen, fitness_now)) {
         }
     }
+
+    // Trials that run side by side may report in the same moment; p and q are for the eye only.
+    void lead(const Structure& structure, double error_sum) {
+        double seen = least_.load();
+        while (error_sum < seen && !least_.compare_exchange_weak(seen, error_sum)) {
+        }
+        if (error_sum < seen) {
+            leading_p = structure.p;
+            leading_q = structure.q;
+        }
+    }
+
+private:
+    std::atomic<double> least_{worst_fitness};
 };
 
 }  // namespace gaident

@@ -86,6 +86,7 @@ public:
             settle(Genome(with_smaller(genome_.ranges()), settings_.code, settings_.roots), smaller,
                    least_in_species * smaller.size(), Random(random.word()));
         trial_.species.resize(all_.size());
+        progress_.species = asked.size();
         for (const Record& r : experiment.records) {
             slowest_ = std::min(slowest_, 0.5 / (static_cast<double>(r.size()) * r.sample_time));
             fastest_ = std::max(fastest_, 3.0 / r.sample_time);
@@ -100,6 +101,8 @@ public:
             const int generations = std::min(settings_.round, settings_.generations - done);
             breed_round(generations, done);
             const bool better = fit_round(done == 0 ? quick : thorough);
+            const std::size_t leader = leading();
+            progress_.lead(all_[leader], trial_.species[leader].cost);
             if (lead() <= down_to_noise * down_to_noise * noise_) ++quiet;
             else quiet = better || done == 0 ? 0 : quiet + 1;
             done += generations;
@@ -257,11 +260,14 @@ private:
     }
 
     // The least error sum of all structures asked for.
-    double lead() const {
-        double least = worst_fitness;
+    double lead() const { return trial_.species[leading()].cost; }
+
+    // Whose it is: the first of them.
+    std::size_t leading() const {
+        std::size_t found = all_.size();
         for (std::size_t i = 0; i < all_.size(); ++i)
-            if (is_asked(i)) least = std::min(least, trial_.species[i].cost);
-        return least;
+            if (is_asked(i) && (found == all_.size() || trial_.species[i].cost < trial_.species[found].cost)) found = i;
+        return found;
     }
 
     void first_fits(Source& s, const Effort& effort) const {

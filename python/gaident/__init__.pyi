@@ -1,5 +1,5 @@
 from . import errors
-from .data import Record, differentiate, read, read_columns
+from .data import Alignment, Record, align, columns, differentiate, read, read_columns
 from .diagnosis import Diagnosis, Finding, Limits, Proposal, diagnose, first_experiment
 from .errors import GaidentError
 from .identification import (
@@ -29,11 +29,13 @@ from .models import (
     simulate,
     simulate_many,
 )
+from .progress_bar import progress
 from .reporting import report
 from .store import load
 
 __all__ = [
     "PI",
+    "Alignment",
     "Diagnosis",
     "Discrete",
     "Effect",
@@ -51,6 +53,8 @@ __all__ = [
     "SearchSpace",
     "Settings",
     "TwoMass",
+    "align",
+    "columns",
     "diagnose",
     "differentiate",
     "effects",
@@ -64,6 +68,7 @@ __all__ = [
     "m_sequence",
     "mechanics_from_model",
     "model_from_factor_parameters",
+    "progress",
     "read",
     "read_columns",
     "report",

@@ -86,7 +86,8 @@ class Experiment:
 
     records: (input, velocity, dt, start, first velocity) each, start one of "rest", "steady", "free".
     loop: "continuous", "sampled" or "open". kernels: an instruction set, "" for the machine's best.
-    Ctrl-C ends long work, and so does an exception that `progress` (generations done, best fitness) raises.
+    Ctrl-C ends long work, and so does an exception that `progress` raises. It gets
+    (generations done, best fitness, number of species, (p, q) of the one that leads or (-1, -1)).
     """
 
     def __init__(
@@ -108,7 +109,7 @@ class Experiment:
         trials: int,
         seed: int,
         workers: int,
-        progress: Callable[[int, float], None] | None = None,
+        progress: Callable[[int, float, int, tuple[int, int]], None] | None = None,
     ) -> list[Trial]: ...
     def refine(
         self,

@@ -6,6 +6,7 @@ Exit codes: 0 done, 1 the work failed, 2 wrong use, 130 Ctrl-C; except for 0 wit
 from __future__ import annotations
 
 import argparse
+import contextlib
 import io
 import json
 import os
@@ -18,8 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gaident import demo as demonstration
+from gaident.cli_logs import log_commands
 from gaident.cli_options import PICTURES, drive_of, in_options, parser_of
-from gaident.cli_output import Progress, csv_targets, csv_text, naming, proposal_csv, target_of, write
+from gaident.cli_output import csv_targets, csv_text, naming, proposal_csv, target_of, write
 from gaident.cli_report import report_command, write_report
 from gaident.data.record import Record
 from gaident.diagnosis.diagnose import diagnose
@@ -34,6 +36,7 @@ from gaident.models.controller import PI
 from gaident.models.mechanics import mechanics_from_dict
 from gaident.models.model import Model
 from gaident.models.simulate import AnyModel, Run, initial_state, run
+from gaident.progress_bar import Progress
 from gaident.store import load
 
 if TYPE_CHECKING:
@@ -70,10 +73,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(argv: Sequence[str] | None) -> int:
     try:
         args = parser_of(COMMANDS).parse_args(argv)
-        args.run(args)
     except SystemExit as exit_:  # --help, --version, wrong options
         return int(exit_.code or 0)
-    return 0
+    if args.quiet and not getattr(args, "json", False):
+        with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
+            return args.run(args) or 0
+    return args.run(args) or 0
 
 
 def _drop_output() -> None:
@@ -100,7 +105,7 @@ def _identify(args: argparse.Namespace) -> None:
     records = _read_all(drive, args.logs, controller)
     settings = Settings.paper() if args.paper else Settings()
     settings = replace(settings, initial_state=args.initial_state)
-    with Progress(sys.stderr) as progress:
+    with Progress(None if args.quiet else sys.stderr) as progress:
         idn = identify(
             records,
             controller,
@@ -181,7 +186,7 @@ def _demo(args: argparse.Namespace) -> None:
     say: Callable[[str], None] = (lambda text: None) if args.json else print
     truth, controller = demonstration.TRUTH, demonstration.CONTROLLER
     say(demonstration.STORY)
-    with Progress(sys.stderr) as progress:
+    with Progress(None if args.quiet else sys.stderr) as progress:
         rec, idn = demonstration.identify_two_masses(args.seed, progress, args.workers)
     say(_summary(idn, "rotary"))
     if isinstance(idn.mechanics, type(truth)):
@@ -203,7 +208,7 @@ def _demo(args: argparse.Namespace) -> None:
         say("\nThe measured EMPS axis is left out: GAIDENT_DATA names no folder with emps/DATA_EMPS.mat")
     else:
         say(f"\n{'-' * 100}\n{demonstration.EMPS_STORY}: {path}\n")
-        with Progress(sys.stderr) as progress:
+        with Progress(None if args.quiet else sys.stderr) as progress:
             rec, idn = demonstration.identify_emps(path, args.seed, progress, args.workers)
         say(_summary(idn, "linear"))
         picture = folder / "demo_emps.png"
@@ -211,7 +216,7 @@ def _demo(args: argparse.Namespace) -> None:
         say(f"\n{demonstration.EMPS_TRUTH}\nwritten: {picture}")
         report["emps"] = {"identification": idn.to_dict()}
     say(f"\n{'-' * 100}\n{demonstration.FRICTION_STORY}")
-    with Progress(sys.stderr) as progress:
+    with Progress(None if args.quiet else sys.stderr) as progress:
         rec, dia = demonstration.diagnose_friction(args.seed, progress)
     say(dia.summary())
     log, picture = folder / "demo_friction.csv", folder / "demo_friction.png"
@@ -326,7 +331,7 @@ def _diagnose(args: argparse.Namespace) -> None:
         if not isinstance(loaded, Identification):
             raise SettingsError(f"--model {args.model} holds no identification: give what gaident identify --out saved")
         idn = loaded
-    with Progress(sys.stderr) as progress:
+    with Progress(None if args.quiet else sys.stderr) as progress:
         dia = diagnose(
             records,
             controller,
@@ -366,7 +371,7 @@ def _reproduce(args: argparse.Namespace) -> None:
 
     folder = Path(args.out)
     folder.mkdir(parents=True, exist_ok=True)
-    with Progress(sys.stderr) as progress:
+    with Progress(None if args.quiet else sys.stderr) as progress:
         result = paper.reproduce(args.trials, args.seeds, args.seed, args.workers, progress)
     pictures = paper.figures(result)
     for name, png in pictures.items():
@@ -380,7 +385,7 @@ def _reproduce(args: argparse.Namespace) -> None:
     print(f"\nwritten: {target}, and its pictures beside it: {', '.join(f'{name}.png' for name in pictures)}")
 
 
-COMMANDS = {
+COMMANDS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "identify": _identify,
     "diagnose": _diagnose,
     "simulate": _simulate,
@@ -388,4 +393,5 @@ COMMANDS = {
     "effects": _effects,
     "demo": _demo,
     "reproduce": _reproduce,
+    **log_commands(drive_of),
 }

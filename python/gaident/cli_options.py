@@ -7,8 +7,9 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NoReturn
 
+from gaident.cli_log_options import add_log_commands, add_log_options, number
 from gaident.cli_report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
-from gaident.drive_file import AXES, COLUMNS, KEYS, Drive, read_drive_file
+from gaident.drive_file import COLUMNS, KEYS, Drive, read_drive_file
 from gaident.errors import ControllerError, SettingsError
 from gaident.identification.settings import INITIAL_STATES
 from gaident.models._checks import one_of
@@ -17,25 +18,13 @@ from gaident.models.controller import LOOPS
 __all__ = ["PICTURES", "drive_of", "in_options", "parser_of"]
 
 PICTURES = (".png", ".pdf", ".svg")
-CONSTANT_HELP = {
-    "counts_per_turn": "encoder counts per turn of the motor, for units of counts",
-    "torque_constant": "[N m/A], for a torque in A",
-    "rated_torque": "what 100 %% means [N m], for a torque in %%",
-    "torque_per_volt": "[N m/V], for a torque in V",
-}
-TEXT_TABLE_HELP = {
-    "delimiter": "what separates columns, a character, tab or space (default: found out)",
-    "decimal": "decimal mark, . or , (default: found out)",
-    "skip": "lines to leave out at the top",
-    "encoding": "as Python calls it (default: found out)",
-}
-
 IDENTIFY_HELP = """\
 Finds structure (p,q), poles, zeros and mechanical parameters of the drive behind one log or several
 (one model for all), with their uncertainty, and says whether a linear model holds at all.
 
 With a controller, the log's velocity command drives the simulated loop; without one, its torque drives
-the model. Formats: CSV and other text tables, MAT of version 5, NPZ.
+the model. Formats: CSV and other text tables, MAT, NPZ; with the extra gaident[formats] also HDF5, Parquet,
+TDMS and MDF. `gaident columns LOG` lists what a log holds, `gaident init LOG` writes its drive.toml.
 """
 IDENTIFY_EXAMPLES = """\
 examples:
@@ -53,7 +42,7 @@ examples:
 
 drive.toml, every part optional:
   axis = "rotary"                 # or "linear"
-  dt = 0.444e-3                   # s; also velocity_cutoff_hz, counts_per_turn, torque_constant, ...
+  dt = 0.444e-3                   # s; also velocity_cutoff_hz, counts_per_turn, gear_ratio, decimate, ...
   [columns]
   command = "w_ref"
   velocity = "w"
@@ -64,6 +53,8 @@ drive.toml, every part optional:
   ki = 1.367                      # N m/rad; also loop, torque_limit, integrator_limit
   [space]
   inertia = [1e-4, 5e-3]          # kg m^2; also resonance_hz, damping, or gain, real, imaginary, p, q, bits
+  [limits]
+  speed = 100                     # rad/s; also torque, travel, duration, for `gaident experiment`
 
 exit codes: 0 done, 1 the work failed, 2 wrong use, 130 interrupted
 """
@@ -108,7 +99,7 @@ and where the paper disagrees with itself. Writes paper.html, which holds its pi
 """
 
 
-def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], None]]) -> argparse.ArgumentParser:
+def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], int | None]]) -> argparse.ArgumentParser:
     """The parser; commands: name -> what runs it, set as `run`."""
     from gaident import __version__
 
@@ -118,17 +109,19 @@ def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], None]]) -> a
         epilog="gaident COMMAND --help explains a command, with examples.",
     )
     parser.add_argument("--version", action="version", version=f"gaident {__version__}")
+    parser.set_defaults(whole_parser=parser)
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True)
 
     def command(name: str, files: str, line: str, text: str, epilog: str = "") -> _Parser:
         usage = f"gaident {name} {files}[options]"
         sub: _Parser = subparsers.add_parser(name, usage=usage, help=line, description=text, epilog=epilog)
         sub.set_defaults(run=commands[name])
+        sub.add_argument("--quiet", action="store_true", help="print nothing but errors (and what --json asks for)")
         return sub
 
     sub = command("identify", "LOG... ", "log -> structure, parameters, uncertainty", IDENTIFY_HELP, IDENTIFY_EXAMPLES)
     sub.add_argument("logs", nargs="+", metavar="LOG", help="log file; several give one model for all")
-    _add_log_options(sub)
+    add_log_options(sub)
     _add_controller_options(sub)
     _add_space_options(sub)
     g = sub.add_argument_group("the search")
@@ -155,10 +148,10 @@ def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], None]]) -> a
         "--validation", nargs="+", metavar="LOG", help="logs that no parameter is fitted to (default: the last 30 %% of each log)"
     )
     sub.add_argument("--model", metavar="FILE", help="the identification to diagnose, as identify --out saved it")
-    _add_log_options(sub)
+    add_log_options(sub)
     _add_controller_options(sub)
     g = sub.add_argument_group("the diagnosis")
-    g.add_argument("--noise", type=_number, metavar="X", help="standard deviation of the velocity noise, where known [rad/s]")
+    g.add_argument("--noise", type=number, metavar="X", help="standard deviation of the velocity noise, where known [rad/s]")
     g.add_argument(
         "--bootstrap",
         type=int,
@@ -183,7 +176,7 @@ def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], None]]) -> a
     )
     sub.add_argument("model", metavar="MODEL.json", help="a saved identification, or a model")
     sub.add_argument("logs", nargs="+", metavar="LOG", help="log file")
-    _add_log_options(sub)
+    add_log_options(sub)
     _add_controller_options(sub)
     sub.add_argument(
         "--initial-state",
@@ -195,10 +188,12 @@ def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], None]]) -> a
     g.add_argument("--out", metavar="PATH", help="CSV file; a folder where several logs are given")
     g.add_argument("--json", action="store_true", help="print everything as JSON instead of CSV")
 
+    add_log_commands(command)
+
     line = "saved result, and its logs -> one HTML page"
     sub = command("report", "RESULT.json [LOG...] ", line, REPORT_HELP, REPORT_EXAMPLES)
     add_report_options(sub)
-    _add_log_options(sub)
+    add_log_options(sub)
 
     sub = command("effects", "", "what a model can carry beyond its linear part", EFFECTS_HELP)
     sub.add_argument("--json", action="store_true", help="print JSON instead of a table")
@@ -238,7 +233,7 @@ def drive_of(args: argparse.Namespace) -> Drive:
     if sections["controller"].get("loop") is not None:
         one_of(sections["controller"]["loop"], "loop", (*LOOPS, "open"), ControllerError)
     sections["units"] = {k: _as_number(v) for k, v in sections["units"].items()}
-    names = ("", "columns", "units", "controller", "space")
+    names = ("", "columns", "units", "controller", "space", "limits")
     return Drive(*(sections[name] for name in names))
 
 
@@ -261,16 +256,6 @@ def _as_number(text: str | float) -> str | float:
         return text
 
 
-def _number(text: str) -> float:
-    """argparse's number; a decimal comma gets its remedy."""
-    try:
-        return float(text)
-    except ValueError:
-        point = text.replace(",", ".")
-        hint = f": write a decimal point, {point}" if "," in text and re.fullmatch(r"[-+\d.]+(e[-+]?\d+)?", point) else ""
-        raise argparse.ArgumentTypeError(f"{text!r} is no number{hint}") from None
-
-
 # What messages of the library say in Python -> the options that do it.
 _IN_OPTIONS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     (r"columns=\{'(\w+)': None\}", r"--columns \1="),
@@ -288,12 +273,12 @@ _IN_OPTIONS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     (r"\bki=0\b", "--ki 0"),
     (r"\bkp=0\b", "--kp 0"),
     (
-        r"\b(dt|delimiter|decimal|skip|encoding|counts_per_turn|torque_constant|rated_torque|torque_per_volt|loop|trials|seed|workers)"
-        r"=(?=[^=]|$)",
+        r"\b(dt|delimiter|decimal|skip|encoding|counts_per_turn|torque_constant|rated_torque|torque_per_volt|gear_ratio|load_side"
+        r"|decimate|resample|loop|trials|seed|workers)=(?=[^=]|$)",
         r"--\1 ",
     ),
     (r"\bvelocity_cutoff_hz=", "--velocity-cutoff "),
-    (r"(?<!\S)--(counts|torque|rated)_(\w+)", lambda found: f"--{found[1]}-{found[2].replace('_', '-')}"),
+    (r"(?<!\S)--(counts|torque|rated|gear|load)_(\w+)", lambda found: f"--{found[1]}-{found[2].replace('_', '-')}"),
     (r" +(?=[,;)](?:\s|$)|$)", ""),
 )
 
@@ -313,54 +298,19 @@ def _whole_range(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2] or match[1])
 
 
-def _add_log_options(parser: argparse.ArgumentParser) -> None:
-    """How logs are read."""
-    g = parser.add_argument_group("the log", "channels: command, velocity, torque, position, time")
-    g.add_argument("--drive", metavar="FILE", help="drive.toml with what belongs to the axis; options override it")
-    g.add_argument(
-        "--columns",
-        "--column",
-        action="append",
-        metavar="CH=NAME,...",
-        help="column of each channel: its name, '#3' (number from 0), or data[:,3] of an array; "
-        "CH= alone leaves a channel out. May be repeated",
-    )
-    g.add_argument(
-        "--units",
-        "--unit",
-        action="append",
-        metavar="CH=UNIT,...",
-        help="unit of each channel (rpm, deg, counts, %%, A, V, ms, ...), or the factor to SI as a number",
-    )
-    g.add_argument("--dt", type=_number, metavar="S", help="sample time [s], for logs without a time column")
-    g.add_argument(
-        "--velocity-cutoff",
-        type=_number,
-        metavar="HZ",
-        dest="velocity_cutoff_hz",
-        help="a log without velocity gets it from position, low-passed at this corner [Hz]",
-    )
-    for name, text in CONSTANT_HELP.items():
-        g.add_argument(f"--{name.replace('_', '-')}", type=_number, metavar="X", help=text)
-    for name, text in TEXT_TABLE_HELP.items():
-        kind, meta = (int, "LINES") if name == "skip" else (str, "TEXT")
-        g.add_argument(f"--{name}", type=kind, metavar=meta, help=f"of a text table: {text}")
-    g.add_argument("--axis", choices=AXES, help="linear: print m, m/s, N, kg (default: rotary)")
-
-
 def _add_controller_options(parser: argparse.ArgumentParser) -> None:
     """The velocity loop."""
     g = parser.add_argument_group("the velocity controller", "without one: open loop, torque to velocity")
-    g.add_argument("--kp", type=_number, metavar="X", help="proportional gain [N m s/rad]")
-    g.add_argument("--ki", type=_number, metavar="X", help="integral gain [N m/rad]")
+    g.add_argument("--kp", type=number, metavar="X", help="proportional gain [N m s/rad]")
+    g.add_argument("--ki", type=number, metavar="X", help="integral gain [N m/rad]")
     g.add_argument(
         "--loop",
         choices=(*LOOPS, "open"),
         help="sampled: a digital drive (default); continuous: everything bilinear, as in the paper; open: "
         "leave the controller out",
     )
-    g.add_argument("--torque-limit", type=_number, metavar="X", help="the controller's torque limit [N m]")
-    g.add_argument("--integrator-limit", type=_number, metavar="X", help="limit of its integral part [N m]")
+    g.add_argument("--torque-limit", type=number, metavar="X", help="the controller's torque limit [N m]")
+    g.add_argument("--integrator-limit", type=number, metavar="X", help="limit of its integral part [N m]")
 
 
 def _add_space_options(parser: argparse.ArgumentParser) -> None:
@@ -374,7 +324,7 @@ def _add_space_options(parser: argparse.ArgumentParser) -> None:
         ("--real", "negated real parts of poles and zeros [rad/s]"),
         ("--imaginary", "imaginary parts [rad/s]"),
     ):
-        g.add_argument(name, nargs=2, type=_number, metavar=("LOW", "HIGH"), help=text)
+        g.add_argument(name, nargs=2, type=number, metavar=("LOW", "HIGH"), help=text)
     for name, text in (("--p", "poles in excess of zeros"), ("--q", "zeros")):
         g.add_argument(name, type=_whole_range, metavar="N|A..B", help=f"{text}: 1, or 0..3")
     g.add_argument("--bits", type=int, metavar="N", help="bits per number of the genetic code (default 10)")

@@ -1,13 +1,10 @@
-"""What the command line writes: files, whole or not at all, and a progress bar."""
+"""What the command line writes: files, whole or not at all."""
 
 from __future__ import annotations
 
-import shutil
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TextIO
 
 from gaident.data.record import Record
 from gaident.diagnosis.experiments import Proposal
@@ -15,43 +12,7 @@ from gaident.errors import SettingsError
 from gaident.files import write_whole
 from gaident.models.simulate import Run
 
-__all__ = ["Progress", "csv_targets", "csv_text", "naming", "proposal_csv", "target_of", "write"]
-
-
-class Progress:
-    """A bar on stderr from 0.3 s on; as a context it gives the callback, None where there is no terminal."""
-
-    WIDTH = 24
-
-    def __init__(self, stream: TextIO | None) -> None:
-        self.terminal = stream if stream is not None and stream.isatty() else None
-        self.began = time.monotonic()
-        self.last = self.began + 0.2
-        self.shown = False
-
-    def __enter__(self) -> Callable[[float, str], None] | None:
-        return None if self.terminal is None else self.show
-
-    def show(self, fraction: float, message: str) -> None:
-        """Draws the bar, ten times a second at most."""
-        now = time.monotonic()
-        if now - self.last < 0.1:
-            return
-        self.last = now
-        self.shown = True
-        full = round(self.WIDTH * min(max(fraction, 0.0), 1.0))
-        bar = "#" * full + "." * (self.WIDTH - full)
-        line = f"[{bar}] {100.0 * fraction:3.0f} %  {now - self.began:.0f} s  {message}"
-        self._put(line[: shutil.get_terminal_size().columns - 1])
-
-    def __exit__(self, *_: object) -> None:
-        if self.shown:
-            self._put("")
-
-    def _put(self, line: str) -> None:
-        if self.terminal is not None:
-            self.terminal.write(f"\r{line}\x1b[K")
-            self.terminal.flush()
+__all__ = ["csv_targets", "csv_text", "naming", "proposal_csv", "target_of", "write"]
 
 
 def csv_text(rec: Record, result: Run | None, axis: str) -> str:

@@ -6,13 +6,14 @@ import dataclasses
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from gaident.data.readers import read
 from gaident.data.record import CHANNELS, Record
-from gaident.errors import ControllerError, ReadError, SpaceError
+from gaident.diagnosis.experiments import Limits
+from gaident.errors import ControllerError, ReadError, SettingsError, SpaceError
 from gaident.identification.space import SearchSpace, derive_space
 from gaident.models._checks import known_keys, one_of, real_number
 from gaident.models.controller import PI
@@ -69,6 +70,20 @@ def _pair_or_one(value: object, name: str) -> tuple[int, int]:
     return _whole(value[0], name), _whole(value[1], name)
 
 
+def _channels(value: object, name: str) -> tuple[str, ...]:
+    listed = [value] if isinstance(value, str) else value
+    if not isinstance(listed, Sequence) or not listed:
+        raise ReadError(f'{name} is {value!r}: give a list of channels, {name} = ["position"]')
+    return tuple(one_of(_text(entry, name), name, CHANNELS, ReadError) for entry in listed)
+
+
+def _positive(value: object, name: str) -> float:
+    number = _number(value, name)
+    if not number > 0.0:
+        raise ReadError(f"{name} is {value!r}: give a number > 0")
+    return number
+
+
 def _axis(value: object, name: str) -> str:
     return one_of(value, name, AXES, ReadError)
 
@@ -80,6 +95,10 @@ KEYS: dict[str, dict[str, Check]] = {
         "dt": _number,
         "velocity_cutoff_hz": _number,
         **dict.fromkeys(CONSTANTS, _number),
+        "gear_ratio": _positive,
+        "load_side": _channels,
+        "decimate": _whole,
+        "resample": _positive,
         "delimiter": _text,
         "decimal": _text,
         "skip": _whole,
@@ -100,6 +119,7 @@ KEYS: dict[str, dict[str, Check]] = {
         "q": _pair_or_one,
         "bits": _whole,
     },
+    "limits": dict.fromkeys(("speed", "torque", "travel", "duration"), _positive),
 }
 
 
@@ -112,6 +132,7 @@ class Drive:
     units: Mapping[str, Any]
     controller_values: Mapping[str, Any]
     space_values: Mapping[str, Any]
+    limit_values: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def axis(self) -> str:
@@ -136,6 +157,16 @@ class Drive:
                 "the drive file), or --loop open to work from torque to velocity"
             )
         return PI(**values)
+
+    def limits(self) -> Limits:
+        """What an experiment may do. Raises SettingsError where the speed or the torque is missing."""
+        missing = [name for name in ("speed", "torque") if name not in self.limit_values]
+        if missing:
+            raise SettingsError(
+                f"the limits lack {' and '.join(missing)}: give --{' and --'.join(missing)} (or [limits] in the drive file), "
+                "what the axis may do in an experiment"
+            )
+        return Limits(**self.limit_values)
 
     def space(self, records: Sequence[Record], controller: PI | None) -> SearchSpace | None:
         """The search space: what is given, the rest derived from the data; None where nothing is given."""

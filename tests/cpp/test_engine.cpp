@@ -120,6 +120,12 @@ TEST_CASE("engine: a long record is searched by several threads to the same resu
         CHECK(same(results.back(), results.front()));
         CHECK(progress.done == results.back().history.size());
         CHECK(progress.best == results.back().best_fitness);
+        const auto& fits = results.back().species;
+        const auto least =
+            std::min_element(fits.begin(), fits.end(), [](const Refined& x, const Refined& y) { return x.cost < y.cost; });
+        CHECK(progress.species == fits.size());
+        CHECK(progress.leading_p == least->factors.structure.p);
+        CHECK(progress.leading_q == least->factors.structure.q);
     }
     // The best chromosome of all islands is the one that is reported.
     const Genome genome(few(), Code::gray, Scale::linear);

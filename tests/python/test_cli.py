@@ -284,7 +284,7 @@ WRONG_DRIVE_FILES = [
     (
         "# nothing\n",
         "this drive file is empty",
-        "it holds [columns], [units], [controller], [space] and axis, dt, velocity_cutoff_hz",
+        "it holds [columns], [units], [controller], [space], [limits] and axis, dt, velocity_cutoff_hz",
     ),
 ]
 
@@ -359,6 +359,11 @@ def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
         (["identify", "--help"], ("examples:", "--drive", "[controller]", "exit codes")),
         (["simulate", "--help"], ("MODEL.json", "examples:")),
         (["demo", "--help"], ("GAIDENT_DATA",)),
+        (["columns", "--help"], ("TwinCAT", "--quiet")),
+        (["init", "--help"], ("FILL IN", "--force")),
+        (["experiment", "--help"], ("[limits]", "--travel")),
+        (["doctor", "--help"], ("Exit code 1",)),
+        (["completion", "--help"], ("bash", "fish")),
     ):
         assert main(args) == 0
         out, err = capsys.readouterr()
@@ -430,9 +435,11 @@ def test_progress_bar_on_a_terminal_only(here: Path) -> None:
         assert process.stdout.read().startswith("(p,q) = ")
         assert process.wait(30) == 0
     os.close(ours)
-    bars = re.findall(rb"\r\[[#.]{24}\] +(\d+) %", seen)
+    text = re.sub(rb"\x1b\[[0-9;?]*[A-Za-z]", b"", seen)
+    bars = re.findall(rb" (\d+)%", text)
     assert bars and bars == sorted(bars, key=int)
-    assert seen.endswith(b"\r\x1b[K")  # nothing of it stays
+    assert re.search(rb"about \d+ s left generation \d+, best fitness [\d.e-]+", text)
+    assert text.split(b"\r")[-1].strip() == b""  # nothing of it stays
     assert called(*args[:-4], "--workers", "1").stderr == ""
 
 

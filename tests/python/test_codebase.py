@@ -53,11 +53,17 @@ ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "diagnosis": ({"errors", "version", "files", "data", "models", "identification"}, {"show", "export"}),
     "store": ({"errors", "data", "identification", "diagnosis"}, set()),
     "show": ({"errors"}, set()),
-    "drive_file": (DESK, set()),
+    "drive_file": (DESK | {"diagnosis"}, set()),
+    "drive_init": ({"errors", "data"}, set()),
+    "doctor": ({"version"}, {"_core", "demo", "identification"}),
+    "progress_bar": (set(), set()),
     "paper": (DESK | {"diagnosis", "version", "show"}, set()),
     "reporting": (DESK | {"diagnosis", "files", "version", "show"}, set()),
     "demo": (DESK | {"diagnosis"}, {"show"}),
-    "cli": (DESK | {"diagnosis", "store", "drive_file", "demo", "files", "reporting"}, {"show", "_core", "paper"}),
+    "cli": (
+        DESK | {"diagnosis", "store", "drive_file", "drive_init", "doctor", "demo", "files", "progress_bar", "reporting"},
+        {"show", "_core", "paper"},
+    ),
     "__main__": ({"cli"}, set()),
     "__init__": (set(), {"version"}),  # the rest is imported by name when it is used
 }

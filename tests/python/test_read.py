@@ -36,8 +36,8 @@ def test_the_same_run_in_every_loggers_manner(file: str, call: dict[str, Any]) -
 
 def test_read_columns_says_what_the_file_holds() -> None:
     held = read_columns(SAMPLES / "pairs.csv")
-    assert list(held) == ["Channel name #0", "Speed", "Channel name #2", "Current"]
-    np.testing.assert_allclose(held["Channel name #0"], np.arange(40) * 0.5e-3)
+    assert list(held) == ["Time #0", "Speed", "Time #2", "Current"]
+    np.testing.assert_allclose(held["Time #0"], np.arange(40) * 0.5e-3)
     text = read_columns(str(SAMPLES / "status_text.csv"))
     assert list(text) == ["date", "t", "state", "velocity", "torque"]
     assert np.isnan(text["state"]).all()

@@ -2,83 +2,123 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.arrays import MINIMUM_SAMPLES, positive_number
+from gaident.data.arrays import MINIMUM_SAMPLES
+from gaident.data.clock import axis_of, clock_of, common_clock, part_of, second_of
 from gaident.data.conditioning import differentiate
+from gaident.data.decimation import Decimator, decimated, factor_of
 from gaident.data.record import CHANNELS, Record
+from gaident.data.resampling import resampled
 from gaident.data.table import Column, Table
-from gaident.data.timeaxis import check_given, sample_time
-from gaident.data.units import QUANTITIES, Constants, factor, is_any_unit
+from gaident.data.timeaxis import TimeAxis
+from gaident.data.wanted import Wanted, si_factor
 from gaident.errors import ReadError, RecordError
 
-__all__ = ["Wanted", "assemble"]
-
-_TIME_NAMES = ("time", "t", "Time", "TIME")
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What the user asked of read; see there."""
-
-    columns: Mapping[str, str | int | None] | None
-    units: Mapping[str, str | float]
-    dt: float | None
-    name: str | None
-    constants: Constants
-    velocity_cutoff_hz: float | None
-
-    def check(self) -> Wanted:
-        """Itself, once what can be judged without the file is right; else ReadError or RecordError."""
-        for argument, value in (("columns", self.columns), ("units", self.units)):
-            if value is not None and not isinstance(value, Mapping):
-                raise ReadError(f"{argument}={value!r} is no mapping; give for example {argument}={{'velocity': ...}}")
-            _known(argument, value or ())
-        self.constants.check()
-        for quantity, unit in self.units.items():
-            factor(quantity, unit, self.constants)
-        if self.dt is not None:
-            positive_number(self.dt, "dt", "s", "give the sample time in seconds, for example dt=1e-3")
-        if self.name is not None and not isinstance(self.name, str):
-            raise ReadError(f"name={self.name!r} is no text; give a str")
-        return self
+__all__ = ["assemble"]
 
 
 def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
-    """The Record that `wanted` describes, from `table`; `stem` names it if the user did not."""
+    """The Record that `wanted` describes, from `table`; `stem` names it if the user did not.
+
+    The rows come block by block, so that a log longer than memory can be decimated on its way in.
+    """
     named = _channels(table, wanted)
-    time = _time_column(table, wanted)
     for quantity in wanted.units:
         if quantity not in named and quantity != "time":
             raise ReadError(
                 f"{table.path}: units names {quantity!r}, but no such column is read; "
                 f"add it to columns={{{quantity!r}: ...}}, or leave its unit out"
             )
-    values = {channel: table.numbers(column, channel) for channel, column in named.items()}
-    timed = {**values, **({"time": time.values} if time is not None and wanted.dt is None else {})}
-    lengths = {channel: len(array) for channel, array in timed.items()}
-    if len(set(lengths.values())) > 1:
-        listed = ", ".join(f"{channel} {length}" for channel, length in lengths.items())
-        raise ReadError(f"{table.path}: the columns have unequal lengths ({listed}); name columns of one run")
-    count = next(iter(lengths.values()))
+    for channel in wanted.load_side:
+        if channel not in named:
+            raise ReadError(f"{table.path}: load_side names {channel!r}, but no such column is read; leave it out there")
+    scales = {channel: _scale(table, wanted, channel, column) for channel, column in named.items()}
+    if wanted.resample is not None:
+        dt, values = _on_even_axis(table, wanted, named, scales)
+    else:
+        dt, values = _block_by_block(table, wanted, named, scales)
+    try:
+        if "velocity" not in values:
+            values["velocity"] = differentiate(values["position"], dt, wanted.velocity_cutoff_hz)
+        name = stem if wanted.name is None else wanted.name
+        return Record(dt, name=name, **{channel: values.get(channel) for channel in CHANNELS})
+    except RecordError as error:
+        raise RecordError(f"{table.path}: {error}") from None
+
+
+_Values = dict[str, NDArray[np.float64]]
+
+
+def _block_by_block(table: Table, wanted: Wanted, named: dict[str, Column], scales: dict[str, float]) -> tuple[float, _Values]:
+    """(dt [s], channel -> values in SI) of a log with one even time axis."""
+    time = common_clock(table, wanted, named)
+    keys = {channel: column for channel, column in named.items() if column is not time}
+    columns = [*keys.values(), *([] if time is None else [time])]
+    if table.batches is None:
+        lengths = {channel: len(column.values) for channel, column in keys.items()}
+        if time is not None and wanted.dt is None:
+            lengths["time"] = len(time.values)
+        if len(set(lengths.values())) > 1:
+            listed = ", ".join(f"{channel} {length}" for channel, length in lengths.items())
+            raise ReadError(
+                f"{table.path}: the columns have unequal lengths ({listed}); name columns of one run, or, where they "
+                "were logged at several rates, put them on one axis with resample= [s]"
+            )
+    factor = factor_of(wanted.decimate)
+    decimators = {channel: Decimator(factor) for channel in named}
+    axis: TimeAxis | None = None
+    count = 0
+    for block in table.blocks(list({column.key: column for column in columns}.values())):
+        held = {channel: block.numbers(part_of(block, column), channel) for channel, column in named.items()}
+        count += len(next(iter(held.values())))
+        if axis is None:
+            axis = axis_of(block, wanted, time)
+        if axis is not None and time is not None:
+            axis.push(block, block.numbers(part_of(block, time), "time"))
+        for channel, values in held.items():
+            decimators[channel].push(values if scales[channel] == 1.0 else values * scales[channel])
     if count < MINIMUM_SAMPLES:
         raise RecordError(
             f"{table.path}: the log has {count} samples, but at least {MINIMUM_SAMPLES} are needed; give a longer log"
         )
-    dt = _sample_time(table, wanted, time)
-    scaled = {channel: _scale(table, wanted, channel, named[channel], array) for channel, array in values.items()}
-    try:
-        if "velocity" not in scaled:
-            scaled["velocity"] = differentiate(scaled["position"], dt, wanted.velocity_cutoff_hz)
-        name = stem if wanted.name is None else wanted.name
-        return Record(dt, name=name, **{channel: scaled.get(channel) for channel in CHANNELS})
-    except RecordError as error:
-        raise RecordError(f"{table.path}: {error}") from None
+    dt = float(wanted.dt) if wanted.dt is not None else _stated(table, named) if axis is None else axis.sample_time(table)
+    return dt * factor, {channel: decimator.finish() for channel, decimator in decimators.items()}
+
+
+def _stated(table: Table, named: Mapping[str, Column]) -> float:
+    """The sample time that the file states for these columns [s]."""
+    periods = [column.period for column in named.values() if column.period is not None]
+    if not periods:
+        raise ReadError(f"{table.path}: columns={{'time': None}} ignores the time column; give dt= [s] then")
+    return periods[0]
+
+
+def _on_even_axis(table: Table, wanted: Wanted, named: dict[str, Column], scales: dict[str, float]) -> tuple[float, _Values]:
+    """(dt [s], channel -> values in SI), each channel interpolated from time stamps of its own."""
+    assert wanted.resample is not None
+    clocks = {channel: clock_of(table, wanted, column) for channel, column in named.items()}
+    parts: dict[str, list[tuple[NDArray[np.float64], NDArray[np.float64]]]] = {channel: [] for channel in named}
+    for channel, column in named.items():
+        clock, first = clocks[channel], 0
+        for block in table.blocks([column] if clock is None else [column, clock]):
+            values = part_of(block, column).whole().astype(np.float64, copy=False)
+            if clock is None:
+                stamps = (first + np.arange(len(values))) * float(column.period or 0.0)
+            else:
+                stamps = part_of(block, clock).whole() * second_of(block, wanted, clock)
+            parts[channel].append((np.asarray(stamps, dtype=np.float64), values * scales[channel]))
+            first += len(values)
+    whole = {channel: (np.concatenate([t for t, _ in p]), np.concatenate([x for _, x in p])) for channel, p in parts.items()}
+    dt = float(wanted.resample)
+    even = resampled(table.path, whole, dt)
+    factor = factor_of(wanted.decimate)
+    if factor > 1:
+        even = {channel: decimated(x, factor) for channel, x in even.items()}
+    return dt * factor, even
 
 
 def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
@@ -117,65 +157,10 @@ def _say_missing(table: Table, channel: str, what: str) -> str:
     )
 
 
-def _time_column(table: Table, wanted: Wanted) -> Column | None:
-    """The column named for time; else one that is called so; else None."""
-    columns = wanted.columns or {}
-    if "time" in columns:
-        address = columns["time"]
-        return None if address is None else table.find(address, "time")
-    for name in _TIME_NAMES:
-        column = table.own(name)
-        if column is not None:
-            return column
-    if wanted.dt is None:
-        raise ReadError(
-            f"{table.path}: dt is not given and no column is called time or t; give dt= [s], or "
-            f"columns={{'time': ...}} with one of {table.listing()}"
-        )
-    return None
-
-
-def _sample_time(table: Table, wanted: Wanted, time: Column | None) -> float:
-    if time is None:
-        if wanted.dt is None:
-            raise ReadError(f"{table.path}: columns={{'time': None}} ignores the time column; give dt= [s] then")
-        return float(wanted.dt)
-    explicit = wanted.columns is not None and "time" in wanted.columns
-    if wanted.dt is None:
-        return sample_time(table, time, _factor(table, wanted, "time", time))
-    # A column that only happens to be called time must not stand in the way of a dt, unless it is one.
-    if explicit or (time.bad is None and time.values.dtype.kind in "iuf" and np.isfinite(time.values).all()):
-        second = _factor(table, wanted, "time", time)
-        check_given(table, time, second, wanted.dt)
-        if explicit:
-            sample_time(table, time, second)
-    return float(wanted.dt)
-
-
-def _scale(table: Table, wanted: Wanted, channel: str, column: Column, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    size = _factor(table, wanted, channel, column)
-    return values if size == 1.0 else values * size
-
-
-def _factor(table: Table, wanted: Wanted, quantity: str, column: Column) -> float:
-    """Factor to SI: the user's unit before the file's."""
-    if quantity in wanted.units:
-        return factor(quantity, wanted.units[quantity], wanted.constants)
-    if column.unit is None:
-        return 1.0
-    try:
-        return factor(quantity, column.unit, wanted.constants)
-    except ReadError as error:
-        known = "" if is_any_unit(column.unit) else ", which is not known"
-        raise ReadError(
-            f"{table.path}: column {column.key!r} says its unit is {column.unit!r}{known}: {error}; "
-            f"or give units={{{quantity!r}: ...}}, which counts before the file's"
-        ) from None
-
-
-def _known(argument: str, keys: Iterable[object]) -> None:
-    for key in keys:
-        if key not in QUANTITIES:
-            near = difflib.get_close_matches(str(key), QUANTITIES, n=1)
-            guess = f" (did you mean {near[0]!r}?)" if near else ""
-            raise ReadError(f"{argument}: {key!r} is no channel{guess}; known are {', '.join(QUANTITIES)}")
+def _scale(table: Table, wanted: Wanted, channel: str, column: Column) -> float:
+    """Factor to SI at the motor: the unit's, and the gear's where the channel was measured behind it."""
+    size = si_factor(table, wanted, channel, column)
+    if channel not in wanted.load_side:
+        return size
+    assert wanted.gear_ratio is not None
+    return size / wanted.gear_ratio if channel == "torque" else size * wanted.gear_ratio

@@ -4,28 +4,21 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.mat import DamagedError, variables
-from gaident.data.table import Column, Table
+from gaident.data.stored import Matrix, array_table, first_line
+from gaident.data.table import Stored, Table
 from gaident.errors import ReadError
 
 __all__ = ["read_mat", "read_npz"]
 
-_LISTED_COLUMNS = 1000
-
 
 def read_mat(path: str, raw: bytes) -> Table:
-    """Numeric variables of a MAT file; fields of a 1 x 1 struct are named `log.speed`."""
-    if raw.startswith(b"MATLAB 7.3") or raw[512:520] == b"\x89HDF\r\n\x1a\n" or raw.startswith(b"\x89HDF"):
-        raise ReadError(
-            f"{path}: a MAT file of version 7.3 (HDF5), which read cannot open; "
-            f"save it in MATLAB with save('log.mat', '-v7'), or export a CSV"
-        )
+    """Numeric variables of a MAT file of version 5 or 4; fields of a 1 x 1 struct are named `log.speed`."""
     try:
         content = variables(raw)
     except DamagedError as error:
@@ -33,20 +26,20 @@ def read_mat(path: str, raw: bytes) -> Table:
             f"{path}: not a whole MAT file of version 5 ({error}); copy it again, "
             f"or save it in MATLAB with save('log.mat', '-v7')"
         ) from None
-    arrays: dict[str, NDArray[Any]] = {}
+    arrays: dict[str, NDArray[Any] | Stored | Matrix] = {}
     others: list[str] = []
     for name, value in content:
         if name in arrays:
             raise ReadError(f"{path}: two variables are called {name!r}; save the log again with one name for each")
         # MATLAB keeps what its objects need in a variable without a name.
         if name:
-            _sort(name, value, arrays, others)
-    return _table(path, arrays, others)
+            sort_array(name, value, arrays, others)
+    return array_table(path, arrays, others)
 
 
 def read_npz(path: str, raw: bytes) -> Table:
     """Numeric arrays of an NPZ file; nothing pickled is ever loaded."""
-    arrays: dict[str, NDArray[Any]] = {}
+    arrays: dict[str, NDArray[Any] | Stored | Matrix] = {}
     others: list[str] = []
     name = "the archive"
     try:
@@ -54,7 +47,7 @@ def read_npz(path: str, raw: bytes) -> Table:
             if len(set(archive.files)) != len(archive.files):
                 raise ReadError(f"{path}: two arrays of one name in it; save the log again with one name for each")
             for name in archive.files:
-                _sort(name, np.asarray(archive[name]), arrays, others)
+                sort_array(name, np.asarray(archive[name]), arrays, others)
     except ReadError:
         raise
     except Exception as error:
@@ -65,13 +58,15 @@ def read_npz(path: str, raw: bytes) -> Table:
                 f"save plain numbers, numpy.savez(file, {name}=numpy.asarray(x, dtype=float))"
             ) from None
         raise ReadError(
-            f"{path}: not a whole NPZ file ({type(error).__name__}: {_first_line(error)}); copy it again, "
+            f"{path}: not a whole NPZ file ({type(error).__name__}: {first_line(error)}); copy it again, "
             f"or save it with numpy.savez"
         ) from None
-    return _table(path, arrays, others)
+    return array_table(path, arrays, others)
 
 
-def _sort(name: str, value: NDArray[Any] | str, arrays: dict[str, NDArray[Any]], others: list[str]) -> None:
+def sort_array(
+    name: str, value: NDArray[Any] | str, arrays: dict[str, NDArray[Any] | Stored | Matrix], others: list[str]
+) -> None:
     """Put a variable among the arrays of numbers, flat where it is a row or a column, or among the others."""
     if isinstance(value, str):
         others.append(f"{name!r} ({value})")
@@ -85,27 +80,3 @@ def _sort(name: str, value: NDArray[Any] | str, arrays: dict[str, NDArray[Any]],
         arrays[name] = value
     else:
         others.append(f"{name!r} ({value.ndim}-dimensional)")
-
-
-def _table(path: str, arrays: Mapping[str, NDArray[Any]], others: list[str]) -> Table:
-    if not arrays:
-        rest = f" (only {', '.join(others)})" if others else ""
-        raise ReadError(f"{path}: the file holds no arrays of numbers{rest}; save the log's columns as plain vectors")
-    columns: list[Column] = []
-    matrices = {}
-    for name, array in arrays.items():
-        if array.ndim == 1:
-            columns.append(Column(name, array))
-            continue
-        matrices[name] = array
-        rows, cols = array.shape
-        # Time runs along the longer side; the other way can still be addressed.
-        if rows >= cols:
-            columns += [Column(f"{name}[:,{k}]", array[:, k]) for k in range(min(cols, _LISTED_COLUMNS))]
-        else:
-            columns += [Column(f"{name}[{k},:]", array[k, :]) for k in range(min(rows, _LISTED_COLUMNS))]
-    return Table(path, tuple(columns), matrices=matrices, others=tuple(others))
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).splitlines() or ["no reason given"])[0][:120]

@@ -1,22 +1,30 @@
-"""Reader for text tables: CSV, TSV, TXT and what else logs are called."""
+"""Reader for text tables: CSV, TSV, TXT and what else logs are called, whole or block by block."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import codecs
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gaident.data.dialect import Dialect, detect, parse_number, split
-from gaident.data.header import COMMENT, find_header
+from gaident.data.cells import ROWS, numbers_of
+from gaident.data.dialect import Dialect, detect
+from gaident.data.exports import END_MARK, refined, scope_layout
+from gaident.data.header import COMMENT, Header, find_header
+from gaident.data.stored import first_line
 from gaident.data.table import Column, Table
-from gaident.data.text import Line, lines_of
+from gaident.data.text import Line, check_text, encoding_of, lines_of
 from gaident.errors import ReadError
 
-__all__ = ["TextOptions", "read_text"]
+__all__ = ["WHOLE", "TextOptions", "open_text"]
 
-_BLOCK = 8192
+WHOLE = 1 << 25
+"""Bytes of a text that is held in memory as it is; longer ones are read block by block."""
+
+_HEAD = 1 << 18
 _WORDS = {"tab": "\t", "space": " ", "comma": ",", "semicolon": ";", "pipe": "|", "\\t": "\t"}
 
 
@@ -54,120 +62,115 @@ class TextOptions:
         return TextOptions(delimiter, self.decimal, self.skip, self.encoding)
 
 
-def read_text(path: str, raw: bytes, options: TextOptions) -> Table:
-    """The table in a text file, whatever its dialect. Raises ReadError with the line and the remedy."""
+@dataclass(frozen=True)
+class _Layout:
+    """What is known of a table before its numbers are read; start: number of the line where they begin."""
+
+    dialect: Dialect
+    header: Header
+    start: int
+
+    @property
+    def trailing(self) -> bool:
+        """Lines that end with a separator have a last column of nothing."""
+        return self.dialect.empty and self.header.headings[-1].key == f"#{self.dialect.width - 1}"
+
+    def table(self, path: str, numbers: Sequence[int], body: Sequence[str]) -> Table:
+        """The columns of these rows; `numbers`: their line numbers."""
+        values, bad = numbers_of(path, numbers, body, self.dialect, self.trailing)
+        headings = self.header.headings[: self.dialect.width - self.trailing]
+        columns = [Column(h.key, values[:, k], h.names, h.unit, bad.get(k), h.clock, h.period) for k, h in enumerate(headings)]
+        if self.dialect.ragged:
+            columns = _without_tail(columns)
+        return Table(path, tuple(columns), lines=numbers, form="text")
+
+
+def open_text(path: str, file: Path, options: TextOptions) -> Table:
+    """The table in a text file, whatever its dialect; a long one is read when its blocks are asked for.
+
+    Raises ReadError with the line and the remedy.
+    """
     options = options.check()
-    everything = lines_of(path, raw, options.encoding)
+    if os.path.getsize(file) <= WHOLE:
+        everything = lines_of(path, file.read_bytes(), options.encoding)
+        layout, lines = _layout(path, everything, options)
+        numbers, body = zip(*lines, strict=True)
+        return layout.table(path, numbers, body)
+    with open(file, "rb") as stream:
+        head = stream.read(_HEAD)
+    encoding = encoding_of(head[: head.rfind(b"\n") + 1] or head, options.encoding)
+    text = codecs.getincrementaldecoder(encoding)(errors="replace").decode(head)
+    layout, lines = _layout(path, text.replace("\r\n", "\n").replace("\r", "\n").split("\n")[:-1], options)
+    sample = layout.table(path, *zip(*lines[:1], strict=True))
+
+    def batches(columns: Sequence[Column]) -> Iterator[Table]:
+        keys = {column.key for column in columns}
+        for numbers, body in _blocks(path, file, encoding, layout.start):
+            block = layout.table(path, numbers, body)
+            yield replace(block, columns=tuple(column for column in block.columns if column.key in keys))
+
+    empty = tuple(replace(column, values=column.whole()[:0], bad=None) for column in sample.columns)
+    return replace(sample, columns=empty, lines=None, batches=batches)
+
+
+def _without_tail(columns: Sequence[Column]) -> list[Column]:
+    """The columns of slower channels end where their time column does; the rows go on for the others."""
+    held = {column.key: np.flatnonzero(np.isfinite(column.whole())) for column in columns}
+    ends = {key: int(rows[-1]) + 1 if rows.size else 0 for key, rows in held.items()}
+    found = []
+    for column in columns:
+        end = ends[column.clock or column.key]
+        bad = None if column.bad is None or column.bad[0] >= end else column.bad
+        found.append(replace(column, values=column.whole()[:end], bad=bad))
+    return found
+
+
+def _layout(path: str, everything: Sequence[str], options: TextOptions) -> tuple[_Layout, list[Line]]:
+    """How the table is written, and the lines of its numbers among those given."""
     skip = options.skip or 0
-    lines: list[Line] = [(n, text) for n, text in enumerate(everything[skip:], skip + 1) if text and not text.isspace()]
+    lines = list(_filled(enumerate(everything[skip:], skip + 1)))
     comments = [line for line in lines if COMMENT.match(line[1])]
     if comments:
         lines = [line for line in lines if not COMMENT.match(line[1])]
     if not lines:
         raise ReadError(f"{path}: no line is left after skip={skip} and comments; give a smaller skip=, or a log with data")
-    dialect = detect(path, lines, options.delimiter, options.decimal)
-    header = find_header(lines, comments, dialect)
-    numbers, body = zip(*lines[header.start :], strict=True)
-    # Lines that end with a separator have a last column of nothing.
-    trailing = dialect.empty and header.headings[-1].key == f"#{dialect.width - 1}"
-    values, bad = _numbers(path, numbers, body, dialect, trailing)
-    columns = [
-        Column(heading.key, values[:, k], heading.names, heading.unit, bad.get(k))
-        for k, heading in enumerate(header.headings[: dialect.width - trailing])
-    ]
-    return Table(path, tuple(columns), lines=numbers)
+    scope = scope_layout(lines) if options.delimiter is None and options.decimal is None else None
+    if scope is not None:
+        dialect, header = scope
+    else:
+        dialect = detect(path, lines, options.delimiter, options.decimal)
+        header = refined(lines, find_header(lines, comments, dialect), dialect)
+    rows = lines[header.start :]
+    if not rows:
+        raise ReadError(f"{path}: below the header stands no row of numbers; export the log with its data")
+    return _Layout(dialect, header, rows[0][0]), rows
 
 
-_Bad = dict[int, tuple[int, str]]
+def _filled(lines: Iterable[Line]) -> Iterator[Line]:
+    """Those that hold something; the mark of the end is nothing."""
+    return ((number, text) for number, text in lines if text and not text.isspace() and text != END_MARK)
 
 
-def _numbers(
-    path: str, numbers: Sequence[int], body: Sequence[str], dialect: Dialect, trailing: bool
-) -> tuple[NDArray[np.float64], _Bad]:
-    """Values (n, width), NaN where no number stands, and per column the first such cell as (row, text).
-
-    Block by block: numpy's own parser is fast but says little of a flaw, so a block that it does not like is
-    read again cell by cell.
-    """
-    values = np.full((len(body), dialect.width), np.nan)
-    bad: _Bad = {}
-    for start in range(0, len(body), _BLOCK):
-        block = body[start : start + _BLOCK]
-        if not _clean(block, dialect, values[start : start + _BLOCK]):
-            found = _careful(
-                path,
-                numbers[start : start + _BLOCK],
-                block,
-                dialect,
-                trailing,
-                values[start : start + _BLOCK],
-            )
-            bad = {k: (start + row, text) for k, (row, text) in found.items()} | bad
-        elif start == 0 and not all(dialect.numeric):
-            first = split(body[0], dialect.delimiter)
-            bad = {k: (0, first[k]) for k in range(dialect.width) if not dialect.numeric[k]}
-    return values, bad
-
-
-def _clean(block: Sequence[str], dialect: Dialect, out: NDArray[np.float64]) -> bool:
-    """Fill `out` (n, width) the fast way; False: the block has a flaw, or is one for the other way."""
-    wanted = [k for k, numeric in enumerate(dialect.numeric) if numeric]
-    if dialect.delimiter == dialect.decimal:
-        return False
-    if len(wanted) < dialect.width:
-        # The parser does not look at the columns it leaves out, so count them here.
-        if dialect.delimiter == " " or any('"' in text for text in block):
-            return False
-        if {text.count(dialect.delimiter) for text in block} != {dialect.width - 1}:
-            return False
-        if dialect.empty and not all(text.rstrip(" ").endswith(dialect.delimiter) for text in block):
-            return False
-    if dialect.decimal == ",":
-        # A point here would be a mark between thousands, or another decimal mark.
-        if any("." in text for text in block):
-            return False
-        block = [text.replace(",", ".") for text in block]
-    delimiter = None if dialect.delimiter == " " else dialect.delimiter
-    usecols = wanted if len(wanted) < dialect.width else None
-    try:
-        values = np.loadtxt(block, delimiter=delimiter, comments=None, ndmin=2, dtype=np.float64, usecols=usecols)
-    except ValueError:
-        return False
-    if values.shape != (len(block), len(wanted)):
-        return False
-    out[:, wanted] = values
-    return True
-
-
-def _careful(
-    path: str,
-    numbers: Sequence[int],
-    block: Sequence[str],
-    dialect: Dialect,
-    trailing: bool,
-    out: NDArray[np.float64],
-) -> _Bad:
-    """Fill `out` (n, width) cell by cell; the first cell of each column that is no number, as (row, text)."""
-    rows = [split(text, dialect.delimiter) for text in block]
-    for number, text, row in zip(numbers, block, rows, strict=True):
-        if len(row) != dialect.width or (trailing and row[-1]):
-            found, usual = len(row) - (trailing and not row[-1]), dialect.width - trailing
+def _blocks(path: str, file: Path, encoding: str, start: int) -> Iterator[tuple[list[int], list[str]]]:
+    """(line numbers, lines) of the rows of numbers, some thousand at a time."""
+    with open(file, encoding=encoding, newline=None) as stream:
+        numbers: list[int] = []
+        body: list[str] = []
+        try:
+            for number, text in _filled((n, line.rstrip("\n")) for n, line in enumerate(stream, 1)):
+                if number < start or COMMENT.match(text):
+                    continue
+                numbers.append(number)
+                body.append(text)
+                if len(body) == ROWS:
+                    check_text(path, body, numbers[0])
+                    yield numbers, body
+                    numbers, body = [], []
+        except UnicodeError as error:
             raise ReadError(
-                f"{path}, line {number}: {found} fields where the other lines have {usual}: {text[:60]!r}; "
-                f"correct or remove this line (a damaged row or a footer?)"
-                f"{_comma_hint(dialect, found - usual)}"
-            )
-    bad: _Bad = {}
-    for k in range(dialect.width):
-        cells = [parse_number(row[k], dialect.decimal) for row in rows]
-        missing = next((index for index, cell in enumerate(cells) if cell is None), None)
-        if missing is not None:
-            bad[k] = (missing, rows[missing][k])
-        out[:, k] = [np.nan if cell is None else cell for cell in cells]
-    return bad
-
-
-def _comma_hint(dialect: Dialect, surplus: int) -> str:
-    if dialect.delimiter == "," and surplus > 0:
-        return "; if the log has decimal commas, export it with ';' between columns"
-    return ""
+                f"{path}, after line {numbers[-1] if numbers else start}: the text is damaged or no {encoding} "
+                f"({first_line(error)}); give its encoding=, for example 'latin-1'"
+            ) from None
+        if body:
+            check_text(path, body, numbers[0])
+            yield numbers, body

@@ -34,12 +34,14 @@ class Dialect:
     decimal    "." or ","
     numeric    whether column k holds numbers
     empty      whether the last column holds nothing at all
+    ragged     whether rows may end early, where the columns at the right have no more values
     """
 
     delimiter: str
     decimal: str
     numeric: tuple[bool, ...]
     empty: bool = False
+    ragged: bool = False
 
     @property
     def width(self) -> int:

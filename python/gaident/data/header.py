@@ -23,11 +23,13 @@ _ENCLOSED = re.compile(r"[\[(<{](.*)[\])>}]")
 
 @dataclass(frozen=True)
 class Heading:
-    """One column's key (unique), other names and unit."""
+    """One column's key (unique), other names and unit; key of its time column and its sample time [s], where stated."""
 
     key: str
     names: tuple[str, ...] = ()
     unit: str | None = None
+    clock: str | None = None
+    period: float | None = None
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,10 @@ class Record:
         lengths = {key: len(values) for key, values in channels.items() if values is not None}
         if len(set(lengths.values())) > 1:
             listed = ", ".join(f"{key} {length}" for key, length in lengths.items())
-            raise RecordError(f"the channels have unequal lengths ({listed} samples); cut them to the same samples")
+            raise RecordError(
+                f"the channels have unequal lengths ({listed} samples); cut them to the same samples, "
+                "or, where they come from two clocks, bring two records together with align"
+            )
         sample_time = positive_number(dt, "dt", "s", "give the sample time in seconds, for example dt=1e-3")
         self._fill(sample_time, channels, str(name))
 
@@ -135,7 +138,7 @@ class Record:
         if samples.step is not None and samples.step != 1:
             raise RecordError(
                 f"{text[:-1]}:{samples.step!r}]: the step must be 1, because leaving out samples folds high "
-                f"frequencies down; cut with rec[a:b], and decimate with a filter before making the record"
+                f"frequencies down; cut with rec[a:b], and decimate behind a low-pass with rec.decimate({samples.step!r})"
             )
         try:
             start, stop, _ = samples.indices(len(self))
@@ -154,6 +157,23 @@ class Record:
             raise RecordError(f"between({t0!r}, {t1!r}): t0 must be before t1; exchange them")
         start, stop = (self._sample_at(float(value)) for value in (t0, t1))
         return self._cut(start, stop, f"between({t0!r}, {t1!r})")
+
+    def decimate(self, factor: int) -> Record:
+        """Every `factor`-th sample behind a low-pass: linear phase, its delay compensated, 50 * factor + 1 taps.
+
+        Up to 80 % of the new Nyquist frequency 1/(2 factor dt) all channels pass to within 0.03 %, in phase; from that
+        frequency on they are damped by 72 dB and more. What a digital controller does between the new samples is no
+        longer in the record: identify a decimated record in open loop, or with a continuous controller. At least 20
+        samples remain. Raises RecordError.
+        """
+        from gaident.data.decimation import decimated, factor_of
+
+        factor = factor_of(factor, "decimate", "({!r})")
+        count = -(-len(self) // factor)
+        if count < MINIMUM_SAMPLES:
+            raise RecordError(f"decimate({factor}) leaves {count} samples, but at least {MINIMUM_SAMPLES} are needed")
+        thinned = {key: decimated(values, factor) for key, values in self.channels()}
+        return Record(self.dt * factor, name=self.name, **thinned)
 
     def _sample_at(self, time: float) -> int:
         """First sample not before `time` [s], within 0..n."""
@@ -208,6 +228,11 @@ class Record:
         label = f"{self.name!r}, " if self.name else ""
         held = ", ".join(f"{key} {values.min() + 0.0:.4g}..{values.max() + 0.0:.4g}" for key, values in self.channels())
         return f"Record({label}{len(self)} samples, dt={self.dt:.6g} s, {self.duration:.4g} s; {held})"
+
+    def _repr_html_(self) -> str:
+        from gaident.data.record_html import record_html
+
+        return record_html(self)
 
     def __reduce__(self) -> tuple[type[Record], tuple[Any, ...]]:
         # Arrays come out of a pickle writable; through the constructor they are checked and locked again.

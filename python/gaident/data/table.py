@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,42 @@ from numpy.typing import NDArray
 from gaident.data.arrays import first_not_finite
 from gaident.errors import ReadError
 
-__all__ = ["Column", "Table"]
+__all__ = ["BLOCK", "Column", "Stored", "Table"]
+
+BLOCK = 1 << 16
+"""Rows that are held at once of a log that is read block by block."""
 
 _NUMBER_SIGN = re.compile(r"#\s*(\d+)")
 _PICK = re.compile(r"(.+)\[\s*(:|-?\d+)\s*,\s*(:|-?\d+)\s*\]")
 _LISTED = 40
+
+
+class Stored:
+    """Values that stay in their file until they are asked for: `stored[a:b]` reads rows a to b-1.
+
+    Raises ReadError where the library that reads them fails: the file is damaged there.
+    """
+
+    def __init__(self, path: str, length: int, dtype: np.dtype[Any], read: Callable[[int, int], NDArray[Any]]) -> None:
+        self.path, self.length, self.dtype, self.read = path, length, dtype, read
+
+    def __len__(self) -> int:
+        return self.length
+
+    def __getitem__(self, rows: slice) -> NDArray[Any]:
+        start, stop, _ = rows.indices(self.length)
+        try:
+            values = self.read(start, stop)
+        except Exception as error:  # every library has its own
+            reason = (str(error).splitlines() or [type(error).__name__])[0][:120]
+            raise ReadError(
+                f"{self.path}: damaged, rows {start} to {stop - 1} cannot be read ({reason}); copy the file again"
+            ) from None
+        if values.shape != (stop - start,):
+            raise ReadError(
+                f"{self.path}: damaged, it holds {values.size} values where {stop - start} are announced; copy it again"
+            )
+        return values
 
 
 @dataclass(frozen=True)
@@ -30,13 +61,21 @@ class Column:
     names    other names it answers to; need not be unique
     unit     as the file says, None if it does not
     bad      (row, text) of the first cell that is no number, None if all are
+    clock    key of the column with its time stamps, where the file says which
+    period   sample time [s], where the file states it
     """
 
     key: str
-    values: NDArray[Any]
+    values: NDArray[Any] | Stored
     names: tuple[str, ...] = ()
     unit: str | None = None
     bad: tuple[int, str] | None = None
+    clock: str | None = None
+    period: float | None = None
+
+    def whole(self) -> NDArray[Any]:
+        """All values, read if they are still in the file."""
+        return self.values[0 : len(self.values)] if isinstance(self.values, Stored) else self.values
 
 
 @dataclass(frozen=True)
@@ -48,6 +87,10 @@ class Table:
     lines     line number of each row, for text files; None where only an index makes sense
     matrices  two-dimensional arrays, addressed as `data[:,3]`, zero based
     others    names of what the file holds besides, such as text, which cannot be a channel
+    first     index of the first row, where the table is a block of a longer one
+    batches   of a file that is read row by row: the rows of the columns asked for, block by block; the columns of
+              the table itself then hold no values
+    form      what the format is called
     """
 
     path: str
@@ -55,10 +98,27 @@ class Table:
     lines: Sequence[int] | None = None
     matrices: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     others: tuple[str, ...] = ()
+    first: int = 0
+    batches: Callable[[Sequence[Column]], Iterator[Table]] | None = None
+    form: str = ""
 
     def place(self, row: int) -> str:
         """Where a row stands, for messages."""
-        return f"index {row}" if self.lines is None else f"line {self.lines[row]}"
+        return f"index {self.first + row}" if self.lines is None else f"line {self.lines[row]}"
+
+    def blocks(self, columns: Sequence[Column], rows: int = BLOCK) -> Iterator[Table]:
+        """The rows of some columns of this table, block after block, each a table of just these columns.
+
+        What is in memory anyway comes as one block. Columns that are still in the file must be of one length.
+        """
+        if self.batches is not None:
+            yield from self.batches(columns)
+        elif any(isinstance(column.values, Stored) for column in columns):
+            for start in range(0, max(len(column.values) for column in columns), rows):
+                part = tuple(replace(column, values=column.values[start : start + rows]) for column in columns)
+                yield replace(self, columns=part, first=start)
+        else:
+            yield replace(self, columns=tuple(columns))
 
     def find(self, address: str | int, channel: str) -> Column:
         """The column called `address`: a name, `#k` or k (zero based), or `data[:,k]`.
@@ -91,7 +151,7 @@ class Table:
     def numbers(self, column: Column, channel: str) -> NDArray[np.float64]:
         """A column as float64, shape (n,), all finite; else ReadError with the first line that is not."""
         where = f"{channel} column {column.key!r}"
-        values = column.values
+        values = column.whole()
         if values.dtype.kind not in "iufb":
             raise ReadError(
                 f"{self.path}: {where} holds no real numbers (dtype {values.dtype}); name another column, or save its real part"
@@ -103,6 +163,7 @@ class Table:
                 f"{self.path}, {self.place(row)}: {where} "
                 f"{'is empty' if not text else f'holds {text!r}, not a number'}"
                 f"{_comma_hint(text)}; correct or remove that {'line' if self.lines is not None else 'value'}"
+                f"{'' if text else ', or, where channels have times of their own, put them on one axis with resample= [s]'}"
             )
         if bad is not None:
             raise ReadError(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import codecs
 import re
+from collections.abc import Sequence
 
 from gaident.errors import ReadError
 
-__all__ = ["Line", "lines_of"]
+__all__ = ["Line", "check_text", "encoding_of", "lines_of"]
 
 Line = tuple[int, str]
 """(line number counted from 1, text without its line end)."""
@@ -28,20 +29,41 @@ def lines_of(path: str, raw: bytes, encoding: str | None = None) -> list[str]:
     text = _decode(path, raw, encoding)
     # DOS programs close a text with one Ctrl-Z.
     text = text.rstrip("\x1a")
-    control = _CONTROL.search(text)
-    if control is not None:
-        line = text.count("\n", 0, control.start()) + 1
-        raise ReadError(
-            f"{path}, line {line}: this is no text file (it holds the byte {ord(control[0]):#04x}); read "
-            "is for text "
-            f"tables (.csv, .txt, .tsv), .mat and .npz: export the log as one of these, "
-            f"or give encoding= if it is text of another encoding"
-        )
+    check_text(path, [text])
     if not text.strip():
         raise ReadError(f"{path}: the file is empty; give a log with at least 20 samples")
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     return text.split("\n")
+
+
+def check_text(path: str, parts: Sequence[str], first: int = 1) -> None:
+    """Raises ReadError for what never stands in a text; `first`: number of the first part's first line."""
+    for above, text in enumerate(parts):
+        control = _CONTROL.search(text)
+        if control is not None:
+            line = first + above + text.count("\n", 0, control.start())
+            raise ReadError(
+                f"{path}, line {line}: this is no text file (it holds the byte {ord(control[0]):#04x}), nor any other log "
+                "that read knows by its content; export the log as CSV, "
+                "or give encoding= if it is text of another encoding"
+            )
+
+
+def encoding_of(head: bytes, given: str | None) -> str:
+    """The encoding of a text that begins so. Raises ReadError for a name that is none."""
+    if given is not None:
+        try:
+            return codecs.lookup(given).name
+        except LookupError:
+            raise ReadError(f"encoding={given!r} is not known to Python; give for example 'utf-8' or 'latin-1'") from None
+    guessed = _guess(head)
+    if guessed is None:
+        try:
+            head.decode("utf-8")
+        except UnicodeDecodeError:
+            return "latin-1" if any(byte in head for byte in b"\x81\x8d\x8f\x90\x9d") else "cp1252"
+    return guessed or "utf-8"
 
 
 def _decode(path: str, raw: bytes, encoding: str | None) -> str:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from gaident.data.table import Column, Table
 from gaident.errors import ReadError
 
-__all__ = ["check_given", "sample_time"]
+__all__ = ["TimeAxis", "stamp_unit", "time_column"]
 
 _JITTER = 0.01
 """Of one sample time: what a logger's clock may wander from sample to sample."""
@@ -24,49 +24,78 @@ _SINGLE_PRINTED = 6e-9
 """Relative error of a single-precision number printed with its nine digits."""
 
 
-def sample_time(table: Table, column: Column, second: float) -> float:
-    """dt [s] of a regular time column: (t(n-1) - t(0)) / (n - 1), every step being about the median.
+class TimeAxis:
+    """A time column as it comes in, block by block: refused where it is irregular, else its sample time.
 
-    column  of `table`; second: what one of its units is in s
     A step may deviate from the median by 1 % (the logger's clock) and by the rounding of the printed digits:
-    0.666666 ms is regular, and so is 0.667, 1.333, 2.000. Raises ReadError with line, jump and remedy.
+    0.666666 ms is regular, and so is 0.667, 1.333, 2.000.
     """
-    t = table.numbers(column, "time")
-    if t.size < 2:
-        raise ReadError(f"{table.path}: time column {column.key!r} has {t.size} value; give a longer log")
-    steps = np.diff(t)
-    median = float(np.median(steps))
-    if median <= 0.0:
-        if steps.min() == 0.0 and steps.max() > 0.0:
-            _too_coarse(table, column, float(steps[steps > 0.0].min()))
-        row = int(np.argmin(steps > 0.0)) + 1
-        raise ReadError(
-            f"{table.path}, {table.place(row)}: time column {column.key!r} does not increase "
-            f"({t[row - 1]:.12g}, then {t[row]:.12g}); sort the log, "
-            f"or give dt= and set columns={{'time': None}}"
-        )
-    deviation = np.abs(steps - median)
-    unequal = deviation > _JITTER * median
-    if unequal.any():
-        printed = _printed_step(t)
-        rounding = np.maximum(printed[1:], printed[:-1])
-        irregular = deviation > _JITTER * median + rounding * (1.0 + 1e-9)
-        if irregular.any():
-            _refuse(table, column, t, int(np.argmax(irregular)), median * second)
-        if rounding.max() > _COARSE * median:
-            # Where the digits suit the sample time, nearly all steps are equal and the few others are real.
-            if unequal.mean() < _FEW:
-                _refuse(table, column, t, int(np.argmax(unequal)), median * second)
-            _too_coarse(table, column, float(rounding.max()))
-    # The mean is free of the rounding that the median keeps; 12 digits drop the noise of the division.
-    mean = float(t[-1] - t[0]) / (t.size - 1) * second
-    return float(f"{mean:.12g}")
+
+    def __init__(self, column: Column, second: float, given: float | None = None, judged: bool = True) -> None:
+        """second: what one of the column's units is in s; given: the dt [s] that must agree, None if there is none.
+
+        judged: whether an irregular axis is refused, as it is where the column was named as the time.
+        """
+        self.column, self.second, self.given, self.judged = column, second, given, judged
+        self.count, self.start, self.last, self.step, self.rounding = 0, 0.0, 0.0, 0.0, 0.0
+
+    def push(self, table: Table, t: NDArray[np.float64]) -> None:
+        """The time stamps of the rows of `table`. Raises ReadError with line, jump and remedy."""
+        if t.size == 0:
+            return
+        shift = int(self.count > 0)
+        if self.count == 0:
+            self.start = float(t[0])
+        self.count += t.size
+        whole = np.concatenate([[self.last], t]) if shift else t
+        self.last = float(t[-1])
+        if whole.size < 2:
+            return
+        if self.given is not None:
+            _check_given(table, self.column, float(np.median(np.diff(whole))) * self.second, self.second, self.given)
+        if self.judged:
+            self._check(table, whole, shift)
+
+    def sample_time(self, table: Table) -> float:
+        """dt [s]: (t(n-1) - t(0)) / (n - 1)."""
+        if self.count < 2:
+            raise ReadError(f"{table.path}: time column {self.column.key!r} has {self.count} value; give a longer log")
+        # The mean is free of the rounding that the median keeps; 12 digits drop the noise of the division.
+        mean = (self.last - self.start) / (self.count - 1) * self.second
+        return float(f"{mean:.12g}")
+
+    def _check(self, table: Table, t: NDArray[np.float64], shift: int) -> None:
+        steps = np.diff(t)
+        median = float(np.median(steps))
+        if median <= 0.0:
+            if steps.min() == 0.0 and steps.max() > 0.0:
+                _too_coarse(table, self.column, float(steps[steps > 0.0].min()))
+            row = int(np.argmin(steps > 0.0)) + 1
+            raise ReadError(
+                f"{table.path}, {table.place(row - shift)}: time column {self.column.key!r} does not increase "
+                f"({t[row - 1]:.12g}, then {t[row]:.12g}); sort the log, "
+                f"or give dt= and set columns={{'time': None}}"
+            )
+        usual = self.step or median  # of the first block
+        deviation = np.abs(steps - usual)
+        unequal = deviation > _JITTER * usual
+        if unequal.any():
+            printed = _printed_step(t)
+            rounding = np.maximum(printed[1:], printed[:-1])
+            self.rounding = max(self.rounding, float(rounding.max()))
+            irregular = deviation > _JITTER * usual + np.maximum(rounding, abs(self.step and self.rounding)) * (1.0 + 1e-9)
+            if irregular.any():
+                _refuse(table, self.column, t, int(np.argmax(irregular)), usual * self.second, shift)
+            if rounding.max() > _COARSE * usual:
+                # Where the digits suit the sample time, nearly all steps are equal and the few others are real.
+                if unequal.mean() < _FEW:
+                    _refuse(table, self.column, t, int(np.argmax(unequal)), usual * self.second, shift)
+                _too_coarse(table, self.column, float(rounding.max()))
+        self.step = usual
 
 
-def check_given(table: Table, column: Column, second: float, dt: float) -> None:
-    """Raise ReadError where the dt that the user gave [s] and the time column differ by more than 1 %."""
-    t = table.numbers(column, "time")
-    found = float(np.median(np.diff(t))) * second if t.size > 1 else dt
+def _check_given(table: Table, column: Column, found: float, second: float, dt: float) -> None:
+    """Raise ReadError where the dt that the user gave [s] and the steps that were found [s] differ by more than 1 %."""
     if abs(found - dt) <= _CONTRADICTION * dt:
         return
     unit = next(
@@ -80,6 +109,45 @@ def check_given(table: Table, column: Column, second: float, dt: float) -> None:
     )
 
 
+# Stamps since 1970 name their unit by their size, and so do those of Windows since 1601: the years 1990 to 2100.
+_EPOCHS = ((6.3e8, 4.2e9, 1.0), (6.3e11, 4.2e12, 1e-3), (6.3e14, 4.2e15, 1e-6), (6.3e17, 4.2e18, 1e-9), (1.22e17, 1.58e17, 1e-7))
+
+
+def stamp_unit(first: float) -> float:
+    """What one unit of a time column without unit is in s, by its first value: of the date where it is one, else s."""
+    return next((size for low, high, size in _EPOCHS if low < first < high), 1.0)
+
+
+_TIME_NAMES = ("time", "t", "__time", "timestamp", "stamp", "header.stamp", "field.header.stamp", "header/stamp", "zeit", "index")
+
+
+def time_column(table: Table, strict: bool = True) -> Column | None:
+    """The column that is called as time is: in SI's language, ROS's or German. None if there is none.
+
+    Two that are called time are one too many: strict, a ReadError; else None.
+
+    ROS: `%time` and `field.header.stamp` of rostopic, `__time` of PlotJuggler, `/topic/header/stamp`.
+    """
+    for exact in ("time", "t", "Time", "TIME"):
+        try:
+            column = table.own(exact)
+        except ReadError:
+            if strict:
+                raise
+            return None
+        if column is not None:
+            return column
+    for name in _TIME_NAMES:
+        found = [c for c in table.columns if any(_bare(n) == name or _bare(n).endswith(f"/{name}") for n in (c.key, *c.names))]
+        if len(found) == 1:
+            return found[0]
+    return None
+
+
+def _bare(name: str) -> str:
+    return name.casefold().strip("%/ ")
+
+
 def _too_coarse(table: Table, column: Column, printed: float) -> None:
     raise ReadError(
         f"{table.path}: time column {column.key!r} is printed in steps of {printed:g}, too coarse to "
@@ -87,15 +155,14 @@ def _too_coarse(table: Table, column: Column, printed: float) -> None:
     )
 
 
-def _refuse(table: Table, column: Column, t: NDArray[np.float64], step: int, dt: float) -> None:
+def _refuse(table: Table, column: Column, t: NDArray[np.float64], step: int, dt: float, shift: int) -> None:
     raise ReadError(
-        f"{table.path}, {table.place(step + 1)}: time column {column.key!r} is irregular: from "
+        f"{table.path}, {table.place(step + 1 - shift)}: time column {column.key!r} is irregular: from "
         f"{t[step]:.12g} to "
         f"{t[step + 1]:.12g} it jumps by {t[step + 1] - t[step]:.6g}, elsewhere by "
         f"{float(np.median(np.diff(t))):.6g}; "
-        f"cut the log there or resample it; if the samples are in truth evenly spaced, give dt={dt:.6g} "
-        "and set "
-        f"columns={{'time': None}}"
+        f"cut the log there, or put it on an even axis with resample={dt:.6g}; if the samples are in truth evenly spaced, "
+        f"give dt={dt:.6g} and set columns={{'time': None}}"
     )
 
 
@@ -120,5 +187,8 @@ def _printed_step(t: NDArray[np.float64]) -> NDArray[np.float64]:
         single = padded.astype(np.float32)
     spacing = np.spacing(np.abs(single).max(axis=1)).astype(np.float64)
     exact = (np.abs(single - padded) <= _SINGLE_PRINTED * np.abs(padded)).all(axis=1)
+    # Stamps of a date look like it too, but differ by less than single precision could tell.
+    steps = np.abs(np.diff(padded, axis=1))
+    exact &= np.where(steps > 0.0, steps, np.inf).min(axis=1) >= 0.5 * spacing
     step = np.where(exact, np.maximum(step, spacing), step)
     return np.repeat(step, _BLOCK)[: t.size]

@@ -10,7 +10,7 @@ import numpy as np
 
 from gaident.errors import ReadError
 
-__all__ = ["QUANTITIES", "Constants", "factor", "is_any_unit", "is_unit", "known_units"]
+__all__ = ["QUANTITIES", "Constants", "factor", "is_any_unit", "is_unit", "known_units", "needed_constant"]
 
 _TURN = 2.0 * math.pi
 
@@ -179,6 +179,12 @@ def factor(quantity: str, unit: str | float, constants: Constants | None = None)
     if value is None:
         raise ReadError(f"units: {quantity} in {unit!r} needs a constant of the drive; give {name}=... {meaning}")
     return row.factor / value if row.divide else row.factor * value
+
+
+def needed_constant(quantity: str, unit: str) -> str | None:
+    """The constant of the drive that a value in this unit needs ("rated_torque" for %); None: none, or unknown."""
+    row = _UNITS[quantity].get(_spelling(unit))
+    return None if row is None or row.constant is None else row.constant[0]
 
 
 def _number(value: object) -> float | None:

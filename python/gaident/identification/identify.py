@@ -146,10 +146,13 @@ class _Work:
         total = trials * self.settings.generations
         usual = 4.0 * trials * self.settings.round  # species stop by themselves: the bar approaches its end
 
-        def report(done: int, best: float) -> None:
+        def report(done: int, best: float, species: int, leading: tuple[int, int]) -> None:
             assert progress is not None
             fraction = done / (done + usual) if self.settings.species else done / total
-            progress(min(1.0, fraction), f"generation {done}, best fitness {best:.4g}")
+            which = (
+                "" if species == 0 else f", {species} species" if leading[0] < 0 else f", species {leading} of {species} leads"
+            )
+            progress(min(1.0, fraction), f"generation {done}, best fitness {best:.4g}{which}")
 
         return self.searched.search(
             ranges=self.ranges,

@@ -1,0 +1,199 @@
+"""Two logs of one run, each with its own clock: where the second lies on the first's time axis, and how sure that is.
+
+    y(t') = g x(t) + c + e,   t = t0 + (1 + rho) t'
+
+x: a channel of the first log over its clock t; y: the same motion in the second over its clock t'; t0: offset, rho:
+difference of the clocks' rates, g and c: scale and zero of the second sensor. Coarsely by the cross-correlation over the
+lag for a range of rho, then by least squares in (t0, rho, g, c). The covariance is the sandwich (J'J)^-1 S (J'J)^-1 with
+the autocorrelation of e in S (Newey, West, "A simple, positive semi-definite, heteroskedasticity and autocorrelation
+consistent covariance matrix", Econometrica 55, 1987).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gaident.data.arrays import MINIMUM_SAMPLES, channel, positive_number
+from gaident.data.decimation import low_passed
+from gaident.data.lags import Fit, coarse_lags, refine
+from gaident.data.record import CHANNELS, Record
+from gaident.errors import RecordError
+
+__all__ = ["Alignment", "align"]
+
+_LEAST_CORRELATION = 0.5
+_SURE = 3.0  # standard deviations from which a difference of the rates is one
+_RIVAL = 10.0  # units of n ln J: what a second offset must be worse by
+_ORDER = ("velocity", "position", "command", "torque")
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """What align found. `t = offset + (1 + rate) t'` leads from the second log's clock to the first's.
+
+    record       the first record, cut to what both cover, with the channels taken over from the second
+    offset       t0 [s] with offset_std [s], its standard deviation
+    rate         rho [1] with rate_std [1]; rate is 0 where the logs show no difference of the clocks (rate_seen False)
+    gain         scale of the second log's channel against the first's (1 where both have the same unit)
+    correlation  between the two, aligned
+    uncertainty  [s] largest error of the time axis within the record, two standard deviations
+    """
+
+    record: Record
+    offset: float
+    offset_std: float
+    rate: float
+    rate_std: float
+    rate_seen: bool
+    gain: float
+    correlation: float
+    uncertainty: float
+
+    def summary(self) -> str:
+        """The same in words."""
+        rate = f"{self.rate * 1e6:+.1f} +- {self.rate_std * 1e6:.1f} ppm"
+        if not self.rate_seen:
+            rate = f"no difference seen (to +- {2e6 * self.rate_std:.3g} ppm)"
+        samples = self.uncertainty / self.record.dt
+        worst = "" if samples < 0.5 else "; too much for phase: log both with one clock where that matters"
+        return (
+            f"the second log begins {self.offset:.6g} +- {self.offset_std:.2g} s after the first (its clock's zero)\n"
+            f"rate of its clock: {rate}\n"
+            f"correlation {self.correlation:.4f}, scale {self.gain:.4g}\n"
+            f"time axis right to {self.uncertainty:.2g} s ({samples:.2g} samples){worst}\n"
+            f"{len(self.record)} samples in common"
+        )
+
+
+def align(
+    rec: Record,
+    other: Record | Mapping[str, ArrayLike],
+    dt: float | None = None,
+    *,
+    on: str | tuple[str, str] | None = None,
+    take: Sequence[str] | None = None,
+    within: tuple[float, float] | None = None,
+    max_rate: float = 1e-3,
+) -> Alignment:
+    """Brings the channels of a second log, which has a clock of its own, onto the first record's time axis.
+
+    rec      the record whose clock stays
+    other    a Record, or channel -> values of a log that makes none, with its sample time `dt` [s]
+    on       the channel in which both show the same motion, or (rec's, other's); None: the first that both have of
+             velocity, position, command, torque. Its unit and sign may differ: the scale is estimated too
+    take     channels of `other` that go into the result; None: those that rec lacks
+    within   (lowest, highest) offset [s] that is possible, where the motion repeats itself
+    max_rate largest difference of the clocks' rates to look for (quartz against quartz stays below 2e-4)
+
+    The channels taken over are low-passed where rec samples more slowly, then interpolated (monotone cubic). Raises
+    RecordError where the logs cannot tell: no motion, no resemblance, or two offsets that fit equally well.
+    """
+    theirs, their_dt = _channels(other, dt)
+    mine = dict(rec.channels())
+    first, second = _common(mine, theirs, on)
+    limit = positive_number(max_rate, "max_rate", "", "give for example 1e-3")
+    x, y = mine[first], theirs[second]
+    for values, whose, name in ((x, "rec", first), (y, "other", second)):
+        if np.ptp(values) == 0.0:
+            raise RecordError(f"{whose}'s {name} is constant: there is no motion to align by; give on= with another channel")
+    fit = _best(x, rec.dt, y, their_dt, within, limit, (first, second))
+    seen = abs(fit.rate) > _SURE * fit.std[1]
+    if not seen:
+        equal = refine(x, rec.dt, y, their_dt, fit.offset + fit.rate * fit.centre, 0.0, limit, free_rate=False)
+        fit = (equal or fit).with_rate_std(fit.std[1])
+    return _result(rec, theirs, their_dt, take, fit, seen)
+
+
+def _channels(other: object, dt: float | None) -> tuple[dict[str, NDArray[np.float64]], float]:
+    if isinstance(other, Record):
+        if dt is not None:
+            raise RecordError(f"dt={dt!r} is for channels without a Record; other is one, leave dt out")
+        return dict(other.channels()), other.dt
+    if not isinstance(other, Mapping):
+        raise RecordError(f"other={other!r:.60} is neither a Record nor a mapping of channels; give {{'velocity': ...}} with dt=")
+    if dt is None:
+        raise RecordError("other holds channels without a Record: give their sample time dt= [s] too")
+    unknown = next((name for name in other if name not in CHANNELS), None)
+    if unknown is not None:
+        raise RecordError(f"other: {unknown!r} is no channel; known are {', '.join(CHANNELS)}")
+    found = {str(name): channel(values, str(name)) for name, values in other.items()}
+    if len({len(values) for values in found.values()}) != 1:
+        listed = ", ".join(f"{name} {len(values)}" for name, values in found.items())
+        raise RecordError(f"other: give channels of equal length ({listed or 'none is given'})")
+    return found, positive_number(dt, "dt", "s", "give the sample time of other in seconds")
+
+
+def _common(mine: Mapping[str, object], theirs: Mapping[str, object], on: object) -> tuple[str, str]:
+    if on is None:
+        both = next((name for name in _ORDER if name in mine and name in theirs), None)
+        if both is None:
+            raise RecordError(
+                f"rec has {', '.join(mine)} and other {', '.join(theirs)}: they share no channel to be aligned by; "
+                "give on=(rec's, other's), two that show the same motion"
+            )
+        return both, both
+    pair = (on, on) if isinstance(on, str) else on
+    if not isinstance(pair, tuple) or len(pair) != 2 or pair[0] not in mine or pair[1] not in theirs:
+        raise RecordError(f"on={on!r}: give a channel of rec ({', '.join(mine)}) and one of other ({', '.join(theirs)})")
+    return str(pair[0]), str(pair[1])
+
+
+def _best(
+    x: NDArray[np.float64],
+    dt: float,
+    y: NDArray[np.float64],
+    their_dt: float,
+    within: tuple[float, float] | None,
+    max_rate: float,
+    names: tuple[str, str],
+) -> Fit:
+    """The fit of the best offset. Raises RecordError where none is, or where another one is as good."""
+    starts = coarse_lags(x, dt, y, their_dt, within, max_rate)
+    tried = [refine(x, dt, y, their_dt, offset, rate, 2.0 * max_rate) for offset, rate in starts]
+    fits = [fit for fit in tried if fit is not None and (within is None or within[0] <= fit.offset <= within[1])]
+    if not fits:
+        raise RecordError(f"within={within!r} leaves no offset at which the logs overlap; give a wider one")
+    best = min(fits, key=lambda fit: fit.variance)
+    what = names[0] if names[0] == names[1] else f"rec's {names[0]} and other's {names[1]}"
+    if best.correlation < _LEAST_CORRELATION:
+        raise RecordError(
+            f"the logs cannot be aligned by {what}: the best correlation is {best.correlation:.2f}; are they of the same run? "
+            "give on= with channels that show the same motion; where the logs last many minutes, cut both to a part first"
+        )
+    for fit in fits:
+        apart = abs(fit.offset - best.offset)
+        if apart > best.width and best.independent * np.log(fit.variance / best.variance) < _RIVAL:
+            raise RecordError(
+                f"the logs cannot be aligned by {what} alone: the motion repeats itself, and offsets of {best.offset:.6g} s and "
+                f"{fit.offset:.6g} s fit equally well; give within=(lowest, highest), or a run with one edge of its own"
+            )
+    return best
+
+
+def _result(
+    rec: Record, theirs: dict[str, NDArray[np.float64]], their_dt: float, take: Sequence[str] | None, fit: Fit, seen: bool
+) -> Alignment:
+    from scipy.interpolate import PchipInterpolator
+
+    mine = dict(rec.channels())
+    taken = [name for name in theirs if name not in mine] if take is None else list(take)
+    missing = next((name for name in taken if name not in theirs), None)
+    if missing is not None:
+        raise RecordError(f"take: other has no {missing!r}; it has {', '.join(theirs)}")
+    inner = (rec.time - fit.offset) / (1.0 + fit.rate)
+    end = (len(next(iter(theirs.values()))) - 1) * their_dt
+    common = np.flatnonzero((inner >= 0.0) & (inner <= end))
+    if common.size < MINIMUM_SAMPLES:
+        raise RecordError(f"the logs have {common.size} samples in common, but at least {MINIMUM_SAMPLES} are needed")
+    start, stop = int(common[0]), int(common[-1]) + 1
+    axis = their_dt * np.arange(len(next(iter(theirs.values()))))
+    ratio = rec.dt / (their_dt * (1.0 + fit.rate))
+    new = {name: PchipInterpolator(axis, low_passed(theirs[name], ratio))(inner[start:stop]) for name in taken}
+    record = Record(rec.dt, name=rec.name, **{**{name: values[start:stop] for name, values in mine.items()}, **new})
+    far = max(abs(inner[start] - fit.centre), abs(inner[stop - 1] - fit.centre))
+    uncertainty = 2.0 * float(np.hypot(fit.centre_std, far * fit.std[1]))
+    return Alignment(record, fit.offset, fit.std[0], fit.rate, fit.std[1], seen, fit.gain, fit.correlation, uncertainty)

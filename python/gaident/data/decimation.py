@@ -1,0 +1,109 @@
+"""Fewer samples without folding: a linear-phase low-pass whose delay is taken out, sample by sample as a log comes in."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.errors import RecordError
+
+__all__ = ["Decimator", "decimated", "factor_of", "low_passed"]
+
+_HALF = 25
+"""Taps on each side, in samples of the decimated signal."""
+
+_KAISER = 8.0
+"""beta: what leaks is 72 dB down."""
+
+_CORNER = 0.9
+"""-6 dB, of the new Nyquist frequency; with these taps the band passes up to 0.8 and is stopped from 1.0 on."""
+
+
+def factor_of(value: object, argument: str = "decimate", form: str = "={!r}") -> int:
+    """`value` as a whole number from 1. Raises RecordError, which shows argument and value in this form."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= 100_000:
+        raise RecordError(f"{argument}{form.format(value)}: give a whole number from 1 to 100000, of samples that become one")
+    return int(value)
+
+
+class Decimator:
+    """Every `factor`-th sample of the low-passed signal.
+
+        y(k) = sum_j h(j) x(k M - j),   j = -L..L,   M = factor, L = 25 M
+        h(j) = sinc(0.9 j / M) kaiser(j; beta = 8), normalised to a sum of 1
+
+    Linear phase, and as the sum runs from -L to L its delay of L samples is compensated: y(k) belongs to the time of
+    x(k M), and all channels keep their phase against each other. Up to 80 % of the new Nyquist frequency 1/(2 M dt)
+    a signal passes to within 0.03 %, from that frequency on it is damped by 72 dB and more. At both ends the signal is
+    continued by its reflection about its end point. What comes out does not depend on how the samples are divided
+    between calls of `push`. It is symmetric: an edge shows a little before it comes, by less than 25 new samples.
+    """
+
+    def __init__(self, factor: int) -> None:
+        self.factor = factor_of(factor)
+        self.half = _HALF * self.factor if self.factor > 1 else 0
+        self.taps = _taps(self.half, self.factor)
+        # Samples not yet done with; the first stands `half` before the next y, once the start was continued.
+        self.kept = np.zeros(0)
+        self.begun = self.half == 0
+        self.out: list[NDArray[np.float64]] = []
+
+    def push(self, x: NDArray[np.float64]) -> None:
+        """The next samples, any number of them."""
+        if self.half == 0:
+            self.out.append(x)
+            return
+        self.kept = np.concatenate([self.kept, x])
+        if not self.begun and self.kept.size > self.half:
+            self.kept = np.concatenate([_reflected(self.kept, self.half), self.kept])
+            self.begun = True
+        if self.begun:
+            self._give(self.kept)
+
+    def finish(self) -> NDArray[np.float64]:
+        """All samples y, shape (ceil(n / factor),)."""
+        if self.half and self.kept.size:
+            if not self.begun:
+                self.kept = np.pad(self.kept, (self.half, 0), "reflect", reflect_type="odd")
+            self._give(np.pad(self.kept, (0, self.half), "reflect", reflect_type="odd"))
+        return np.concatenate(self.out) if self.out else np.zeros(0)
+
+    def _give(self, x: NDArray[np.float64]) -> None:
+        count = (x.size - 2 * self.half - 1) // self.factor + 1
+        if count < 1:
+            return
+        from scipy.signal import upfirdn
+
+        # The first y stands at 2 L = 50 M of the whole convolution.
+        y = upfirdn(self.taps, x[: (count - 1) * self.factor + 2 * self.half + 1], 1, self.factor)
+        self.out.append(np.ascontiguousarray(y[2 * _HALF : 2 * _HALF + count]))
+        self.kept = x[count * self.factor :]
+
+
+def _taps(half: int, ratio: float) -> NDArray[np.float64]:
+    j = np.arange(-half, half + 1)
+    taps = np.sinc(_CORNER * j / ratio) * np.kaiser(2 * half + 1, _KAISER)
+    return np.asarray(taps / taps.sum())
+
+
+def low_passed(x: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:
+    """x behind the same low-pass, not decimated, for a sample rate `ratio` times as slow; x itself up to 1.05."""
+    if ratio <= 1.05:
+        return x
+    from scipy.signal import oaconvolve
+
+    half = int(np.ceil(_HALF * ratio))
+    return np.asarray(oaconvolve(np.pad(x, half, "reflect", reflect_type="odd"), _taps(half, ratio), "valid"))
+
+
+def decimated(x: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
+    """All of x at once, see Decimator."""
+    decimator = Decimator(factor)
+    decimator.push(x)
+    return decimator.finish()
+
+
+def _reflected(x: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """`count` samples before x, reflected about its first."""
+    y: NDArray[np.float64] = 2.0 * x[0] - x[count:0:-1]
+    return y

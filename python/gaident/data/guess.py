@@ -1,0 +1,180 @@
+"""Which column of a log is which channel, as far as names, units and the values themselves tell."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.listing import ColumnInfo, Listing
+from gaident.data.record import CHANNELS
+from gaident.data.units import Constants, factor
+from gaident.errors import ReadError
+
+__all__ = ["Guess", "guess_channels", "position_and_velocity", "unit_from_position", "unit_from_velocity"]
+
+# Words in the names of drive logs, English and German; a name is cut at capitals, digits and signs.
+_COMMAND = {
+    "r",
+    "ref",
+    "reference",
+    "cmd",
+    "command",
+    "soll",
+    "sollwert",
+    "set",
+    "setpoint",
+    "sp",
+    "target",
+    "desired",
+    "demand",
+    "des",
+}
+_MEASURED = {"act", "actual", "ist", "istwert", "meas", "measured", "fb", "feedback", "real", "motor", "servo"}
+_WORDS: dict[str, dict[str, int]] = {
+    "velocity": {
+        **dict.fromkeys(("velocity", "vel", "speed", "spd", "omega", "drehzahl", "geschwindigkeit", "rpm"), 4),
+        **dict.fromkeys(("w", "wm", "n", "v", "dq", "qd"), 2),
+    },
+    "torque": {
+        **dict.fromkeys(("torque", "trq", "moment", "drehmoment", "tau", "force", "kraft", "effort"), 4),
+        **dict.fromkeys(("current", "strom", "iq", "thrust"), 3),
+        **dict.fromkeys(("u", "m", "i"), 2),
+    },
+    "position": {
+        **dict.fromkeys(("position", "pos", "angle", "theta", "phi", "lage", "winkel", "encoder"), 4),
+        **dict.fromkeys(("q", "qm", "enc", "weg", "x"), 2),
+    },
+}
+_NEVER = {
+    *("error", "err", "deviation", "droop", "following", "limit", "max", "min", "load", "ratio", "temp", "temperature", "status"),
+    *("state", "seq", "id", "acc", "acceleration", "jerk", "counter", "digital", "selected", "power"),
+}
+_LEAST = 2
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Channel -> column, with why; what the file says of its unit stands in the column."""
+
+    channels: Mapping[str, ColumnInfo]
+    reasons: Mapping[str, str]
+    time: ColumnInfo | None
+
+
+def guess_channels(listing: Listing) -> Guess:
+    """The most likely column of each channel; one that nothing speaks for is left out."""
+    usable = [c for c in listing.columns if c.samples > 1 and c.lowest is not None and c.lowest != c.highest and not c.is_time]
+    longest = max((c.samples for c in usable), default=0)
+    usable = [c for c in usable if c.samples == longest or c.sample_time is not None]
+    scored: dict[str, list[tuple[int, ColumnInfo, str]]] = {channel: [] for channel in CHANNELS}
+    for column in usable:
+        for channel in CHANNELS:
+            score, reason = _score(column, channel)
+            if score >= _LEAST:
+                scored[channel].append((score, column, reason))
+    channels: dict[str, ColumnInfo] = {}
+    reasons: dict[str, str] = {}
+    for channel in ("velocity", "command", "torque", "position"):
+        free = [row for row in scored[channel] if row[1].name not in {c.name for c in channels.values()}]
+        if free:
+            _, channels[channel], reasons[channel] = max(free, key=lambda row: row[0])
+    order = {channel: channels[channel] for channel in CHANNELS if channel in channels}
+    return Guess(order, reasons, _time(listing, longest))
+
+
+def _time(listing: Listing, longest: int) -> ColumnInfo | None:
+    """The column that is called as time is; else one that rises evenly, if there is only one."""
+    named = [c for c in listing.columns if c.is_time]
+    if named:
+        return named[0]
+    even = [c for c in listing.columns if c.rises_evenly and c.samples == longest and c.lowest is not None]
+    return even[0] if len(even) == 1 else None
+
+
+def _words(name: str) -> list[str]:
+    spaced = re.sub(r"([a-z])([A-Z])", r"\1 \2", re.sub(r"[\[(<{].*", "", name))
+    return [word.casefold() for word in re.findall(r"[^\W\d_]+", spaced)]
+
+
+def _score(column: ColumnInfo, channel: str) -> tuple[int, str]:
+    """How much speaks for it: words of the name, the unit."""
+    quantity = "velocity" if channel == "command" else channel
+    words = [word for name in (column.name, *column.names) for word in _words(name)]
+    if _NEVER & set(words):
+        return 0, ""
+    by_name = max((_WORDS[quantity].get(word, 0) for word in words), default=0)
+    fits = _is_unit_of(column.unit, quantity)
+    if column.unit is not None and not fits and not (quantity == "torque" and column.unit == "%"):
+        return 0, ""
+    commanded, measured = bool(_COMMAND & set(words)), bool(_MEASURED & set(words))
+    score = by_name + (3 if fits else 0)
+    if channel == "command":
+        score = score + 3 if commanded else 0
+    elif channel in ("velocity", "position"):
+        score += -4 if commanded else 1 if measured else 0
+    else:
+        score += 1 if commanded else 0  # what the controller issued rather than what was measured
+    why = [f"its name says {quantity}" if by_name else "", f"its unit is one of {quantity}" if fits else ""]
+    if channel == "command" and commanded:
+        why.append("its name says that it is a command")
+    return score, ", ".join(filter(None, why))
+
+
+def _is_unit_of(unit: str | None, quantity: str) -> bool:
+    if unit is None:
+        return False
+    try:
+        factor(quantity, unit, Constants(1.0, 1.0, 1.0, 1.0))
+    except ReadError:
+        return False
+    # V and 1 stand for many things.
+    return unit.strip().casefold() not in ("v", "mv", "m", "1", "-") or quantity == "position"
+
+
+_VELOCITY_UNITS = ("rad/s", "rpm", "deg/s", "rps", "m/s", "mm/s", "m/min", "mm/min")
+_ALIKE = 0.9
+_SURELY = 0.98
+
+
+def slope_between(position: NDArray[np.float64], velocity: NDArray[np.float64], dt: float) -> tuple[float, float]:
+    """(k, correlation) of d position/dt = k velocity + c; (0, 0) where one of them rests."""
+    rate, own = np.gradient(position, dt)[1:-1], velocity[1:-1]
+    rate, own = rate - rate.mean(), own - own.mean()
+    power, other = float(own @ own), float(rate @ rate)
+    if power == 0.0 or other == 0.0:
+        return 0.0, 0.0
+    both = float(rate @ own)
+    return both / power, both / float(np.sqrt(power * other))
+
+
+def unit_from_position(velocity: NDArray[np.float64], position: NDArray[np.float64], dt: float, linear: bool) -> str | None:
+    """The unit of a velocity, from the slope of a position in SI; None where none fits to within 2 %."""
+    size, correlation = slope_between(position, velocity, dt)
+    if correlation < _ALIKE:
+        return None
+    for unit in _VELOCITY_UNITS:
+        if unit.startswith("m") == linear and abs(size / factor("velocity", unit) - 1.0) < 0.02:
+            return unit
+    return None
+
+
+def unit_from_velocity(command: NDArray[np.float64], velocity: NDArray[np.float64], linear: bool) -> str | None:
+    """The unit of a velocity command, from a velocity in SI that follows it; None where it does not to within 25 %."""
+    power = float(command @ command)
+    size = float(command @ velocity) / power if power > 0.0 else 0.0
+    if size <= 0.0 or float(command @ velocity) < _ALIKE * np.sqrt(power * float(velocity @ velocity)):
+        return None
+    for unit in _VELOCITY_UNITS:
+        if unit.startswith("m") == linear and abs(np.log(size / factor("velocity", unit))) < np.log(1.25):
+            return unit
+    return None
+
+
+def position_and_velocity(values: Mapping[str, NDArray[np.float64]], dt: float) -> tuple[str, str] | None:
+    """The two columns of which one is the derivative of the other, beyond doubt; None where no pair or several are."""
+    found = [(a, b) for a in values for b in values if a != b and abs(slope_between(values[a], values[b], dt)[1]) > _SURELY]
+    return found[0] if len(found) == 1 else None

@@ -1,0 +1,180 @@
+"""What a log holds, for the person who has to name its columns: names, units, ranges, sample times."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.delimited import TextOptions
+from gaident.data.readers import open_log
+from gaident.data.table import Column, Table
+from gaident.data.timeaxis import TimeAxis, stamp_unit, time_column
+from gaident.data.units import factor
+from gaident.errors import ReadError
+
+__all__ = ["ColumnInfo", "Listing", "columns", "printable"]
+
+
+@dataclass(frozen=True)
+class ColumnInfo:
+    """One column of a log.
+
+    name         what the file calls it, as the `columns` of read take it; names: other names it answers to
+    unit         as the file says, None if it does not
+    samples      number of values; lowest, highest: their range in the file's unit, None where there is no number
+    sample_time  [s], None where nothing tells it or the time stamps are irregular
+    is_time      whether it is taken for the time of the others; rises_evenly: whether it could be
+    note         what stands in the way of its use, "" if nothing does
+    """
+
+    name: str
+    names: tuple[str, ...]
+    unit: str | None
+    samples: int
+    lowest: float | None
+    highest: float | None
+    sample_time: float | None
+    is_time: bool
+    rises_evenly: bool
+    note: str
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A log's format and columns; `str()` is a table of them. others: what it holds besides, no columns of numbers."""
+
+    path: str
+    form: str
+    columns: tuple[ColumnInfo, ...]
+    others: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {"schema": "gaident/columns", "schema_version": 1, **asdict(self)}
+
+    def __str__(self) -> str:
+        timed = any(c.is_time for c in self.columns)
+        rows = [("column", "unit", "samples", "lowest", "highest", "dt [ms]", "")]
+        for c in self.columns:
+            step = "" if c.sample_time is None else f"{1e3 * c.sample_time:.6g}"
+            remark = "rises evenly: a time?" if c.rises_evenly and not timed else ""
+            remark = "; ".join(filter(None, ["time" if c.is_time else "", c.note, remark]))
+            rows.append(
+                (printable(c.name), printable(c.unit or "-"), str(c.samples), _number(c.lowest), _number(c.highest), step, remark)
+            )
+        widths = [max(len(row[k]) for row in rows) for k in range(6)]
+        lines = [f"{self.path}: {self.form}"]
+        for row in rows:
+            cells = [cell.ljust(w) if k < 2 else cell.rjust(w) for k, (cell, w) in enumerate(zip(row[:6], widths, strict=True))]
+            lines.append("  ".join([*cells, row[6]]).rstrip())
+        if self.others:
+            lines.append(f"besides, no columns of numbers: {', '.join(self.others)}")
+        return "\n".join(lines)
+
+
+def printable(text: str) -> str:
+    """The text for a terminal: tabs, line ends and control characters of a name as escapes."""
+    return text if text.isprintable() else repr(text)[1:-1]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.6g}"
+
+
+def columns(
+    path: str | os.PathLike[str] | Any,
+    *,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+    skip: int | None = None,
+    encoding: str | None = None,
+) -> Listing:
+    """Names, units, ranges and sample times of what a log (or DataFrame) holds; options and errors as of read.
+
+    The values pass through block by block, none is kept.
+    """
+    with open_log(path, TextOptions(delimiter, decimal, skip, encoding)) as table:
+        real = [column for column in table.columns if column.values.dtype.kind in "iufb"]
+        clocks = {column.clock for column in real if column.clock is not None}
+        main = time_column(table, strict=False) if not clocks else None
+        gathered = {
+            column.key: _Gathered(column, column.key in clocks or (main is not None and column.key == main.key))
+            for column in real
+        }
+        groups: Sequence[Sequence[Column]] = [real] if table.batches is not None else [[column] for column in real]
+        for group in groups:
+            for block in table.blocks(group):
+                for column in block.columns:
+                    gathered[column.key].push(block, column)
+        found = []
+        for column in real:
+            own = gathered[column.key]
+            clock = own if own.axis is not None else gathered.get(column.clock or (main.key if main is not None else ""))
+            found.append(own.info(table, clock))
+        return Listing(table.path, table.form, tuple(found), table.others)
+
+
+class _Gathered:
+    """A column's range, and its time axis where it is one, as its blocks pass."""
+
+    def __init__(self, column: Column, is_time: bool) -> None:
+        self.column, self.is_time = column, is_time
+        self.samples, self.lowest, self.highest, self.bad = 0, np.inf, -np.inf, ""
+        self.axis: TimeAxis | None = None
+        self.irregular = ""
+        self.even, self.first, self.rise = True, 0.0, 0.0  # as far as seen: rises by the same from value to value
+
+    def push(self, block: Table, column: Column) -> None:
+        values = column.whole().astype(np.float64, copy=False)
+        finite = values[np.isfinite(values)]
+        self._look_for_time(values)
+        self.samples += len(values)
+        if finite.size:
+            self.lowest, self.highest = min(self.lowest, float(finite.min())), max(self.highest, float(finite.max()))
+        if not self.bad and finite.size < len(values):
+            row = int(np.argmin(np.isfinite(values)))
+            text = column.bad[1] if column.bad is not None else str(values[row])
+            self.bad = f"{'empty' if not text else f'no number: {text[:20]!r}'} at {block.place(row)}"
+        if self.is_time and not self.irregular:
+            self._pass_time(block, values)
+
+    def _look_for_time(self, values: NDArray[np.float64]) -> None:
+        if not self.even or len(values) < 2:
+            return
+        if self.samples == 0:
+            self.first, self.rise = float(values[0]), float(values[-1] - values[0]) / (len(values) - 1)
+        expected = self.first + self.rise * (self.samples + np.arange(len(values)))
+        self.even = self.rise > 0.0 and bool(np.all(np.abs(values - expected) <= 0.02 * self.rise))
+
+    def _pass_time(self, block: Table, values: NDArray[np.float64]) -> None:
+        try:
+            if self.axis is None:
+                unit = self.column.unit
+                self.axis = TimeAxis(self.column, factor("time", unit) if unit else stamp_unit(float(values[0])))
+            self.axis.push(block, block.numbers(next(c for c in block.columns if c.key == self.column.key), "time"))
+        except (ReadError, IndexError) as error:
+            self.irregular = str(error).split(": ", 1)[-1].split(";")[0]
+
+    def step(self, table: Table) -> float | None:
+        """The sample time of this time column [s]; None where it is irregular."""
+        if self.axis is None or self.irregular or self.samples < 2:
+            return None
+        return self.axis.sample_time(table)
+
+    def info(self, table: Table, clock: _Gathered | None) -> ColumnInfo:
+        column = self.column
+        step = clock.step(table) if clock is not None and clock.is_time and clock.samples == self.samples else None
+        notes = [self.bad, self.irregular if self.irregular and not self.bad else ""]
+        if self.samples and self.lowest == self.highest and not self.bad:
+            notes.append("one number" if self.samples == 1 else "constant")
+        held = np.isfinite(self.lowest)
+        return ColumnInfo(
+            column.key, column.names, column.unit, self.samples, self.lowest if held else None, self.highest if held else None,
+            column.period if step is None and column.clock is None else step, self.is_time,
+            self.even and self.samples > 2, ", ".join(filter(None, notes)),
+        )  # fmt: skip

@@ -1,0 +1,53 @@
+"""A Record as a notebook shows it: a short table with a small picture of each channel. Pure function of the record."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from gaident.data.record import Record
+
+__all__ = ["record_html", "sparkline"]
+
+_WIDTH, _HEIGHT = 240, 28
+_CELL = 'style="text-align:right"'
+
+
+def record_html(rec: Record) -> str:
+    """name, samples, dt, duration, and per channel range, mean and course; no script, everything escaped."""
+    name = f"<b>{escape(rec.name)}</b> " if rec.name else ""
+    head = f"<div>{name}Record, {len(rec)} samples, dt {rec.dt:.6g} s, {rec.duration:.4g} s</div>"
+    rows = "".join(
+        f"<tr><td>{key}</td>"
+        + "".join(f"<td {_CELL}>{value + 0.0:.4g}</td>" for value in (values.min(), values.max(), values.mean()))
+        + f"<td>{sparkline(values)}</td></tr>"
+        for key, values in rec.channels()
+    )
+    titles = "".join(f"<th {_CELL}>{title}</th>" for title in ("lowest", "highest", "mean"))
+    return f"{head}<table><thead><tr><th></th>{titles}<th></th></tr></thead><tbody>{rows}</tbody></table>"
+
+
+def sparkline(values: NDArray[np.float64]) -> str:
+    """An inline SVG of the course: lowest and highest of each column of pixels, so that no peak is lost."""
+    columns = min(_WIDTH, len(values))
+    edges = np.linspace(0, len(values), columns + 1).astype(int)
+    low = np.minimum.reduceat(values, edges[:-1])
+    high = np.maximum.reduceat(values, edges[:-1])
+    bottom, top = float(low.min()), float(high.max())
+    # Halved, for a range as wide as float64 itself.
+    spread = 0.5 * top - 0.5 * bottom or 1.0
+
+    def height(v: NDArray[np.float64]) -> NDArray[np.float64]:
+        return 1.0 + (_HEIGHT - 2.0) * (1.0 - (0.5 * v - 0.5 * bottom) / spread)
+
+    x = np.arange(columns) * (_WIDTH / max(1, columns - 1))
+    upper = [f"{a:.1f},{b:.1f}" for a, b in zip(x, height(high), strict=True)]
+    lower = [f"{a:.1f},{b:.1f}" for a, b in zip(x[::-1], height(low)[::-1], strict=True)]
+    return (
+        f'<svg width="{_WIDTH}" height="{_HEIGHT}" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="course over time">'
+        f'<polygon points="{" ".join(upper + lower)}" fill="currentColor" stroke="currentColor" stroke-width="1"/></svg>'
+    )

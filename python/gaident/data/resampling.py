@@ -1,0 +1,48 @@
+"""Channels with time stamps of their own, irregular or of several rates, on one even time axis: only where asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.errors import ReadError
+
+__all__ = ["resampled"]
+
+_COARSER = 1.5
+
+
+def resampled(
+    path: str, channels: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]], dt: float
+) -> dict[str, NDArray[np.float64]]:
+    """Each channel by linear interpolation at t0 + n dt, t0 to t1 being what all channels cover.
+
+    channels  name -> (time stamps [s], values), shape (n,) each, not ordered by need; stamps without a value (NaN) are
+              left out
+    dt        sample time of the result [s]; at most 1.5 times what the channels have, or high frequencies would fold
+
+    Linear interpolation is a low-pass of its own (-0.9 dB at a quarter of the log's sample rate, no delay). Raises
+    ReadError.
+    """
+    held = {}
+    for name, (time, values) in channels.items():
+        there = np.isfinite(time) & np.isfinite(values)
+        t, x = time[there], values[there]
+        back = np.flatnonzero(np.diff(t) <= 0.0)
+        if t.size < 2 or back.size:
+            where = "has fewer than two values" if t.size < 2 else f"does not increase at {t[back[0]]:.12g} s"
+            raise ReadError(f"{path}: the time of {name} {where}; sort the log or remove stamps that stand twice")
+        median = float(np.median(np.diff(t)))
+        if dt > _COARSER * median:
+            raise ReadError(
+                f"{path}: resample={dt:g} s is coarser than the log, whose {name} has steps of {median:g} s, and would fold high "
+                f"frequencies down; give resample={median:.4g} and decimate={max(2, round(dt / median))}"
+            )
+        held[name] = (t, x)
+    start, stop = max(t[0] for t, _ in held.values()), min(t[-1] for t, _ in held.values())
+    if stop <= start:
+        raise ReadError(f"{path}: the channels were not logged at the same time; name columns of one run")
+    axis = start + dt * np.arange(int(np.floor((stop - start) / dt + 1e-6)) + 1)
+    return {name: np.interp(axis, t, x) for name, (t, x) in held.items()}

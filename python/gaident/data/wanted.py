@@ -1,0 +1,89 @@
+"""What the user asked of read, and the factor to SI that follows from it."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from gaident.data.arrays import positive_number
+from gaident.data.decimation import factor_of
+from gaident.data.record import CHANNELS
+from gaident.data.table import Column, Table
+from gaident.data.units import QUANTITIES, Constants, factor, is_any_unit
+from gaident.errors import ReadError
+
+__all__ = ["Wanted", "si_factor"]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the user asked of read; see there."""
+
+    columns: Mapping[str, str | int | None] | None
+    units: Mapping[str, str | float]
+    dt: float | None
+    name: str | None
+    constants: Constants
+    velocity_cutoff_hz: float | None
+    decimate: int = 1
+    resample: float | None = None
+    gear_ratio: float | None = None
+    load_side: tuple[str, ...] = ()
+
+    def check(self) -> Wanted:
+        """Itself, once what can be judged without the file is right; else ReadError or RecordError."""
+        for argument, value in (("columns", self.columns), ("units", self.units)):
+            if value is not None and not isinstance(value, Mapping):
+                raise ReadError(f"{argument}={value!r} is no mapping; give for example {argument}={{'velocity': ...}}")
+            _known(argument, value or ())
+        self.constants.check()
+        for quantity, unit in self.units.items():
+            factor(quantity, unit, self.constants)
+        if self.dt is not None:
+            positive_number(self.dt, "dt", "s", "give the sample time in seconds, for example dt=1e-3")
+        factor_of(self.decimate)
+        if self.resample is not None:
+            positive_number(self.resample, "resample", "s", "give the sample time of the even axis in seconds")
+            if self.dt is not None:
+                raise ReadError("dt and resample are both given; resample takes the log's time stamps, leave dt out")
+        self._check_gear()
+        if self.name is not None and not isinstance(self.name, str):
+            raise ReadError(f"name={self.name!r} is no text; give a str")
+        return self
+
+    def _check_gear(self) -> None:
+        for channel in self.load_side:
+            if channel not in CHANNELS:
+                raise ReadError(f"load_side: {channel!r} is no channel; known are {', '.join(CHANNELS)}")
+        if self.gear_ratio is not None:
+            positive_number(self.gear_ratio, "gear_ratio", "", "give the turns of the motor per turn of the load")
+        if bool(self.load_side) != (self.gear_ratio is not None):
+            raise ReadError(
+                f"gear_ratio={self.gear_ratio!r} with load_side={self.load_side!r}: give both or none, the turns of the "
+                "motor per turn of the load and the channels that were measured behind the gear"
+            )
+
+
+def si_factor(table: Table, wanted: Wanted, quantity: str, column: Column) -> float:
+    """Factor to SI: the user's unit before the file's."""
+    if quantity in wanted.units:
+        return factor(quantity, wanted.units[quantity], wanted.constants)
+    if column.unit is None:
+        return 1.0
+    try:
+        return factor(quantity, column.unit, wanted.constants)
+    except ReadError as error:
+        known = "" if is_any_unit(column.unit) else ", which is not known"
+        raise ReadError(
+            f"{table.path}: column {column.key!r} says its unit is {column.unit!r}{known}: {error}; "
+            f"or give units={{{quantity!r}: ...}}, which counts before the file's"
+        ) from None
+
+
+def _known(argument: str, keys: Iterable[object]) -> None:
+    for key in keys:
+        if key not in QUANTITIES:
+            near = difflib.get_close_matches(str(key), QUANTITIES, n=1)
+            guess = f" (did you mean {near[0]!r}?)" if near else ""
+            raise ReadError(f"{argument}: {key!r} is no channel{guess}; known are {', '.join(QUANTITIES)}")

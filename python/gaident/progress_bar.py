@@ -1,0 +1,118 @@
+"""How far long work has come: a line with bar, percentage, time left and what is being done, on a terminal or in a notebook."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import time
+from collections.abc import Callable
+from html import escape
+from types import TracebackType
+from typing import TextIO
+
+__all__ = ["Progress", "progress"]
+
+_QUIET = 0.3  # s of work before anything is drawn
+_FRACTION = 0.02  # of the work: before that no time left is told
+
+
+class Progress:
+    """Draws `(fraction, message)`; as a context it gives the function that takes them.
+
+    Nothing is drawn, and None is given instead of a function, where `stream` is neither a terminal nor a notebook.
+    NO_COLOR is respected. What was drawn is gone when the context ends.
+    """
+
+    def __init__(self, stream: TextIO | None) -> None:
+        self.stream = stream if stream is not None and (stream.isatty() or _in_notebook()) else None
+        self.began = time.monotonic()
+        self.bar: _TerminalBar | _NotebookBar | None = None
+
+    def __enter__(self) -> Callable[[float, str], None] | None:
+        return None if self.stream is None else self.show
+
+    def show(self, fraction: float, message: str) -> None:
+        """fraction of the work that is done, 0 to 1; message: generation, best fitness, species, or what else is under way."""
+        passed = time.monotonic() - self.began
+        if self.bar is None:
+            if passed < _QUIET:
+                return
+            self.bar = _NotebookBar() if _in_notebook() else _TerminalBar(self.stream)
+        done = min(max(fraction, 0.0), 1.0)
+        left = passed * (1.0 - done) / done if done > _FRACTION else None
+        self.bar.update(done, message, "" if left is None else f"about {_clock(left)} left")
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None) -> None:
+        if self.bar is not None:
+            self.bar.stop()
+            self.bar = None
+
+
+class _TerminalBar:
+    """A line drawn by rich."""
+
+    def __init__(self, stream: TextIO | None) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import Progress as Bar
+
+        texts = [TextColumn("{task.fields[left]}"), TextColumn("{task.fields[message]}", markup=False)]
+        times = [TaskProgressColumn(), TimeElapsedColumn()]
+        console = Console(file=stream, force_jupyter=False)
+        # The streams are left alone: what is printed beside the bar goes where it was meant to.
+        self.bar = Bar(
+            BarColumn(24), *times, *texts, console=console, transient=True, redirect_stdout=False, redirect_stderr=False
+        )
+        self.task = self.bar.add_task("", total=1.0, message="", left="")
+        self.bar.start()
+
+    def update(self, done: float, message: str, left: str) -> None:
+        self.bar.update(self.task, completed=done, message=message, left=left)
+
+    def stop(self) -> None:
+        self.bar.stop()
+
+
+class _NotebookBar:
+    """The same as HTML in the cell's output, ten times a second at most; needs no widgets."""
+
+    def __init__(self) -> None:
+        display = importlib.import_module("IPython.display")
+        self.html = display.HTML
+        self.handle = display.display(self.html(""), display_id=True)
+        self.last = 0.0
+
+    def update(self, done: float, message: str, left: str) -> None:
+        if time.monotonic() - self.last < 0.1:
+            return
+        self.last = time.monotonic()
+        text = escape("  ".join(filter(None, [f"{100.0 * done:.0f} %", left, message])))
+        self.handle.update(self.html(f'<progress max="1" value="{done:.4f}"></progress> {text}'))
+
+    def stop(self) -> None:
+        self.handle.update(self.html(""))
+
+
+def progress() -> Progress:
+    """For the `progress` of identify and diagnose, in a script or a notebook.
+
+        with ga.progress() as shown:
+            idn = ga.identify(rec, controller=ctl, progress=shown)
+
+    Draws on standard error; nothing in a pipe.
+    """
+    return Progress(sys.stderr)
+
+
+def _in_notebook() -> bool:
+    """Whether this runs in a notebook's kernel, as IPython says."""
+    shell = sys.modules.get("IPython")
+    if shell is None:
+        return False
+    instance = shell.get_ipython()
+    return instance is not None and type(instance).__name__ == "ZMQInteractiveShell"
+
+
+def _clock(seconds: float) -> str:
+    whole = max(1, round(seconds))
+    return f"{whole} s" if whole < 100 else f"{whole // 60}:{whole % 60:02d} min" if whole < 6000 else f"{whole / 3600:.1f} h"
