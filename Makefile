@@ -48,14 +48,14 @@ test: ## every test, C++ and Python, and ruff and mypy
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target SIDE_BY_SIDE=yes lint build-checked
 	@$(MAKE) --no-print-directory test-checked test-python
 
-lint: .venv/.tested
+lint: .venv/.requirements
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
 test-cpp: test-checked test-sanitized
 
-build-checked: .venv/.tested
+build-checked: .venv/.built
 	$(BIN)/cmake --build build/checked
 
 test-checked: build-checked
@@ -92,6 +92,9 @@ clean: ## remove everything that these commands made
 	rm -rf build docs/pictures .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find python tests bench -name __pycache__ -prune -exec rm -rf {} +
 
+# $(call listed,NAME): a list of pyproject.toml, a line each.
+listed = $(BIN)/python -c 'import ast, re; print(*ast.literal_eval(re.search(r"(?ms)^$(1) = (\[[^\n]*\]|\[.*?^\])", open("pyproject.toml").read())[1]), sep="\n")'
+
 # The environment, in steps. A stamp is renewed when what it was made from changes.
 .venv/.tools: pyproject.toml Makefile
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || { echo "gaident needs Python 3.10 or newer as '$(PYTHON)' (name another one: make PYTHON=python3.12 ...)" >&2; exit 1; }
@@ -99,7 +102,7 @@ clean: ## remove everything that these commands made
 	@$(PYTHON) -c 'import os, sysconfig; open(os.path.join(sysconfig.get_path("include"), "Python.h")).close()' 2>/dev/null || { echo "Python.h is missing; on Debian: apt install python3-dev" >&2; exit 1; }
 	@command -v $(firstword $(CXX)) >/dev/null || { echo "no C++ compiler '$(CXX)'; on Debian: apt install g++" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
-	@$(BIN)/python -c 'import ast, re; text = open("pyproject.toml").read(); print(*ast.literal_eval(re.search(r"(?ms)^requires = (\[.*?\])", text)[1]), sep="\n")' > .venv/build-requires.txt
+	@$(call listed,requires) > .venv/build-requires.txt
 	$(PIP_INSTALL) -r .venv/build-requires.txt cmake ninja
 	@touch $@
 
@@ -107,16 +110,25 @@ clean: ## remove everything that these commands made
 	$(PIP_INSTALL) $(PACKAGE) .
 	@touch $@
 
-.venv/.tested: .venv/.tools $(SOURCES)
-	$(PIP_INSTALL) $(CHECKED) ".[test]"
+# What the tests need, and the package built for them, apart: the first waits for the network, the second for the compiler.
+.venv/.requirements: .venv/.tools
+	@$(call listed,dependencies) > .venv/requires.txt && $(call listed,test) >> .venv/requires.txt
+	$(PIP_INSTALL) -r .venv/requires.txt
+	@touch $@
+
+.venv/.built: .venv/.tools $(SOURCES)
+	$(PIP_INSTALL) --no-deps $(CHECKED) .
+	@touch $@
+
+.venv/.tested: .venv/.requirements .venv/.built
 	@touch .venv/.installed $@
 
 .venv/.documented: .venv/.installed
-	@$(BIN)/python -c 'import ast, re; text = open("pyproject.toml").read(); print(*ast.literal_eval(re.search(r"(?ms)^docs = (\[.*?\])", text)[1]), sep="\n")' > .venv/docs-requires.txt
+	@$(call listed,docs) > .venv/docs-requires.txt
 	$(PIP_INSTALL) -r .venv/docs-requires.txt
 	@touch $@
 
 .venv/.tidied: .venv/.tools
-	@$(BIN)/python -c 'import ast, re; text = open("pyproject.toml").read(); print(*ast.literal_eval(re.search(r"(?ms)^tidy = (\[.*?\])", text)[1]), sep="\n")' > .venv/tidy-requires.txt
+	@$(call listed,tidy) > .venv/tidy-requires.txt
 	$(PIP_INSTALL) -r .venv/tidy-requires.txt
 	@touch $@
