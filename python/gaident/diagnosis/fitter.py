@@ -17,6 +17,10 @@ __all__ = ["OF_ANGLE", "Fitter"]
 
 Vector = NDArray[np.float64]
 
+FREE_RUN = (
+    2.0  # times the noise of the velocity that the free run of a right model may miss: a loop lets some torque noise through
+)
+
 OF_ANGLE = ("unbalance", "cogging", "velocity_ripple")
 
 
@@ -29,6 +33,14 @@ class Fitter:
     def only_noise(self, fit: Fit, slack: float = 1.1) -> bool:
         """Whether a fit leaves, whitened, no more than `slack` times the noise that the measured velocity itself shows."""
         return bool(np.sqrt(fit.cost / self.problem.count) < slack * self.driven.noise)
+
+    def runs_free(self, fit: Fit) -> bool:
+        """Whether the free run of the loop, too, misses the velocity by little more than its noise."""
+        if not self.driven.loopable:
+            return self.only_noise(fit)
+        looped = replace(fit.layout, looped=True)
+        cost = float(self.problem.costs(looped, fit.x[None, :], WHITE)[0])
+        return self.only_noise(fit) and bool(np.sqrt(cost / self.problem.count) < FREE_RUN * self.driven.noise)
 
     def in_loop(self, fit: Fit) -> Fit:
         """The better of both views: where the best candidate was judged in the loop, all have to be."""
