@@ -115,3 +115,14 @@ def test_nothing_is_named_where_nothing_is_hidden(kind: str, noise: str) -> None
 def test_two_effects_are_both_found(pair: tuple[str, str]) -> None:
     judged = diagnosed(pair)
     assert judged.in_set and not judged.wrong and len(judged.sets) == 2, judged
+
+
+def test_two_effects_that_pass_for_noise_together_are_both_found() -> None:
+    """A clamped integral adds up like a random torque: friction gains nothing before it is known, nor the clamp before friction."""
+    judged = diagnosed(("coulomb_friction", "integrator_clamp"), torque=False, seed=22000011)
+    assert judged.in_set and not judged.wrong and len(judged.sets) == 2, judged
+
+
+def test_the_angle_of_a_filtered_velocity_is_late_and_passes_for_no_other_effect() -> None:
+    judged = diagnosed(("cogging", "velocity_filter"), noise="encoder", torque=False, seed=22000000)
+    assert judged.in_set and not judged.wrong and len(judged.sets) == 2, judged

@@ -27,6 +27,7 @@ IMMATERIAL = 0.02
 MATERIAL = 0.01
 """BIC units per sample of a long record: less, half a per cent of the whitened rms error, is significant there and no cause."""
 
+ASTRAY = 1.5  # times the noise of the velocity: what a model may leave, whitened, before the free run is asked for a better one
 SWAP = 2.0  # BIC units by which a rival has to be better to take a finding's seat
 SEEN = 0.8  # of half the sampling frequency: how far up a coarse grid shows a resonance
 ROUNDS = 4  # of fits and filters, at most, until the final numbers stand
@@ -157,7 +158,7 @@ def _found(search: Search, scales: Scales, model: Model) -> tuple[Fit, Fit]:
         if search.fitter.runs_free(end):
             break
     base, end = min(ends, key=lambda e: e[1].bic)
-    if search.driven.loopable and not search.fitter.runs_free(end):
+    if search.driven.loopable and not search.fitter.runs_free(end, ASTRAY):
         other = search.freed(end, loop_starts(search, scales, model, bases))
         if other is not end:
             end = without_second_mass(search, other)

@@ -136,9 +136,14 @@ class Search:
                 best = self.fitter.in_loop(best)
             if found is None or best.bic - found.bic < self.threshold or not self.material(best, found):
                 break
-            best = self.fitter.polished(self.thinned(with_second_mass(self.problem, found)))
+            if set(best.effects) & set(FRICTION) and (inside := self.fitter.in_loop(best)) is not best:
+                # Driven by the torque, what nobody commanded adds up between the stops, for other effects to describe; the loop
+                # does not let it.
+                self.known.pop(self.key(best), None)
+                best = inside
+                continue
+            best = self.fitter.as_filter(self.fitter.polished(self.thinned(with_second_mass(self.problem, found))))
             if set(best.effects) & set(FRICTION) and not self.fitter.only_noise(best):
-                # Driven by the torque, what nobody commanded adds up between the stops; the loop does not let it.
                 best = self.fitter.in_loop(best)
         return best
 
@@ -202,10 +207,15 @@ class Search:
 
     def extensions(self, now: Fit) -> list[Fit]:
         """Settled fits of the promising extensions, best first; what was worked out once is remembered."""
-        key = (now.layout.masses, frozenset(now.effects))
+        key = self.key(now)
         if key not in self.known:
             self.known[key] = self.worked_out(now)
         return self.known[key]
+
+    @staticmethod
+    def key(fit: Fit) -> tuple[int, frozenset[str]]:
+        """Under which the extensions of a model are remembered."""
+        return fit.layout.masses, frozenset(fit.effects)
 
     def worked_out(self, now: Fit) -> list[Fit]:
         """The extensions of one model.
