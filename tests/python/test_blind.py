@@ -118,7 +118,7 @@ def test_two_effects_are_both_found(pair: tuple[str, str]) -> None:
 
 
 def test_two_effects_that_pass_for_noise_together_are_both_found() -> None:
-    """A clamped integral adds up like a random torque: friction gains nothing before it is known, nor the clamp before friction."""
+    """A clamped integral adds up like a random torque: friction gains nothing before it, nor it before friction."""
     judged = diagnosed(("coulomb_friction", "integrator_clamp"), torque=False, seed=22000011)
     assert judged.in_set and not judged.wrong and len(judged.sets) == 2, judged
 
