@@ -29,7 +29,7 @@ __all__ = ["by_free_run"]
 BEAM = 4  # models that are carried on
 FITTED = 6  # candidates beside each that get a short fit
 QUIET = 1.3  # times the noise of the measured velocity: nothing is left to explain
-TWIN = {"velocity_filter": "torque_lag"}  # one of them is enough
+TWIN = {"velocity_filter": "torque_lag"}  # one of the two is enough
 FALL = 0.1  # part of V beyond the noise that a step has to explain
 
 
@@ -41,7 +41,7 @@ def by_free_run(fitter: Fitter, starts: Sequence[Fit], candidates: Callable[[Lay
     while len(best.effects) < most and QUIET**2 * floor < best.cost < WORST:
         grown: dict[tuple[int, frozenset[str]], Fit] = {}
         for fit in (f for now in beam for f in _extensions(fitter, now, candidates(now.layout))):
-            key = (fit.layout.masses, frozenset(TWIN.get(e, e) for e in fit.effects))
+            key = (fit.layout.masses, frozenset(fit.effects))
             if key not in grown or fit.bic < grown[key].bic:
                 grown[key] = fit
         short = sorted(grown.values(), key=lambda f: f.bic)
@@ -74,7 +74,7 @@ def _finished(fitter: Fitter, fit: Fit) -> list[Fit]:
 def _extensions(fitter: Fitter, now: Fit, effects: Sequence[str]) -> list[Fit]:
     """Short fits with one effect more; of the friction family only the first, the others take its place later."""
     screening = Screening(fitter.problem, fitter.driven)
-    screening.add(now.layout, now.x, [e for e in effects if e not in FRICTION[1:]])
+    screening.add(now.layout, now.x, [e for e in effects if e not in FRICTION[1:] and TWIN.get(e) not in effects])
     fits = []
     for s in screening.ranked(WHITE)[:FITTED]:
         tries = [fitter.problem.fit(s.layout, x, WHITE, 4) for x in s.starts[:2]]
