@@ -91,7 +91,9 @@ def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float
         elif group == "sizes":
             for effect in [e for e in EFFECTS if e not in NOISE_EFFECTS]:
                 rng = np.random.default_rng([number, zlib.crc32(effect.encode())])
-                plant = str(rng.choice([p.name for p in nominal_plants() if p.two_masses or effect not in COUPLING]))
+                # One mass with an extra resonance is a drive of two masses: nothing would be hidden.
+                two = {*COUPLING, "extra_resonance"}
+                plant = str(rng.choice([p.name for p in nominal_plants() if p.two_masses or effect not in two]))
                 factor = 10 ** rng.uniform(-1, np.log10(4))
                 limit = (limits or {}).get((effect, plant))
                 if limit is not None and number % 2:

@@ -8,12 +8,17 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+import numpy as np
 import pytest
 
 import gaident as ga
 from blind_judge import CLASSES, DRIVERS, Judgement, judge
 from drive_cases import EFFECTS, random_case, records
 from drive_rig import OUTSIDE, library
+from gaident.diagnosis.candidates import CANDIDATES, Scales
+from gaident.diagnosis.driven import Driven
+from gaident.diagnosis.layout import Layout
+from gaident.models.simulate import simulate_values
 
 if not hasattr(ga, "diagnose"):
     pytest.skip("this gaident has no diagnose()", allow_module_level=True)
@@ -23,6 +28,7 @@ except RuntimeError as missing:
     pytest.skip(str(missing), allow_module_level=True)
 
 SEED = 20261121
+SCALES = Scales(1e-3, 1.0, 50.0, 1.0, 1e3, 10.0, 0.02, float("nan"), float("nan"), False, 1.0)
 
 
 @lru_cache
@@ -115,3 +121,26 @@ def test_nothing_is_named_where_nothing_is_hidden(kind: str, noise: str) -> None
 def test_two_effects_are_both_found(pair: tuple[str, str]) -> None:
     judged = diagnosed(pair)
     assert judged.in_set and not judged.wrong and len(judged.sets) == 2, judged
+
+
+def test_two_effects_of_which_none_is_a_first_step_are_both_found() -> None:
+    """Without the friction a lag passes for a delay; without the lag the friction passes for noise."""
+    judged = diagnosed(("coulomb_friction", "torque_lag"), noise="encoder", seed=21000001)
+    assert judged.in_set and not judged.wrong and len(judged.sets) == 2, judged
+
+
+def test_the_angle_behind_a_filter_and_a_ripple_of_the_sensor_is_taken_back() -> None:
+    """Driven by the logged torque, the true drive follows the log; at the angle that the sensor shows it misses by far."""
+    rec, _, controller, truth = random_case(SEED, ("cogging", "velocity_ripple"), noise="none", factor=2.0)
+    truth.effects["velocity_filter"] = {"time_constant": 2e-3}
+    rec, _ = records(truth)
+    plant, driven = truth.plant, Driven.of([rec], controller)
+    assert not plant.two_masses
+    layout = Layout.of(ga.OneMass(plant.J, plant.D).model(), SCALES, [False])
+    x = layout.base_vector(ga.OneMass(plant.J, plant.D).model())
+    for effect, values in truth.effects.items():
+        x = layout.inserted(x, CANDIDATES[effect].coordinates(values))
+        layout = layout.extended(effect)
+    missed = np.std(rec.velocity - driven.predict(layout, x[None, :])[0])
+    with_sensor = simulate_values(layout.structure, *layout.values(x[None, :]), driven.driven[0])
+    assert missed < 0.1 * np.std(rec.velocity - with_sensor), (missed, np.std(rec.velocity - with_sensor))

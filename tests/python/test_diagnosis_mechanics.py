@@ -8,7 +8,7 @@ import pytest
 
 import gaident as ga
 from gaident.diagnosis.candidates import Scales
-from gaident.diagnosis.layout import Layout
+from gaident.diagnosis.layout import Layout, evenly_damped
 from gaident.diagnosis.mechanics import MECHANICS, moved
 from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import Fit
@@ -46,3 +46,14 @@ def test_one_mass_and_pairs_that_do_not_swing() -> None:
     found = moved(fit(overdamped), fit(overdamped))
     assert list(found) == ["inertia", "viscous_friction"]
     assert found["viscous_friction"][1] == pytest.approx(4.0 * 100.0 * 3000.0 / (2000.0 * 90.0 * 2000.0))
+
+
+def test_even_damping_leaves_a_drive_of_even_bearings_alone_and_mends_one_that_is_driven() -> None:
+    """D_M/J_M = D_L/J_L = a: f1 = a + (e1 - a) f0/e0 is what the shaft's damping makes of the zeros."""
+    model = ga.TwoMass(JM=2e-4, DM=1e-3, JL=3e-4, DL=1.5e-3, KG=60.0, DG=2e-3).model()
+    layout = Layout.of(model, SCALES, [False])
+    x = layout.base_vector(model)
+    assert evenly_damped(layout, x) == pytest.approx(x, rel=1e-4)
+    spoiled = x.copy()
+    spoiled[4] *= 3.0
+    assert evenly_damped(layout, spoiled) == pytest.approx(x, rel=1e-4)

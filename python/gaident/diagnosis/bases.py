@@ -6,6 +6,7 @@ diagnosis starts from the mechanism, so that they can be told by name.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,14 +14,14 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.candidates import CANDIDATES, FRICTION, Scales
 from gaident.diagnosis.driven import Driven
-from gaident.diagnosis.layout import Layout, described, is_mechanism, two_masses
+from gaident.diagnosis.layout import Layout, described, is_mechanism, swings, two_masses
 from gaident.diagnosis.noise_filter import WHITE, ShaftNoise
 from gaident.diagnosis.problem import WORST, Fit, Problem, project_out
 from gaident.diagnosis.screening import Screening
 from gaident.diagnosis.stepwise import Search, with_second_mass
 from gaident.models.model import Model
 
-__all__ = ["base_fit", "linear_bases", "one_mass", "resonates", "two_mass_fits", "without_second_mass"]
+__all__ = ["base_fit", "linear_bases", "loop_starts", "one_mass", "two_mass_fits", "without_second_mass"]
 
 Vector = NDArray[np.float64]
 
@@ -45,7 +46,7 @@ def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]
     best = min((one, two), key=lambda f: f.bic)
     problem.shaft = ShaftNoise(best.layout.model(best.x), scales.dt, driven.controller)
     one, two = problem.settled(one), problem.settled(two)
-    if one.bic < two.bic or not resonates(two):
+    if one.bic < two.bic or not swings(two.layout, two.x):
         return [one, two]
     screening = Screening(problem, driven)
     screening.add(one.layout, one.x, [e for e in search.candidates(one.layout) if e not in (*FRICTION[1:], "extra_resonance")])
@@ -60,17 +61,26 @@ def linear_bases(search: Search, scales: Scales, identified: Model) -> list[Fit]
     return [two]
 
 
+def loop_starts(search: Search, scales: Scales, identified: Model, bases: Sequence[Fit]) -> list[Fit]:
+    """The best linear fit of one mass and of two in the loop: from the bases, and from the mechanism in the identified model.
+
+    A replayed torque that a limit of the controller spoils leads the bases astray; the model was identified in the loop.
+    """
+    problem, driven = search.problem, search.driven
+    starts = [(f.layout, f.x) for f in bases]
+    for model in rigid(identified) + reduced(identified):
+        layout = Layout.of(model, described(scales, model), driven.moving)
+        starts.append((layout, np.concatenate([layout.base_vector(model), np.zeros(sum(layout.starts))])))
+    fits = [problem.fit(replace(layout, looped=True), x, WHITE, 12) for layout, x in starts]
+    fits.sort(key=lambda f: (not swings(f.layout, f.x), f.cost))
+    return [next(f for f in fits if f.layout.masses == m) for m in sorted({f.layout.masses for f in fits})]
+
+
 def base_fit(problem: Problem, driven: Driven, scales: Scales, model: Model, iterations: int = 20) -> Fit:
     """A mechanism fitted to the records' plain errors."""
     layout = Layout.of(model, described(scales, model), driven.moving, driven.loop_only)
     x = np.concatenate([layout.base_vector(model), np.zeros(sum(layout.starts))])
     return problem.fit(layout, x, WHITE, iterations)
-
-
-def resonates(fit: Fit) -> bool:
-    """Whether the pairs of two masses are damped as a shaft's are: e1 < 2 zeta sqrt(e0), f1 < 2 zeta sqrt(f0), zeta = 0.5."""
-    _, _, e1, e0, f1, f0 = fit.layout.base_values(fit.x[None, :])[0]
-    return bool(e0 > 0.0 and f0 > 0.0 and abs(e1) < np.sqrt(e0) and abs(f1) < np.sqrt(f0))
 
 
 def _fits(problem: Problem, driven: Driven, scales: Scales, starts: list[Model]) -> list[Fit]:
@@ -83,7 +93,7 @@ def _fits(problem: Problem, driven: Driven, scales: Scales, starts: list[Model])
 def two_mass_fits(problem: Problem, driven: Driven, scales: Scales, identified: Model, one: Fit) -> list[Fit]:
     """Short fits of two masses that resonate as on a shaft."""
     starts = reduced(identified) + resonant(problem, one)
-    return [f for f in _fits(problem, driven, scales, starts) if resonates(f)]
+    return [f for f in _fits(problem, driven, scales, starts) if swings(f.layout, f.x)]
 
 
 def reduced(identified: Model) -> list[Model]:
@@ -92,17 +102,22 @@ def reduced(identified: Model) -> list[Model]:
     A lag or a delay adds roots of its own to those of the mechanism, which stand between them. With p, z one pair each and a the
     slowest real pole, K |z|^2/(a |p|^2) is the identified model's gain at standstill.
     """
-    real = [-r.real for r in identified.poles if r.imag == 0.0]
+    slow = rigid(identified)
     poles, zeros = ([r for r in roots if r.imag > 0.0] for roots in (identified.poles, identified.zeros))
+    return [
+        Model(one.gain * abs(p) ** 2 / abs(z) ** 2, [one.poles[0], p, p.conjugate()], [z, z.conjugate()])
+        for one in slow for p in poles for z in zeros
+    ]  # fmt: skip
+
+
+def rigid(identified: Model) -> list[Model]:
+    """The identified model's slowest real pole alone, with its gain at standstill; none without a real pole."""
+    real = [r for r in identified.poles if r.imag == 0.0]
     if not real:
         return []
-    a = min(real, key=abs)
-    others = [r for r in identified.poles if r != -a]
-    rigid = float(identified.gain * np.prod(np.abs(identified.zeros)) / np.prod(np.abs(others)))
-    return [
-        Model(rigid * abs(p) ** 2 / abs(z) ** 2, [-a, p, p.conjugate()], [z, z.conjugate()])
-        for p in poles for z in zeros
-    ]  # fmt: skip
+    slow = min(real, key=abs)
+    others = [r for r in identified.poles if r != slow]
+    return [Model(float(identified.gain * np.prod(np.abs(identified.zeros)) / np.prod(np.abs(others))), [slow])]
 
 
 def one_mass(driven: Driven, identified: Model) -> Model:

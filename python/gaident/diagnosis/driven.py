@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
+from gaident.diagnosis.candidates import CANDIDATES
 from gaident.diagnosis.hygiene import quantisation
 from gaident.diagnosis.layout import Layout
 from gaident.identification.space import torque_of
@@ -113,6 +114,8 @@ class Driven:
 
     def predict(self, layout: Layout, X: Matrix) -> Matrix:
         """Simulated velocities of rows of x, (n, samples)."""
+        if self._seen_askew(layout):
+            return np.vstack([self._predict_turned(layout, x) for x in X])
         if layout.looped:
             names, values = layout.values(X)
             steps = self.substeps(names)
@@ -130,6 +133,37 @@ class Driven:
             )
             for i, r in enumerate(self.free if layout.own_angle else self.driven)
         ]
+        return np.concatenate(parts, axis=1)
+
+    def _seen_askew(self, layout: Layout) -> bool:
+        """Whether the angle comes from a velocity that the sensor bends, and something else turns with the true one."""
+        if layout.own_angle or self.angle_logged or set(layout.effects) & set(AT_CONTROLLER):
+            return False
+        turning = {e for e in layout.effects if CANDIDATES[e].harmonic}
+        return ("velocity_filter" in layout.effects and bool(turning)) or ("velocity_ripple" in turning and len(turning) > 1)
+
+    def _predict_turned(self, layout: Layout, x: Vector) -> Matrix:
+        """With the angle that the sensor of the model x saw as what it integrates to, theta_m, taken back:
+
+        theta_r = theta_m + tau w_m,   theta_r = theta + a (sin(n theta + phase) - sin(phase))
+        """
+        names, values = layout.values(x[None, :])
+        bent = {e: layout.effect_values(x[None, :], e)[0] for e in ("velocity_filter", "velocity_ripple") if e in layout.effects}
+        tau = float(bent["velocity_filter"][0]) if "velocity_filter" in bent else 0.0
+        amplitude, order, phase = bent.get("velocity_ripple", np.zeros(3))
+        parts = []
+        for i, (turned, driven) in enumerate(zip(self.turned, self.driven, strict=True)):
+            seen = _angle(driven) + tau * (driven.velocity - driven.velocity[0])
+            angle = seen
+            for _ in range(2):
+                angle = seen - amplitude * (np.sin(order * angle + phase) - np.sin(phase))
+            record = _with_angle(turned if layout.looped else driven, angle)
+            controller = self.controller if layout.looped else None
+            states = None if layout.looped else layout.start_values(x[None, :], i)
+            steps = self.substeps(names)
+            parts.append(
+                simulate_values(layout.structure, names, values, record, controller, initial_states=states, substeps=steps)
+            )
         return np.concatenate(parts, axis=1)
 
     def substeps(self, effects: Sequence[str]) -> int | None:

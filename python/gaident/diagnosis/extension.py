@@ -8,14 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.diagnosis.bases import base_fit, linear_bases, one_mass, resonates, two_mass_fits, without_second_mass
+from gaident.diagnosis.bases import base_fit, linear_bases, loop_starts, one_mass, two_mass_fits, without_second_mass
 from gaident.diagnosis.candidates import CANDIDATES, FRICTION, Scales
 from gaident.diagnosis.coarse import Coarse, blocks_of, moved_to
 from gaident.diagnosis.driven import AT_CONTROLLER, Driven
+from gaident.diagnosis.layout import swings
 from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import Fit, Problem
 from gaident.diagnosis.stepwise import MOST, Rival, Search, with_second_mass
 from gaident.models.model import Model
+from gaident.models.simulate import simulate
 
 __all__ = ["Extension", "extended", "numbered"]
 
@@ -25,6 +27,7 @@ IMMATERIAL = 0.02
 MATERIAL = 0.01
 """BIC units per sample of a long record: less, half a per cent of the whitened rms error, is significant there and no cause."""
 
+ASTRAY = 1.5  # times the noise of the velocity: what a model may leave, whitened, before the free run is asked for a better one
 SWAP = 2.0  # BIC units by which a rival has to be better to take a finding's seat
 SEEN = 0.8  # of half the sampling frequency: how far up a coarse grid shows a resonance
 ROUNDS = 4  # of fits and filters, at most, until the final numbers stand
@@ -113,7 +116,7 @@ def _floor(problem: Problem, driven: Driven, scales: Scales, model: Model, one: 
     if not np.isfinite(floor):
         return 0.0
     if floor > 0.0 and driven.loopable:  # what the loop does not let through is none either, as a load that adds up without it
-        inside = problem.errors(replace(one.layout, looped=True), one.x[None, :])[0]
+        inside = np.concatenate([r.velocity - simulate(model, r, driven.controller) for r in driven.records])
         floor = min(floor, beyond(float(np.mean(inside[problem.weight > 0.0] ** 2))))
     if floor > 0.0:  # a shaft that resonates is no misfit
         floor = min([floor, *(beyond(f.cost / problem.count) for f in two_mass_fits(problem, driven, scales, model, one))])
@@ -150,12 +153,17 @@ def _found(search: Search, scales: Scales, model: Model) -> tuple[Fit, Fit]:
         end = without_second_mass(search, search.run(base))
         # On a coarse grid a resonance beyond what it shows is some other thing of short times: all samples will tell.
         # Two masses that do not swing describe something else, which one mass leaves for all to see.
-        swings = end.layout.masses == 1 or resonates(end)
-        if not ends or (swings and (scales.blocks == 1 or _resonance(end) < SEEN * np.pi / scales.dt)):
+        if not ends or (swings(end.layout, end.x) and (scales.blocks == 1 or _resonance(end) < SEEN * np.pi / scales.dt)):
             ends.append((base, end))
-        if search.fitter.only_noise(end):
+        if search.fitter.runs_free(end):
             break
-    return min(ends, key=lambda e: e[1].bic)
+    base, end = min(ends, key=lambda e: e[1].bic)
+    if search.driven.loopable and not search.fitter.runs_free(end, ASTRAY):
+        other = search.freed(end, loop_starts(search, scales, model, bases))
+        if other is not end:
+            end = without_second_mass(search, other)
+            base = base if base.layout.masses == end.layout.masses else _bare(search, end)
+    return base, search.leanest(end)
 
 
 def _resonance(fit: Fit) -> float:

@@ -17,6 +17,10 @@ __all__ = ["OF_ANGLE", "Fitter"]
 
 Vector = NDArray[np.float64]
 
+FREE_RUN = (
+    2.0  # times the noise of the velocity that the free run of a right model may miss: a loop lets some torque noise through
+)
+
 OF_ANGLE = ("unbalance", "cogging", "velocity_ripple")
 
 
@@ -30,12 +34,34 @@ class Fitter:
         """Whether a fit leaves, whitened, no more than `slack` times the noise that the measured velocity itself shows."""
         return bool(np.sqrt(fit.cost / self.problem.count) < slack * self.driven.noise)
 
+    def runs_free(self, fit: Fit, slack: float = 1.1) -> bool:
+        """Whether the free run of the loop, too, misses the velocity by little more than its noise."""
+        if not self.driven.loopable:
+            return self.only_noise(fit, slack)
+        looped = replace(fit.layout, looped=True)
+        cost = float(self.problem.costs(looped, fit.x[None, :], WHITE)[0])
+        return self.only_noise(fit, slack) and bool(np.sqrt(cost / self.problem.count) < FREE_RUN * self.driven.noise)
+
     def in_loop(self, fit: Fit) -> Fit:
         """The better of both views: where the best candidate was judged in the loop, all have to be."""
         if fit.layout.looped or not self.driven.loopable:
             return fit
         looped = replace(fit.layout, looped=True)
         return min((fit, self.problem.settled(self.problem.fit(looped, fit.x, WHITE, 8))), key=lambda f: f.bic)
+
+    def as_filter(self, fit: Fit) -> Fit:
+        """A torque lag as a velocity filter beside an effect of the angle, where that is better.
+
+        Alone they are the same. But the angle of a filtered velocity is late, and so is not what the ripple turns with.
+        """
+        if "torque_lag" not in fit.effects or not set(fit.effects) & set(OF_ANGLE) or self.driven.angle_logged:
+            return fit
+        z = fit.x[fit.layout.slot("torque_lag")]
+        short = fit.layout.without("torque_lag")
+        x = short.inserted(fit.layout.removed(fit.x, "torque_lag"), z)
+        return min(
+            (fit, self.problem.settled(self.problem.fit(short.extended("velocity_filter"), x, WHITE, 12))), key=lambda f: f.bic
+        )
 
     def finished(self, fit: Fit) -> Fit:
         """A short fit taken to the end, under the filter of what it leaves itself."""

@@ -21,7 +21,17 @@ from gaident.models.factors import Structure
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
 
-__all__ = ["Layout", "described", "is_mechanism", "mechanism", "parameter_names", "two_masses"]
+__all__ = [
+    "Layout",
+    "as_two_masses",
+    "described",
+    "evenly_damped",
+    "is_mechanism",
+    "mechanism",
+    "parameter_names",
+    "swings",
+    "two_masses",
+]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -213,9 +223,47 @@ def two_masses(layout: Layout, x: Vector) -> Model:
     return Model(K * (wp / wz) ** 2, poles, quadratic_roots(2.0 * zz * wz, wz**2))
 
 
+def as_two_masses(layout: Layout, x: Vector) -> tuple[Layout, Vector]:
+    """The drive of two masses whose resonance is the extra one of x, with the other effects; start states at 0."""
+    model = two_masses(layout, x)
+    longer = Layout.of(model, described(layout.scales, model), [n > 0 for n in layout.starts], layout.looped)
+    y = longer.base_vector(model)
+    for e in layout.effects:
+        if e != "extra_resonance":
+            longer = longer.extended(e)
+            y = np.concatenate([y, x[layout.slot(e)]])
+    return longer, np.concatenate([y, np.zeros(sum(longer.starts))])
+
+
+def evenly_damped(layout: Layout, x: Vector) -> Vector:
+    """Two masses with the damping of the zeros that the rest implies: f1 = a + (e1 - a) f0/e0.
+
+    With bearings in proportion to the inertias, D_M/J_M = D_L/J_L = a, the shaft's damping D_G makes
+
+        e1 = a + D_G (1/J_M + 1/J_L),   f1 = a + D_G/J_L,   f0/e0 = J_M/(J_M + J_L)
+
+    A linear fit of a shaft with a gap damps the zeros instead, as if bearings of the load braked and those of the motor drove it.
+    A gap put into such a mechanism makes it no better, whatever its width; in a passive one the cost has one broad valley.
+    """
+    _, a, e1, e0, _, f0 = layout.base_values(x[None, :])[0]
+    if not 0.0 < f0 < e0:
+        return x
+    even = x.copy()
+    even[4] = (a + (e1 - a) * f0 / e0) / layout.units[3]
+    return even
+
+
 def is_mechanism(layout: Layout, x: Vector) -> bool:
     """Whether two masses are two masses on a shaft: sum of pairwise A = K_G (1/J_M + 1/J_L) is above prod B = K_G/J_L."""
     if layout.masses == 1:
         return True
     _, a, e1, e0, _, f0 = layout.base_values(x[None, :])[0]
     return bool(e0 + a * e1 > f0)
+
+
+def swings(layout: Layout, x: Vector) -> bool:
+    """Whether two masses are damped as those on a shaft: e1 < 2 zeta sqrt(e0), f1 < 2 zeta sqrt(f0), zeta = 0.5."""
+    if layout.masses == 1:
+        return True
+    _, _, e1, e0, f1, f0 = layout.base_values(x[None, :])[0]
+    return bool(e0 > 0.0 and f0 > 0.0 and abs(e1) < np.sqrt(e0) and abs(f1) < np.sqrt(f0))

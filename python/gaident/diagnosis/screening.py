@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.candidates import CANDIDATES
 from gaident.diagnosis.driven import Driven
-from gaident.diagnosis.layout import Layout
+from gaident.diagnosis.layout import Layout, evenly_damped
 from gaident.diagnosis.noise_filter import WHITE, NoiseFilter
 from gaident.diagnosis.problem import Problem, project_out
 
@@ -77,14 +77,20 @@ class Screening:
 
     def add(self, layout: Layout, x: Vector, effects: Sequence[str]) -> None:
         """Candidates as extensions of the model x."""
-        _, J, error = self.problem.linearised(layout, x, WHITE)
-        base = _Base(layout, x, error, J)
         rough = [e for e in effects if CANDIDATES[e].rough]
         if rough and self.driven.loopable and not layout.looped:
             # A replayed torque that a limit inside the controller spoils has led the mechanism astray; the loop holds it.
             inside = replace(layout, looped=True)
             self.add(inside, x if self.driven.torque_logged else self.problem.fit(inside, x, WHITE, 8).x, rough)
             effects = [e for e in effects if CANDIDATES[e].place != "coupling"]
+        self._add(layout, x, effects)
+        between = [e for e in effects if CANDIDATES[e].place == "coupling"]
+        if between:
+            self._add(layout, evenly_damped(layout, x), between)
+
+    def _add(self, layout: Layout, x: Vector, effects: Sequence[str]) -> None:
+        _, J, error = self.problem.linearised(layout, x, WHITE)
+        base = _Base(layout, x, error, J)
         for effect in effects:
             candidate = CANDIDATES[effect]
             longer = layout.extended(effect)

@@ -67,10 +67,7 @@ def simplified(search: Search, final: Fit, left: Leftover) -> Fit:
         return final
     for effect in final.effects:
         for parent in CANDIDATES[effect].parents:
-            level = final.x[final.layout.slot(effect)][:1]
-            layout = final.layout.without(effect).extended(parent)
-            x = layout.without(parent).inserted(final.layout.removed(final.x, effect), level)
-            simpler = search.problem.settled(search.problem.fit(layout, x, final.noise, 12))
+            simpler = search.as_parent(final, effect, parent)
             of_its_size = left.gains[driver] > OF_ITS_SIZE * (simpler.bic - final.bic)
             if of_its_size and share(search, simpler, final, left) < STANDS:
                 return simpler

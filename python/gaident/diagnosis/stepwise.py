@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from gaident.diagnosis.candidates import CANDIDATES, FRICTION
 from gaident.diagnosis.driven import Driven
 from gaident.diagnosis.fitter import Fitter
-from gaident.diagnosis.layout import Layout, described, is_mechanism, two_masses
+from gaident.diagnosis.free_run import by_free_run
+from gaident.diagnosis.layout import Layout, as_two_masses, is_mechanism, two_masses
 from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import WORST, Fit, Problem
 from gaident.diagnosis.screening import Screening
@@ -66,7 +67,64 @@ class Search:
 
     def run(self, base: Fit) -> Fit:
         """The extended model; its effects stand in the order in which they were found."""
-        best = base
+        best = self.stepped(base)
+        if self.driven.loopable or self.fitter.only_noise(best):
+            return best
+        rough = [e for e in self.candidates(base.layout) if CANDIDATES[e].rough and e not in best.effects]
+        return self.fitter.rescued(best, base, rough, self.threshold)
+
+    def freed(self, best: Fit, starts: Sequence[Fit]) -> Fit:
+        """Where the free run of a model misses more than noise: what the plain error of the loop leads to from linear starts."""
+        self.note("looking at the free run of the loop")
+        seen = by_free_run(self.fitter, starts, self.candidates, MOST)
+        for fit in seen[:1]:
+            best = self.better(best, self.fitter.polished(self.problem.settled(with_second_mass(self.problem, fit))))
+        for effect in [e for e in self.allowed if CANDIDATES[e].rough]:
+            if self.fitter.runs_free(best):
+                break
+            start = next((f for f in seen if effect in f.effects), None)
+            if start is not None:
+                best = self.better(best, self.fitter.searched(start))
+        return best
+
+    def leanest(self, best: Fit) -> Fit:
+        """Beside a gap: without the effects, or with the simpler ones, that do as well after a search of their own.
+
+        An impact more or less makes valleys. What an effect beside a gap brings may be no more than a better valley, which the
+        model without it reaches, too, once it is looked for.
+        """
+        if "backlash" not in best.effects or len(best.effects) == 1 or not self.driven.loopable:
+            return best
+
+        def searched(fit: Fit) -> Fit:
+            return min((fit, self.fitter.searched(fit)), key=lambda f: f.bic)
+
+        best = searched(best)
+        for effect in [e for e in best.effects if e != "backlash"]:
+            simpler = [self.without(best, effect), *(self.as_parent(best, effect, p) for p in CANDIDATES[effect].parents)]
+            for fit in simpler:
+                found = searched(fit)
+                if found.bic - best.bic < self.threshold:
+                    best = found
+                    break
+        return best
+
+    def as_parent(self, fit: Fit, effect: str, parent: str) -> Fit:
+        """The model refitted with a simpler effect in the place of one that contains it, at its level."""
+        level = fit.x[fit.layout.slot(effect)][:1]
+        layout = fit.layout.without(effect).extended(parent)
+        x = layout.without(parent).inserted(fit.layout.removed(fit.x, effect), level)
+        return self.problem.settled(self.problem.fit(layout, x, fit.noise, 12))
+
+    def better(self, best: Fit, other: Fit) -> Fit:
+        """Another model, thinned and extended, if it is worth the threshold more."""
+        if other.bic > best.bic + self.threshold:
+            return best
+        other = self.stepped(self.thinned(other, every=True))
+        return other if best.bic - other.bic > self.threshold else best
+
+    def stepped(self, best: Fit) -> Fit:
+        """A model and the effects that are found beyond it, one by one."""
         while len(best.effects) < MOST:
             beyond = ", ".join(e.replace("_", " ") for e in best.effects)
             self.note(f"looking beyond {beyond or 'the linear model'}")
@@ -78,14 +136,16 @@ class Search:
                 best = self.fitter.in_loop(best)
             if found is None or best.bic - found.bic < self.threshold or not self.material(best, found):
                 break
-            best = self.fitter.polished(self.thinned(with_second_mass(self.problem, found)))
+            if set(best.effects) & set(FRICTION) and (inside := self.fitter.in_loop(best)) is not best:
+                # Driven by the torque, what nobody commanded adds up between the stops, for other effects to describe; the loop
+                # does not let it.
+                self.known.pop(self.key(best), None)
+                best = inside
+                continue
+            best = self.fitter.as_filter(self.fitter.polished(self.thinned(with_second_mass(self.problem, found))))
             if set(best.effects) & set(FRICTION) and not self.fitter.only_noise(best):
-                # Driven by the torque, what nobody commanded adds up between the stops; the loop does not let it.
                 best = self.fitter.in_loop(best)
-        if self.fitter.only_noise(best):
-            return best
-        rough = [e for e in self.candidates(base.layout) if CANDIDATES[e].rough and e not in best.effects]
-        return self.fitter.rescued(best, base, rough, self.threshold)
+        return best
 
     def material(self, best: Fit, found: Fit) -> bool:
         """Whether an extension explains a fair part of what the model leaves beyond the noise, or all of it.
@@ -147,10 +207,15 @@ class Search:
 
     def extensions(self, now: Fit) -> list[Fit]:
         """Settled fits of the promising extensions, best first; what was worked out once is remembered."""
-        key = (now.layout.masses, frozenset(now.effects))
+        key = self.key(now)
         if key not in self.known:
             self.known[key] = self.worked_out(now)
         return self.known[key]
+
+    @staticmethod
+    def key(fit: Fit) -> tuple[int, frozenset[str]]:
+        """Under which the extensions of a model are remembered."""
+        return fit.layout.masses, frozenset(fit.effects)
 
     def worked_out(self, now: Fit) -> list[Fit]:
         """The extensions of one model.
@@ -311,12 +376,4 @@ def with_second_mass(problem: Problem, fit: Fit) -> Fit:
     layout, x = fit.layout, fit.x
     if layout.masses == 2 or "extra_resonance" not in layout.effects:
         return fit
-    model = two_masses(layout, x)
-    longer = Layout.of(model, described(layout.scales, model), [n > 0 for n in layout.starts], layout.looped)
-    y = longer.base_vector(model)
-    for e in layout.effects:
-        if e != "extra_resonance":
-            longer = longer.extended(e)
-            y = np.concatenate([y, x[layout.slot(e)]])
-    y = np.concatenate([y, np.zeros(sum(longer.starts))])
-    return problem.settled(problem.fit(longer, y, fit.noise, 8))
+    return problem.settled(problem.fit(*as_two_masses(layout, x), fit.noise, 8))
