@@ -32,7 +32,7 @@ SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
 endif
-.PHONY: help install demo test bench tidy docs lint test-cpp test-python clean build-checked test-checked test-sanitized
+.PHONY: help install demo test bench embedded tidy docs lint test-cpp test-python clean build-checked test-checked test-sanitized
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -76,10 +76,14 @@ bench: .venv/.tools ## build (plainly, without Python) and run the C++ benchmark
 	$(BIN)/cmake --build build/plain --target gaident_bench
 	build/plain/bench/gaident_bench $(BENCH_FLAGS)
 
+embedded: ## the search in a drive: built for two emulated Cortex-M boards, run there, compared bit for bit (docs/dsp.md)
+	@csrc/embedded/tools.sh
+	@$(MAKE) --no-print-directory -f csrc/embedded/embedded.mk OUT=build/embedded
+
 tidy: .venv/.tidied ## repair and format the Python and C++ sources
 	$(BIN)/ruff check --fix-only .
 	$(BIN)/ruff format .
-	$(BIN)/clang-format -i $$(find csrc bench tests/cpp -name '*.?pp')
+	$(BIN)/clang-format -i $$(find csrc bench tests/cpp -name '*.?pp' -o -path 'csrc/embedded/*.[ch]')
 
 # Pictures and formulas from the core, the tutorial run; warnings are errors (but not with --quiet, which hides them from --strict).
 docs: .venv/.documented ## build the documentation into build/docs

@@ -3,6 +3,7 @@
 #include "../csrc/gaident/effect_batch.hpp"
 
 #include "../csrc/gaident/denormals.hpp"
+#include "../csrc/gaident/roots.hpp"
 
 #include <algorithm>
 #include <chrono>

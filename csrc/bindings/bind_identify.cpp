@@ -181,7 +181,7 @@ void bind_identify(py::module_& m) {
     py::class_<Settings>(m, "EngineSettings")
         .def(py::init([](int population, int tournament, double crossover, double mutation, int generations, int elites,
                          bool gray, bool logarithmic, double error_weight, double order_weight, bool species, int round,
-                         int quiet_rounds, bool in_float) {
+                         int quiet_rounds, bool in_float, const std::string& mirror) {
                  Settings s;
                  s.population = population;
                  s.tournament = tournament;
@@ -196,12 +196,13 @@ void bind_identify(py::module_& m) {
                  s.round = round;
                  s.quiet_rounds = quiet_rounds;
                  s.in_float = in_float;
+                 s.mirror = mirror;
                  s.check();
                  return s;
              }),
              py::arg("population"), py::arg("tournament"), py::arg("crossover"), py::arg("mutation"), py::arg("generations"),
              py::arg("elites"), py::arg("gray"), py::arg("logarithmic"), py::arg("error_weight"), py::arg("order_weight"),
-             py::arg("species"), py::arg("round"), py::arg("quiet_rounds"), py::arg("in_float"));
+             py::arg("species"), py::arg("round"), py::arg("quiet_rounds"), py::arg("in_float"), py::arg("mirror") = "");
 
     py::class_<PyRefined>(m, "Refined")
         .def_property_readonly("gain", [](const PyRefined& f) { return f.r.factors.gain; })
@@ -221,6 +222,7 @@ void bind_identify(py::module_& m) {
         .def_property_readonly("best_generation", [](const Trial& t) { return t.best_generation; })
         .def_property_readonly("best", [](const Trial& t) { return t.best; })
         .def_property_readonly("evaluations", [](const Trial& t) { return t.evaluations; })
+        .def_property_readonly("overflows", [](const Trial& t) { return t.overflows; })
         .def_property_readonly("species", [](const Trial& t) {
             std::vector<PyRefined> all;
             for (const Refined& r : t.species) all.push_back({r});

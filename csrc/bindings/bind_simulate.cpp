@@ -1,9 +1,31 @@
+#include "../gaident/mirror.hpp"
 #include "../gaident/simulate.hpp"
 #include "bindings.hpp"
 
 using namespace gaident;
 
 namespace {
+
+// In a drive's arithmetic; the torque is the controller's answer to the velocity, in double.
+void simulate_mirrored(const Factors<double>& g, std::span<const double> input, double dt, const Loop& loop, const double* start,
+                       const std::string& arithmetic, std::span<double> velocity, std::span<double> torque) {
+    if (start != nullptr) throw std::invalid_argument("initial_state: in arithmetic '" + arithmetic + "' a model starts at rest");
+    mirror_velocity(arithmetic, false, g, input, dt, loop, velocity);
+    Controller<double> controller(loop, dt);
+    for (std::size_t k = 0; k < input.size(); ++k) torque[k] = controller.step(input[k] - velocity[k]);
+}
+
+// (velocity, whether it left the arithmetic's range)
+py::tuple mirrored(const std::string& arithmetic, bool in_z, double gain, const ComplexArray& poles, const ComplexArray& zeros,
+                   double dt, const RealArray& input, double kp, double ki) {
+    const Factors<double> g = make_factors(gain, poles, zeros);
+    const double endless = std::numeric_limits<double>::infinity();
+    const Loop l = make_loop("continuous", kp, ki, endless, endless);
+    RealArray velocity(input.size());
+    const bool left = mirror_velocity(arithmetic, in_z, g, view(input), dt, l,
+                                      {velocity.mutable_data(), static_cast<std::size_t>(input.size())});
+    return py::make_tuple(velocity, left);
+}
 
 py::tuple simulate_model(double gain, const ComplexArray& poles, const ComplexArray& zeros, double dt, const RealArray& input,
                          const std::string& loop, double kp, double ki, double torque_limit, double integrator_limit,
@@ -25,7 +47,7 @@ py::tuple simulate_model(double gain, const ComplexArray& poles, const ComplexAr
         const py::gil_scoped_release release;
         if (arithmetic == "double") simulate<double>(g, in, dt, l, start, w, u);
         else if (arithmetic == "float") simulate_in_float(g, in, dt, l, start, w, u);
-        else throw std::invalid_argument("arithmetic must be 'double' or 'float', not '" + arithmetic + "'");
+        else simulate_mirrored(g, in, dt, l, start, arithmetic, w, u);
     }
     return py::make_tuple(velocity, torque);
 }
@@ -49,6 +71,8 @@ void bind_simulate(py::module_& m) {
     m.def("simulate", &simulate_model, py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("dt"), py::arg("input"),
           py::arg("loop"), py::arg("kp"), py::arg("ki"), py::arg("torque_limit"), py::arg("integrator_limit"),
           py::arg("initial_state"), py::arg("arithmetic") = "double");
+    m.def("mirrored", &mirrored, py::arg("arithmetic"), py::arg("in_z"), py::arg("gain"), py::arg("poles"), py::arg("zeros"),
+          py::arg("dt"), py::arg("input"), py::arg("kp"), py::arg("ki"));
     m.def("discrete", &discrete_model, py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("dt"), py::arg("loop"),
           py::arg("kp"), py::arg("ki"));
 }

@@ -1,3 +1,4 @@
+#include "../gaident/roots.hpp"
 #include "bindings.hpp"
 
 #include <condition_variable>

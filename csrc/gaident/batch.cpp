@@ -217,14 +217,13 @@ namespace {
 
 constexpr std::size_t none = ~std::size_t{0};
 
-// Under a constant command r a PI loop rests at y = r: its a[N-1] is its b[N], so it has no steady error. The deviations from that
-// rest, y - r and x[i] - x_rest[i] with x_rest[0] = r - b[0] r, x_rest[i] = a[i-1] r - b[i] r, obey the recurrence without input, which
-// is nearly half the work.
+// From states to their deviations from rest under the constant command r.
 void settle(DoubleGroup& g, double r) {
     for (int i = 0; i < g.order; ++i)
         for (int lane = 0; lane < DoubleGroup::width; ++lane) {
-            const double at_rest = i == 0 ? 1.0 - g.b[0][lane] : g.a[i - 1][lane] - g.b[i][lane];
-            g.x[i][lane] -= at_rest * r;
+            const auto a = [&](int k) { return g.a[k][lane]; };
+            const auto b = [&](int k) { return g.b[k][lane]; };
+            g.x[i][lane] -= at_rest(i, a, b) * r;
         }
 }
 

@@ -3,6 +3,7 @@
 
 #include "decoder.hpp"
 #include "fitness.hpp"
+#include "held.hpp"
 #include "kernels/kernels.hpp"
 #include "loop.hpp"
 #include "record.hpp"

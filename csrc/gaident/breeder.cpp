@@ -12,6 +12,7 @@ Breeder::Breeder(const Experiment& experiment, const Genome& genome, const Setti
       random_(random, experiment.kernels->words),
       mutation_(settings.mutation, random_),
       batch_(experiment, static_cast<std::size_t>(settings.population), settings.in_float),
+      mirror_(settings.mirror.empty() ? nullptr : make_mirror(settings.mirror, experiment, genome, settings.weights)),
       now_(static_cast<std::size_t>(settings.population), genome.words()),
       next_(now_),
       costs_(now_.size(), worst_fitness),
@@ -28,9 +29,10 @@ void Breeder::set_structure(std::size_t first, std::size_t count, Structure s) {
 }
 
 void Breeder::evaluate() {
+    evaluations_ += now_.size();
+    if (mirror_) return mirror_->evaluate(now_, costs_);
     batch_.errors(now_, decoder_, costs_);
     for (std::size_t i = 0; i < now_.size(); ++i) costs_[i] = fitness(costs_[i], decoder_.structure(now_[i]), settings_.weights);
-    evaluations_ += now_.size();
 }
 
 std::size_t Breeder::best_of(std::size_t first, std::size_t count) const {
@@ -53,18 +55,8 @@ void Breeder::breed(std::span<const Group> groups) {
                 [&](std::size_t i, std::size_t j) { return costs_[i] < costs_[j] || (costs_[i] == costs_[j] && i < j); });
             for (std::size_t k = 0; k < elites; ++k) copy(now_[ranking_[k]], next_[g.first + k]);
         }
-        for (std::size_t k = elites; k < g.count; k += 2) {
-            const Word* mother = now_[tournament(random_, costs_.data(), g.first, g.count, settings_.tournament)];
-            const Word* father = now_[tournament(random_, costs_.data(), g.first, g.count, settings_.tournament)];
-            Word* const child1 = next_[g.first + k];
-            Word* const child2 = k + 1 < g.count ? next_[g.first + k + 1] : spare_.data();
-            if (random_.word() < cross_below) {
-                crossover(random_, genome_.starts(), words, mother, father, child1, child2);
-            } else {
-                copy(mother, child1);
-                copy(father, child2);
-            }
-        }
+        const Mating mating{g.first, g.count, settings_.tournament, cross_below};
+        mate(random_, mating, genome_.starts(), words, now_[0], costs_.data(), elites, next_[0], spare_.data());
         // Parents of one species carry the same structure bits, so only mutation could change them.
         const int first_bit = g.fixed_structure ? 2 * genome_.structure_bits() : 0;
         mutation_.apply(random_, next_[g.first + elites], words, g.count - elites, first_bit, genome_.bits());

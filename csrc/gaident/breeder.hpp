@@ -1,6 +1,7 @@
 // A population and its generations. A generation reads like the paper: evaluate, select, cross, mutate.
 #pragma once
 
+#include "mirror.hpp"
 #include "operators.hpp"
 #include "settings.hpp"
 
@@ -36,6 +37,7 @@ public:
     double cost(std::size_t i) const { return costs_[i]; }
     Factors<double> candidate(std::size_t i) const { return decode(now_[i], genome_); }
     std::size_t evaluations() const { return evaluations_; }
+    std::size_t overflows() const { return mirror_ ? mirror_->overflows() : 0; }
 
 private:
     const Genome& genome_;
@@ -44,6 +46,7 @@ private:
     WordStream random_;
     Mutation mutation_;
     Batch batch_;
+    std::unique_ptr<Mirror> mirror_;  // instead of the batch, where a drive's arithmetic is asked for
     Population now_, next_;
     std::vector<double> costs_;
     std::vector<std::size_t> ranking_;

@@ -1,14 +1,10 @@
 // Chromosomes as packed bits: bit i of a chromosome is bit 63 - i % 64 of word i / 64, so a field reads most significant bit
-// first and a hex dump reads like Fig. 4 of the paper. A population is one flat array. Nothing here knows what bits mean.
+// first and a hex dump reads like Fig. 4 of the paper. Nothing here knows what bits mean.
 #pragma once
 
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <span>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
 namespace gaident {
 
@@ -45,23 +41,5 @@ constexpr int count_bits(const Word* c, int words) {
     for (int i = 0; i < words; ++i) n += std::popcount(c[i]);
     return n;
 }
-
-// `count` chromosomes of `words` words each, one after the other.
-class Population {
-public:
-    Population(std::size_t count, int words) : words_(words), data_(count * static_cast<std::size_t>(words)) {
-        if (count == 0 || words < 1) throw std::invalid_argument("Population: count and words must be at least 1");
-    }
-    Word* operator[](std::size_t i) { return data_.data() + i * static_cast<std::size_t>(words_); }
-    const Word* operator[](std::size_t i) const { return data_.data() + i * static_cast<std::size_t>(words_); }
-    std::size_t size() const { return data_.size() / static_cast<std::size_t>(words_); }
-    int words() const { return words_; }
-    std::span<Word> flat() { return data_; }
-    void swap(Population& other) { data_.swap(other.data_); }
-
-private:
-    int words_;
-    std::vector<Word> data_;
-};
 
 }  // namespace gaident

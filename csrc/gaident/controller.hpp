@@ -7,8 +7,8 @@
 #pragma once
 
 #include "bilinear.hpp"
-#include "held.hpp"
 
+#include <cstdint>
 #include <limits>
 
 namespace gaident {

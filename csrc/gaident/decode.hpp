@@ -1,4 +1,4 @@
-// Chromosome + genome -> factors, and back.
+// Chromosome + genome -> factors.
 //
 // A and B are complex numbers but the model must be real. METHOD: pairs are taken within a group first, (A11,A12), (A21,A22),
 // (B21,B22), ...; where both pole groups have a member left over, those two form a pair; what is still left is real. A pair is a conjugate
@@ -34,15 +34,18 @@ void visit_zeros(Structure s, OnPair&& pair, OnSingle&& single) {
     if (s.q % 2 != 0) single(Locus{Role::zero2, s.q - 1});
 }
 
-inline Factors<double> decode(const Word* c, const Genome& g) {
-    Factors<double> f;
+// `value(field, bits)` gives a field's value in R, bits being what stands in the chromosome; `unit(p)` the unit of K.
+template <class R, class Value, class Unit>
+Factors<R> decode(const Word* c, const Genome& g, Value&& value, Unit&& unit) {
+    Factors<R> f;
     f.structure = {g.structure(c, Role::p), g.structure(c, Role::q)};
-    f.gain = g.value(c, g.field(Role::gain, Part::whole, 0)) * g.ranges().gain_unit(f.structure.p);
-    const auto real = [&](Locus a) { return g.value(c, g.field(a.role, Part::real, a.index)); };
+    const auto read = [&](const Field& field) { return value(field, get_field(c, field.first, field.width)); };
+    f.gain = read(g.field(Role::gain, Part::whole, 0)) * unit(f.structure.p);
+    const auto real = [&](Locus a) { return read(g.field(a.role, Part::real, a.index)); };
     const auto pair = [&](Locus a, Locus b) {
         const Field& im = g.field(b.role, Part::imaginary, b.index);
-        if (!get_bit(c, im.first)) return real_pair(real(a), real(b));
-        return conjugate_pair(real(a), g.value(c, g.field(a.role, Part::imaginary, a.index)));
+        if (!get_bit(c, im.first)) return real_pair<R>(real(a), real(b));
+        return conjugate_pair<R>(real(a), read(g.field(a.role, Part::imaginary, a.index)));
     };
     int n = 0;
     visit_poles(
@@ -53,26 +56,10 @@ inline Factors<double> decode(const Word* c, const Genome& g) {
     return f;
 }
 
-// Writes structure, gain and the active genes of `f`; latent genes keep their bits. Values take the nearest code.
-inline void encode(const Factors<double>& f, const Genome& g, Word* c) {
-    g.set_structure(c, f.structure.p, f.structure.q);
-    g.set_value(c, g.field(Role::gain, Part::whole, 0), f.gain / g.ranges().gain_unit(f.structure.p));
-    const auto set = [&](Locus a, Part part, double x) { g.set_value(c, g.field(a.role, part, a.index), x); };
-    const auto pair = [&](Locus a, Locus b, Pair<double> e) {
-        std::complex<double> a1, a2;
-        split(e, a1, a2);
-        const bool conjugate = a1.imag() != 0.0;
-        set_bit(c, g.field(b.role, Part::imaginary, b.index).first, conjugate);
-        set(a, Part::real, a1.real());
-        if (conjugate) set(a, Part::imaginary, a1.imag());
-        else set(b, Part::real, a2.real());
-    };
-    int n = 0;
-    visit_poles(
-        f.structure, [&](Locus a, Locus b) { pair(a, b, f.pole_pair[n++]); }, [&](Locus a) { set(a, Part::real, f.pole); });
-    n = 0;
-    visit_zeros(
-        f.structure, [&](Locus a, Locus b) { pair(a, b, f.zero_pair[n++]); }, [&](Locus a) { set(a, Part::real, f.zero); });
+inline Factors<double> decode(const Word* c, const Genome& g) {
+    return decode<double>(
+        c, g, [&](const Field& f, std::uint32_t bits) { return g.value_of(bits, f); },
+        [&](int p) { return g.ranges().gain_unit(p); });
 }
 
 }  // namespace gaident

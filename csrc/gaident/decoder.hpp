@@ -3,6 +3,7 @@
 #pragma once
 
 #include "decode.hpp"
+#include "population.hpp"
 
 #include <vector>
 

@@ -33,7 +33,7 @@ struct Delta {
 template <class A>
 bool float_suffices(int order, A&& a) {
     double k = 1.0, scale = 0.5;
-    for (int i = 0; i < order; ++i, scale *= 0.5) k += std::abs(a(i)) * scale;
+    for (int i = 0; i < order; ++i, scale *= 0.5) k += (a(i) < 0.0 ? -a(i) : a(i)) * scale;
     return k <= 1.6;
 }
 

@@ -28,6 +28,16 @@ private:
 private:
     static constexpr std::uint64_t flush_to_zero = 1ULL << 24;
     std::uint64_t saved_;
+#elif defined(__ARM_FP)  // Cortex-M with a floating-point unit
+    FlushDenormals() {
+        asm volatile("vmrs %0, fpscr" : "=r"(saved_));
+        asm volatile("vmsr fpscr, %0" : : "r"(saved_ | flush_to_zero));
+    }
+    ~FlushDenormals() { asm volatile("vmsr fpscr, %0" : : "r"(saved_)); }
+
+private:
+    static constexpr std::uint32_t flush_to_zero = 1U << 24;
+    std::uint32_t saved_;
 #else
     FlushDenormals() = default;
     ~FlushDenormals() = default;

@@ -32,6 +32,7 @@ Trial run_plain(const Experiment& experiment, const Genome& genome, const Settin
         breeder.generation(all);
     }
     trial.evaluations = breeder.evaluations();
+    trial.overflows = breeder.overflows();
     return trial;
 }
 

@@ -12,8 +12,9 @@
 #pragma once
 
 #include "chromosome.hpp"
+#include "wrong_use.hpp"
 
-#include <cmath>
+#include <span>
 
 namespace gaident {
 
@@ -47,7 +48,7 @@ struct SearchRanges {
     // gain_scale^(p-1) [rad/s]. 1 is the paper: one range whatever p.
     double gain_scale = 1.0;
 
-    double gain_unit(int p) const {
+    constexpr double gain_unit(int p) const {
         double unit = p == 0 ? 1.0 / gain_scale : 1.0;
         for (int i = 1; i < p; ++i) unit *= gain_scale;
         return unit;
@@ -66,7 +67,7 @@ public:
     static constexpr int max_order = 7;  // of p and of q
     static constexpr int max_words = (6 + 16 * 43 + word_bits - 1) / word_bits;
 
-    Genome(const SearchRanges& s, Code code, Scale roots) : code_(code), ranges_(s) {
+    constexpr Genome(const SearchRanges& s, Code code, Scale roots) : code_(code), ranges_(s) {
         check(s);
         const int structure_bits = s.p_max > 3 || s.q_max > 3 ? 3 : 2;
         const double top = static_cast<double>((1 << structure_bits) - 1);
@@ -82,18 +83,18 @@ public:
         for (int f = 0; f < field_count_; ++f) set_bit(starts_, fields_[f].first, true);
     }
 
-    int bits() const { return bits_; }
-    int words() const { return words_for(bits_); }
-    int structure_bits() const { return fields_[0].width; }
-    Code code() const { return code_; }
-    const SearchRanges& ranges() const { return ranges_; }
-    std::span<const Field> fields() const { return {fields_, static_cast<std::size_t>(field_count_)}; }
+    constexpr int bits() const { return bits_; }
+    constexpr int words() const { return words_for(bits_); }
+    constexpr int structure_bits() const { return fields_[0].width; }
+    constexpr Code code() const { return code_; }
+    constexpr const SearchRanges& ranges() const { return ranges_; }
+    constexpr std::span<const Field> fields() const { return {fields_, static_cast<std::size_t>(field_count_)}; }
     // A one at the first bit of every field: where crossover starts afresh.
-    const Word* starts() const { return starts_; }
+    constexpr const Word* starts() const { return starts_; }
 
-    const Field& field(Role role, Part part, int index) const { return fields_[slot(role, part, index)]; }
+    constexpr const Field& field(Role role, Part part, int index) const { return fields_[slot(role, part, index)]; }
 
-    std::uint32_t code_of(const Word* c, const Field& f) const { return number_of(get_field(c, f.first, f.width)); }
+    constexpr std::uint32_t code_of(const Word* c, const Field& f) const { return number_of(get_field(c, f.first, f.width)); }
 
     double value(const Word* c, const Field& f) const { return value_of(get_field(c, f.first, f.width), f); }
 
@@ -101,20 +102,20 @@ public:
     double value_of(std::uint32_t raw, const Field& f) const {
         const double t = static_cast<double>(number_of(raw)) / static_cast<double>((1U << f.width) - 1U);
         if (f.scale == Scale::linear) return f.range.lo + (f.range.hi - f.range.lo) * t;
-        return f.range.lo * std::exp(t * std::log(f.range.hi / f.range.lo));
+        return f.range.lo * __builtin_exp(t * __builtin_log(f.range.hi / f.range.lo));
     }
 
     // Nearest code of a value; values outside the range take the nearest end.
     void set_value(Word* c, const Field& f, double value) const {
         const double x = value < f.range.lo ? f.range.lo : (value > f.range.hi ? f.range.hi : value);
-        const double span = f.scale == Scale::linear ? f.range.hi - f.range.lo : std::log(f.range.hi / f.range.lo);
-        const double t = f.scale == Scale::linear ? (x - f.range.lo) / span : std::log(x / f.range.lo) / span;
-        const auto code = static_cast<std::uint32_t>(std::lround(t * static_cast<double>((1U << f.width) - 1U)));
+        const double span = f.scale == Scale::linear ? f.range.hi - f.range.lo : __builtin_log(f.range.hi / f.range.lo);
+        const double t = f.scale == Scale::linear ? (x - f.range.lo) / span : __builtin_log(x / f.range.lo) / span;
+        const auto code = static_cast<std::uint32_t>(__builtin_lround(t * static_cast<double>((1U << f.width) - 1U)));
         set_field(c, f.first, f.width, code_ == Code::gray ? to_gray(code) : code);
     }
 
     // p and q are numbers, not search variables on a scale; codes beyond the allowed range take its ends.
-    int structure(const Word* c, Role role) const {
+    constexpr int structure(const Word* c, Role role) const {
         const int raw = static_cast<int>(code_of(c, fields_[role == Role::p ? 0 : 1]));
         const int lo = role == Role::p ? ranges_.p_min : ranges_.q_min;
         const int hi = role == Role::p ? ranges_.p_max : ranges_.q_max;
@@ -134,30 +135,30 @@ public:
     }
 
 private:
-    std::uint32_t number_of(std::uint32_t raw) const { return code_ == Code::gray ? from_gray(raw) : raw; }
+    constexpr std::uint32_t number_of(std::uint32_t raw) const { return code_ == Code::gray ? from_gray(raw) : raw; }
 
-    static void check(const SearchRanges& s) {
+    static constexpr void check(const SearchRanges& s) {
         for (const Range r : {s.gain, s.real, s.imaginary})
-            if (!std::isfinite(r.lo) || !std::isfinite(r.hi))
-                throw std::invalid_argument("SearchRanges: the ends of all ranges must be finite");
-        const auto bad = [](const std::string& what) { throw std::invalid_argument("SearchRanges: " + what); };
-        if (!(s.gain.lo > 0.0 && s.gain.hi > s.gain.lo)) bad("gain needs 0 < lo < hi (it is coded logarithmically)");
-        if (!(s.gain_scale > 0.0)) bad("gain_scale must be positive");
-        if (!(s.real.hi > s.real.lo)) bad("real needs lo < hi");
-        if (!(s.imaginary.lo >= 0.0 && s.imaginary.hi > s.imaginary.lo)) bad("imaginary needs 0 <= lo < hi");
-        if (s.p_min < 0 || s.p_max < s.p_min || s.p_max > max_order) bad("p needs 0 <= lo <= hi <= 7");
-        if (s.q_min < 0 || s.q_max < s.q_min || s.q_max > max_order) bad("q needs 0 <= lo <= hi <= 7");
-        if (s.bits < 2 || s.bits > 16) bad("bits must be 2..16");
+            if (!__builtin_isfinite(r.lo) || !__builtin_isfinite(r.hi))
+                wrong_use("SearchRanges: the ends of all ranges must be finite");
+        if (!(s.gain.lo > 0.0 && s.gain.hi > s.gain.lo))
+            wrong_use("SearchRanges: gain needs 0 < lo < hi (it is coded logarithmically)");
+        if (!(s.gain_scale > 0.0)) wrong_use("SearchRanges: gain_scale must be positive");
+        if (!(s.real.hi > s.real.lo)) wrong_use("SearchRanges: real needs lo < hi");
+        if (!(s.imaginary.lo >= 0.0 && s.imaginary.hi > s.imaginary.lo)) wrong_use("SearchRanges: imaginary needs 0 <= lo < hi");
+        if (s.p_min < 0 || s.p_max < s.p_min || s.p_max > max_order) wrong_use("SearchRanges: p needs 0 <= lo <= hi <= 7");
+        if (s.q_min < 0 || s.q_max < s.q_min || s.q_max > max_order) wrong_use("SearchRanges: q needs 0 <= lo <= hi <= 7");
+        if (s.bits < 2 || s.bits > 16) wrong_use("SearchRanges: bits must be 2..16");
     }
 
-    void add(Role role, Part part, int index, int width, Range range, Scale scale) {
+    constexpr void add(Role role, Part part, int index, int width, Range range, Scale scale) {
         fields_[field_count_++] = Field{role, part, index, bits_, width, range, scale};
         bits_ += width;
     }
 
     // On a logarithmic scale a range that begins at or below 0 is coded over four decades below its upper end; the
     // local fit, which knows no codes, still reaches down to the range's own lower end.
-    void add_complex(Role role, int index, Scale scale) {
+    constexpr void add_complex(Role role, int index, Scale scale) {
         for (const Part part : {Part::real, Part::imaginary}) {
             Range r = part == Part::real ? ranges_.real : ranges_.imaginary;
             if (scale == Scale::logarithmic && r.lo <= 0.0) r.lo = r.hi > 0.0 ? r.hi * 1e-4 : r.lo;
@@ -166,7 +167,7 @@ private:
         }
     }
 
-    int slot(Role role, Part part, int index) const {
+    constexpr int slot(Role role, Part part, int index) const {
         if (role == Role::p || role == Role::q || role == Role::gain) return static_cast<int>(role);
         const int count = structure_bits() == 2 ? 3 : 7;
         const int number = role == Role::pole1 ? index : count + 2 * index + (role == Role::zero2 ? 1 : 0);

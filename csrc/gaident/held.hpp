@@ -11,6 +11,9 @@
 
 #include "delta.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace gaident {
 
 namespace detail {

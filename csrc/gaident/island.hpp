@@ -26,6 +26,7 @@ public:
         return breeder_.candidate(breeder_.best_of(groups_[k].first, groups_[k].count));
     }
     std::size_t evaluations() const { return breeder_.evaluations(); }
+    std::size_t overflows() const { return breeder_.overflows(); }
 
 private:
     Genome genome_;

@@ -1,8 +1,8 @@
 // Structures one module apart: a fitted optimum as a start for the next larger or smaller structure.
 #pragma once
 
-#include "factors.hpp"
 #include "genome.hpp"
+#include "roots.hpp"
 
 #include <vector>
 

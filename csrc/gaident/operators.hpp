@@ -12,8 +12,8 @@ namespace gaident {
 
 // Tournament: `size` contestants drawn with replacement from [first, first + count), one word each; the lowest cost wins, the
 // earlier drawn on a tie.
-template <class Source>
-std::size_t tournament(Source& random, const double* cost, std::size_t first, std::uint32_t count, int size) {
+template <class Source, class Cost>
+std::size_t tournament(Source& random, const Cost* cost, std::size_t first, std::uint32_t count, int size) {
     std::size_t winner = first + below(random.word(), count);
     for (int k = 1; k < size; ++k) {
         const std::size_t rival = first + below(random.word(), count);
@@ -87,7 +87,7 @@ public:
         for (std::uint64_t skipped = 0;; skipped += tails_.size()) {
             const Word u = random.word();
             if (u < tails_.back()) continue;
-            std::size_t k = first_[u >> (word_bits - top_bits)];
+            std::size_t k = first_[static_cast<std::size_t>(u >> (word_bits - top_bits))];
             while (u < tails_[k]) ++k;
             return skipped + k;
         }
@@ -100,5 +100,33 @@ private:
     std::array<std::uint8_t, 1 << top_bits> first_{};  // by the top bits of a word: the first k it can stand for
     std::uint64_t gap_ = 0;
 };
+
+// Individuals [first, first + count) of a population, as parents and in what order they mate.
+struct Mating {
+    std::size_t first;
+    std::uint32_t count;
+    int tournament;
+    Word cross_below;  // threshold of the crossover rate
+};
+
+// Children [first + from, first + count) of `next`, pair by pair: the mother's tournament, the father's, the chance of crossover and its
+// cuts. `spare` takes the second child where their number is odd.
+template <class Source, class Cost>
+void mate(Source& random, const Mating& m, const Word* starts, int words, const Word* now, const Cost* costs, std::size_t from,
+          Word* next, Word* spare) {
+    const auto at = [words](std::size_t i) { return i * static_cast<std::size_t>(words); };
+    for (std::size_t k = from; k < m.count; k += 2) {
+        const Word* const mother = now + at(tournament(random, costs, m.first, m.count, m.tournament));
+        const Word* const father = now + at(tournament(random, costs, m.first, m.count, m.tournament));
+        Word* const child1 = next + at(m.first + k);
+        Word* const child2 = k + 1 < m.count ? next + at(m.first + k + 1) : spare;
+        if (random.word() < m.cross_below) {
+            crossover(random, starts, words, mother, father, child1, child2);
+        } else {
+            for (int w = 0; w < words; ++w) child1[w] = mother[w];
+            for (int w = 0; w < words; ++w) child2[w] = father[w];
+        }
+    }
+}
 
 }  // namespace gaident

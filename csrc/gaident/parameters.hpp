@@ -5,8 +5,8 @@
 // The coefficients of a pair s^2 + e1 s + e0 pass smoothly from complex to real roots, which the roots themselves do not.
 #pragma once
 
-#include "factors.hpp"
 #include "genome.hpp"
+#include "roots.hpp"
 
 #include <span>
 #include <vector>

@@ -5,6 +5,8 @@
 #include "genome.hpp"
 #include "refine.hpp"
 
+#include <string>
+
 namespace gaident {
 
 struct Settings {
@@ -21,6 +23,7 @@ struct Settings {
     int round = 40;        // generations between two local fits of every species
     int quiet_rounds = 1;  // rounds without progress after which the search ends
     bool in_float = false;
+    std::string mirror;  // name of a drive's arithmetic (mirror.hpp) to evaluate in; empty: none
 
     void check() const {
         const auto bad = [](const std::string& what) { throw std::invalid_argument("Settings: " + what); };
@@ -41,6 +44,7 @@ struct Trial {
     std::vector<Word> best;        // its chromosome
     std::vector<Refined> species;  // with species: the local fit of each structure, by p + q, then q
     std::size_t evaluations = 0;   // candidates simulated by the genetic search
+    std::size_t overflows = 0;     // of them, in a drive's arithmetic, those that left its range or diverged
 };
 
 struct Progress {

@@ -4,6 +4,7 @@
 #include "batch.hpp"
 #include "denormals.hpp"
 #include "float_pair.hpp"
+#include "roots.hpp"
 
 namespace gaident {
 

@@ -107,7 +107,10 @@ public:
             else quiet = better || done == 0 ? 0 : quiet + 1;
             done += generations;
         }
-        for (const auto& island : islands_) trial_.evaluations += island->evaluations();
+        for (const auto& island : islands_) {
+            trial_.evaluations += island->evaluations();
+            trial_.overflows += island->overflows();
+        }
         std::size_t kept = 0;
         for (std::size_t i = 0; i < all_.size(); ++i)
             if (is_asked(i)) std::swap(trial_.species[kept++], trial_.species[i]);

@@ -9,6 +9,9 @@
 
 #include "factors.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace gaident {
 
 struct TwoMasses {

@@ -39,6 +39,7 @@ class EngineSettings:
         round: int,
         quiet_rounds: int,
         in_float: bool,
+        mirror: str = "",
     ) -> None: ...
 
 class Refined:
@@ -78,6 +79,8 @@ class Trial:
     def best(self) -> list[int]: ...
     @property
     def evaluations(self) -> int: ...
+    @property
+    def overflows(self) -> int: ...
     @property
     def species(self) -> list[Refined]: ...
 
@@ -165,6 +168,19 @@ def simulate(
     arithmetic: str = "double",
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(velocity, torque) of the model in its loop; limits may be inf, an empty initial_state is rest."""
+
+def mirrored(
+    arithmetic: str,
+    in_z: bool,
+    gain: float,
+    poles: NDArray[np.complex128],
+    zeros: NDArray[np.complex128],
+    dt: float,
+    input: NDArray[np.float64],
+    kp: float,
+    ki: float,
+) -> tuple[NDArray[np.float64], bool]:
+    """(velocity in the continuous loop in a drive's arithmetic, whether it left its range); in_z: not in delta form."""
 
 def discrete(
     gain: float,

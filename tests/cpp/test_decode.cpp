@@ -1,5 +1,5 @@
 #include "check.hpp"
-#include "gaident/decode.hpp"
+#include "gaident/encode.hpp"
 #include "gaident/reference/bits.hpp"
 
 using namespace gaident;

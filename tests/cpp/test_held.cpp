@@ -1,5 +1,6 @@
 #include "check.hpp"
 #include "gaident/closed_loop.hpp"
+#include "gaident/held.hpp"
 #include "gaident/reference/drives.hpp"
 
 using namespace gaident;

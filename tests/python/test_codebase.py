@@ -20,9 +20,22 @@ PACKAGE = ROOT / "python" / "gaident"
 
 # The core, lowest first: a file includes only what stands above it. Files of one folder share its place.
 CORE_ORDER = [
-    *("rng", "arithmetic", "float_pair", "lanes", "denormals", "chromosome", "genome", "factors", "decode"),
-    *("decoder", "parameters", "neighbours", "delta", "bilinear", "held", "controller", "closed_loop", "loop", "record"),
-    *("fitness", "kernels/", "elementary", "effects/", "friction", "two_mass", "effect_constants", "effect_plant"),
+    *(
+        "wrong_use",
+        "rng",
+        "arithmetic",
+        "float_pair",
+        "lanes",
+        "c30",
+        "fixed",
+        "counting",
+        "denormals",
+        "chromosome",
+        "population",
+    ),
+    *("genome", "factors", "roots", "decode", "encode", "decoder", "parameters", "neighbours", "delta", "bilinear", "held"),
+    *("controller", "closed_loop", "loop", "record", "fitness", "candidate", "fixed_scaling", "operators", "static_search"),
+    *("kernels/", "elementary", "effects/", "friction", "two_mass", "effect_constants", "effect_plant"),
     *(
         "own_effects",
         "effect_loop",
@@ -31,12 +44,13 @@ CORE_ORDER = [
         "parallel",
         "batch",
         "simulate",
+        "mirror",
         "linear",
         "sweep",
         "refine",
         "statistics",
     ),
-    *("settings", "operators", "breeder", "island", "species", "engine", "reference/", "effect_prepare", "effect_batch"),
+    *("settings", "breeder", "island", "species", "engine", "reference/", "effect_prepare", "effect_batch"),
 ]
 
 # Python: what each room may import of gaident, beside itself, and what inside a function only. A room is a

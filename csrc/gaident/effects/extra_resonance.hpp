@@ -6,6 +6,8 @@
 #include "../factors.hpp"
 #include "effect.hpp"
 
+#include <stdexcept>
+
 namespace gaident {
 
 struct ExtraResonance {

@@ -1,6 +1,7 @@
 // The one source of the sample loops; included by one .cpp per instruction set, each with its own tag type.
 #pragma once
 
+#include "../held.hpp"
 #include "../lanes.hpp"
 #include "../loop.hpp"
 #include "kernels.hpp"

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "../record.hpp"
+#include "../roots.hpp"
 #include "cascade.hpp"
 
 namespace gaident::reference {

@@ -73,6 +73,13 @@ def identify(
             continue
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
             raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
+    if settings.in_drive and (
+        controller is None or controller.loop != "continuous" or any(map(math.isfinite, controller.limits))
+    ):
+        raise SettingsError(
+            f"settings.arithmetic is {settings.arithmetic!r}: a drive's search knows the paper's loop only, continuous and without "
+            'limits; give such a controller, or arithmetic="double"'
+        )
     threads = _processors() if workers is None else int(workers)
     digests = _distinct(given)
     # Sums must not depend on the order given.
@@ -90,6 +97,13 @@ def identify(
     result = work.report(best, scored, found, int(seed))
     if derived and not settings.species:
         warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give space=SearchSpace(...)."
+        object.__setattr__(result, "warnings", (*result.warnings, warning))
+    overflows = sum(t.overflows for t in found)
+    if overflows:
+        evaluations = sum(t.evaluations for t in found)
+        warning = (
+            f"In {settings.arithmetic} {overflows} of {evaluations} candidates left its range or diverged; they count as worst."
+        )
         object.__setattr__(result, "warnings", (*result.warnings, warning))
     object.__setattr__(result, "seconds", time.perf_counter() - began)
     return result

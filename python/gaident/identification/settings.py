@@ -19,7 +19,9 @@ ENGINES = {
 }
 CODES = ("gray", "binary")
 SCALES = ("logarithmic", "linear")
-ARITHMETICS = ("double", "float")
+# A drive's: genes, coefficients, recurrence and fitness in them. See docs/dsp.md.
+DRIVE_ARITHMETICS = ("drive_float", "c30", "fixed", "fixed_tight", "fixed_wide")
+ARITHMETICS = ("double", "float", *DRIVE_ARITHMETICS)
 INITIAL_STATES = ("auto", "rest", "free")
 
 
@@ -35,7 +37,9 @@ class Settings:
     elites: survivors of the plain engine (species always keep one each).
     code: "gray" or "binary"; scale: "logarithmic" or "linear" coding of real and imaginary parts (K is always logarithmic).
     error_weight, order_weight: Wf1, Wf2 of fitness (6).
-    arithmetic: "double" or "float", of the genetic search; local fits are always double.
+    arithmetic: "double" or "float", of the genetic search; local fits are always double. Or that of a drive (docs/dsp.md), in
+        which the run is the drive's bit for bit: "drive_float" (32 bits throughout), "c30" (the paper's processor), "fixed" (32-bit
+        fixed point; "fixed_tight" and "fixed_wide" with less and more headroom): for the continuous loop without limits.
     initial_state: "rest", "free" (estimated for every record) or "auto": estimated for records that do not start at rest.
 
     Raises SettingsError naming the field, its value and what it may be.
@@ -100,6 +104,11 @@ class Settings:
         return cls(code="binary", scale="linear", engine="plain")
 
     @property
+    def in_drive(self) -> bool:
+        """Whether the search runs in a drive's arithmetic."""
+        return self.arithmetic in DRIVE_ARITHMETICS
+
+    @property
     def species(self) -> bool:
         """Whether structures are protected in species of their own."""
         return self.engine == "species"
@@ -123,6 +132,7 @@ class Settings:
             round=self.round,
             quiet_rounds=self.quiet_rounds,
             in_float=self.arithmetic == "float",
+            mirror=self.arithmetic if self.in_drive else "",
         )
 
     def to_dict(self) -> dict[str, Any]:

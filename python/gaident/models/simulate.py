@@ -23,7 +23,7 @@ from gaident.models.own_effects import OWN
 
 Signal = NDArray[np.float64]
 AnyModel = Model | OneMass | TwoMass
-ARITHMETICS = ("double", "float")
+ARITHMETICS = ("double", "float", "drive_float", "c30", "fixed", "fixed_tight", "fixed_wide")
 MAX_SUBSTEPS = 64
 
 
@@ -65,7 +65,8 @@ def run(
     initial_state  None: at rest; otherwise what `gaident.models.initial_state` gives: p + q numbers of the
                    plant, the first of them the velocity [rad/s] before the first input acts; with a
                    controller one more, its stored torque [N m]
-    arithmetic     "double", or "float" for 32-bit arithmetic (within 1e-4 of the response; models without effects)
+    arithmetic     "double", or "float" for 32-bit arithmetic (within 1e-4 of the response; models without effects); or a
+                   drive's (docs/dsp.md): from rest, in the continuous loop without limits
     substeps       steps per sample of a model with effects, 1..64; None: as many as it needs
 
     A model that diverges gives infinite or undefined values, no error. Raises RecordError where the record
@@ -204,6 +205,8 @@ def _simulated(
     if state is not None:
         _check_start(plant, controller, start, what)
     steps = checked_substeps(substeps)
+    if arithmetic not in ("double", "float") and not plant.effects:
+        _check_drive(controller, state, arithmetic)
     if not plant.effects:
         return *_core_simulate(plant, rec.dt, source, controller, start, arithmetic), None
     if arithmetic != "double":
@@ -212,6 +215,14 @@ def _simulated(
     found = _simulate(_core_record(rec, source, controller), [plant], starts, steps, 1, True)
     velocity, torque, angle = (signal[0] for signal in found)
     return velocity, torque, angle
+
+
+def _check_drive(controller: PI | None, state: ArrayLike | None, arithmetic: str) -> None:
+    limits = (0.0,) if controller is None else controller.limits
+    if controller is None or controller.loop != "continuous" or any(map(math.isfinite, limits)):
+        raise ModelError(f'arithmetic is {arithmetic!r}: it is that of the continuous loop without limits; use "double" here')
+    if state is not None:
+        raise ModelError(f"initial_state is {state!r}: in the arithmetic {arithmetic!r} a model starts at rest; leave it out")
 
 
 OwnList = list[tuple[str, Callable[..., Any], Signal]]

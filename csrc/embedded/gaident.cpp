@@ -1,0 +1,82 @@
+// gaident.h on the search of paper_search.hpp.
+#include "gaident.h"
+
+#include "../gaident/denormals.hpp"
+#include "paper_search.hpp"
+
+#include <new>
+
+using namespace gaident;
+
+// Opaque for C.
+struct gaident_search {
+    PaperSearch search;
+    explicit gaident_search(const StaticSetup<InDrive>& setup) : search(setup) {}
+};
+
+extern "C" {
+
+gaident_settings gaident_paper_settings(double kp, double ki, double sample_time, double peak) {
+    return {kp, ki, sample_time, peak, 0, 0.9, 0.01, 2, 1.0, 2.0};
+}
+
+size_t gaident_bytes() { return sizeof(gaident_search); }
+
+gaident_search* gaident_configure(void* memory, size_t bytes, const gaident_settings* s) {
+    const auto rate = [](double x) { return x >= 0.0 && x <= 1.0; };
+    const auto positive = [](double x) { return x > 0.0 && x < 1e30; };
+    if (memory == nullptr || s == nullptr || bytes < sizeof(gaident_search)) return nullptr;
+    if (reinterpret_cast<uintptr_t>(memory) % alignof(gaident_search) != 0) return nullptr;
+    if (!positive(s->kp) || !(s->ki == 0.0 || positive(s->ki)) || !positive(s->sample_time) || !positive(s->peak)) return nullptr;
+    if (!rate(s->crossover) || !rate(s->mutation) || (s->mutation > 0.0 && s->mutation < 1e-6)) return nullptr;
+    if (s->tournament < 1 || s->tournament > population || !positive(s->error_weight) || !(s->order_weight >= 0.0))
+        return nullptr;
+    const FlushDenormals flush;
+    StaticSetup<InDrive> setup = paper_setup();
+    setup.kp = s->kp;
+    setup.ki = s->ki;
+    setup.sample_time = s->sample_time;
+    setup.peak = s->peak;
+    setup.tournament = s->tournament;
+    setup.crossover = s->crossover;
+    setup.mutation = s->mutation;
+    setup.weights = {s->error_weight, s->order_weight};
+    setup.seed = s->seed;
+    return new (memory) gaident_search(setup);
+}
+
+int gaident_feed(gaident_search* g, double command, double velocity) { return g->search.feed(command, velocity) ? 1 : 0; }
+
+int gaident_ready(const gaident_search* g) { return g->search.full() ? 1 : 0; }
+
+int gaident_work(gaident_search* g, int individuals) {
+    const FlushDenormals flush;
+    return g->search.full() ? g->search.work(individuals) : 0;
+}
+
+int gaident_run(gaident_search* g, int generations) {
+    const FlushDenormals flush;
+    if (!g->search.full()) return 0;
+    for (int k = 0; k < generations; ++k) g->search.generation();
+    return g->search.generations();
+}
+
+int gaident_best(const gaident_search* g, gaident_model* model) {
+    if (g->search.generations() == 0) return 0;
+    const Factors<Number> f = g->search.best_model();
+    const auto number = [](const Number& x) { return static_cast<double>(x); };
+    const auto pair = [&](const Pair<Number>& x) { return gaident_pair{number(x.e1), number(x.e0)}; };
+    *model = {};
+    model->p = f.structure.p;
+    model->q = f.structure.q;
+    model->gain = number(f.gain);
+    for (int i = 0; i < f.structure.pole_pairs(); ++i) model->pole_pairs[i] = pair(f.pole_pair[i]);
+    for (int i = 0; i < f.structure.zero_pairs(); ++i) model->zero_pairs[i] = pair(f.zero_pair[i]);
+    if (f.structure.single_pole()) model->pole = number(f.pole);
+    if (f.structure.single_zero()) model->zero = number(f.zero);
+    model->fitness = number(g->search.best_fitness());
+    model->generation = g->search.best_generation();
+    model->generations = g->search.generations();
+    return 1;
+}
+}

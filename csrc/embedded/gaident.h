@@ -1,0 +1,83 @@
+/* gaident in a drive: identification of the plant inside a velocity loop, while the drive works. C99.
+ *
+ *     static uint64_t memory[...];                             gaident_bytes() bytes, aligned to 8
+ *     gaident_search *g = gaident_configure(memory, sizeof memory, &settings);
+ *     in the control task:      gaident_feed(g, command, velocity);    until it returns 0: the record is full
+ *     in a background task:     gaident_run(g, 1);                     one generation more; or gaident_work(g, n) for shorter slices
+ *     at any time there:        gaident_best(g, &model);
+ *
+ * gaident_feed and the others may be called from different tasks: feed touches nothing but the record, and the search begins when the
+ * record is full. No function allocates, waits, or prints. Numbers are double in the interface whatever the arithmetic inside. */
+#ifndef GAIDENT_H
+#define GAIDENT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct gaident_search gaident_search;
+
+typedef struct {
+    double kp;           /* proportional gain of the velocity controller [N m s/rad] */
+    double ki;           /* its integral gain [N m/rad] */
+    double sample_time;  /* [s] */
+    double peak;         /* largest velocity or command to be expected [rad/s]; sets the fixed-point scaling */
+    uint64_t seed;       /* the same seed gives the same run, here and on the desk */
+    double crossover;    /* rate per pair, 0..1; the paper: 0.9 */
+    double mutation;     /* rate per bit, 1e-6..1; the paper: 0.01 */
+    int tournament;      /* contestants; the paper does not say, 2 */
+    double error_weight; /* Wf1 */
+    double order_weight; /* Wf2 */
+} gaident_settings;
+
+/* s^2 + e1 s + e0 [1/s, 1/s^2] */
+typedef struct {
+    double e1, e0;
+} gaident_pair;
+
+/* G(s) = gain * prod zeros / prod poles, p poles more than zeros, q zeros: (p+q)/2 pairs of poles and, if p+q is odd, s + pole; q/2 pairs
+ * of zeros and, if q is odd, s + zero. */
+typedef struct {
+    int p, q;
+    double gain;
+    gaident_pair pole_pairs[3];
+    double pole;
+    gaident_pair zero_pairs[1];
+    double zero;
+    double fitness;  /* equation (6); smaller is better */
+    int generation;  /* in which it was found */
+    int generations; /* evaluated so far */
+} gaident_model;
+
+/* The paper's settings (Table II) for a loop. */
+gaident_settings gaident_paper_settings(double kp, double ki, double sample_time, double peak);
+
+/* Memory that a search takes [bytes]. */
+size_t gaident_bytes(void);
+
+/* Builds a search in `memory`, which stays the caller's. NULL where it is too small or not aligned to 8, or a setting is out of range. */
+gaident_search* gaident_configure(void* memory, size_t bytes, const gaident_settings* settings);
+
+/* One sample of the step that is to be identified, from rest on [rad/s]. 1: taken; 0: the record was already full. */
+int gaident_feed(gaident_search* g, double command, double velocity);
+
+/* Whether the record is full. */
+int gaident_ready(const gaident_search* g);
+
+/* Runs `generations` more; returns how many have been evaluated in all. 0 while the record is not full. */
+int gaident_run(gaident_search* g, int generations);
+
+/* A shorter slice: up to `individuals` evaluated, or one population bred. Returns the generations evaluated in all. */
+int gaident_work(gaident_search* g, int individuals);
+
+/* The best model so far; 1, or 0 while there is none. */
+int gaident_best(const gaident_search* g, gaident_model* model);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

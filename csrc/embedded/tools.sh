@@ -1,0 +1,23 @@
+#!/bin/sh
+# What `make embedded` needs: looks for it, installs it where this is Debian and we are root or may become so, and otherwise says how.
+# Exit code 0: everything is there.
+packages="gcc-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm"
+
+have() {
+    command -v qemu-system-arm && command -v arm-none-eabi-g++ &&
+        echo '#include <concepts>' | arm-none-eabi-g++ -std=c++20 -ffreestanding -fsyntax-only -x c++ -
+} >/dev/null 2>&1
+
+have && exit 0
+if command -v apt-get >/dev/null 2>&1; then
+    root=""
+    [ "$(id -u)" -eq 0 ] || root="sudo -n"
+    if [ -z "$root" ] || $root true 2>/dev/null; then
+        echo "installing $packages" >&2
+        { $root apt-get update -q && $root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $packages; } \
+            >/dev/null 2>&1
+        have && exit 0
+    fi
+fi
+echo "the cross compiler and the emulator are missing; on Debian: apt install $packages" >&2
+exit 1

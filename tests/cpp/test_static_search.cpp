@@ -1,0 +1,164 @@
+// The search that runs in a drive, against the desk's.
+#include "check.hpp"
+#include "drive_bench.hpp"
+#include "gaident/c30.hpp"
+#include "gaident/denormals.hpp"
+#include "gaident/engine.hpp"
+#include "gaident/fixed_scaling.hpp"
+#include "gaident/static_search.hpp"
+
+#include <memory>
+
+using namespace gaident;
+
+namespace {
+
+template <class A>
+struct Tables {
+    std::vector<typename A::Number> gain, real, imaginary;
+    Genome genome{SearchRanges{}, Code::binary, Scale::linear};
+
+    Tables() {
+        const auto fill = [&](auto& table, const Field& f) {
+            for (std::uint32_t bits = 0; bits < 1U << f.width; ++bits)
+                table.push_back(typename A::Number(genome.value_of(bits, f)));
+        };
+        fill(gain, genome.field(Role::gain, Part::whole, 0));
+        fill(real, genome.field(Role::pole1, Part::real, 0));
+        fill(imaginary, genome.field(Role::pole1, Part::imaginary, 0));
+    }
+    StaticSetup<A> setup(const Bench& bench, std::uint64_t seed) const {
+        const reference::Drive& d = bench.drive;
+        StaticSetup<A> s;
+        s.genome = &genome;
+        s.values.gain = gain.data();
+        s.values.real = real.data();
+        s.values.imaginary = imaginary.data();
+        for (auto& unit : s.values.unit) unit = typename A::Number(1.0);
+        s.kp = d.loop.kp;
+        s.ki = d.loop.ki;
+        s.sample_time = d.sample_time;
+        for (const auto* signal : {&bench.measured.input, &bench.measured.output})
+            for (const double v : *signal) s.peak = std::max(s.peak, std::abs(v));
+        s.seed = seed;
+        return s;
+    }
+};
+
+template <class A>
+Trial run(const Bench& bench, int generations, std::uint64_t seed) {
+    const FlushDenormals flush;
+    const Tables<A> tables;
+    const auto search = std::make_unique<StaticSearch<A, 50, 250>>(tables.setup(bench, seed));
+    for (std::size_t i = 0; i < 250; ++i) search->feed(bench.measured.input[i], bench.measured.output[i]);
+    Trial t;
+    for (int g = 0; g < generations; ++g) {
+        search->generation();
+        t.history.push_back(static_cast<double>(search->least_cost()));
+    }
+    t.best_fitness = static_cast<double>(search->best_fitness());
+    t.best_generation = search->best_generation();
+    t.best.assign(search->best(), search->best() + 4);
+    return t;
+}
+
+Trial desk(const Bench& bench, const char* mirror, int generations, std::uint64_t seed) {
+    Settings s;
+    s.generations = generations;
+    s.mirror = mirror;
+    Progress progress;
+    return search(bench.experiment, SearchRanges{}, s, 1, seed, 1, progress)[0];
+}
+
+bool same(const Trial& a, const Trial& b) {
+    return a.history == b.history && a.best == b.best && a.best_fitness == b.best_fitness &&
+           a.best_generation == b.best_generation;
+}
+
+}  // namespace
+
+TEST_CASE("static search: in double the desk's run, bit for bit; settling and driven records") {
+    for (const bool step : {true, false}) {
+        reference::Drive d = two_mass();
+        if (!step)
+            for (std::size_t i = 100; i < d.input.size(); ++i) d.input[i] = -20.0;
+        const Bench bench(d);
+        CHECK(same(run<Plain<double>>(bench, 60, 4), desk(bench, "", 60, 4)));
+    }
+}
+
+TEST_CASE("static search: in a drive's arithmetic the run of its mirror on the desk, bit for bit") {
+    for (const bool step : {true, false}) {
+        reference::Drive d = two_mass();
+        if (!step)
+            for (std::size_t i = 100; i < d.input.size(); ++i) d.input[i] = -20.0;
+        const Bench bench(d);
+        CHECK(same(run<Plain<float>>(bench, 30, 4), desk(bench, "drive_float", 30, 4)));
+        CHECK(same(run<Plain<C30Word, C30>>(bench, 30, 4), desk(bench, "c30", 30, 4)));
+        CHECK(same(run<FixedPoint<2>>(bench, 30, 4), desk(bench, "fixed", 30, 4)));
+        CHECK(!same(run<Plain<float>>(bench, 30, 4), desk(bench, "c30", 30, 4)));
+    }
+}
+
+TEST_CASE("static search: slices of any size make the same run; a full record takes no more samples") {
+    const Bench bench(two_mass());
+    const Tables<Plain<float>> tables;
+    using Search = StaticSearch<Plain<float>, 50, 250>;
+    const auto whole = std::make_unique<Search>(tables.setup(bench, 9)),
+               sliced = std::make_unique<Search>(tables.setup(bench, 9));
+    for (Search* s : {whole.get(), sliced.get()}) {
+        for (std::size_t i = 0; i < 250; ++i) {
+            CHECK(!s->full());
+            CHECK(s->feed(bench.measured.input[i], bench.measured.output[i]));
+        }
+        CHECK(s->full() && !s->feed(1.0, 1.0) && s->samples() == 250);
+    }
+    CHECK(whole->generations() == 0);
+    while (whole->generation() < 5) {
+    }
+    for (int n = 1; sliced->work(n) < 5;) n = n % 7 + 1;
+    CHECK(whole->best_fitness() == sliced->best_fitness() && whole->best_generation() == sliced->best_generation());
+    for (int w = 0; w < 200; ++w) CHECK(whole->chromosomes()[w] == sliced->chromosomes()[w]);
+    for (int i = 0; i < 50; ++i) CHECK(whole->costs()[i] == sliced->costs()[i]);
+    const Factors<double> f = decode(whole->best(), tables.genome);
+    CHECK(whole->best_model().structure == f.structure);
+    CHECK_NEAR(whole->best_model().gain, f.gain, 1e-6 * f.gain);
+}
+
+TEST_CASE("mirror: two records, and records that begin in motion, cost what double says; overflows are counted") {
+    Bench bench(two_mass());
+    bench.experiment.records.push_back(bench.experiment.records[0]);
+    bench.experiment.records[1].start = Start::steady;
+    bench.experiment.records[1].velocity0 = 40.0;
+    const Genome genome(SearchRanges{}, Code::binary, Scale::linear);
+    const Decoder decoder(genome);
+    Population all(200, genome.words());
+    Random random(2);
+    for (std::size_t i = 0; i < all.size(); ++i)
+        for (int w = 0; w < all.words(); ++w) all[i][w] = random.word();
+    std::vector<double> exact(all.size()), found(all.size());
+    Batch(bench.experiment, all.size(), false).errors(all, decoder, exact);
+    for (std::size_t i = 0; i < all.size(); ++i) exact[i] = fitness(exact[i], decoder.structure(all[i]), {});
+    // One row of tolerances per arithmetic, relative; docs/dsp.md has more figures.
+    const struct {
+        const char* name;
+        double tolerance;
+    } rows[] = {{"drive_float", 2e-5}, {"c30", 2e-5}, {"fixed", 2e-3}, {"fixed_tight", 1e-3}, {"fixed_wide", 2e-2}};
+    for (const auto& row : rows) {
+        const auto mirror = make_mirror(row.name, bench.experiment, genome, {});
+        mirror->evaluate(all, found);
+        std::size_t worst = 0;
+        double deviation = 0.0;
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            if (!(found[i] < worst_fitness)) ++worst;
+            else deviation = std::max(deviation, std::abs(found[i] / exact[i] - 1.0));
+        }
+        std::printf("%-12s deviation of the fitness %.2g, overflows %zu of %zu\n", row.name, deviation, worst, all.size());
+        CHECK(deviation < row.tolerance);
+        CHECK(mirror->overflows() == worst && worst < all.size() / 2);
+    }
+    CHECK(mirror_names().size() == std::size(rows));
+    CHECK_THROWS(make_mirror("half", bench.experiment, genome, {}), std::invalid_argument);
+    bench.experiment.loop.torque_limit = 1.0;
+    CHECK_THROWS(make_mirror("c30", bench.experiment, genome, {}), std::invalid_argument);
+}
