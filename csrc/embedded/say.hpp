@@ -34,6 +34,6 @@ private:
         text_[n_] = c;
         if (n_ + 1 < static_cast<int>(sizeof text_) - 1) ++n_;
     }
-    char text_[200] = {};
+    char text_[260] = {};
     int n_ = 0;
 };

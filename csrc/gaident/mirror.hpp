@@ -27,7 +27,7 @@ protected:
 std::unique_ptr<Mirror> make_mirror(std::string_view arithmetic, const Experiment& experiment, const Genome& genome,
                                     const FitnessWeights& weights);
 
-// The names: "drive_float", "c30", "fixed", ...
+// The names: "drive_double", "drive_float", "c30", "fixed", ...
 std::vector<std::string_view> mirror_names();
 
 // One model's velocity in such an arithmetic; `in_z`: not in delta form but in powers of z, the coefficients computed in double and rounded

@@ -84,6 +84,7 @@ TEST_CASE("static search: in double the desk's run, bit for bit; settling and dr
             for (std::size_t i = 100; i < d.input.size(); ++i) d.input[i] = -20.0;
         const Bench bench(d);
         CHECK(same(run<Plain<double>>(bench, 60, 4), desk(bench, "", 60, 4)));
+        CHECK(same(run<Plain<double>>(bench, 60, 4), desk(bench, "drive_double", 60, 4)));
     }
 }
 
@@ -143,7 +144,7 @@ TEST_CASE("mirror: two records, and records that begin in motion, cost what doub
     const struct {
         const char* name;
         double tolerance;
-    } rows[] = {{"drive_float", 2e-5}, {"c30", 2e-5}, {"fixed", 2e-3}, {"fixed_tight", 1e-3}, {"fixed_wide", 2e-2}};
+    } rows[] = {{"drive_double", 1e-12}, {"drive_float", 2e-5}, {"c30", 2e-5}, {"fixed", 2e-3}, {"fixed_tight", 1e-3}, {"fixed_wide", 2e-2}};
     for (const auto& row : rows) {
         const auto mirror = make_mirror(row.name, bench.experiment, genome, {});
         mirror->evaluate(all, found);

@@ -77,8 +77,8 @@ def identify(
         controller is None or controller.loop != "continuous" or any(map(math.isfinite, controller.limits))
     ):
         raise SettingsError(
-            f"settings.arithmetic is {settings.arithmetic!r}: a drive's search knows the paper's loop only, continuous and without "
-            'limits; give such a controller, or arithmetic="double"'
+            f"settings.arithmetic is {settings.arithmetic!r}: a drive's search knows the paper's loop only, continuous and "
+            'without limits; give such a controller, or arithmetic="double"'
         )
     threads = _processors() if workers is None else int(workers)
     digests = _distinct(given)

@@ -20,7 +20,7 @@ ENGINES = {
 CODES = ("gray", "binary")
 SCALES = ("logarithmic", "linear")
 # A drive's: genes, coefficients, recurrence and fitness in them. See docs/dsp.md.
-DRIVE_ARITHMETICS = ("drive_float", "c30", "fixed", "fixed_tight", "fixed_wide")
+DRIVE_ARITHMETICS = ("drive_double", "drive_float", "c30", "fixed", "fixed_tight", "fixed_wide")
 ARITHMETICS = ("double", "float", *DRIVE_ARITHMETICS)
 INITIAL_STATES = ("auto", "rest", "free")
 
@@ -38,8 +38,9 @@ class Settings:
     code: "gray" or "binary"; scale: "logarithmic" or "linear" coding of real and imaginary parts (K is always logarithmic).
     error_weight, order_weight: Wf1, Wf2 of fitness (6).
     arithmetic: "double" or "float", of the genetic search; local fits are always double. Or that of a drive (docs/dsp.md), in
-        which the run is the drive's bit for bit: "drive_float" (32 bits throughout), "c30" (the paper's processor), "fixed" (32-bit
-        fixed point; "fixed_tight" and "fixed_wide" with less and more headroom): for the continuous loop without limits.
+        which the run is the drive's bit for bit: "drive_double", "drive_float" (64 and 32 bits throughout), "c30" (the paper's
+        processor), "fixed" (32-bit fixed point; "fixed_tight", "fixed_wide": less and more headroom). Those know the continuous
+        loop without limits.
     initial_state: "rest", "free" (estimated for every record) or "auto": estimated for records that do not start at rest.
 
     Raises SettingsError naming the field, its value and what it may be.

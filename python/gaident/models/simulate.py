@@ -23,7 +23,7 @@ from gaident.models.own_effects import OWN
 
 Signal = NDArray[np.float64]
 AnyModel = Model | OneMass | TwoMass
-ARITHMETICS = ("double", "float", "drive_float", "c30", "fixed", "fixed_tight", "fixed_wide")
+ARITHMETICS = ("double", "float", "drive_double", "drive_float", "c30", "fixed", "fixed_tight", "fixed_wide")
 MAX_SUBSTEPS = 64
 
 
