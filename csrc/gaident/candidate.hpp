@@ -20,9 +20,10 @@
 
 namespace gaident {
 
-// How large the signals of a search can get: the record's peak [rad/s] and the ranges of the genes.
+// How large the signals of a search can get: the record's peak [rad/s] and length, and the ranges of the genes.
 struct Extent {
     double peak;
+    std::size_t samples;
     const SearchRanges* ranges;
     double kp, ki, sample_time;
 };

@@ -5,8 +5,14 @@
 //
 //     x[i] = d^i y + a[0] d^(i-1) y + ... + a[i-1] y - b[0] d^i r - ... - b[i] r
 //
+// and, summed up over T samples (substitute x[i](n+1) - x[i](n) = x[i+1] + b[i+1] r - a[i] y from the last state on) from where it may
+// start, at rest or away from it (closed_loop.hpp: at_rest),
+//
+//     |x[i]| <= peak (|a[i-1] - b[i]| + sum_j (a[i+j] + b[i+j+1]) T^(j+1) / (j+1)!)
+//
 // The coefficients are largest for the structure's fastest and strongest plant, the end of every range, and a difference is at most
-// min(1, a[0]) of what it is taken of. So each structure has its own points, one per state.
+// min(1, a[0]) of what it is taken of. The smaller bound counts: the first for the early states, the second for the last. So each structure
+// has its own points, one per state.
 #pragma once
 
 #include "candidate.hpp"
@@ -40,14 +46,21 @@ struct StatePoints {
     std::int8_t at[max_loop_order + 1] = {};
 
     StatePoints() = default;
-    // `h`: the closed loop with the largest coefficients; `peak`: of the signals, headroom included
-    StatePoints(const Delta<double>& h, double peak) {
+    // `h`: the closed loop with the largest coefficients; `peak`: of the signals, headroom included; `T`: samples
+    StatePoints(const Delta<double>& h, double peak, double T) {
         const auto size = [](double x) { return x < 0.0 ? -x : x; };
         const double rate = h.order > 0 && size(h.a[0]) < 1.0 ? size(h.a[0]) : 1.0;
         double bound = 1.0;  // of d^i y + a[0] d^(i-1) y + ... + a[i-1] y
         for (int i = 0; i < h.order; ++i) {
             if (i > 0) bound = rate * bound + size(h.a[i - 1]);
-            at[i] = static_cast<std::int8_t>(point_for(peak * (bound + (i > 0 ? size(h.b[i]) : 0.0))));
+            const double by_differences = bound + (i > 0 ? size(h.b[i]) : 0.0);
+            double by_sums = i > 0 ? size(h.a[i - 1] - h.b[i]) : 1.0, power = 1.0;
+            for (int j = 0; i + j < h.order; ++j) {
+                power *= T / static_cast<double>(j + 1);
+                by_sums += (size(h.a[i + j]) + size(h.b[i + j + 1])) * power;
+            }
+            const int point = i == 0 ? point_for(peak) : point_for(peak * (by_sums < by_differences ? by_sums : by_differences));
+            at[i] = static_cast<std::int8_t>(point < 120 ? point : 120);
         }
     }
 };
@@ -58,13 +71,14 @@ struct FixedScaling {
 
     FixedScaling() = default;
     FixedScaling(const Extent& extent, int headroom) {
-        const double peak = extent.peak * static_cast<double>(1 << headroom);
-        signal_point = point_for(peak > 0.0 ? peak : 1.0);
+        const double peak = (extent.peak > 0.0 ? extent.peak : 1.0) * static_cast<double>(1 << headroom);
+        signal_point = point_for(peak);
         for (int p = extent.ranges->p_min; p <= extent.ranges->p_max; ++p)
             for (int q = extent.ranges->q_min; q <= extent.ranges->q_max; ++q) {
                 const Factors<double> end = end_of_ranges(*extent.ranges, {p, q});
                 const Delta<double> plant = bilinear_plant(end, extent.sample_time);
-                states[p][q] = StatePoints(close_loop(plant, extent.kp, extent.ki, extent.sample_time), peak > 0.0 ? peak : 1.0);
+                states[p][q] = StatePoints(close_loop(plant, extent.kp, extent.ki, extent.sample_time), peak,
+                                           static_cast<double>(extent.samples));
             }
     }
 };
@@ -85,7 +99,7 @@ struct FixedPoint {
     static constexpr Signal signal(Sample x, const Scaling& s) { return {x, s.signal_point, false}; }
     static constexpr Sample store(const Signal& x) { return x.word; }
     static State state(const Scaling& scaling, Structure s, int i, double value = 0.0) {
-        const int point = i == 0 ? scaling.signal_point : scaling.states[s.p][s.q].at[i];
+        const int point = i == 0 ? scaling.signal_point : scaling.states[s.p][s.q].at[i];  // x[0] is a velocity
         return value == 0.0 ? FixedSignal(0, point, false) : FixedSignal::of(value, point);
     }
     static Sum no_error(const Scaling& s) {

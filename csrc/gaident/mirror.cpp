@@ -50,7 +50,7 @@ private:
         bool settles;
 
         Taken(const Record& r, const Loop& loop, const SearchRanges& ranges, double peak)
-            : scaling(Extent{peak, &ranges, loop.kp, loop.ki, r.sample_time}) {
+            : scaling(Extent{peak, r.size(), &ranges, loop.kp, loop.ki, r.sample_time}) {
             settles = std::all_of(r.input.begin(), r.input.end(), [&](double v) { return v == r.input[0]; });
             for (const double v : r.input) input.push_back(A::sample(v, scaling));
             for (const double v : r.output) output.push_back(A::sample(v, scaling));
@@ -159,7 +159,7 @@ bool velocity_in(bool in_z, const Factors<double>& g, std::span<const double> in
     double peak = 0.0;
     for (const double v : input) peak = std::max(peak, std::abs(v));
     const SearchRanges ranges = ranges_around(g);
-    const typename A::Scaling scaling(Extent{peak, &ranges, loop.kp, loop.ki, Ts});
+    const typename A::Scaling scaling(Extent{peak, input.size(), &ranges, loop.kp, loop.ki, Ts});
     const double limit = static_cast<double>(A::worst());
     bool left = false;
     const auto keep = [&](std::size_t k, const typename A::Signal& y) {

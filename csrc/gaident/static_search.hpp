@@ -33,7 +33,7 @@ public:
 
     explicit StaticSearch(const StaticSetup<A>& s)
         : setup_(s),
-          scaling_(Extent{s.peak, &s.genome->ranges(), s.kp, s.ki, s.sample_time}),
+          scaling_(Extent{s.peak, max_samples, &s.genome->ranges(), s.kp, s.ki, s.sample_time}),
           weights_(s.weights),
           random_(Random::stream(s.seed, s.stream)),
           mutation_(s.mutation, random_) {

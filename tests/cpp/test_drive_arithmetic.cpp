@@ -136,7 +136,7 @@ TEST_CASE("fixed: scalings come from the ranges; wider ranges leave fewer bits, 
     const SearchRanges ranges;
     const reference::Drive d = reference::paper_drive(true);
     const auto scaling = [&](const SearchRanges& r, double peak, int headroom) {
-        return FixedScaling(Extent{peak, &r, d.loop.kp, d.loop.ki, d.sample_time}, headroom);
+        return FixedScaling(Extent{peak, 250, &r, d.loop.kp, d.loop.ki, d.sample_time}, headroom);
     };
     const FixedScaling s = scaling(ranges, 43.6, 0);
     CHECK(s.signal_point == 25);  // 43.6 < 64 = 2^6, and 31 bits
