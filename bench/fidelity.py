@@ -31,7 +31,7 @@ ARITHMETICS = {
     "fixed_wide": "fixed, 6 bits",
 }
 DT, COMMAND, NOISE = 0.444e-3, np.full(250, 43.6), 0.3
-SPACE = ga.SearchSpace(gain=(1e3, 2e4), real=(0.0, 60.0), imag=(0.0, 250.0))
+SPACE = ga.SearchSpace(gain=(1e3, 2e4), real=(0.0, 60.0), imaginary=(0.0, 250.0))
 ONE_MASS = ga.Model(6278.26, poles=(-34.13,))
 TWO_MASSES = ga.Model(6545.29, poles=(-15.41, -10.3 + 150.9j, -10.3 - 150.9j), zeros=(-4.26 + 93.98j, -4.26 - 93.98j))
 
