@@ -169,7 +169,8 @@ private:
 
     [[gnu::always_inline]] R rippled() const {
         R w = plant_.velocity();
-        if (own_sensor_) w = asked(OwnPlace::sensor, w, held_, time_);
+        if (own_sensor_) [[unlikely]]
+            w = asked(OwnPlace::sensor, w, held_, time_);
         if (!set_.has(Effect::velocity_ripple)) return w;
         return VelocityRipple::seen(c_.ripple_amplitude, c_.ripple_order, c_.ripple_phase, theta_, w);
     }
@@ -202,7 +203,8 @@ private:
     // The torque u is issued, to be held until the next.
     [[gnu::always_inline]] void act(R u) {
         using enum Effect;
-        if (own_actuator_) u = asked(OwnPlace::actuator, plant_.velocity(), u, time_);
+        if (own_actuator_) [[unlikely]]
+            u = asked(OwnPlace::actuator, plant_.velocity(), u, time_);
         if (set_.has(torque_saturation)) u = clamp(u, -c_.saturation, c_.saturation);
         if (set_.has(torque_dead_band)) u = TorqueDeadBand::step(c_.dead_band, u);
         held_ = u;
@@ -237,7 +239,8 @@ private:
         if (set_.has(cogging)) T = T - Cogging::torque(c_.cogging_amplitude, c_.cogging_order, c_.cogging_phase, theta_);
 
         const R w = plant_.velocity();
-        if (own_shaft_) T = with_own(w, T, t);
+        if (own_shaft_) [[unlikely]]
+            T = with_own(w, T, t);
         const R w_free = plant_.free_velocity(T, friction_torque_);
         R w_next = w_free;
         if (friction_) {
