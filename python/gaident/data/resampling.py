@@ -19,12 +19,12 @@ def resampled(
 ) -> dict[str, NDArray[np.float64]]:
     """Each channel by linear interpolation at t0 + n dt, t0 to t1 being what all channels cover.
 
-    channels  name -> (time stamps [s], values), shape (n,) each, not ordered by need; stamps without a value (NaN) are
-              left out
+    channels  name -> (time stamps [s], values), shape (n,) each, n may differ; the stamps increase, those without a
+              value (NaN) are left out
     dt        sample time of the result [s]; at most 1.5 times what the channels have, or high frequencies would fold
 
-    Linear interpolation is a low-pass of its own (-0.9 dB at a quarter of the log's sample rate, no delay). Raises
-    ReadError.
+    Linear interpolation is a low-pass of its own (sinc^2 on average: -1.8 dB at a quarter of the log's sample rate) without
+    delay. Raises ReadError.
     """
     held = {}
     for name, (time, values) in channels.items():
