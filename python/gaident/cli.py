@@ -7,28 +7,38 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import io
 import json
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from gaident import demo as demonstration
+from gaident.cli_demo import demo_command
 from gaident.cli_logs import log_commands
 from gaident.cli_options import PICTURES, drive_of, in_options, parser_of
-from gaident.cli_output import csv_targets, csv_text, naming, proposal_csv, target_of, write
+from gaident.cli_output import (
+    csv_targets,
+    csv_text,
+    draw,
+    naming,
+    print_json,
+    proposal_csv,
+    save_figure,
+    summary_of,
+    target_of,
+    write,
+)
 from gaident.cli_report import report_command, write_report
 from gaident.data.record import Record
 from gaident.diagnosis.diagnose import diagnose
 from gaident.drive_file import Drive
 from gaident.errors import GaidentError, SettingsError
 from gaident.identification.identify import identify
-from gaident.identification.result import Identification, json_text
+from gaident.identification.result import Identification
 from gaident.identification.settings import Settings
 from gaident.identification.starts import starts_moving
 from gaident.models import effects
@@ -38,9 +48,6 @@ from gaident.models.model import Model
 from gaident.models.simulate import AnyModel, Run, initial_state, run
 from gaident.progress_bar import Progress
 from gaident.store import load
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["main"]
 
@@ -122,15 +129,15 @@ def _identify(args: argparse.Namespace) -> None:
             idn.save(out)
         written.append(out)
     if plot is not None:
-        _draw(idn, records, drive.axis, plot)
+        draw(idn, records, drive.axis, plot)
         written.append(plot)
     if page is not None:
         write_report(idn, page, records, (), drive.axis)
         written.append(page)
     if args.json:
-        _print_json(idn.to_dict())
+        print_json(idn.to_dict())
         return
-    print(_summary(idn, drive.axis))
+    print(summary_of(idn, drive.axis))
     if written:
         print(f"\nwritten: {', '.join(map(str, written))}")
 
@@ -166,7 +173,7 @@ def _simulate(args: argparse.Namespace) -> None:
     if args.json:
         plant = model if isinstance(model, Model) else model.model()
         runs = [_run_dict(rec, result) for rec, result in zip(records, results, strict=True)]
-        _print_json({
+        print_json({
             "schema": "gaident/simulation", "schema_version": 1, "model": plant.to_dict(),
             "controller": None if controller is None else controller.to_dict(), "runs": runs,
         })  # fmt: skip
@@ -178,61 +185,9 @@ def _simulate(args: argparse.Namespace) -> None:
             print(f"{rec.name}: fit {fit:.2f} %, rmse {rmse:.4g}; written: {target}")
 
 
-def _demo(args: argparse.Namespace) -> None:
-    from gaident.show.summary import mechanics_comparison
-
-    folder = Path(args.out)
-    folder.mkdir(parents=True, exist_ok=True)
-    say: Callable[[str], None] = (lambda text: None) if args.json else print
-    truth, controller = demonstration.TRUTH, demonstration.CONTROLLER
-    say(demonstration.STORY)
-    with Progress(None if args.quiet else sys.stderr) as progress:
-        rec, idn = demonstration.identify_two_masses(args.seed, progress, args.workers)
-    say(_summary(idn, "rotary"))
-    if isinstance(idn.mechanics, type(truth)):
-        say(f"\nCompared with the truth\n{mechanics_comparison(idn.mechanics, truth)}")
-    log, picture = folder / "demo_two_mass.csv", folder / "demo_two_mass.png"
-    write(log, csv_text(rec, None, "rotary").encode())
-    _draw(idn, [rec], "rotary", picture)
-    say(f"\nwritten: {picture}, {log}; the same from the log:")
-    say(f"  gaident identify {log} --kp {controller.kp} --ki {controller.ki} --loop {controller.loop}")
-    report: dict[str, Any] = {
-        "schema": "gaident/demo",
-        "schema_version": 1,
-        "two_masses": {"truth": truth.to_dict(), "identification": idn.to_dict()},
-        "emps": None,
-        "friction": None,
-    }
-    path = demonstration.emps_path()
-    if path is None:
-        say("\nThe measured EMPS axis is left out: GAIDENT_DATA names no folder with emps/DATA_EMPS.mat")
-    else:
-        say(f"\n{'-' * 100}\n{demonstration.EMPS_STORY}: {path}\n")
-        with Progress(None if args.quiet else sys.stderr) as progress:
-            rec, idn = demonstration.identify_emps(path, args.seed, progress, args.workers)
-        say(_summary(idn, "linear"))
-        picture = folder / "demo_emps.png"
-        _draw(idn, [rec], "linear", picture)
-        say(f"\n{demonstration.EMPS_TRUTH}\nwritten: {picture}")
-        report["emps"] = {"identification": idn.to_dict()}
-    say(f"\n{'-' * 100}\n{demonstration.FRICTION_STORY}")
-    with Progress(None if args.quiet else sys.stderr) as progress:
-        rec, dia = demonstration.diagnose_friction(args.seed, progress)
-    say(dia.summary())
-    log, picture = folder / "demo_friction.csv", folder / "demo_friction.png"
-    write(log, csv_text(rec, None, "rotary").encode())
-    _save_figure(dia.plot(), picture)
-    controller = demonstration.DIGITAL
-    say(f"\n{demonstration.FRICTION_TRUTH}\nwritten: {picture}, {log}; the same from the log:")
-    say(f"  gaident diagnose {log} --kp {controller.kp} --ki {controller.ki}")
-    report["friction"] = {"truth": {"coulomb_friction": {"torque": demonstration.FRICTION}}, "diagnosis": dia.to_dict()}
-    if args.json:
-        _print_json(report)
-
-
 def _effects(args: argparse.Namespace) -> None:
     if args.json:
-        _print_json({
+        print_json({
             "schema": "gaident/effects", "schema_version": 1, "effects": [row.to_dict() for row in effects.table()],
         })  # fmt: skip
     else:
@@ -277,24 +232,6 @@ def _load_model(path: str) -> tuple[AnyModel, PI | None, dict[str, tuple[float, 
     return known, None, {}
 
 
-def _summary(idn: Identification, axis: str) -> str:
-    from gaident.show.summary import identification_summary
-
-    return identification_summary(replace(idn, warnings=tuple(in_options(w) for w in idn.warnings)), axis)
-
-
-def _draw(idn: Identification, records: Sequence[Record], axis: str, path: Path) -> None:
-    from gaident.show.plots import plot_identification
-
-    _save_figure(plot_identification(idn, records, axis), path)
-
-
-def _save_figure(figure: Figure, path: Path) -> None:
-    drawn = io.BytesIO()
-    figure.savefig(drawn, format=path.suffix[1:].lower())
-    write(path, drawn.getvalue())
-
-
 def _fit(rec: Record, result: Run) -> tuple[float, float]:
     """(rmse, fit_percent) of one simulated run."""
     with np.errstate(over="ignore", invalid="ignore"):
@@ -308,10 +245,6 @@ def _run_dict(rec: Record, result: Run) -> dict[str, Any]:
     rmse, fit = _fit(rec, result)
     return {"name": rec.name, "dt": rec.dt, "samples": len(rec), "rmse": rmse, "fit_percent": fit,
             "velocity": result.velocity.tolist(), "torque": result.torque.tolist()}  # fmt: skip
-
-
-def _print_json(data: dict[str, Any]) -> None:
-    print(json_text(data))
 
 
 def _diagnose(args: argparse.Namespace) -> None:
@@ -348,7 +281,7 @@ def _diagnose(args: argparse.Namespace) -> None:
             dia.save(out)
         written.append(out)
     if plot is not None:
-        _save_figure(dia.plot(axis=drive.axis), plot)
+        save_figure(dia.plot(axis=drive.axis), plot)
         written.append(plot)
     if page is not None:
         write_report(dia, page, records, validation or (), drive.axis)
@@ -357,7 +290,7 @@ def _diagnose(args: argparse.Namespace) -> None:
         write(following, proposal_csv(dia.next_experiment, drive.axis).encode())
         written.append(following)
     if args.json:
-        _print_json(dia.to_dict())
+        print_json(dia.to_dict())
         return
     print(in_options(dia.summary(drive.axis)))
     if following is not None and following not in written:
@@ -379,7 +312,7 @@ def _reproduce(args: argparse.Namespace) -> None:
     target = folder / "paper.html"
     write(target, paper.page(result, pictures).encode())
     if args.json:
-        _print_json(result.to_dict())
+        print_json(result.to_dict())
         return
     print(paper.summary(result))
     print(f"\nwritten: {target}, and its pictures beside it: {', '.join(f'{name}.png' for name in pictures)}")
@@ -391,7 +324,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int | None]] = {
     "simulate": _simulate,
     "report": report_command,
     "effects": _effects,
-    "demo": _demo,
+    "demo": demo_command,
     "reproduce": _reproduce,
     **log_commands(drive_of),
 }

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from gaident import doctor
-from gaident.cli_output import proposal_csv, target_of, write
+from gaident.cli_output import print_json, proposal_csv, target_of, write
 from gaident.data.listing import columns, printable
 from gaident.data.readers import read_columns
 from gaident.diagnosis.experiments import first_experiment
 from gaident.drive_file import Drive
 from gaident.drive_init import draft
 from gaident.errors import SettingsError
-from gaident.identification.result import json_text
 
 __all__ = ["log_commands"]
 
@@ -40,7 +39,7 @@ def _columns(args: argparse.Namespace) -> None:
     found = [columns(log, **_text_options(args)) for log in args.logs]
     if args.json:
         listed = [listing.to_dict() for listing in found]
-        print(json_text(listed[0] if len(listed) == 1 else {"schema": "gaident/columns", "schema_version": 1, "logs": listed}))
+        print_json(listed[0] if len(listed) == 1 else {"schema": "gaident/columns", "schema_version": 1, "logs": listed})
     else:
         print("\n\n".join(map(str, found)))
 
@@ -61,10 +60,10 @@ def _init(args: argparse.Namespace) -> None:
         text = text.replace("\n[columns]", f"\n{lines}\n\n[columns]", 1)
     write(target, text.encode())
     if args.json:
-        print(json_text({
+        print_json({
             "schema": "gaident/init", "schema_version": 1, "written": str(target), "channels": dict(found.channels),
             "fill_in": list(found.fill_in),
-        }))  # fmt: skip
+        })  # fmt: skip
         return
     print(f"written: {target}")
     for channel, name in found.channels.items():
@@ -84,7 +83,7 @@ def _experiment(args: argparse.Namespace, drive: Drive) -> None:
     inertia = drive.space_values.get("inertia")
     proposal = first_experiment(dt, drive.limits(), None if inertia is None else inertia[0], drive.controller_values.get("kp"))
     if args.json:
-        print(json_text({"schema": "gaident/experiment", "schema_version": 1, **proposal.to_dict()}))
+        print_json({"schema": "gaident/experiment", "schema_version": 1, **proposal.to_dict()})
         return
     text = proposal_csv(proposal, drive.axis)
     if target is None:
@@ -96,7 +95,10 @@ def _experiment(args: argparse.Namespace, drive: Drive) -> None:
 
 def _doctor(args: argparse.Namespace) -> int:
     found = doctor.examine()
-    print(json_text(found.to_dict()) if args.json else found)
+    if args.json:
+        print_json(found.to_dict())
+    else:
+        print(found)
     return 1 if found.flaws else 0
 
 

@@ -1,18 +1,37 @@
-"""What the command line writes: files, whole or not at all."""
+"""What the command line writes: files, whole or not at all, pictures, summaries, JSON."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from gaident.cli_options import in_options
 from gaident.data.record import Record
 from gaident.diagnosis.experiments import Proposal
 from gaident.errors import SettingsError
 from gaident.files import write_whole
+from gaident.identification.result import Identification, json_text
 from gaident.models.simulate import Run
 
-__all__ = ["csv_targets", "csv_text", "naming", "proposal_csv", "target_of", "write"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "csv_targets",
+    "csv_text",
+    "draw",
+    "naming",
+    "print_json",
+    "proposal_csv",
+    "save_figure",
+    "summary_of",
+    "target_of",
+    "write",
+]
 
 
 def csv_text(rec: Record, result: Run | None, axis: str) -> str:
@@ -82,3 +101,29 @@ def naming(target: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise OSError(f"cannot write {target}: {error.strerror or error}") from error
+
+
+def summary_of(idn: Identification, axis: str) -> str:
+    """The summary, its remedies as options."""
+    from gaident.show.summary import identification_summary
+
+    return identification_summary(replace(idn, warnings=tuple(in_options(w) for w in idn.warnings)), axis)
+
+
+def draw(idn: Identification, records: Sequence[Record], axis: str, path: Path) -> None:
+    """The identification's main picture."""
+    from gaident.show.plots import plot_identification
+
+    save_figure(plot_identification(idn, records, axis), path)
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """A picture in the format that its name ends in."""
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format=path.suffix[1:].lower())
+    write(path, drawn.getvalue())
+
+
+def print_json(data: dict[str, Any]) -> None:
+    """A result for programs."""
+    print(json_text(data))

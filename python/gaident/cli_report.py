@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from gaident.cli_options import drive_of, in_options
-from gaident.cli_output import target_of, write
+from gaident.cli_output import print_json, target_of, write
 from gaident.data.record import Record
 from gaident.diagnosis.result import Diagnosis
 from gaident.errors import GaidentError
-from gaident.identification.result import Identification, json_text
+from gaident.identification.result import Identification
 from gaident.reporting import report_page
 from gaident.store import load
 
@@ -44,7 +44,7 @@ def report_command(args: argparse.Namespace) -> None:
     records, validation = ([drive.read(log) for log in logs] for logs in (args.logs, held))
     size = write_report(result, target, records, validation, drive.axis)
     if args.json:
-        print(json_text({"schema": "gaident/report", "schema_version": 1, "path": str(target), "bytes": size}))
+        print_json({"schema": "gaident/report", "schema_version": 1, "path": str(target), "bytes": size})
         return
     unknown = [r.name for r in (*records, *validation) if r.digest not in _known(result)]
     if unknown:

@@ -172,7 +172,7 @@ class _Draft:
             _line("# gear_ratio = 10.0", 'turns of the motor per turn of the load, with load_side = ["position"], what was')
         )
         lines.append(_line("", "measured behind the gear"))
-        lines.append(_line("# decimate = 10", "keep every so manieth sample behind a low-pass, for very long logs"))
+        lines.append(_line("# decimate = 10", "keep every tenth sample behind a low-pass, for very long logs"))
         return lines
 
     def _columns(self) -> list[str]:

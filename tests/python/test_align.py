@@ -61,6 +61,14 @@ def test_a_clear_difference_of_the_clocks_is_seen() -> None:
     assert "ppm" in found.summary() and "samples in common" in found.summary()
 
 
+@pytest.mark.parametrize("rate", [3e-3, -6e-3])
+def test_rates_beyond_the_limit_are_refused(rate: float) -> None:
+    rec, other = pair(1, 0.3, rate, 1e-3)
+    with pytest.raises(RecordError, match=r"rates differ by about -?0\.00[36].*, which is beyond max_rate=0\.001; .* larger"):
+        align(rec, other, 1e-3)
+    assert align(rec, other, 1e-3, max_rate=8e-3).rate == pytest.approx(rate, abs=2e-4)
+
+
 def test_where_the_logs_cannot_tell_it_says_so() -> None:
     t = np.arange(4000) * 1e-3
     rec = ga.Record(1e-3, velocity=np.sin(20 * t), torque=t)

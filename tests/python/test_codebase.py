@@ -62,7 +62,7 @@ ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "files": (set(), set()),
     "data": ({"errors", "files"}, {"version"}),
     "models": ({"errors", "data", "_core"}, {"export"}),
-    "export": ({"errors", "models", "_core"}, {"version"}),  # called by methods of models and results
+    "export": ({"errors", "files", "models", "_core"}, {"version"}),  # called by methods of models and results
     "identification": ({"errors", "version", "files", "data", "models", "_core"}, {"show", "export"}),
     "diagnosis": ({"errors", "version", "files", "data", "models", "identification"}, {"show", "export"}),
     "store": ({"errors", "data", "identification", "diagnosis"}, set()),

@@ -52,6 +52,8 @@ def test_channels_of_several_rates_are_joined_only_on_request() -> None:
         read(SAMPLES / "scope.csv", columns=slow)
     with pytest.raises(ReadError, match=r"resample=0\.01 s is coarser.*decimate=20"):
         read(SAMPLES / "scope.csv", columns=slow, resample=0.01)
+    with pytest.raises(ReadError, match=r"resample=1e-06 s is more than 100 times finer.*0\.0005 s.*give seconds"):
+        read(SAMPLES / "scope.csv", columns=slow, resample=1e-6)
     rec = read(SAMPLES / "scope.csv", columns=slow, resample=0.5e-3)
     assert len(rec) == 37 and rec.torque is not None
     np.testing.assert_allclose(rec.torque, 30 + 0.125 * np.arange(37))

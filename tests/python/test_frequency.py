@@ -49,6 +49,24 @@ def test_the_command_as_instrument_gives_the_drive_whatever_the_noise() -> None:
     assert np.all(np.abs(quiet.value / truth - 1.0)[used] < 0.1) and np.all(quiet.coherence[used] > 0.9)
 
 
+def test_deviation_and_threshold_are_right_where_frequencies_are_taken_together() -> None:
+    """White torque and white noise, G = 1: what the estimates scatter, and how often chance passes its threshold."""
+    rng = np.random.default_rng(0)
+    off_by, claimed, passed = [], [], []
+    for _ in range(60):
+        u, e, other = rng.standard_normal((3, 6000))
+        found = measured_response(ga.Record(DT, torque=u, velocity=u + e))
+        off_by.append(np.abs(found.value - 1.0) ** 2)
+        claimed.append(found.std**2)
+        chance = measured_response(ga.Record(DT, torque=u, velocity=other))
+        passed.append(chance.coherence > chance.threshold)
+    bands = np.arange(len(claimed[0])) // 20  # few frequencies taken together, then ever more
+    for band in range(4):
+        there = bands == band
+        assert np.sqrt(np.mean(np.array(off_by)[:, there]) / np.mean(np.array(claimed)[:, there])) == pytest.approx(1.0, abs=0.08)
+        assert np.mean(np.array(passed)[:, there]) == pytest.approx(0.05, abs=0.02)
+
+
 def test_without_it_a_loop_biases_the_estimate_and_the_sentence_says_so() -> None:
     rec = record(3.0)
     blind = measured_response(ga.Record(DT, velocity=rec.velocity, torque=rec.torque))

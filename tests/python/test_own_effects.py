@@ -14,7 +14,7 @@ import pytest
 
 import gaident as ga
 from gaident.errors import ModelError
-from gaident.models.own_effects import OWN
+from gaident.models.own_effects import OWN, Parameter, starts
 from gaident.models.simulate import Structure, simulate_values
 
 effects = ga.effects
@@ -228,3 +228,10 @@ def test_a_function_that_fails_later_is_named() -> None:
     rec = ga.Record(2.0 * DT, torque=TORQUE, velocity=np.zeros(N))
     with pytest.raises(ModelError, match="the effect 'mine': its function raised RuntimeError: no more"):
         ga.simulate(ONE.with_effect("mine", size=0.01), rec)
+
+
+def test_a_search_begins_somewhere_other_than_at_nothing() -> None:
+    even = Parameter("bias", "N m", neutral=0.0, lowest=-1.0, highest=1.0)
+    for count in (1, 2, 3, 5):
+        begun = starts(even, count)
+        assert begun and 0.0 not in begun and all(-1.0 < v < 1.0 for v in begun)

@@ -27,7 +27,9 @@ __all__ = ["Alignment", "align"]
 
 _LEAST_CORRELATION = 0.5
 _SURE = 3.0  # standard deviations from which a difference of the rates is one
-_RIVAL = 10.0  # units of n ln J: what a second offset must be worse by
+_RIVAL = 10.0  # units of n ln J: what a second offset, or another rate, must be worse by
+_WIDER = 2.0  # times max_rate: as far as the fit may go
+_ANY = 50.0  # times max_rate: as far as it is asked about where it ran into that
 _ORDER = ("velocity", "position", "command", "torque")
 
 
@@ -90,7 +92,8 @@ def align(
     max_rate largest difference of the clocks' rates to look for (quartz against quartz stays below 2e-4)
 
     The channels taken over are low-passed where rec samples more slowly, then interpolated (monotone cubic). Raises
-    RecordError where the logs cannot tell: no motion, no resemblance, or two offsets that fit equally well.
+    RecordError where the logs cannot tell: no motion, no resemblance, two offsets that fit equally well, or a rate beyond
+    max_rate.
     """
     theirs, their_dt = _channels(other, dt)
     mine = dict(rec.channels())
@@ -101,6 +104,13 @@ def align(
         if np.ptp(values) == 0.0:
             raise RecordError(f"{whose}'s {name} is constant: there is no motion to align by; give on= with another channel")
     fit = _best(x, rec.dt, y, their_dt, within, limit, (first, second))
+    if abs(fit.rate) >= _WIDER * limit:
+        free = refine(x, rec.dt, y, their_dt, fit.offset, fit.rate, _ANY * limit)
+        if free is not None and free.independent * np.log(fit.variance / free.variance) > _RIVAL:
+            raise RecordError(
+                f"the clocks' rates differ by about {free.rate:.2g}, which is beyond max_rate={max_rate!r}; check the sample "
+                "times of both logs, or give a larger max_rate"
+            )
     seen = abs(fit.rate) > _SURE * fit.std[1]
     if not seen:
         equal = refine(x, rec.dt, y, their_dt, fit.offset + fit.rate * fit.centre, 0.0, limit, free_rate=False)
@@ -153,7 +163,7 @@ def _best(
 ) -> Fit:
     """The fit of the best offset. Raises RecordError where none is, or where another one is as good."""
     starts = coarse_lags(x, dt, y, their_dt, within, max_rate)
-    tried = [refine(x, dt, y, their_dt, offset, rate, 2.0 * max_rate) for offset, rate in starts]
+    tried = [refine(x, dt, y, their_dt, offset, rate, _WIDER * max_rate) for offset, rate in starts]
     fits = [fit for fit in tried if fit is not None and (within is None or within[0] <= fit.offset <= within[1])]
     if not fits:
         raise RecordError(f"within={within!r} leaves no offset at which the logs overlap; give a wider one")

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.mat import DamagedError, variables
-from gaident.data.stored import Matrix, array_table, first_line
-from gaident.data.table import Stored, Table
+from gaident.data.stored import Matrix, array_table
+from gaident.data.table import Stored, Table, first_line
 from gaident.errors import ReadError
 
 __all__ = ["read_mat", "read_npz"]

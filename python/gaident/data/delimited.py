@@ -14,8 +14,7 @@ from gaident.data.cells import ROWS, numbers_of
 from gaident.data.dialect import Dialect, detect
 from gaident.data.exports import END_MARK, refined, scope_layout
 from gaident.data.header import COMMENT, Header, find_header
-from gaident.data.stored import first_line
-from gaident.data.table import Column, Table
+from gaident.data.table import Column, Table, first_line
 from gaident.data.text import Line, check_text, encoding_of, lines_of
 from gaident.errors import ReadError
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.stored import first_line, library, midnight, seconds_since, unique_keys
-from gaident.data.table import BLOCK, Column, Table
+from gaident.data.stored import library, midnight, seconds_since, unique_keys
+from gaident.data.table import BLOCK, Column, Table, first_line
 from gaident.errors import ReadError
 
 __all__ = ["frame_table", "is_frame", "open_parquet"]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.stored import Matrix, array_table, first_line, library
-from gaident.data.table import Stored, Table
+from gaident.data.stored import Matrix, array_table, library
+from gaident.data.table import Stored, Table, first_line
 from gaident.errors import ReadError
 
 __all__ = ["open_hdf"]

@@ -111,7 +111,7 @@ def read(
              constants of the drive, for the units counts, A, %, V
     velocity_cutoff_hz
              a log with a position and no velocity gets differentiate(position, dt, velocity_cutoff_hz)
-    decimate every so manieth sample behind a linear-phase low-pass whose delay is compensated, see
+    decimate 10: every tenth sample behind a linear-phase low-pass whose delay is compensated, see
              Record.decimate; the log is decimated as it is read, whatever its length
     resample [s] put channels with irregular time stamps, or of several rates, on one even axis, by linear
              interpolation; never done unasked

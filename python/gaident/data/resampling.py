@@ -12,6 +12,7 @@ from gaident.errors import ReadError
 __all__ = ["resampled"]
 
 _COARSER = 1.5
+_FINER = 100.0
 
 
 def resampled(
@@ -19,14 +20,16 @@ def resampled(
 ) -> dict[str, NDArray[np.float64]]:
     """Each channel by linear interpolation at t0 + n dt, t0 to t1 being what all channels cover.
 
-    channels  name -> (time stamps [s], values), shape (n,) each, not ordered by need; stamps without a value (NaN) are
-              left out
-    dt        sample time of the result [s]; at most 1.5 times what the channels have, or high frequencies would fold
+    channels  name -> (time stamps [s], values), shape (n,) each, n may differ; the stamps increase, those without a
+              value (NaN) are left out
+    dt        sample time of the result [s]; at most 1.5 times what the channels have, or high frequencies would fold;
+              at least a hundredth of the finest
 
-    Linear interpolation is a low-pass of its own (-0.9 dB at a quarter of the log's sample rate, no delay). Raises
-    ReadError.
+    Linear interpolation is a low-pass of its own (sinc^2 on average: -1.8 dB at a quarter of the log's sample rate) without
+    delay. Raises ReadError.
     """
     held = {}
+    finest = np.inf
     for name, (time, values) in channels.items():
         there = np.isfinite(time) & np.isfinite(values)
         t, x = time[there], values[there]
@@ -41,6 +44,12 @@ def resampled(
                 f"frequencies down; give resample={median:.4g} and decimate={max(2, round(dt / median))}"
             )
         held[name] = (t, x)
+        finest = min(finest, median)
+    if dt * _FINER < finest:
+        raise ReadError(
+            f"{path}: resample={dt:g} s is more than {_FINER:g} times finer than the log, whose steps are {finest:g} s: "
+            f"give seconds, for example resample={finest:.4g}"
+        )
     start, stop = max(t[0] for t, _ in held.values()), min(t[-1] for t, _ in held.values())
     if stop <= start:
         raise ReadError(f"{path}: the channels were not logged at the same time; name columns of one run")

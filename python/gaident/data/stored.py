@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gaident.data.table import Column, Stored, Table
 from gaident.errors import ReadError
 
-__all__ = ["Matrix", "array_table", "first_line", "library", "midnight", "seconds_since", "unique_keys"]
+__all__ = ["Matrix", "array_table", "library", "midnight", "seconds_since", "unique_keys"]
 
 _LISTED_COLUMNS = 1000
 
@@ -99,8 +99,3 @@ def seconds_since(origin: Any, stamps: NDArray[Any]) -> NDArray[np.float64]:
     """Dates or time differences [s], counted from `origin`; NaN where there is none."""
     passed = (stamps - origin).astype("timedelta64[ns]")
     return np.where(np.isnat(passed), np.nan, passed.astype(np.int64) * 1e-9)
-
-
-def first_line(error: BaseException) -> str:
-    """What an error of another library says, for a message of one line."""
-    return (str(error).splitlines() or ["no reason given"])[0][:120]

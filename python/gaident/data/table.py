@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gaident.data.arrays import first_not_finite
 from gaident.errors import ReadError
 
-__all__ = ["BLOCK", "Column", "Stored", "Table"]
+__all__ = ["BLOCK", "Column", "Stored", "Table", "first_line"]
 
 BLOCK = 1 << 16
 """Rows that are held at once of a log that is read block by block."""
@@ -22,6 +22,11 @@ BLOCK = 1 << 16
 _NUMBER_SIGN = re.compile(r"#\s*(\d+)")
 _PICK = re.compile(r"(.+)\[\s*(:|-?\d+)\s*,\s*(:|-?\d+)\s*\]")
 _LISTED = 40
+
+
+def first_line(error: BaseException) -> str:
+    """What an error of another library says, for a message of one line."""
+    return (str(error).splitlines() or [type(error).__name__])[0][:120]
 
 
 class Stored:
@@ -41,9 +46,8 @@ class Stored:
         try:
             values = self.read(start, stop)
         except Exception as error:  # every library has its own
-            reason = (str(error).splitlines() or [type(error).__name__])[0][:120]
             raise ReadError(
-                f"{self.path}: damaged, rows {start} to {stop - 1} cannot be read ({reason}); copy the file again"
+                f"{self.path}: damaged, rows {start} to {stop - 1} cannot be read ({first_line(error)}); copy the file again"
             ) from None
         if values.shape != (stop - start,):
             raise ReadError(

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from gaident import _core
 from gaident.errors import ModelError
 from gaident.export.c_effects import HELPERS, Pieces, effect_pieces, indented, number
+from gaident.files import write_whole
 from gaident.models.controller import PI
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def write_c(
         name = f"drive_{name}" if not name or name[0].isdigit() else name
     text = c_source(model, dt, controller, name, substeps)
     if path is not None:
-        Path(path).write_text(text, encoding="utf-8")
+        write_whole(path, text.encode())
     return text
 
 

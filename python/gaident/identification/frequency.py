@@ -4,7 +4,8 @@
 
     G(f)   = S_wr / S_ur                                       r: the command; without one the torque itself, which is H1
     S_vv   = S_ww - 2 Re(conj(G) S_wu) + |G|^2 S_uu            what G does not explain
-    var G  = S_vv S_rr / (K |S_ur|^2)                          K: independent averages
+    var G  = S_vv S_rr / ((K - 1) |S_ur|^2)                    K: independent averages, of which G takes one
+    1/K    = sum over pairs of the m windows and c frequencies of |rho|^2 / (m c)^2
     coherence = min(|S_wr|^2 / (S_ww S_rr), |S_ur|^2 / (S_uu S_rr))
 
 Inside a loop, noise on the velocity comes back in the torque, and H1 then tends to -1/C where the noise is large. The command
@@ -37,11 +38,16 @@ LONGEST = 4096  # samples of a window
 PER_OCTAVE = 12  # frequencies kept
 CHANCE = 0.05  # of a coherence above `threshold` where there is none
 
+SAME = np.array([1.0, 4.0 / 9.0, 1.0 / 36.0])
+NEXT = np.array([1.0 / 36.0, (4.0 / (9.0 * np.pi)) ** 2, 1.0 / 144.0, (4.0 / (45.0 * np.pi)) ** 2])
+"""|rho|^2 of white noise behind Hann windows, 0, 1, 2, ... frequencies apart: in one window, and in the next one."""
+
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
     """An estimate over frequency [Hz], arrays (n,): value [rad/s/(N m)] complex, its standard deviation, coherence 0..1.
 
+    std (n,): root of the mean |error|^2 of the complex value; magnitude, and phase times magnitude, deviate by std/sqrt(2) each.
     threshold (n,): the coherence that unrelated signals pass once in twenty. instrument: whether the command was used (joint
     input-output); False: torque to velocity directly (H1). windows: how many; resolution [Hz].
     """
@@ -138,6 +144,17 @@ def _constant(x: Vector) -> bool:
     return float(np.ptp(x)) <= 1e-9 * float(np.abs(x).max())
 
 
+def _averages(windows: int, count: NDArray[np.intp]) -> Vector:
+    """K for `count` (n,) neighbouring frequencies: the number of independent ones that would scatter as much."""
+
+    def pairs(rho: Vector) -> Vector:
+        apart = np.arange(len(rho))
+        times = np.where(apart == 0, 1.0, 2.0) * np.maximum(1.0 - apart / count[:, None], 0.0)
+        return np.asarray(times @ rho)
+
+    return np.asarray(windows * count / (pairs(SAME) + 2.0 * (1.0 - 1.0 / windows) * pairs(NEXT)))
+
+
 def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> FrequencyResponse:
     """From torque u to velocity w; a command that never changes is no instrument."""
     n = len(w)
@@ -163,16 +180,16 @@ def _estimate(u: Vector, w: Vector, command: Vector | None, dt: float) -> Freque
 
     ww, uu, rr = (cross(x, x).real for x in (W, U, R))
     wr, ur, wu = cross(W, R), cross(U, R), cross(W, U)
-    # Neighbours of a Hann window share two thirds of what they know.
-    averages = len(starts) * np.maximum(1.0, 2.0 / 3.0 * count)
+    averages = _averages(len(starts), count)
     with np.errstate(divide="ignore", invalid="ignore"):
         value = wr / ur
         unexplained = np.maximum(ww - 2.0 * (value.conj() * wu).real + np.abs(value) ** 2 * uu, 0.0)
-        std = np.sqrt(unexplained * rr / averages) / np.abs(ur)
+        std = np.sqrt(unexplained * rr / np.maximum(averages - 1.0, 0.0)) / np.abs(ur)
         coherence = np.minimum(np.abs(wr) ** 2 / (ww * rr), np.abs(ur) ** 2 / (uu * rr))
     known = np.isfinite(value) & np.isfinite(coherence)
     frequency = np.add.reduceat(f, first) / count
-    threshold = 1.0 - CHANCE ** (1.0 / np.maximum(averages - 1.0, 1.0))
+    with np.errstate(divide="ignore"):
+        threshold = 1.0 - CHANCE ** (1.0 / np.maximum(averages - 1.0, 0.0))
     return FrequencyResponse(
         frequency=frequency[known],
         value=value[known],

@@ -120,8 +120,10 @@ def starts(p: Parameter, count: int = 5) -> tuple[float, ...]:
     shares = [(i + 0.5) / count for i in range(count)]
     if p.logarithmic:
         return tuple(p.lowest * (p.highest / p.lowest) ** share for share in shares)
-    values = [p.lowest + (p.highest - p.lowest) * share for share in shares]
-    return tuple(v for v in values if abs(v - p.neutral) > 0.01 * (p.highest - p.lowest) or math.isnan(p.neutral))
+    span = p.highest - p.lowest
+    values = [p.lowest + span * share for share in shares]
+    kept = tuple(v for v in values if abs(v - p.neutral) > 0.01 * span or math.isnan(p.neutral))
+    return kept or (p.lowest + 0.75 * span,)
 
 
 def checked(own: Own) -> Own:

@@ -21,14 +21,14 @@ def plot_response(responses: Any, hz: bool = False, axis: str = "rotary", title:
 
     responses: measured and simulated (or None), estimates with frequency [Hz], value, std, coherence, threshold; fine [Hz] and
     model: the linear part as the loop samples it. Points whose coherence chance could give are left out; bars are 2 standard
-    deviations. hz: frequencies in Hz instead of rad/s.
+    deviations of the magnitude and of the phase, 1/sqrt(2) of the complex value's each. hz: frequencies in Hz instead of rad/s.
     """
     scale = 1.0 if hz else math.tau
     m, s = responses.measured, responses.simulated
     sure = m.coherence > m.threshold
     fig = _figure(7.5, 6.6)
     top, middle, low = fig.subplots(3, 1, sharex=True, height_ratios=(1.6, 1.0, 0.7))
-    f, g, spread = scale * m.frequency[sure], m.value[sure], 2.0 * m.std[sure]
+    f, g, spread = scale * m.frequency[sure], m.value[sure], math.sqrt(2.0) * m.std[sure]
     size = np.abs(g)
     style: dict[str, Any] = {"fmt": "o", "color": SKY, "markersize": 3.5, "elinewidth": 1.0, "zorder": 1}
     # A bar that would reach 0 ends at a hundredth of the value: the axis is logarithmic.

@@ -222,7 +222,8 @@ def response_chart(r: Any, axis: str) -> Chart:
     """Bode diagram of the model against what the record shows by itself, with coherence."""
     m = r.measured
     sure = m.coherence > m.threshold
-    curves = [(m.frequency[sure], m.value[sure], "record", "measured", "means", 0.0, 2.0 * m.std[sure])]
+    # Magnitude and phase deviate by 1/sqrt(2) of what the complex value does.
+    curves = [(m.frequency[sure], m.value[sure], "record", "measured", "means", 0.0, math.sqrt(2.0) * m.std[sure])]
     if r.simulated is not None:
         s = r.simulated
         curves.append((s.frequency, s.value, "model, estimated the same way", "extended", "line", 1.5, None))
