@@ -227,6 +227,8 @@ def test_doctor_tells_what_is_there(capsys: pytest.CaptureFixture[str], monkeypa
     assert data["flaws"] == [] and data["threads"] >= 1 and data["instruction_set"]
     assert "two masses found" in data["self_test"]
     assert [(x["name"], x["extra"]) for x in data["libraries"]] == [("numpy", ""), ("h5py", "hdf5"), ("nothing-such", "tdms")]
+    monkeypatch.setattr(doctor.metadata, "requires", lambda _: ["pillow>=9.1"])  # its module is PIL
+    assert doctor.examine().flaws == ()
     monkeypatch.setattr(doctor.metadata, "requires", lambda _: ["numpy", "no-such-thing>=2"])
     assert main(["doctor"]) == 1
     out = capsys.readouterr().out
