@@ -236,6 +236,8 @@ def test_data_frames_by_the_names_of_their_columns(tmp_path: Path) -> None:
         read(whole, columns=NAMES)
     with pytest.raises(ReadError, match=r"there is no column 'omega' for velocity.*'t', 'r', 'w', 'u', 's'"):
         read(frame, columns={"velocity": "omega", "torque": "u"})
+    with pytest.raises(ReadError, match=r"one column only, 'w', but a record needs the velocity and a command or torque$"):
+        read(frame[["w"]], columns={"velocity": "w"}, dt=1e-3)
     with pytest.raises(ReadError, match=r"delimiter= is for text tables, but a DataFrame"):
         read(frame, columns=NAMES, delimiter=";")
 
