@@ -111,6 +111,10 @@ def test_init_writes_a_drive_file_that_identify_takes(here: Path, capsys: pytest
     assert Path("drive.toml").read_bytes() == before
     assert main(["init", "step.csv", "--force", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["fill_in"] == []
+    # The line to go on with is one that a shell takes.
+    Path("my step.csv").write_bytes(Path("step.csv").read_bytes())
+    assert main(["init", "my step.csv", "--out", "my.toml"]) == 0
+    assert "then: gaident identify 'my step.csv' --drive my.toml" in capsys.readouterr().out
     # Every commented key is one that the file may have.
     for line in text.splitlines():
         key = line.removeprefix("# ").split("=")[0].strip()
