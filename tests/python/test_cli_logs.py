@@ -5,6 +5,7 @@ from __future__ import annotations
 import html.parser
 import io
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -275,6 +276,12 @@ def test_progress_is_drawn_on_a_terminal_and_nowhere_else(monkeypatch: pytest.Mo
         drawn = stream.getvalue()
         assert "25%" in drawn and "species (1, 2) of [bold]10" in drawn and "left" in drawn
         assert ("\x1b[38" in drawn or "\x1b[3" in drawn.replace("\x1b[3;", "")) == colours
+    monkeypatch.setenv("COLUMNS", "80")  # the message gives way, not the bar, the percentage or the time
+    stream = Terminal()
+    with Progress(stream) as show:
+        assert show is not None
+        show(0.25, "generation 120, best fitness 9.107e+05, species (1, 2) of 12 leads")
+    assert re.search(r"━━━ +25% \d:\d\d:\d\d about \d+ s left generation 120, best fitness 9\.107e\+\d*…", stream.getvalue())
     with Progress(io.StringIO()) as show:
         assert show is None
     with Progress(None) as show:
