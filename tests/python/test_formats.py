@@ -367,5 +367,7 @@ def test_a_gear_between_motor_and_sensor() -> None:
     for wrong in ({"gear_ratio": 10.0}, {"load_side": "torque"}, {"gear_ratio": -1.0, "load_side": "torque"}):
         with pytest.raises((ReadError, RecordError), match="gear_ratio"):
             read(SAMPLES / "scope.csv", columns=columns, **wrong)  # type: ignore[arg-type]
+    with pytest.raises(ReadError, match="load_side is given without gear_ratio: give both or none"):
+        read(SAMPLES / "scope.csv", columns=columns, load_side="torque")
     with pytest.raises(ReadError, match="load_side names 'position'"):
         read(SAMPLES / "scope.csv", columns=columns, gear_ratio=10.0, load_side=["position"])
