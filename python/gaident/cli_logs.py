@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -72,7 +73,7 @@ def _init(args: argparse.Namespace) -> None:
         print("to be filled in, marked FILL IN:")
         for line in found.fill_in:
             print(f"  {line}")
-    print(f"then: gaident identify {args.log} --drive {target}")
+    print(f"then: gaident identify {shlex.quote(str(args.log))} --drive {shlex.quote(str(target))}")
 
 
 def _experiment(args: argparse.Namespace, drive: Drive) -> None:

@@ -42,7 +42,9 @@ examples:
 
 drive.toml, every part optional:
   axis = "rotary"                 # or "linear"
-  dt = 0.444e-3                   # s; also velocity_cutoff_hz, counts_per_turn, gear_ratio, decimate, ...
+  dt = 0.444e-3                   # s; also velocity_cutoff_hz, counts_per_turn, torque_constant,
+                                  # rated_torque, torque_per_volt, gear_ratio, load_side, decimate,
+                                  # resample, delimiter, decimal, skip, encoding
   [columns]
   command = "w_ref"
   velocity = "w"

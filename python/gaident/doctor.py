@@ -16,6 +16,7 @@ __all__ = ["Examination", "Library", "examine"]
 
 _REQUIREMENT = re.compile(r"^([\w.-]+)[^;]*(?:;(.*))?$")
 _EXTRA = re.compile(r"extra\s*==\s*['\"]([\w.-]+)['\"]")
+_MODULES = {"pillow": "PIL"}  # what is imported, where it is not the distribution's name
 _FOR_DEVELOPERS = {"test", "peers", "compare", "tidy", "docs"}
 
 
@@ -115,7 +116,7 @@ def _library(name: str, extra: str) -> Library:
     if extra:
         return Library(name, version, extra)
     try:
-        importlib.import_module(name.replace("-", "_"))
+        importlib.import_module(_MODULES.get(name.lower(), name.replace("-", "_")))
     except Exception as error:
         return Library(name, version, extra, f"cannot be imported ({type(error).__name__}: {error})")
     return Library(name, version, extra)

@@ -154,7 +154,7 @@ class _Draft:
             )
         else:
             source = f"from the column {_quoted(time.name)}" if time is not None else "as the file states"
-            lines.append(_line(f"# dt = {self.dt:.9g}", f"s, {source}; needed only for logs without it"))
+            lines.append(_line(f"# dt = {self.dt:.9g}", f"s, {source}; needed for logs without it, and for gaident experiment"))
         for name in dict.fromkeys(needed_constant(channel, unit) for channel, unit in self.units.items() if unit):
             if name is not None:
                 value, meaning = _CONSTANTS[name]

@@ -60,14 +60,19 @@ class _TerminalBar:
         times = [TaskProgressColumn(), TimeElapsedColumn()]
         console = Console(file=stream, force_jupyter=False)
         # The streams are left alone: what is printed beside the bar goes where it was meant to.
+        width = 24 if console.width >= 110 else 12
+        self.taken = width + len(" 100% 0:00:00  ") + 1  # of the line, without the texts
         self.bar = Bar(
-            BarColumn(24), *times, *texts, console=console, transient=True, redirect_stdout=False, redirect_stderr=False
+            BarColumn(width), *times, *texts, console=console, transient=True, redirect_stdout=False, redirect_stderr=False
         )
         self.task = self.bar.add_task("", total=1.0, message="", left="")
         self.bar.start()
 
     def update(self, done: float, message: str, left: str) -> None:
-        self.bar.update(self.task, completed=done, message=message, left=left)
+        # Where the line is too short, rich would shorten bar, percentage and time too: the message gives way.
+        room = max(0, self.bar.console.width - self.taken - len(left))
+        shown = message if len(message) <= room else message[: max(0, room - 1)].rstrip() + "…"[:room]
+        self.bar.update(self.task, completed=done, message=shown, left=left)
 
     def stop(self) -> None:
         self.bar.stop()

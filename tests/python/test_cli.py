@@ -356,7 +356,7 @@ def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
     for args, parts in (
         (["--help"], ("identify", "simulate", "demo")),
         (["--version"], ("gaident ",)),
-        (["identify", "--help"], ("examples:", "--drive", "[controller]", "exit codes")),
+        (["identify", "--help"], ("examples:", "--drive", "[controller]", "rated_torque", "load_side", "exit codes")),
         (["simulate", "--help"], ("MODEL.json", "examples:")),
         (["demo", "--help"], ("GAIDENT_DATA",)),
         (["columns", "--help"], ("TwinCAT", "--quiet")),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html.parser
 import io
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -111,6 +112,10 @@ def test_init_writes_a_drive_file_that_identify_takes(here: Path, capsys: pytest
     assert Path("drive.toml").read_bytes() == before
     assert main(["init", "step.csv", "--force", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["fill_in"] == []
+    # The line to go on with is one that a shell takes.
+    Path("my step.csv").write_bytes(Path("step.csv").read_bytes())
+    assert main(["init", "my step.csv", "--out", "my.toml"]) == 0
+    assert "then: gaident identify 'my step.csv' --drive my.toml" in capsys.readouterr().out
     # Every commented key is one that the file may have.
     for line in text.splitlines():
         key = line.removeprefix("# ").split("=")[0].strip()
@@ -227,6 +232,8 @@ def test_doctor_tells_what_is_there(capsys: pytest.CaptureFixture[str], monkeypa
     assert data["flaws"] == [] and data["threads"] >= 1 and data["instruction_set"]
     assert "two masses found" in data["self_test"]
     assert [(x["name"], x["extra"]) for x in data["libraries"]] == [("numpy", ""), ("h5py", "hdf5"), ("nothing-such", "tdms")]
+    monkeypatch.setattr(doctor.metadata, "requires", lambda _: ["pillow>=9.1"])  # its module is PIL
+    assert doctor.examine().flaws == ()
     monkeypatch.setattr(doctor.metadata, "requires", lambda _: ["numpy", "no-such-thing>=2"])
     assert main(["doctor"]) == 1
     out = capsys.readouterr().out
@@ -269,6 +276,12 @@ def test_progress_is_drawn_on_a_terminal_and_nowhere_else(monkeypatch: pytest.Mo
         drawn = stream.getvalue()
         assert "25%" in drawn and "species (1, 2) of [bold]10" in drawn and "left" in drawn
         assert ("\x1b[38" in drawn or "\x1b[3" in drawn.replace("\x1b[3;", "")) == colours
+    monkeypatch.setenv("COLUMNS", "80")  # the message gives way, not the bar, the percentage or the time
+    stream = Terminal()
+    with Progress(stream) as show:
+        assert show is not None
+        show(0.25, "generation 120, best fitness 9.107e+05, species (1, 2) of 12 leads")
+    assert re.search(r"━━━ +25% \d:\d\d:\d\d about \d+ s left generation 120, best fitness 9\.107e\+\d*…", stream.getvalue())
     with Progress(io.StringIO()) as show:
         assert show is None
     with Progress(None) as show:

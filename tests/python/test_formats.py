@@ -238,6 +238,8 @@ def test_data_frames_by_the_names_of_their_columns(tmp_path: Path) -> None:
         read(whole, columns=NAMES)
     with pytest.raises(ReadError, match=r"there is no column 'omega' for velocity.*'t', 'r', 'w', 'u', 's'"):
         read(frame, columns={"velocity": "omega", "torque": "u"})
+    with pytest.raises(ReadError, match=r"one column only, 'w', but a record needs the velocity and a command or torque$"):
+        read(frame[["w"]], columns={"velocity": "w"}, dt=1e-3)
     with pytest.raises(ReadError, match=r"delimiter= is for text tables, but a DataFrame"):
         read(frame, columns=NAMES, delimiter=";")
 
@@ -367,5 +369,7 @@ def test_a_gear_between_motor_and_sensor() -> None:
     for wrong in ({"gear_ratio": 10.0}, {"load_side": "torque"}, {"gear_ratio": -1.0, "load_side": "torque"}):
         with pytest.raises((ReadError, RecordError), match="gear_ratio"):
             read(SAMPLES / "scope.csv", columns=columns, **wrong)  # type: ignore[arg-type]
+    with pytest.raises(ReadError, match="load_side is given without gear_ratio: give both or none"):
+        read(SAMPLES / "scope.csv", columns=columns, load_side="torque")
     with pytest.raises(ReadError, match="load_side names 'position'"):
         read(SAMPLES / "scope.csv", columns=columns, gear_ratio=10.0, load_side=["position"])

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import tracemalloc
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -278,6 +279,11 @@ def test_a_cut_shares_memory_and_its_pickle_holds_only_the_cut() -> None:
     cut = rec[:100]
     assert np.shares_memory(cut.velocity, rec.velocity)
     assert len(pickle.dumps(cut)) < 10_000
+
+
+def test_saving_where_there_is_no_folder_says_so(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"cannot write .*run1\.json: there is no folder .*none; create it first"):
+        Record(1e-3, velocity=np.zeros(30), torque=np.ones(30)).save(tmp_path / "none" / "run1.json")
 
 
 def test_a_long_record_costs_one_copy() -> None:

@@ -126,8 +126,8 @@ def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
     if len(table.columns) == 1:
         raise ReadError(
             f"{table.path}: the log holds one column only, {table.columns[0].key!r}, but a record needs "
-            "the velocity and a "
-            f"command or torque; if other columns were not recognised, give delimiter="
+            "the velocity and a command or torque"
+            f"{'' if table.form == 'DataFrame' else '; if other columns were not recognised, give delimiter='}"
         )
     if wanted.columns is None:
         found = {channel: column for channel in CHANNELS if (column := table.own(channel)) is not None}

@@ -59,9 +59,10 @@ class Wanted:
         if self.gear_ratio is not None:
             positive_number(self.gear_ratio, "gear_ratio", "", "give the turns of the motor per turn of the load")
         if bool(self.load_side) != (self.gear_ratio is not None):
+            given, lacking = ("load_side", "gear_ratio") if self.load_side else ("gear_ratio", "load_side")
             raise ReadError(
-                f"gear_ratio={self.gear_ratio!r} with load_side={self.load_side!r}: give both or none, the turns of the "
-                "motor per turn of the load and the channels that were measured behind the gear"
+                f"{given} is given without {lacking}: give both or none, gear_ratio=... the turns of the motor per turn of "
+                "the load, load_side=... the channels that were measured behind the gear"
             )
 
 

@@ -56,6 +56,12 @@ BEYOND: dict[frozenset[str], str] = {
 assert set(BEYOND) == set(TWINS)
 
 
+def _listed(effects: Sequence[str]) -> str:
+    """'a, b and c', as people write the names."""
+    names = [e.replace("_", " ") for e in effects]
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+
+
 @dataclass(frozen=True)
 class _Bench:
     """What a proposed command is tried on."""
@@ -118,11 +124,8 @@ def propose(
         return None, notes
     names = tuple(dict.fromkeys(name for effect, rival in pairs for name in (effect, rival.effect)))
     if driven.controller is None or driven.command is None:
-        listed = " from ".join(n.replace("_", " ") for n in names)
-        return None, [
-            *notes,
-            f"Without a controller no command can be worked out that separates {listed}: give controller=PI(...).",
-        ]
+        remedy = "give controller=PI(...), and a log with the velocity command"
+        return None, [*notes, f"Without a controller no command can be worked out that tells {_listed(names)} apart: {remedy}."]
     bench = _Bench(driven.controller, final.noise, max(final.cost / count, 1e-300), driven.torque_logged, elsewhere)
     items = menu(driven, final)
     # A generalisation that was fitted as its neutral case is the same drive: such a pair no command separates.
@@ -146,8 +149,7 @@ def propose(
         if most < T:
             best, most = items[i], T
     if best is None or most < CLEAR:
-        listed = " from ".join(n.replace("_", " ") for n in names)
-        return None, [*notes, f"No experiment of the menu within the limits of these records separates {listed}."]
+        return None, [*notes, f"No experiment of the menu within the limits of these records tells {_listed(names)} apart."]
     n = len(best.command)
     proposal = best.proposal(names, float(n * np.log1p(most / n)))
     return replace(proposal, reason=f"{best.name.capitalize()}: {best.reason[0].lower()}{best.reason[1:]}"), notes
