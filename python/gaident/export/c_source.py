@@ -195,6 +195,7 @@ def _head(model: Model, dt: float, controller: PI | None, name: str, version: st
     lines = [
         f"/* {name}: {drive} to motor velocity [rad/s], every {number(dt)} s ({loop}).",
         " *",
+        " * SI units of a rotary axis; a linear axis reads m for rad and N for N m.",
         f" * Written by gaident {version}. C99, standard library only.",
         " *",
         f" *   gain  {number(model.gain)}",

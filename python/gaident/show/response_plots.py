@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaident.show.plots import BLACK, BLUE, ORANGE, SKY, VERMILION, _figure, _locator, _tidy
 from gaident.show.wording import unit, velocity_unit
@@ -13,7 +14,14 @@ from gaident.show.wording import unit, velocity_unit
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot_response"]
+__all__ = ["phase_line", "plot_response"]
+
+
+def phase_line(response: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Phase [deg] within 180 either way, to be drawn as a line: not a number, a gap, where it goes on at the other end."""
+    phase = np.degrees(np.angle(response))
+    phase[1:][np.abs(np.diff(phase)) > 180.0] = math.nan
+    return phase
 
 
 def plot_response(responses: Any, hz: bool = False, axis: str = "rotary", title: str = "") -> Figure:
@@ -36,10 +44,10 @@ def plot_response(responses: Any, hz: bool = False, axis: str = "rotary", title:
     middle.errorbar(f, np.degrees(np.angle(g)), np.degrees(np.minimum(spread / size, math.pi)), **style)
     if s is not None:
         top.plot(scale * s.frequency, np.abs(s.value), color=BLACK, linewidth=1.2, label="model, estimated the same way")
-        middle.plot(scale * s.frequency, np.degrees(np.angle(s.value)), color=BLACK, linewidth=1.2)
+        middle.plot(scale * s.frequency, phase_line(s.value), color=BLACK, linewidth=1.2)
     dashes: dict[str, Any] = {"color": VERMILION, "linewidth": 1.0, "linestyle": (0, (4, 2))}
     top.plot(scale * responses.fine, np.abs(responses.model), label="its linear part, exact", **dashes)
-    middle.plot(scale * responses.fine, np.degrees(np.angle(responses.model)), **dashes)
+    middle.plot(scale * responses.fine, phase_line(responses.model), **dashes)
     low.plot(scale * m.frequency, m.coherence, color=BLUE, linewidth=1.2)
     low.plot(scale * m.frequency, m.threshold, color=ORANGE, linewidth=1.2, linestyle="--", label="reached by chance, 1 of 20")
     top.set_xscale("log")

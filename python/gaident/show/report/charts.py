@@ -20,6 +20,7 @@ from gaident.show.diagnosis_numbers import (
 from gaident.show.diagnosis_plots import robust_limits
 from gaident.show.report.chart import BINS, Band, Chart, Mark, Panel, Trace, cloud, series
 from gaident.show.report.views import Curve, Run, Vector
+from gaident.show.response_plots import phase_line
 from gaident.show.wording import number, unit, velocity_unit
 
 __all__ = [
@@ -232,7 +233,7 @@ def response_chart(r: Any, axis: str) -> Chart:
     for f, g, label, role, kind, width, spread in curves:
         style: dict[str, Any] = {"kind": kind, "width": width, "dash": "dash" if role == "linear" else "solid"}
         size.append(Trace(f, np.abs(g), label, role, spread=spread, **style))
-        turns = np.degrees(np.angle(g))
+        turns = phase_line(g) if kind == "line" else np.degrees(np.angle(g))
         phase.append(
             Trace(f, turns, "", role, spread=None if spread is None else np.degrees(spread / np.abs(g)).clip(0, 180), **style)
         )
