@@ -259,6 +259,12 @@ def decode(
 ) -> tuple[float, NDArray[np.complex128], NDArray[np.complex128]]:
     """(gain, poles, zeros) of a chromosome."""
 
+def clamped_sum(steps: NDArray[np.float64], limit: float, start: float) -> NDArray[np.float64]:
+    """I(n) = I(n-1) + steps(n), clamped to +-limit after each update, from I(-1) = start."""
+
+def rate_limited(command: NDArray[np.float64], step: float, start: float) -> NDArray[np.float64]:
+    """The command followed by at most `step` a sample, from `start`."""
+
 def recurrence(
     model: EffectModel,
     dt: float,

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import math
 
+import numpy as np
 import pytest
 
+from gaident import _core
 from gaident.errors import ControllerError
 from gaident.models.controller import PI
 
@@ -80,3 +82,18 @@ def test_a_forgotten_gain_is_named_with_its_remedy() -> None:
     with pytest.raises(ControllerError, match="PI lacks kp and ki"):
         PI()
     assert PI(kp=1.0, ki=0).ki == 0.0
+
+
+def test_the_core_clamps_a_sum_and_limits_a_rate_as_one_sample_after_the_other() -> None:
+    rng = np.random.default_rng(5)
+    steps = rng.standard_normal(300)
+    total, sums, value, followed = 0.3, [], -1.0, []
+    for x in steps.tolist():
+        total = min(max(total + x, -1.5), 1.5)
+        sums.append(total)
+        value += min(max(x - value, -0.2), 0.2)
+        followed.append(value)
+    given = steps.copy()
+    np.testing.assert_array_equal(_core.clamped_sum(given, 1.5, 0.3), sums)
+    np.testing.assert_array_equal(_core.rate_limited(given, 0.2, -1.0), followed)
+    np.testing.assert_array_equal(given, steps)

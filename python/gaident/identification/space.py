@@ -274,10 +274,9 @@ def _torque_blocks(
         integrals = np.cumsum(increments)
         torque_limit, integrator_limit = controller.limits
         if np.abs(integrals).max() > integrator_limit:
-            total = 0.0
-            for n, step in enumerate(increments.tolist()):
-                total = min(max(total + step, -integrator_limit), integrator_limit)
-                integrals[n] = total
+            from gaident import _core
+
+            integrals = _core.clamped_sum(increments, integrator_limit, 0.0)
         integral, last = float(integrals[-1]), float(e[-1])
         torque: NDArray[np.float64] = np.clip(controller.kp * e + integrals, -torque_limit, torque_limit)
         yield first, torque, w

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident import _core
 from gaident.models.controller import PI
 
 __all__ = ["HOLDS", "held_torque", "pi_torque", "rate_limited"]
@@ -29,7 +30,7 @@ def pi_torque(command: Vector, velocity: Vector, dt: float, controller: PI, init
     torque_limit, integrator_limit = controller.limits
     integral = initial_integral + np.cumsum(steps)
     if float(np.abs(integral).max()) > integrator_limit:
-        integral = _clamped_sum(steps, integrator_limit, initial_integral)
+        integral = _core.clamped_sum(steps, integrator_limit, initial_integral)
     u: Vector = np.clip(controller.kp * e + integral, -torque_limit, torque_limit)
     return u
 
@@ -68,18 +69,4 @@ def held_torque(command: Vector, velocity: Vector, dt: float, controller: PI, ru
 
 def rate_limited(command: Vector, rate: float, dt: float, start: float) -> Vector:
     """`command` [rad/s] followed from `start` with a slope of at most `rate` [rad/s^2], shape (n,)."""
-    step = rate * dt
-    out, value = [], start
-    for wanted in command.tolist():
-        value += min(max(wanted - value, -step), step)
-        out.append(value)
-    return np.array(out)
-
-
-def _clamped_sum(steps: Vector, limit: float, start: float) -> Vector:
-    """I(n) = I(n-1) + steps(n), clamped after each update: only one sample after the other gives it."""
-    out, total = [], start
-    for step in steps.tolist():
-        total = min(max(total + step, -limit), limit)
-        out.append(total)
-    return np.array(out)
+    return _core.rate_limited(command, rate * dt, start)
