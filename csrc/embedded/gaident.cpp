@@ -11,7 +11,10 @@ using namespace gaident;
 // Opaque for C.
 struct gaident_search {
     PaperSearch search;
-    explicit gaident_search(const StaticSetup<InDrive>& setup) : search(setup) {}
+    double limit;          // of a sample [rad/s]: within it no fixed-point word saturates, nor the deviation from the command
+    bool spoiled = false;  // a sample was none, or beyond the limit
+    explicit gaident_search(const StaticSetup<InDrive>& setup) : search(setup), limit(2.0 * setup.peak) {}
+    bool within(double x) const { return x >= -limit && x <= limit; }
 };
 
 extern "C" {
@@ -24,13 +27,14 @@ size_t gaident_bytes() { return sizeof(gaident_search); }
 
 gaident_search* gaident_configure(void* memory, size_t bytes, const gaident_settings* s) {
     const auto rate = [](double x) { return x >= 0.0 && x <= 1.0; };
-    const auto positive = [](double x) { return x > 0.0 && x < 1e30; };
+    const auto positive = [](double x) { return x > 1e-30 && x < 1e30; };  // in any arithmetic
     if (memory == nullptr || s == nullptr || bytes < sizeof(gaident_search)) return nullptr;
     if (reinterpret_cast<uintptr_t>(memory) % alignof(gaident_search) != 0) return nullptr;
     if (!positive(s->kp) || !(s->ki == 0.0 || positive(s->ki)) || !positive(s->sample_time) || !positive(s->peak)) return nullptr;
     if (!rate(s->crossover) || !rate(s->mutation) || (s->mutation > 0.0 && s->mutation < 1e-6)) return nullptr;
-    if (s->tournament < 1 || s->tournament > population || !positive(s->error_weight) || !(s->order_weight >= 0.0))
-        return nullptr;
+    if (s->tournament < 1 || s->tournament > population) return nullptr;
+    if (!positive(s->error_weight) || !positive(s->error_weight * s->error_weight)) return nullptr;
+    if (!(s->order_weight >= 0.0 && s->order_weight < 1e30)) return nullptr;
     const FlushDenormals flush;
     StaticSetup<InDrive> setup = paper_setup();
     setup.kp = s->kp;
@@ -45,9 +49,13 @@ gaident_search* gaident_configure(void* memory, size_t bytes, const gaident_sett
     return new (memory) gaident_search(setup);
 }
 
-int gaident_feed(gaident_search* g, double command, double velocity) { return g->search.feed(command, velocity) ? 1 : 0; }
+int gaident_feed(gaident_search* g, double command, double velocity) {
+    if (!g->search.feed(command, velocity)) return 0;
+    g->spoiled = g->spoiled || !g->within(command) || !g->within(velocity);
+    return 1;
+}
 
-int gaident_ready(const gaident_search* g) { return g->search.full() ? 1 : 0; }
+int gaident_ready(const gaident_search* g) { return !g->search.full() ? 0 : (g->spoiled ? -1 : 1); }
 
 int gaident_work(gaident_search* g, int individuals) {
     const FlushDenormals flush;
@@ -62,7 +70,7 @@ int gaident_run(gaident_search* g, int generations) {
 }
 
 int gaident_best(const gaident_search* g, gaident_model* model) {
-    if (g->search.generations() == 0) return 0;
+    if (g->spoiled || !(g->search.best_fitness() < InDrive::worst())) return 0;
     const Factors<Number> f = g->search.best_model();
     const auto number = [](const Number& x) { return static_cast<double>(x); };
     const auto pair = [&](const Pair<Number>& x) { return gaident_pair{number(x.e1), number(x.e0)}; };

@@ -6,8 +6,9 @@
  *     in a background task:     gaident_run(g, 1);                     one generation more; or gaident_work(g, n) for shorter slices
  *     at any time there:        gaident_best(g, &model);
  *
- * gaident_feed and the others may be called from different tasks: feed touches nothing but the record, and the search begins when the
- * record is full. No function allocates, waits, or prints. Numbers are double in the interface whatever the arithmetic inside. */
+ * gaident_feed and the others may be called from different tasks, where feed is in the one of higher priority on the same processor: feed
+ * touches nothing but the record, and the search begins when the record is full. `g` is never NULL. No function allocates, waits,
+ * or prints. Numbers are double in the interface whatever the arithmetic inside. */
 #ifndef GAIDENT_H
 #define GAIDENT_H
 
@@ -61,10 +62,11 @@ size_t gaident_bytes(void);
 /* Builds a search in `memory`, which stays the caller's. NULL where it is too small or not aligned to 8, or a setting is out of range. */
 gaident_search* gaident_configure(void* memory, size_t bytes, const gaident_settings* settings);
 
-/* One sample of the step that is to be identified, from rest on [rad/s]. 1: taken; 0: the record was already full. */
+/* One sample of the step that is to be identified, from rest on [rad/s]. 1: taken; 0: the record was already full. A sample that
+ * is not finite or beyond 2 peak is taken, too, but spoils the record: gaident_ready says so. */
 int gaident_feed(gaident_search* g, double command, double velocity);
 
-/* Whether the record is full. */
+/* 0: the record is not full; 1: it is; -1: it is, but spoiled, and no model will come of it: configure anew. */
 int gaident_ready(const gaident_search* g);
 
 /* Runs `generations` more; returns how many have been evaluated in all. 0 while the record is not full. */
@@ -73,7 +75,7 @@ int gaident_run(gaident_search* g, int generations);
 /* A shorter slice: up to `individuals` evaluated, or one population bred. Returns the generations evaluated in all. */
 int gaident_work(gaident_search* g, int individuals);
 
-/* The best model so far; 1, or 0 while there is none. */
+/* The best model so far; 1, or 0 while there is none: no candidate's fitness was finite, or the record is spoiled. */
 int gaident_best(const gaident_search* g, gaident_model* model);
 
 #ifdef __cplusplus

@@ -111,3 +111,36 @@ def test_the_c_interface_is_c99() -> None:
     text = '#include "gaident.h"\nint ready(gaident_search *g) { return gaident_ready(g); }\n'
     built = subprocess.run(command, input=text, capture_output=True, text=True)
     assert built.returncode == 0, built.stderr
+
+
+@pytest.mark.parametrize("name, arithmetic", [("Float", "drive_float"), ("Fixed", "fixed")])
+def test_the_c_interface_makes_the_desks_run(rec: ga.Record, tmp_path: Path, name: str, arithmetic: str) -> None:
+    """tests/cpp/c_interface.c also checks what the interface refuses, and what a bad sample does."""
+    cc, cxx = shutil.which("gcc"), shutil.which("g++")
+    if cc is None or cxx is None:
+        pytest.skip("no gcc or g++ on the path")
+
+    def run(*command: object, given: str = "") -> str:
+        done = subprocess.run([str(c) for c in command], input=given, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    core, tables, program = ROOT / "csrc" / "embedded", tmp_path / "make_tables", tmp_path / "program"
+    run(cxx, "-std=c++20", "-O1", "-ffp-contract=off", "-o", tables, core / "make_tables.cpp")
+    (tmp_path / "genes.hpp").write_text(run(tables, "genes"))
+    flags = f"-std=c++20 -O1 -ffp-contract=off -ffreestanding -fno-exceptions -fno-rtti -DGAIDENT_ARITHMETIC={name} -I{tmp_path}"
+    run(cxx, *flags.split(), "-c", "-o", tmp_path / "core.o", core / "gaident.cpp")
+    caller = ROOT / "tests" / "cpp" / "c_interface.c"
+    run(cc, "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{core}", "-o", program, caller, tmp_path / "core.o")
+
+    command = np.full(250, 43.6)
+    numbers = [LOOP.kp, LOOP.ki, rec.dt, max(43.6, float(np.max(np.abs(rec.velocity))))]
+    numbers += np.column_stack([command, rec.velocity]).ravel().tolist()
+    p, q, gain, fitness, generation = run(program, given="\n".join(float(x).hex() for x in numbers)).split()
+
+    settings = ga.Settings(code="binary", scale="linear", engine="plain", generations=30, arithmetic=arithmetic)
+    found = ga.identify(rec, LOOP, SPACE, settings, seed=1)
+    history = found.trials[0].history
+    assert float.fromhex(fitness) == np.min(history) and int(generation) == np.argmin(history)
+    assert (int(p), int(q)) == (found.model.p, found.model.q)
+    assert float.fromhex(gain) == pytest.approx(found.model.gain, rel=1e-6)
