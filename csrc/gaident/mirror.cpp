@@ -6,6 +6,7 @@
 #include "simulate.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <string>
 
 namespace gaident {
@@ -163,8 +164,8 @@ bool velocity_in(bool in_z, const Factors<double>& g, std::span<const double> in
     const double limit = static_cast<double>(A::worst());
     bool left = false;
     const auto keep = [&](std::size_t k, const typename A::Signal& y) {
-        velocity[k] = static_cast<double>(y);
         left = left || left_range(y, limit);
+        velocity[k] = left ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(y);
     };
     if (in_z) {
         PowersOfZ<A> z(close_loop(bilinear_plant(g, Ts), loop.kp, loop.ki, Ts));

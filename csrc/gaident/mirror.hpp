@@ -31,7 +31,7 @@ std::unique_ptr<Mirror> make_mirror(std::string_view arithmetic, const Experimen
 std::vector<std::string_view> mirror_names();
 
 // One model's velocity in such an arithmetic; `in_z`: not in delta form but in powers of z, the coefficients computed in double and rounded
-// once, which is kinder than a drive could be. Returns whether it left the arithmetic's range.
+// once, which is kinder than a drive could be. Returns whether it left the arithmetic's range; from there on the velocity is NaN.
 bool mirror_velocity(std::string_view arithmetic, bool in_z, const Factors<double>& g, std::span<const double> input,
                      double sample_time, const Loop& loop, std::span<double> velocity);
 

@@ -46,6 +46,16 @@ def test_simulates_what_double_does(rec: ga.Record, arithmetic: str) -> None:
     assert deviation < TOLERANCE[arithmetic] * np.max(np.abs(exact))
 
 
+def test_simulation_beyond_the_range_is_undefined_and_not_clipped(rec: ga.Record) -> None:
+    fast = ga.Record(dt=rec.dt, velocity=np.full(250, 60.0), command=np.full(250, 60.0))  # words without headroom end at 64 rad/s
+    exact = ga.simulate(MODEL, fast, LOOP)
+    first = int(np.argmax(exact > 64.0))
+    tight = ga.simulate(MODEL, fast, LOOP, arithmetic="fixed_tight")
+    assert 0 < first < 249 and np.isnan(tight[first:]).all()
+    assert np.max(np.abs(tight[:first] - exact[:first])) < 1e-3
+    assert np.isfinite(ga.simulate(MODEL, fast, LOOP, arithmetic="fixed")).all()
+
+
 def test_identify_runs_as_the_drive_does(rec: ga.Record) -> None:
     def run(arithmetic: str, seed: int = 1) -> ga.Identification:
         settings = ga.Settings(code="binary", scale="linear", engine="plain", generations=60, arithmetic=arithmetic)

@@ -66,7 +66,7 @@ def run(
                    plant, the first of them the velocity [rad/s] before the first input acts; with a
                    controller one more, its stored torque [N m]
     arithmetic     "double", or "float" for 32-bit arithmetic (within 1e-4 of the response; models without effects); or a
-                   drive's (docs/dsp.md): from rest, in the continuous loop without limits
+                   drive's (docs/dsp.md): from rest, in the continuous loop without limits; NaN once it has left its range
     substeps       steps per sample of a model with effects, 1..64; None: as many as it needs
 
     A model that diverges gives infinite or undefined values, no error. Raises RecordError where the record
