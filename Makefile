@@ -43,12 +43,12 @@ install: .venv/.installed ## set up .venv and install the package into it
 demo: .venv/.installed ## identify a two-mass drive, find a hidden friction; text on the screen, pictures in build/demo
 	@$(BIN)/gaident demo --out "$(DEMO_DIR)"
 
-# What needs one processor (mypy) beside what needs all of them (the build); alone what measures speed.
-test: ## every test, C++ and Python, and ruff and mypy
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target SIDE_BY_SIDE=yes lint build-checked
+# What comes from the network beside what needs the compiler; alone what measures speed.
+test: ## every test, C++ and Python
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target SIDE_BY_SIDE=yes .venv/.requirements build-checked
 	@$(MAKE) --no-print-directory test-checked test-python
 
-lint: .venv/.requirements
+lint: .venv/.requirements ## ruff and mypy
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
