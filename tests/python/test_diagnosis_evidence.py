@@ -227,9 +227,9 @@ def test_the_missing_torque_without_a_logged_torque_is_the_same() -> None:
 def test_the_smoother_is_fast_and_refuses_what_it_cannot_see() -> None:
     rec = drive(Tc=0.05)
     long = ga.Record(DT, np.tile(rec.command, 50), np.tile(rec.velocity, 50), torque=np.tile(rec.torque, 50))
-    begin = time.perf_counter()
+    begin = time.process_time()
     missing_torque(TWO_MASS.model(), long, CONTROLLER)
-    assert time.perf_counter() - begin < 5.0  # 100 000 samples
+    assert time.process_time() - begin < 5.0  # 100 000 samples
     with pytest.raises(ModelError, match="zero at 0"):
         missing_torque(ga.Model(5000.0, [-3.0, -20.0], [0.0]), rec, CONTROLLER)
     with pytest.raises(ModelError, match="p = 0"):

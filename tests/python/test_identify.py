@@ -281,7 +281,7 @@ def test_progress_is_reported_and_an_error_in_it_stops_the_run() -> None:
     began = time.perf_counter()
     with pytest.raises(RuntimeError, match="no more"):
         ga.identify(rec, ctl, settings=ga.Settings(engine="plain", generations=5_000_000), progress=broken)
-    assert time.perf_counter() - began < 5.0
+    assert time.perf_counter() - began < 20.0  # it would take minutes
 
 
 MISUSE = [
