@@ -1,9 +1,6 @@
 #include "../gaident/mirror.hpp"
-#include "../gaident/replay.hpp"
 #include "../gaident/simulate.hpp"
 #include "bindings.hpp"
-
-#include <algorithm>
 
 using namespace gaident;
 
@@ -55,16 +52,6 @@ py::tuple simulate_model(double gain, const ComplexArray& poles, const ComplexAr
     return py::make_tuple(velocity, torque);
 }
 
-// A copy on which `run` has worked.
-template <void (*run)(std::span<double>, double, double)>
-RealArray replayed(const RealArray& values, double limit, double start) {
-    RealArray out(values.size());
-    const std::span<double> all{out.mutable_data(), static_cast<std::size_t>(out.size())};
-    std::copy_n(values.data(), all.size(), all.begin());
-    run(all, limit, start);
-    return out;
-}
-
 py::tuple discrete_model(double gain, const ComplexArray& poles, const ComplexArray& zeros, double dt, const std::string& loop,
                          double kp, double ki) {
     const Factors<double> g = make_factors(gain, poles, zeros);
@@ -86,8 +73,6 @@ void bind_simulate(py::module_& m) {
           py::arg("initial_state"), py::arg("arithmetic") = "double");
     m.def("mirrored", &mirrored, py::arg("arithmetic"), py::arg("in_z"), py::arg("gain"), py::arg("poles"), py::arg("zeros"),
           py::arg("dt"), py::arg("input"), py::arg("kp"), py::arg("ki"));
-    m.def("clamped_sum", &replayed<clamped_sum>, py::arg("steps"), py::arg("limit"), py::arg("start"));
-    m.def("rate_limited", &replayed<rate_limited>, py::arg("command"), py::arg("step"), py::arg("start"));
     m.def("discrete", &discrete_model, py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("dt"), py::arg("loop"),
           py::arg("kp"), py::arg("ki"));
 }

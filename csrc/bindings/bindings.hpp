@@ -29,6 +29,7 @@ RealArray to_array(const std::vector<double>& v);
 void run_interruptibly(std::atomic<bool>& stop, const std::function<void()>& work, const std::function<void()>& tick);
 
 void bind_simulate(py::module_& m);
+void bind_filter(py::module_& m);
 void bind_identify(py::module_& m);
 void bind_effects(py::module_& m);
 void bind_recurrence(py::module_& m);

@@ -1,7 +1,7 @@
 """The core of gaident: recurrences, genetic search and local fit (csrc/bindings); SI units."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -258,6 +258,33 @@ def decode(
     words: Sequence[int], ranges: SearchRanges, gray: bool, logarithmic: bool
 ) -> tuple[float, NDArray[np.complex128], NDArray[np.complex128]]:
     """(gain, poles, zeros) of a chromosome."""
+
+def filtered(
+    b: NDArray[np.float64], a: NDArray[np.float64], rows: NDArray[np.float64], lengths: Sequence[int]
+) -> NDArray[np.float64]:
+    """v(n) = sum_i b_i e(n-i) - sum_{i>=1} a_i v(n-i) of rows of e, each cut into records of these lengths, from rest."""
+
+def lagged_products(e: NDArray[np.float64], lags: int) -> NDArray[np.float64]:
+    """sum_n e(n) e(n-k), k = 0..lags."""
+
+class Hold:
+    """What a controller does with its integrator at the torque limit."""
+
+    held: ClassVar[Hold]
+    held_back: ClassVar[Hold]
+    tracked: ClassVar[Hold]
+    __members__: ClassVar[dict[str, Hold]]
+
+def held_torque(
+    error: NDArray[np.float64],
+    kp: float,
+    half: float,
+    torque_limit: float,
+    integrator_limit: float,
+    rule: Hold,
+    integral: float,
+) -> NDArray[np.float64]:
+    """Torque of a PI whose integrator does not wind up at its torque limit; half: ki dt/2."""
 
 def clamped_sum(steps: NDArray[np.float64], limit: float, start: float) -> NDArray[np.float64]:
     """I(n) = I(n-1) + steps(n), clamped to +-limit after each update, from I(-1) = start."""

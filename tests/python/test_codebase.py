@@ -35,7 +35,7 @@ CORE_ORDER = [
     ),
     *("genome", "factors", "roots", "decode", "encode", "decoder", "parameters", "neighbours", "delta", "bilinear", "held"),
     *("controller", "closed_loop", "loop", "record", "fitness", "candidate", "fixed_scaling", "operators", "static_search"),
-    *("kernels/", "elementary", "effects/", "replay", "friction", "two_mass", "effect_constants", "effect_plant"),
+    *("kernels/", "elementary", "effects/", "filter", "replay", "friction", "two_mass", "effect_constants", "effect_plant"),
     *(
         "own_effects",
         "effect_loop",

@@ -68,7 +68,7 @@ def test_a_floor_bounds_what_a_filter_makes_of_a_smooth_error() -> None:
 
 def test_the_power_of_a_noise_filter_is_that_of_its_impulse_response() -> None:
     plant = ga.OneMass(J=1e-3, D=1e-3).model()
-    noise = ShaftNoise(plant, DT, None).filter(4, 7)
+    noise = ShaftNoise(plant, DT, None).filters([(4, 7)])[0]
     assert noise is not None
     v = noise.of(np.random.default_rng(0).standard_normal((1, 200_000)), (200_000,))[0]
     assert float(np.mean(v**2)) == pytest.approx(noise.power, rel=0.03)

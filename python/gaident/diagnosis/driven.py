@@ -21,8 +21,8 @@ from gaident.diagnosis.layout import Layout
 from gaident.identification.space import torque_of
 from gaident.identification.starts import noise_std, starts_moving
 from gaident.models.controller import PI
+from gaident.models.filtering import filtered, rate_limited
 from gaident.models.own_effects import OWN
-from gaident.models.pi_torque import rate_limited
 from gaident.models.simulate import simulate_values
 
 __all__ = ["Driven"]
@@ -125,7 +125,7 @@ class Driven:
             )
         at_controller = [e for e in layout.effects if e in AT_CONTROLLER]
         if at_controller:
-            return np.vstack([self._predict_one(layout, x, at_controller) for x in X])
+            return self._predict_limited(layout, X, at_controller)
         names, values = layout.values(X)
         parts = [
             simulate_values(
@@ -173,16 +173,23 @@ class Driven:
             return None
         return int(2 ** np.clip(np.ceil(np.log2(self.records[0].dt / self.finest)), 0.0, 5.0))
 
-    def _predict_one(self, layout: Layout, x: Vector, at_controller: Sequence[str]) -> Matrix:
-        """With effects of the controller the torque itself depends on x."""
-        limits = {e: float(layout.effect_values(x[None, :], e)[0, 0]) for e in at_controller}
-        names, values = layout.values(x[None, :], at_controller)
+    def _predict_limited(self, layout: Layout, X: Matrix, at_controller: Sequence[str]) -> Matrix:
+        """With effects of the controller the torque itself depends on x: rows that share it are simulated together."""
+        limits = np.column_stack([layout.effect_values(X, e)[:, 0] for e in at_controller])
+        distinct, group = np.unique(limits, axis=0, return_inverse=True)
+        out = np.empty((len(X), sum(self.lengths)))
+        for i, row in enumerate(distinct):
+            of_row = np.flatnonzero(group.ravel() == i)
+            out[of_row] = self._predict_one(layout, X[of_row], dict(zip(at_controller, row.tolist(), strict=True)))
+        return out
+
+    def _predict_one(self, layout: Layout, X: Matrix, limits: dict[str, float]) -> Matrix:
+        names, values = layout.values(X, tuple(limits))
         steps = self.substeps(layout.effects)
         parts = []
         for i, (r, read) in enumerate(zip(self.records, self.read, strict=True)):
-            torque = replayed(read, self.controller, limits)
-            states = layout.start_values(x[None, :], i)
-            driven = _driven(r, torque)
+            states = layout.start_values(X, i)
+            driven = _driven(r, replayed(read, self.controller, limits))
             parts.append(simulate_values(layout.structure, names, values, driven, initial_states=states, substeps=steps))
         return np.concatenate(parts, axis=1)
 
@@ -204,25 +211,16 @@ class Driven:
 
         In the loop the controller answers: G d - T (G d), T the closed loop's response to the command.
         """
-        from scipy.signal import lfilter
-
         for e in layout.effects:
             x, layout = layout.removed(x, e), layout.without(e)
         linear = layout.model(x)
-        filters = [linear.discrete(layout.scales.dt)]
-        if layout.looped:
-            filters.append(linear.discrete(layout.scales.dt, self.controller))
-        out = np.empty_like(torques)
-        at = 0
-        for n in self.lengths:
-            rows = torques[:, at : at + n]
-            answers = []
-            for d in filters:
-                rows = lfilter(d.alpha, np.concatenate([[1.0], -d.beta]), rows, axis=1)
-                answers.append(rows)
-            out[:, at : at + n] = answers[0] if len(answers) == 1 else answers[0] - answers[1]
-            at += n
-        return out
+        dt = layout.scales.dt
+        d = linear.discrete(dt)
+        free = filtered(d.alpha, np.append(1.0, -d.beta), torques, self.lengths)
+        if not layout.looped:
+            return free
+        d = linear.discrete(dt, self.controller)
+        return free - filtered(d.alpha, np.append(1.0, -d.beta), free, self.lengths)
 
     def twist(self, layout: Layout, x: Vector) -> Vector:
         """Twist of the shaft of two masses, to scale, as the linear part of the model x has it: u e0/(s^2 + e1 s + e0)."""
@@ -236,11 +234,10 @@ class Driven:
         return self._second_order(torques, [-K, 0.0], e1, e0)
 
     def _second_order(self, rows: Matrix, numerator: list[float], e1: float, e0: float) -> Matrix:
-        from scipy.signal import cont2discrete, lfilter
+        from scipy.signal import cont2discrete
 
         b, a, _ = cont2discrete((numerator, [1.0, max(e1, 0.0), abs(e0)]), self.records[0].dt)
-        parts = np.split(rows, np.cumsum(self.lengths)[:-1], axis=1)
-        return np.concatenate([np.asarray(lfilter(b.ravel(), a, part, axis=1)) for part in parts], axis=1)
+        return filtered(b.ravel(), a, rows, self.lengths)
 
     def commanded(self, rate: float) -> Driven:
         """The same with commands that change by `rate` [rad/s^2] at most, as the controller of a closed loop then reads them."""

@@ -148,9 +148,12 @@ def _held(smooth: Vector, dt: float, floor: float, top: float) -> tuple[list[flo
     low = high = float(smooth[0])
     values = smooth.tolist()
     for i in range(1, n + 1):
-        if i < n and max(high, values[i]) - min(low, values[i]) <= band:
-            low, high = min(low, values[i]), max(high, values[i])
-            continue
+        if i < n:
+            value = values[i]
+            lower, higher = value if value < low else low, value if value > high else high
+            if higher - lower <= band:
+                low, high = lower, higher
+                continue
         middle = (start + i) // 2
         # On a ramp the halves of the stretch differ by half the band.
         if i - start >= 20 and abs(np.median(smooth[start:middle]) - np.median(smooth[middle:i])) < 0.35 * band:

@@ -11,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.candidates import CANDIDATES, Scales
-from gaident.models.effects import table
+from gaident.models.effects import place_of, table
 from gaident.models.factors import Structure
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
@@ -115,21 +116,26 @@ class Layout:
         """Number of base parameters, which come first."""
         return 1 + len(self.units)
 
-    @property
-    def sizes(self) -> tuple[int, ...]:
-        """Coordinates of each effect."""
-        return tuple(CANDIDATES[e].size for e in self.effects)
-
-    @property
+    @cached_property
     def size(self) -> int:
         """Length of x."""
-        return self.base + sum(self.sizes) + sum(self.starts)
+        return self.base + sum(CANDIDATES[e].size for e in self.effects) + sum(self.starts)
+
+    @cached_property
+    def _slots(self) -> dict[str, slice]:
+        slots, at = {}, self.base
+        for e in self.effects:
+            slots[e] = slice(at, at + CANDIDATES[e].size)
+            at = slots[e].stop
+        return slots
+
+    @cached_property
+    def _ordered(self) -> tuple[str, ...]:
+        return tuple(sorted(self.effects, key=place_of))
 
     def slot(self, effect: str) -> slice:
         """Where an effect's coordinates stand."""
-        i = self.effects.index(effect)
-        first = self.base + sum(self.sizes[:i])
-        return slice(first, first + self.sizes[i])
+        return self._slots[effect]
 
     def base_vector(self, model: Model) -> Vector:
         """x of the base parameters of a model of this structure."""
@@ -159,8 +165,7 @@ class Layout:
 
     def values(self, X: Matrix, left_out: Sequence[str] = ()) -> tuple[tuple[str, ...], Matrix]:
         """(effects in the order of the table, rows of base parameters and theirs) for `simulate_values`."""
-        order = [row.name for row in table()]
-        names = tuple(sorted((e for e in self.effects if e not in left_out), key=order.index))
+        names = tuple(e for e in self._ordered if e not in left_out)
         return names, np.hstack([self.base_values(X), *(self.effect_values(X, e) for e in names)])
 
     def start_values(self, X: Matrix, record: int) -> Matrix | None:

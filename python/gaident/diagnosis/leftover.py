@@ -17,6 +17,7 @@ from gaident.diagnosis.driven import Driven
 from gaident.diagnosis.line import torque_of_line
 from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import Fit, Problem, project_out
+from gaident.models.filtering import clamped_sum
 
 __all__ = ["Leftover", "leftover"]
 
@@ -146,13 +147,9 @@ def _of_path(angle: Vector, lengths: tuple[int, ...]) -> Matrix:
     rows = np.empty((len(widths), len(angle)))
     at = 0
     for n in lengths:
-        steps = np.diff(angle[at : at + n], prepend=angle[at]).tolist()
+        steps = np.diff(angle[at : at + n], prepend=angle[at])
         for row, width in zip(rows, widths.tolist(), strict=True):
-            z, path = 0.0, []
-            for step in steps:
-                z = min(max(z + step, -width), width)
-                path.append(z)
-            row[at : at + n] = path
+            row[at : at + n] = clamped_sum(steps, width)
         at += n
     return rows / widths[:, None]
 

@@ -18,14 +18,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.diagnosis.state_space import Discretised, discretised, disturbed, steady_covariance
-from gaident.errors import GaidentError
-from gaident.identification.noise import autocorrelation, autoregression_of, fit_autoregression, highest_order
+from gaident.diagnosis.state_space import Discretised, discretised, disturbed, steady_covariances
+from gaident.identification.noise import autocorrelation, autoregression_of, highest_order
 from gaident.models.controller import PI
+from gaident.models.filtering import filtered
 from gaident.models.model import Model
 
 __all__ = ["HIGHEST", "WHITE", "NoiseFilter", "ShaftNoise", "autoregression"]
@@ -48,6 +49,11 @@ class NoiseFilter:
     size: int = 0
 
     @cached_property
+    def key(self) -> tuple[bytes, bytes, int]:
+        """The same for filters of the same numbers."""
+        return self.b.tobytes(), self.a.tobytes(), self.size
+
+    @cached_property
     def power(self) -> float:
         """Sum of the squared impulse response: what becomes of white noise of variance 1."""
         if len(self.a) == 1:
@@ -59,13 +65,7 @@ class NoiseFilter:
         """Rows of v, each record by itself with its past at 0."""
         if len(self.b) == len(self.a) == 1:
             return E
-        from scipy.signal import lfilter
-
-        ends = np.cumsum(lengths)[:-1]
-        with np.errstate(invalid="ignore", over="ignore"):
-            if len(ends) == 0:
-                return np.asarray(lfilter(self.b, self.a, E, axis=1))
-            return np.concatenate([lfilter(self.b, self.a, part, axis=1) for part in np.split(E, ends, axis=1)], axis=1)
+        return filtered(self.b, self.a, E, lengths)
 
     def then(self, phi: Vector) -> NoiseFilter:
         """This filter, and the autoregression phi on what it leaves."""
@@ -86,21 +86,40 @@ def autoregression(parts: Sequence[Vector], highest: int = HIGHEST, floor: float
 
     floor: variance of white noise that is taken to be on the parts beside what they show.
     """
-    if floor == 0.0:
-        order = fit_autoregression(parts, highest).order
-    else:
-        total = sum(len(e) for e in parts)
-        products = np.sum([autocorrelation(e, highest_order([len(e) for e in parts], highest)) for e in parts], axis=0)
-        products[0] += floor * total
-        order = autoregression_of(products, total).order
+    total = sum(len(e) for e in parts)
+    top = highest_order([len(e) for e in parts], highest)
+    products = [autocorrelation(e, top) for e in parts]
+    pooled: Vector = np.sum(products, axis=0)
+    pooled[0] += floor * total
+    order = autoregression_of(pooled, total).order
     if order == 0:
         return np.zeros(0)
-    gram, right = np.zeros((order, order)), np.zeros(order)
-    for e in parts:
-        rows = np.lib.stride_tricks.sliding_window_view(e[:-1], order)[:, ::-1]
-        gram += rows.T @ rows + floor * len(rows) * np.eye(order)
-        right += rows.T @ e[order:]
-    return np.asarray(np.linalg.lstsq(gram, right, rcond=1e-13)[0], dtype=np.float64)
+    M = sum(_moments(e, r, order) for e, r in zip(parts, products, strict=True))
+    M = M + floor * (total - order * len(parts)) * np.eye(order + 1)
+    return np.asarray(np.linalg.lstsq(M[1:, 1:], M[0, 1:], rcond=1e-13)[0], dtype=np.float64)
+
+
+def _moments(e: Vector, products: Vector, order: int) -> Matrix:
+    """sum over n >= order of e(n-i) e(n-j), i, j = 0..order, from the sums of products over all n.
+
+    The first row lacks the products at the start; each diagonal follows from its first by the two products at its ends.
+    """
+    head, tail = e[:order], e[len(e) - order :][::-1]
+    M = np.empty((order + 1, order + 1))
+    M[0] = products[: order + 1] - autocorrelation(head, order)
+    ends = np.outer(head[::-1], head[::-1]) - np.outer(tail, tail)
+    for i in range(order):
+        M[i + 1, i + 1 :] = M[i, i:-1] + ends[i, i:]
+    return np.triu(M) + np.triu(M, 1).T
+
+
+def _polynomials(roots: NDArray[Any]) -> Matrix:
+    """Real coefficients from the highest power on, of rows of roots."""
+    c = np.zeros((len(roots), roots.shape[1] + 1), dtype=np.complex128)
+    c[:, 0] = 1.0
+    for i, r in enumerate(roots.T):
+        c[:, 1 : i + 2] -= r[:, None] * c[:, : i + 1]
+    return c.real.copy()
 
 
 class ShaftNoise:
@@ -108,54 +127,54 @@ class ShaftNoise:
 
     def __init__(self, model: Model, dt: float, controller: PI | None) -> None:
         self.plant: Discretised = discretised(model, dt)
+        self.roots = np.linalg.eigvals(self.plant.A)
         self.loop = None if controller is None else np.linalg.eigvals(disturbed(self.plant, controller, dt).A)
         self.last: dict[bool, tuple[int, int]] = {}
         self.made: dict[tuple[int, int, bool], NoiseFilter | None] = {}
 
-    def filter(self, i: int, j: int, looped: bool = False) -> NoiseFilter | None:
-        """The filter of TAUS[i] and SIZES[j]; None outside the grid or where there is none."""
-        if not (0 <= i < len(TAUS) and 0 <= j < len(SIZES)):
-            return None
-        key = (i, j, looped)
-        if key not in self.made:
-            self.made[key] = self._filter(float(np.exp(-1.0 / TAUS[i])), float(SIZES[j]) / self.plant.first_response, looped)
-        return self.made[key]
+    def filters(self, places: Sequence[tuple[int, int]], looped: bool = False) -> list[NoiseFilter | None]:
+        """The filters of TAUS[i] and SIZES[j]; None outside the grid or where there is none."""
+        keys = [(i, j, looped) for i, j in places]
+        missing = [k for k in keys if k not in self.made and 0 <= k[0] < len(TAUS) and 0 <= k[1] < len(SIZES)]
+        if missing:
+            phis = np.exp(-1.0 / TAUS[[i for i, _, _ in missing]])
+            sizes = SIZES[[j for _, j, _ in missing]] / self.plant.first_response
+            self.made.update(zip(missing, self._filters(phis, sizes, looped), strict=True))
+        return [self.made.get(k) for k in keys]
 
-    def _filter(self, phi: float, size: float, looped: bool) -> NoiseFilter | None:
+    def _filters(self, phis: Vector, sizes: Vector, looped: bool) -> list[NoiseFilter | None]:
         m = len(self.plant.B)
-        A = np.zeros((m + 1, m + 1), dtype=np.complex128)
-        A[:m, :m], A[:m, m], A[m, m] = self.plant.A, self.plant.B, phi
+        A = np.zeros((len(phis), m + 1, m + 1), dtype=np.complex128)
+        A[:, :m, :m], A[:, :m, m], A[:, m, m] = self.plant.A, self.plant.B, phis
         H = np.append(self.plant.C, 0.0).astype(np.complex128)
         Q = np.zeros_like(A)
-        Q[m, m] = size**2
-        try:
-            P = steady_covariance(A, H, Q)
-        except GaidentError:
-            return None
-        K = A @ P @ H.conj() / (1.0 + (H @ P @ H.conj()).real)
-        roots, filtered = np.linalg.eigvals(A), np.linalg.eigvals(A - np.outer(K, H))
+        Q[:, m, m] = sizes**2
+        P = steady_covariances(A, H, Q)
+        known = np.all(np.isfinite(P), axis=(1, 2))
+        PH = np.where(known[:, None, None], P, 0.0) @ H.conj()
+        K = (A @ PH[:, :, None])[:, :, 0] / (1.0 + (PH @ H).real)[:, None]
+        unfiltered: NDArray[Any] = self.roots
+        filtered: NDArray[Any] = np.linalg.eigvals(A - K[:, :, None] * H)
         if looped and self.loop is not None:
-            roots, filtered = np.append(self.loop, phi), np.append(filtered, 1.0)
-        return NoiseFilter(np.asarray(np.poly(roots).real), np.asarray(np.poly(filtered).real), 2)
+            unfiltered, filtered = self.loop, np.append(filtered, np.ones((len(A), 1)), axis=1)
+        numerators = _polynomials(np.append(np.tile(unfiltered, (len(A), 1)), phis[:, None], axis=1))
+        denominators = _polynomials(filtered)
+        return [NoiseFilter(b, a, 2) if k else None for b, a, k in zip(numerators, denominators, list(known), strict=True)]
 
     def best(self, cost: Callable[[NoiseFilter], float], looped: bool) -> NoiseFilter | None:
         """The filter of least cost, downhill from the one before; the first time from the middle of the grid, in large steps."""
         costs: dict[tuple[int, int], float] = {}
-
-        def at(k: tuple[int, int]) -> float:
-            if k not in costs:
-                f = self.filter(*k, looped)
-                costs[k] = np.inf if f is None else cost(f)
-            return costs[k]
-
         here = self.last.get(looped, (4, 7))
         for stride in (1,) if looped in self.last else (3, 1):
             while True:
                 i, j = here
                 around = [(i + stride * u, j + stride * v) for u in (-1, 0, 1) for v in (-1, 0, 1)]
-                best = min(around, key=at)
-                if not at(best) < at(here):
+                new = [k for k in around if k not in costs]
+                for k, f in zip(new, self.filters(new, looped), strict=True):
+                    costs[k] = np.inf if f is None else cost(f)
+                best = min(around, key=costs.__getitem__)
+                if not costs[best] < costs[here]:
                     break
                 here = best
         self.last[looped] = here
-        return self.filter(*here, looped) if np.isfinite(at(here)) else None
+        return self.filters([here], looped)[0] if np.isfinite(costs[here]) else None

@@ -19,8 +19,8 @@ had been on the velocity: H is that of e plus this noise, and V/N above becomes 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -30,10 +30,11 @@ from gaident.diagnosis.layout import Layout
 from gaident.diagnosis.noise_filter import HIGHEST, ON_TOP, WHITE, NoiseFilter, ShaftNoise, autoregression
 from gaident.errors import GaidentError
 
-__all__ = ["Fit", "Problem", "project_out"]
+__all__ = ["Fit", "Problem", "orthonormal_rows", "project_out"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+Index = NDArray[np.intp]
 Predict = Callable[[Layout, Matrix], Matrix]
 
 LOST = 1e60  # rad/s: the error of a model that diverges, every sample; its squares stay numbers
@@ -50,6 +51,11 @@ class Fit:
     cost: float
     bic: float
     converged: bool = False
+
+    @property
+    def key(self) -> Hashable:
+        """The same for fits of the same numbers."""
+        return self.layout, self.x.tobytes(), self.noise.key, self.cost, self.bic, self.converged
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -73,6 +79,7 @@ class Problem:
     shaft: ShaftNoise | None = None
     simulations: int = 0
     floor: float = 0.0
+    _known: dict[Hashable, Fit] = field(init=False, default_factory=dict, repr=False)
 
     def errors(self, layout: Layout, X: Matrix) -> Matrix:
         """Rows of plain errors."""
@@ -85,9 +92,7 @@ class Problem:
     def whitened(self, E: Matrix, noise: NoiseFilter) -> Matrix:
         """Rows of whitened errors; samples that do not count are 0."""
         V = noise.of(self._bridged(E), self.lengths)
-        with np.errstate(invalid="ignore"):
-            V = V * self.counted
-        return V
+        return np.multiply(V, self.counted, out=None if V is E else V)
 
     @cached_property
     def counted(self) -> Vector:
@@ -101,23 +106,27 @@ class Problem:
 
     def _bridged(self, E: Matrix) -> Matrix:
         """Errors with a straight line over the masked samples, so that a filter does not see them."""
-        gaps = np.flatnonzero(self.weight == 0.0)
+        gaps, before, after, share = self._bridges
         if len(gaps) == 0:
             return E
         E = E.copy()
-        known = np.flatnonzero(self.weight > 0.0)
-        right = np.searchsorted(known, gaps)
-        before, after = known[np.maximum(right - 1, 0)], known[np.minimum(right, len(known) - 1)]
-        share = np.clip((gaps - before) / np.maximum(after - before, 1), 0.0, 1.0)
         E[:, gaps] = E[:, before] + share * (E[:, after] - E[:, before])
         return E
+
+    @cached_property
+    def _bridges(self) -> tuple[Index, Index, Index, Vector]:
+        """Masked samples, those that count before and after each, and its place between them from 0 to 1."""
+        gaps, known = np.flatnonzero(self.weight == 0.0), np.flatnonzero(self.weight > 0.0)
+        right = np.searchsorted(known, gaps)
+        before, after = known[np.maximum(right - 1, 0)], known[np.minimum(right, len(known) - 1)]
+        return gaps, before, after, np.clip((gaps - before) / np.maximum(after - before, 1), 0.0, 1.0)
 
     @property
     def head(self) -> int:
         """Samples at the start of each record that never count, so that filters of all orders are judged on the same ones."""
         return min(HIGHEST, min(self.lengths) // 12)
 
-    @property
+    @cached_property
     def count(self) -> float:
         """Number of samples that count."""
         return float(self.counted.sum())
@@ -162,7 +171,18 @@ class Problem:
         return V[0], J, E[0]
 
     def fit(self, layout: Layout, x: Vector, noise: NoiseFilter, iterations: int = 12) -> Fit:
-        """Levenberg-Marquardt from x, eight dampings side by side, bounds by projection."""
+        """Levenberg-Marquardt from x, eight dampings side by side, bounds by projection; the same fit is made once."""
+        key = "fit", layout, x.tobytes(), noise.key, iterations
+        return self._once(key, lambda: self._fit(layout, x, noise, iterations))
+
+    def _once(self, key: Hashable, work: Callable[[], Fit]) -> Fit:
+        """What the search asks for again, on another way to the same model, is remembered."""
+        key = key, self.shaft, self.floor
+        if key not in self._known:
+            self._known[key] = work()
+        return self._known[key]
+
+    def _fit(self, layout: Layout, x: Vector, noise: NoiseFilter, iterations: int) -> Fit:
         limits, steps = layout.limits(), layout.steps()
         x = np.clip(x, *limits)
         damping, converged = 1e-2, False
@@ -183,12 +203,7 @@ class Problem:
             sub, gradient, scale = A[np.ix_(index, index)], g[index], diagonal[index]
             factors = damping * 10.0 ** np.arange(-3.0, 5.0)
             X = np.repeat(x[None, :], len(factors), axis=0)
-            for row, factor in zip(X, factors, strict=True):
-                M = sub + np.diag(factor * scale + 1e-12 * scale.max() * 1e-6)
-                try:
-                    row[index] -= np.linalg.solve(M, gradient)
-                except np.linalg.LinAlgError:
-                    continue
+            X[:, index] -= _damped_steps(sub, gradient, factors[:, None] * scale + 1e-18 * scale.max())
             X = np.clip(X, *limits)
             costs = self.costs(layout, X, noise)
             best = int(np.argmin(costs))
@@ -212,6 +227,9 @@ class Problem:
         """The fit under the filter of what it leaves itself (two rounds of generalised least squares)."""
         if fit.cost >= WORST:
             return fit
+        return self._once(("settled", fit.key, iterations), lambda: self._settled(fit, iterations))
+
+    def _settled(self, fit: Fit, iterations: int) -> Fit:
         best = fit
         for n in (iterations, max(iterations // 2, 2)):
             noise = self.filter_of(self.errors(fit.layout, fit.x[None, :])[0], fit.layout.looped)
@@ -224,6 +242,9 @@ class Problem:
         """The same x under the filter of what it leaves."""
         if fit.cost >= WORST:
             return fit
+        return self._once(("judged", fit.key), lambda: self._judged(fit))
+
+    def _judged(self, fit: Fit) -> Fit:
         error = self.errors(fit.layout, fit.x[None, :])
         noise = self.filter_of(error[0], fit.layout.looped)
         return self._scored(fit.layout, fit.x, noise, float(_sums(self.whitened(error, noise))[0]), fit.converged)
@@ -244,6 +265,15 @@ class Problem:
     def _variance(self, cost: float, noise: NoiseFilter) -> float:
         """V/N + f |h|^2."""
         return max(cost, 1e-300) / self.count + (self.floor * noise.power if self.floor else 0.0)
+
+
+def _damped_steps(A: Matrix, g: Vector, damping: Matrix) -> Matrix:
+    """(A + diag(d))^-1 g for each row d of damping; 0 where there is none."""
+    M = A + damping[:, :, None] * np.eye(len(g))
+    try:
+        return np.asarray(np.linalg.solve(M, np.repeat(g[None, :, None], len(M), axis=0))[:, :, 0])
+    except np.linalg.LinAlgError:
+        return np.array([np.linalg.solve(m, g) if np.linalg.cond(m) < np.inf else np.zeros_like(g) for m in M])
 
 
 def _sums(V: Matrix) -> Vector:

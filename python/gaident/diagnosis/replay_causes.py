@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from gaident.identification.noise import ljung_box
 from gaident.models.controller import PI
-from gaident.models.pi_torque import HOLDS, held_torque, pi_torque, rate_limited
+from gaident.models.filtering import rate_limited
+from gaident.models.pi_torque import HOLDS, held_torque, pi_torque
 
 __all__ = ["Explanation", "explain", "white_noise"]
 

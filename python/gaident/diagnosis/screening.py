@@ -21,7 +21,7 @@ from gaident.diagnosis.candidates import CANDIDATES
 from gaident.diagnosis.driven import Driven
 from gaident.diagnosis.layout import Layout, evenly_damped
 from gaident.diagnosis.noise_filter import WHITE, NoiseFilter
-from gaident.diagnosis.problem import Problem, project_out
+from gaident.diagnosis.problem import Problem, orthonormal_rows, project_out
 
 __all__ = ["Screened", "Screening"]
 
@@ -48,7 +48,7 @@ class Screened:
     hope: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Trial:
     effect: str
     layout: Layout
@@ -58,7 +58,7 @@ class _Trial:
     columns: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Base:
     """The model that candidates extend: x, plain error and sensitivities."""
 
@@ -68,12 +68,25 @@ class _Base:
     J: Matrix
 
 
+@dataclass(frozen=True, eq=False)
+class _View:
+    """A base under one filter: an orthonormal basis of what its parameters can explain, the rest of its error, its BIC."""
+
+    noise: NoiseFilter
+    basis: Matrix
+    rest: Vector
+    own: float
+
+
 class Screening:
     """All candidates against one model; noise filters can be changed without a new simulation."""
 
     def __init__(self, problem: Problem, driven: Driven) -> None:
         self.problem, self.driven = problem, driven
         self.trials: list[_Trial] = []
+        self._beyond: dict[_Base, tuple[int, NoiseFilter]] = {}
+        self._views: dict[tuple[_Base, NoiseFilter, bool], _View] = {}
+        self._screened: dict[tuple[_Trial, _View], Screened] = {}
 
     def add(self, layout: Layout, x: Vector, effects: Sequence[str]) -> None:
         """Candidates as extensions of the model x."""
@@ -121,13 +134,12 @@ class Screening:
         orders = orders[seen & (orders * speed * layout.scales.dt < 2.5)]
         if len(orders) == 0:
             return orders, np.zeros((0, len(error)))
-        phase = orders[:, None] * angle[None, :]
-        sine, cosine = np.sin(phase), np.cos(phase)
+        waves = _harmonics(angle, orders)
         if candidate.harmonic == "torque":
-            pairs = np.stack([-sine, -cosine], axis=1).reshape(-1, len(angle))
+            pairs = np.stack([-waves.imag, -waves.real], axis=1).reshape(-1, len(angle))
             return orders, self.driven.response(layout, x, pairs)
         w = (self.problem.measured - error) * orders[:, None]
-        return orders, np.stack([w * cosine, -w * sine], axis=1).reshape(-1, len(angle))
+        return orders, np.stack([w * waves.real, -w * waves.imag], axis=1).reshape(-1, len(angle))
 
     def filter_beyond(self, base: _Base) -> NoiseFilter:
         """Noise filter of what nothing in the library explains, to first order: no effect is whitened away as noise."""
@@ -151,37 +163,53 @@ class Screening:
         What counts is the fall of a candidate's cost against the model that it extends, in the same view: a model in its loop
         leaves another error than one that the torque drives. noise: the filter; None: each view's own of what nothing explains.
         """
-        n = self.problem.count
-        bases: dict[int, tuple[NoiseFilter, Matrix, Vector, float]] = {}
         best: dict[str, Screened] = {}
         for t in self.trials:
-            key = id(t.base)
-            if key not in bases:
-                f = self.filter_beyond(t.base) if noise is None else noise
-                J = self.problem.whitened(t.base.J, f)
-                rest = project_out(J, self.problem.whitened(t.base.error[None, :], f))[0]
-                bases[key] = (f, J, rest, self._without(t.base, f if noise is not None else None))
-            f, J, rest, own = bases[key]
-            V = self.problem.whitened(t.errors, f)
-            finite = np.all(np.isfinite(V), axis=1)
-            V = project_out(J, np.where(finite[:, None], V, 0.0))
-            power = float(rest @ rest)
-            if t.columns:
-                worth = _pair_worth(V, rest)
-                order = np.argsort(worth)[::-1][:2]
-                costs = np.maximum(power - worth[order], 1e-300)
-                starts = tuple(_harmonic_start(t, V, rest, int(i)) for i in order)
-            else:
-                costs = np.where(finite, _along(V - rest, rest, CANDIDATES[t.effect].proportional), np.inf)
-                order = np.argsort(costs)
-                starts = tuple(t.base.layout.inserted(t.base.x, row) for row in _start_rows(t, V, rest, order[:3]))
-                costs = costs[order]
-            cost, size = max(float(costs[0]), 1e-300), CANDIDATES[t.effect].size
-            fall = n * np.log(max(power, 1e-300) / cost) - size * np.log(n)
-            bic = n * np.log(cost / n) + (t.base.layout.size + size + f.size) * np.log(n)
-            if t.effect not in best or fall > best[t.effect].fall:
-                best[t.effect] = Screened(t.effect, t.layout, starts, f, float(fall), float(own - bic))
+            view = self._view(t.base, noise)
+            key = t, view
+            if key not in self._screened:
+                self._screened[key] = self._judged(t, view)
+            found = self._screened[key]
+            if t.effect not in best or found.fall > best[t.effect].fall:
+                best[t.effect] = found
         return sorted(best.values(), key=lambda s: -s.fall)
+
+    def _view(self, base: _Base, noise: NoiseFilter | None) -> _View:
+        own = noise is None
+        if noise is None:
+            trials = sum(t.base is base for t in self.trials)
+            if base not in self._beyond or self._beyond[base][0] != trials:
+                self._beyond[base] = trials, self.filter_beyond(base)
+            noise = self._beyond[base][1]
+        key = base, noise, own
+        if key not in self._views:
+            basis = orthonormal_rows(self.problem.whitened(base.J, noise))
+            v = self.problem.whitened(base.error[None, :], noise)[0]
+            rest = v - (v @ basis.T) @ basis
+            self._views[key] = _View(noise, basis, rest, self._without(base, None if own else noise))
+        return self._views[key]
+
+    def _judged(self, t: _Trial, view: _View) -> Screened:
+        n, rest = self.problem.count, view.rest
+        V = self.problem.whitened(t.errors, view.noise)
+        finite = np.all(np.isfinite(V), axis=1)
+        V[~finite] = 0.0
+        V -= (V @ view.basis.T) @ view.basis
+        power = float(rest @ rest)
+        if t.columns:
+            worth = _pair_worth(V, rest)
+            order = np.argsort(worth)[::-1][:2]
+            costs = np.maximum(power - worth[order], 1e-300)
+            starts = tuple(_harmonic_start(t, V, rest, int(i)) for i in order)
+        else:
+            costs = np.where(finite, _along(V - rest, rest, CANDIDATES[t.effect].proportional), np.inf)
+            order = np.argsort(costs)
+            starts = tuple(t.base.layout.inserted(t.base.x, row) for row in _start_rows(t, V, rest, order[:3]))
+            costs = costs[order]
+        cost, size = max(float(costs[0]), 1e-300), CANDIDATES[t.effect].size
+        fall = n * np.log(max(power, 1e-300) / cost) - size * np.log(n)
+        bic = n * np.log(cost / n) + (t.base.layout.size + size + view.noise.size) * np.log(n)
+        return Screened(t.effect, t.layout, starts, view.noise, float(fall), float(view.own - bic))
 
     def _without(self, base: _Base, noise: NoiseFilter | None) -> float:
         """BIC of the model that is extended, under a filter or that of its own errors."""
@@ -189,6 +217,18 @@ class Screening:
         f = noise or self.problem.filter_of(base.error, base.layout.looped)
         v = self.problem.whitened(base.error[None, :], f)[0]
         return float(n * np.log(max(float(v @ v), 1e-300) / n) + (base.layout.size + f.size) * np.log(n))
+
+
+def _harmonics(angle: Vector, orders: Vector) -> NDArray[np.complex128]:
+    """exp(i n angle), a row for each order n, these rising by whole numbers: each from the one before."""
+    rows = np.empty((len(orders), len(angle)), dtype=np.complex128)
+    turn = np.exp(1j * angle)
+    wave, before = np.ones_like(turn), 0
+    for row, order in zip(rows, orders, strict=True):
+        for _ in range(int(order) - before):
+            wave = wave * turn
+        row[:], before = wave, int(order)
+    return rows
 
 
 def _along(D: Matrix, rest: Vector, proportional: bool = False) -> Vector:

@@ -11,7 +11,7 @@ from gaident.errors import ModelError
 from gaident.models.controller import PI
 from gaident.models.model import Model
 
-__all__ = ["Discretised", "discretised", "disturbed", "recursion", "steady_covariance"]
+__all__ = ["Discretised", "discretised", "disturbed", "recursion", "steady_covariance", "steady_covariances"]
 
 Complex = NDArray[np.complex128]
 
@@ -122,23 +122,36 @@ def recursion(A: Complex, drive: ArrayLike, start: ArrayLike | None = None, newe
 
 
 def steady_covariance(A: Complex, H: Complex, Q: Complex) -> Complex:
-    """P of the steady Kalman filter with noise variance 1: P = A P A* - A P H*(H P H* + 1)^-1 H P A* + Q, by doubling.
+    """P of the steady Kalman filter with noise variance 1: P = A P A* - A P H*(H P H* + 1)^-1 H P A* + Q.
 
-    Raises ModelError where the doubling does not settle: a state is not seen at the output and does not fade.
+    Raises ModelError where there is none: a state is not seen at the output and does not fade.
     """
-    a, g, p = A.conj().T, np.outer(H.conj(), H), Q
-    eye = np.eye(len(A))
-    for _ in range(60):
-        inverse = np.linalg.inv(eye + g @ p)
-        step = a.conj().T @ p @ inverse @ a
-        g = g + a @ inverse @ g @ a.conj().T
-        a = a @ inverse @ a
-        p = p + step
-        p = 0.5 * (p + p.conj().T)
-        if not np.all(np.isfinite(p)):
-            break
-        if float(np.abs(step).max()) <= 1e-12 * float(np.abs(p).max()):
-            return p
-    raise ModelError(
-        "a missing torque does not show in this model's velocity: it has a zero at 0, or a pole that no torque moves"
-    )
+    P: Complex = steady_covariances(A[None], H, Q[None])[0]
+    if not np.all(np.isfinite(P)):
+        raise ModelError(
+            "a missing torque does not show in this model's velocity: it has a zero at 0, or a pole that no torque moves"
+        )
+    return P
+
+
+def steady_covariances(A: Complex, H: Complex, Q: Complex) -> Complex:
+    """`steady_covariance` of many A and Q (k, m, m) by doubling, side by side; nan where there is none."""
+    a, g, p = A.conj().swapaxes(1, 2), np.broadcast_to(np.outer(H.conj(), H), A.shape), Q
+    eye = np.eye(A.shape[-1])
+    settled = np.zeros(len(A), dtype=bool)
+    out = np.full_like(A, np.nan)
+    with np.errstate(all="ignore"):
+        for _ in range(60):
+            before, inverse = a.conj().swapaxes(1, 2), np.linalg.inv(eye + g @ p)
+            after = inverse @ a
+            step = before @ p @ after
+            g = g + a @ inverse @ g @ before
+            a = a @ after
+            p = p + step
+            p = 0.5 * (p + p.conj().swapaxes(1, 2))
+            new = ~settled & (np.abs(step).max(axis=(1, 2)) <= 1e-12 * np.abs(p).max(axis=(1, 2)))
+            out[new] = p[new]
+            settled |= new
+            if np.all(settled | ~np.isfinite(p).all(axis=(1, 2))):
+                break
+    return out

@@ -44,6 +44,7 @@ SHARE, BACKLASH_SHARE = 0.1, 0.5
 
 FITTED = 6  # candidates that each of the two rankings sends into a short fit
 FINISHED = 5  # of these, how many are fitted to the end
+FAR = 0.5  # BIC units per sample by which a short fit may be behind the model that it extends, to be fitted to the end
 
 
 @dataclass(frozen=True)
@@ -249,7 +250,8 @@ class Search:
                     fit = self.problem.judged(self.problem.fit(s.layout, x0, s.noise, 3))
                     if s.effect not in short or fit.bic < short[s.effect].bic:
                         short[s.effect] = fit
-        best = sorted(short.values(), key=lambda f: f.bic)[:FINISHED]
+        near = [f for f in short.values() if f.bic < now.bic + FAR * self.problem.count]
+        best = sorted(near, key=lambda f: f.bic)[:FINISHED]
         fits += [self.fitter.finished(f) for f in best]
         fits = sorted((f for f in fits if f.cost < WORST and self.is_mechanism(f)), key=lambda f: f.bic)
         if fits and fits[0].layout.looped:

@@ -7,16 +7,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from operator import mul
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gaident import _core
 
 __all__ = ["Autoregression", "autoregression_of", "fit_autoregression", "highest_order", "ljung_box", "ljung_box_of", "whiten"]
 
 Vector = NDArray[np.float64]
 
 MAX_ORDER = 30
+DIRECT = 40  # lags up to which products are quicker than a transform
 
 
 class Autoregression(NamedTuple):
@@ -49,21 +53,22 @@ def highest_order(lengths: Sequence[int], max_order: int = MAX_ORDER) -> int:
 
 def autoregression_of(products: Vector, total: int) -> Autoregression:
     """The same from sums of products e(n) e(n+k), k = 0..top, over `total` samples."""
-    cov = products / total
+    cov = (products / total).tolist()
     if not cov[0] > 0.0:
         return Autoregression(np.zeros(0), 0.0)
-    phi, variance = np.zeros(0), float(cov[0])
-    best, best_score = Autoregression(phi, math.sqrt(variance)), total * math.log(variance)
+    phi: list[float] = []
+    variance = cov[0]
+    best, best_std, best_score = phi, math.sqrt(variance), total * math.log(variance)
     for m in range(1, len(cov)):
-        reflection = float(cov[m] - phi @ cov[m - 1 : 0 : -1]) / variance
-        phi = np.append(phi - reflection * phi[::-1], reflection)
+        reflection = (cov[m] - sum(map(mul, phi, cov[m - 1 : 0 : -1]))) / variance
+        phi = [f - reflection * g for f, g in zip(phi, phi[::-1], strict=True)] + [reflection]
         variance *= 1.0 - reflection**2
         if not variance > 1e-14 * cov[0]:
             break
         score = total * math.log(variance) + m * math.log(total)
         if score < best_score:
-            best, best_score = Autoregression(phi, math.sqrt(variance)), score
-    return best
+            best, best_std, best_score = phi, math.sqrt(variance), score
+    return Autoregression(np.array(best, dtype=np.float64), best_std)
 
 
 def whiten(x: Vector, phi: Vector) -> Vector:
@@ -91,7 +96,9 @@ def ljung_box_of(products: Vector, total: int) -> float:
 
 
 def autocorrelation(e: Vector, lags: int) -> Vector:
-    """sum_n e(n) e(n+k), k = 0..lags, by FFT (padded, so not circular)."""
+    """sum_n e(n) e(n+k), k = 0..lags; many by FFT (padded, so not circular)."""
+    if lags <= DIRECT:
+        return _core.lagged_products(e, lags)
     size = 1 << (len(e) + lags).bit_length()
     spectrum = np.fft.rfft(e, size)
     r: Vector = np.fft.irfft(spectrum.real**2 + spectrum.imag**2, size)[: lags + 1]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gaident.data.record import Record
 from gaident.errors import SpaceError
 from gaident.models.controller import PI
+from gaident.models.pi_torque import pi_block
 
 if TYPE_CHECKING:
     from gaident import _core
@@ -269,14 +270,6 @@ def _torque_blocks(
             continue
         assert controller is not None and rec.command is not None  # checked on entry to identify()
         e = rec.command[first : first + length] - w
-        increments = 0.5 * controller.ki * rec.dt * (e + np.concatenate([[last], e[:-1]]))
-        increments[0] += integral
-        integrals = np.cumsum(increments)
-        torque_limit, integrator_limit = controller.limits
-        if np.abs(integrals).max() > integrator_limit:
-            from gaident import _core
-
-            integrals = _core.clamped_sum(increments, integrator_limit, 0.0)
-        integral, last = float(integrals[-1]), float(e[-1])
-        torque: NDArray[np.float64] = np.clip(controller.kp * e + integrals, -torque_limit, torque_limit)
+        torque, integral = pi_block(e, rec.dt, controller, last, integral)
+        last = float(e[-1])
         yield first, torque, w

@@ -77,6 +77,11 @@ def _by_name() -> dict[str, tuple[int, Row]]:
     return {row.name: (i, row) for i, row in enumerate(table())}
 
 
+def place_of(name: str) -> int:
+    """Row of an effect in the table, which is the order in which the core takes effects."""
+    return _by_name()[name][0]
+
+
 def register(
     name: str,
     parameters: Sequence[Parameter],
@@ -224,7 +229,7 @@ def _unknown(name: object) -> str:
 def ordered(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     """Effects in the order of the table, a later one of the same name in place of an earlier."""
     latest = {effect.name: effect for effect in effects}
-    return tuple(sorted(latest.values(), key=lambda effect: (effect.row, _by_name()[effect.name][0])[1]))
+    return tuple(sorted(latest.values(), key=lambda effect: (effect.row, place_of(effect.name))[1]))
 
 
 def _value(row: Row, parameter: Parameter, value: object) -> float:

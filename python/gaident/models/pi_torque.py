@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from gaident import _core
 from gaident.models.controller import PI
+from gaident.models.filtering import clamped_sum
 
-__all__ = ["HOLDS", "held_torque", "pi_torque", "rate_limited"]
+__all__ = ["HOLDS", "held_torque", "pi_block", "pi_torque"]
 
 Vector = NDArray[np.float64]
 
@@ -23,16 +24,19 @@ def pi_torque(command: Vector, velocity: Vector, dt: float, controller: PI, init
 
     initial_integral: what the integrator held before sample 0 [N m]. Both loops of `PI` share this rule.
     """
-    e = command - velocity
-    half = 0.5 * controller.ki * dt * e
-    steps = half.copy()
-    steps[1:] += half[:-1]
+    return pi_block(command - velocity, dt, controller, 0.0, initial_integral)[0]
+
+
+def pi_block(e: Vector, dt: float, controller: PI, last: float, integral: float) -> tuple[Vector, float]:
+    """(torque, integral after it) [N m] for a block of errors [rad/s], with the last error and the integral before it."""
+    half = 0.5 * controller.ki * dt
+    steps = half * (e + np.concatenate([[last], e[:-1]]))
     torque_limit, integrator_limit = controller.limits
-    integral = initial_integral + np.cumsum(steps)
-    if float(np.abs(integral).max()) > integrator_limit:
-        integral = _core.clamped_sum(steps, integrator_limit, initial_integral)
-    u: Vector = np.clip(controller.kp * e + integral, -torque_limit, torque_limit)
-    return u
+    integrals = integral + np.cumsum(steps)
+    if float(np.abs(integrals).max()) > integrator_limit:
+        integrals = clamped_sum(steps, integrator_limit, integral)
+    u: Vector = np.clip(controller.kp * e + integrals, -torque_limit, torque_limit)
+    return u, float(integrals[-1])
 
 
 HOLDS = {
@@ -51,22 +55,7 @@ def held_torque(command: Vector, velocity: Vector, dt: float, controller: PI, ru
     held_back  I(n) = I(n-1) where e(n) v(n) > 0
     tracked    I(n) = u(n) - kp e(n)
     """
-    limit, clamp = controller.limits
-    kp, half = controller.kp, 0.5 * controller.ki * dt
-    out, integral, last = [], initial_integral, 0.0
-    for e in (command - velocity).tolist():
-        new = min(max(integral + half * (e + last), -clamp), clamp)
-        v = kp * e + new
-        u = min(max(v, -limit), limit)
-        if u == v or (rule == "held_back" and e * v <= 0.0):
-            integral = new
-        elif rule == "tracked":
-            integral = u - kp * e
-        last = e
-        out.append(u)
-    return np.array(out)
-
-
-def rate_limited(command: Vector, rate: float, dt: float, start: float) -> Vector:
-    """`command` [rad/s] followed from `start` with a slope of at most `rate` [rad/s^2], shape (n,)."""
-    return _core.rate_limited(command, rate * dt, start)
+    hold = _core.Hold.__members__[rule]
+    return _core.held_torque(
+        command - velocity, controller.kp, 0.5 * controller.ki * dt, *controller.limits, hold, initial_integral
+    )

@@ -1,0 +1,67 @@
+#include "../gaident/filter.hpp"
+#include "../gaident/replay.hpp"
+#include "bindings.hpp"
+
+#include <numeric>
+
+using namespace gaident;
+
+namespace {
+
+// Rows of `values`, each cut into records of these lengths, filtered by b/a.
+RealArray filtered_rows(const RealArray& b, const RealArray& a, const RealArray& values,
+                        const std::vector<std::size_t>& lengths) {
+    if (values.ndim() != 2) throw std::invalid_argument("rows: a matrix is needed");
+    const auto rows = static_cast<std::size_t>(values.shape(0)), n = static_cast<std::size_t>(values.shape(1));
+    if (std::accumulate(lengths.begin(), lengths.end(), std::size_t{0}) != n)
+        throw std::invalid_argument("lengths: they must add up to the " + std::to_string(n) + " columns of the rows");
+    if (b.size() < 1 || a.size() < 1 || a.size() > max_recursion + 1 || a.data()[0] != 1.0)
+        throw std::invalid_argument("b, a: at least one number each, a[0] = 1 and at most " + std::to_string(max_recursion) +
+                                    " more");
+    RealArray out({values.shape(0), values.shape(1)});
+    double* const v = out.mutable_data();
+    {
+        const py::gil_scoped_release release;
+        filtered(view(b), view(a), values.data(), v, rows, n, lengths);
+    }
+    return out;
+}
+
+RealArray products(const RealArray& e, int lags) {
+    if (lags < 0) throw std::invalid_argument("lags: 0 or more");
+    RealArray out(lags + 1);
+    lagged_products(e.data(), static_cast<std::size_t>(e.size()), {out.mutable_data(), static_cast<std::size_t>(lags) + 1});
+    return out;
+}
+
+// A copy on which `run` has worked.
+RealArray changed(const RealArray& values, auto&& run) {
+    RealArray out(values.size());
+    const std::span<double> all{out.mutable_data(), static_cast<std::size_t>(out.size())};
+    std::copy_n(values.data(), all.size(), all.begin());
+    run(all);
+    return out;
+}
+
+template <void (*run)(std::span<double>, double, double)>
+RealArray replayed(const RealArray& values, double limit, double start) {
+    return changed(values, [&](std::span<double> all) { run(all, limit, start); });
+}
+
+RealArray held(const RealArray& error, double kp, double half, double torque_limit, double integrator_limit, Hold rule,
+               double integral) {
+    return changed(error,
+                   [&](std::span<double> all) { held_torque(all, kp, half, torque_limit, integrator_limit, rule, integral); });
+}
+
+}  // namespace
+
+void bind_filter(py::module_& m) {
+    m.def("filtered", &filtered_rows, py::arg("b"), py::arg("a"), py::arg("rows"), py::arg("lengths"));
+    m.def("lagged_products", &products, py::arg("e"), py::arg("lags"));
+    py::enum_<Hold>(m, "Hold").value("held", Hold::held).value("held_back", Hold::held_back).value("tracked", Hold::tracked);
+    m.def("held_torque", &held, py::arg("error"), py::arg("kp"), py::arg("half"), py::arg("torque_limit"),
+          py::arg("integrator_limit"), py::arg("rule"), py::arg("integral"));
+    m.def("clamped_sum", &replayed<clamped_sum>, py::arg("steps"), py::arg("limit"), py::arg("start"));
+    m.def("rate_limited", &replayed<rate_limited>, py::arg("command"), py::arg("step"), py::arg("start"));
+}

@@ -1,0 +1,78 @@
+// Sums of lagged products, and rational filters over whole rows, from rest:
+//
+//     v(n) = sum_i b_i e(n-i) - sum_{i>=1} a_i v(n-i),   a_0 = 1
+//
+// First the sum over e, a shifted row for each b_i; then the recursion in transposed direct form,
+//
+//     v(n) = f(n) + z_1,   z_i = z_{i+1} - a_i v(n),
+//
+// a few rows side by side, since each waits for itself.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <span>
+#include <utility>
+
+namespace gaident {
+
+constexpr int max_recursion = 16;  // numbers a_1, a_2, ... of a filter
+
+inline void moving_sum(std::span<const double> b, const double* e, double* v, std::size_t n) {
+    for (std::size_t k = 0; k < n; ++k) v[k] = b[0] * e[k];
+    for (std::size_t i = 1; i < std::min(b.size(), n); ++i) {
+        const double bi = b[i];
+        double* const late = v + i;
+        for (std::size_t k = 0; k < n - i; ++k) late[k] += bi * e[k];
+    }
+}
+
+// In place; rows `stride` apart.
+template <int order, int rows>
+void recursion(const double* a, double* v, std::size_t stride, std::size_t n) {
+    double z[order + 1][rows] = {};
+    for (std::size_t k = 0; k < n; ++k) {
+        double y[rows];
+        for (int r = 0; r < rows; ++r) y[r] = v[static_cast<std::size_t>(r) * stride + k] + z[0][r];
+        for (int i = 0; i < order; ++i)
+            for (int r = 0; r < rows; ++r) z[i][r] = z[i + 1][r] - a[i + 1] * y[r];
+        for (int r = 0; r < rows; ++r) v[static_cast<std::size_t>(r) * stride + k] = y[r];
+    }
+}
+
+template <int order>
+void recursions(const double* a, double* v, std::size_t rows, std::size_t stride, std::size_t n) {
+    std::size_t r = 0;
+    for (; r + 4 <= rows; r += 4) recursion<order, 4>(a, v + r * stride, stride, n);
+    for (; r < rows; ++r) recursion<order, 1>(a, v + r * stride, stride, n);
+}
+
+// Rows of e to rows of v, `stride` apart, each row cut into records of these lengths. a holds at most 1 + max_recursion numbers.
+inline void filtered(std::span<const double> b, std::span<const double> a, const double* e, double* v, std::size_t rows,
+                     std::size_t stride, std::span<const std::size_t> lengths) {
+    using Run = void (*)(const double*, double*, std::size_t, std::size_t, std::size_t);
+    static constexpr auto runs = []<int... order>(std::integer_sequence<int, order...>) {
+        return std::array<Run, sizeof...(order)>{recursions<order>...};
+    }(std::make_integer_sequence<int, max_recursion + 1>{});
+    std::size_t at = 0;
+    for (const std::size_t n : lengths) {
+        for (std::size_t r = 0; r < rows; ++r) moving_sum(b, e + r * stride + at, v + r * stride + at, n);
+        if (a.size() > 1) runs[a.size() - 1](a.data(), v + at, rows, stride, n);
+        at += n;
+    }
+}
+
+// products[k] = sum_n e(n) e(n-k), k = 0, 1, ...; in four sums, so that none waits for itself.
+inline void lagged_products(const double* e, std::size_t n, std::span<double> products) {
+    for (std::size_t k = 0; k < products.size(); ++k) {
+        double part[4] = {};
+        std::size_t i = std::min(k, n);
+        for (; i + 4 <= n; i += 4)
+            for (std::size_t j = 0; j < 4; ++j) part[j] += e[i + j] * e[i + j - k];
+        for (; i < n; ++i) part[0] += e[i] * e[i - k];
+        products[k] = (part[0] + part[1]) + (part[2] + part[3]);
+    }
+}
+
+}  // namespace gaident

@@ -1,0 +1,34 @@
+"""What only one sample after the other gives, in the core: rational filters over rows, clamped sums, limited slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident import _core
+
+__all__ = ["clamped_sum", "filtered", "rate_limited"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+def filtered(b: Vector, a: Vector, rows: Matrix, lengths: Sequence[int]) -> Matrix:
+    """v(n) = sum_i b_i e(n-i) - sum_{i>=1} a_i v(n-i), a_0 = 1, from rest at the start of each record.
+
+    rows: (n, samples) of e, records of these `lengths` one after the other -> (n, samples) of v. Raises ValueError where the
+    lengths are not those of the rows, and for more than 16 numbers a_i behind a_0.
+    """
+    return _core.filtered(b, a, rows, lengths)
+
+
+def clamped_sum(steps: Vector, limit: float, start: float = 0.0) -> Vector:
+    """I(n) = I(n-1) + steps(n), clamped to +-limit after each step, from I(-1) = start; shape (n,)."""
+    return _core.clamped_sum(steps, limit, start)
+
+
+def rate_limited(command: Vector, rate: float, dt: float, start: float) -> Vector:
+    """`command` [rad/s] followed from `start` with a slope of at most `rate` [rad/s^2], shape (n,)."""
+    return _core.rate_limited(command, rate * dt, start)

@@ -1,0 +1,77 @@
+"""Filters and sums that run in the core, against SciPy and NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from gaident.diagnosis.noise_filter import autoregression
+from gaident.diagnosis.state_space import steady_covariance, steady_covariances
+from gaident.errors import ModelError
+from gaident.identification.noise import autocorrelation
+from gaident.models.filtering import clamped_sum, filtered
+
+RNG = np.random.default_rng(5)
+
+
+@pytest.mark.parametrize("zeros", [0, 1, 5, 20])
+@pytest.mark.parametrize("poles", [0, 1, 2, 7, 16])
+@pytest.mark.parametrize("rows", [1, 4, 7])
+def test_rows_are_filtered_record_by_record(zeros: int, poles: int, rows: int) -> None:
+    b = RNG.standard_normal(zeros + 1)
+    a = np.poly(0.8 * np.exp(1j * np.linspace(0.1, 3.0, poles))).real if poles else np.ones(1)
+    E = RNG.standard_normal((rows, 300))
+    found = filtered(b, a, E, (100, 3, 197))
+    wanted = np.concatenate([lfilter(b, a, part, axis=1) for part in np.split(E, [100, 103], axis=1)], axis=1)
+    np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
+
+
+def test_what_cannot_be_filtered_is_refused() -> None:
+    E = np.ones((2, 10))
+    with pytest.raises(ValueError, match="add up to the 10 columns"):
+        filtered(np.ones(1), np.ones(1), E, (4, 5))
+    with pytest.raises(ValueError, match=r"a\[0\] = 1"):
+        filtered(np.ones(1), np.array([2.0, 1.0]), E, (10,))
+    with pytest.raises(ValueError, match="at most 16 more"):
+        filtered(np.ones(1), np.ones(18), E, (10,))
+
+
+@pytest.mark.parametrize("n", [1, 3, 8, 501])
+def test_lagged_products(n: int) -> None:
+    e = RNG.standard_normal(n)
+    wanted = [float(np.sum(e[k:] * e[: max(n - k, 0)])) if k < n else 0.0 for k in range(7)]
+    np.testing.assert_allclose(autocorrelation(e, 6), wanted, rtol=1e-12, atol=1e-13 * n)
+    np.testing.assert_allclose(autocorrelation(e, 50)[:7], wanted, rtol=1e-9, atol=1e-13 * n)  # by transform
+
+
+def test_an_autoregression_is_the_least_squares_of_each_sample_on_those_before() -> None:
+    parts = [lfilter([1.0], [1.0, -1.6, 0.7], RNG.standard_normal(n)) for n in (400, 90)]
+    phi = autoregression(parts)
+    order = len(phi)
+    assert order == 2
+    rows = [np.lib.stride_tricks.sliding_window_view(e[:-1], order)[:, ::-1] for e in parts]
+    wanted = np.linalg.lstsq(np.vstack(rows), np.concatenate([e[order:] for e in parts]), rcond=None)[0]
+    np.testing.assert_allclose(phi, wanted, rtol=1e-9)
+
+
+def test_covariances_side_by_side_are_those_of_each() -> None:
+    from scipy.linalg import solve_discrete_are
+
+    A = np.array([[[0.9, 0.1], [0.0, phi]] for phi in (0.5, 0.99)], dtype=np.complex128)
+    H, Q = np.array([1.0, 0.0], dtype=np.complex128), np.array([np.diag([0.0, q]) for q in (1e-3, 2.0)], dtype=np.complex128)
+    both = steady_covariances(A, H, Q)
+    for a, q, p in zip(A, Q, both, strict=True):
+        np.testing.assert_array_equal(p, steady_covariance(a, H, q))
+        np.testing.assert_allclose(p, solve_discrete_are(a.T.real, H.real[:, None], q.real, np.eye(1)), rtol=1e-9)
+    unseen = np.diag([0.9, 1.0]).astype(np.complex128)[None]
+    alone = steady_covariances(np.concatenate([A[:1], unseen]), H, np.stack([Q[0], np.eye(2, dtype=np.complex128)]))
+    np.testing.assert_allclose(alone[0], both[0], rtol=1e-9)
+    assert not np.isfinite(alone[1]).any()
+    with pytest.raises(ModelError, match="does not show in this model's velocity"):
+        steady_covariance(unseen[0], H, np.eye(2, dtype=np.complex128))
+
+
+def test_a_clamped_sum() -> None:
+    np.testing.assert_array_equal(clamped_sum(np.array([1.0, 1.0, 1.0, -1.0, -5.0, 0.5]), 2.0), [1.0, 2.0, 2.0, 1.0, -2.0, -1.5])
+    np.testing.assert_array_equal(clamped_sum(np.array([1.0, -1.0]), 2.0, 1.5), [2.0, 1.0])
