@@ -292,14 +292,13 @@ def test_progress_in_a_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
     shown: list[str] = []
 
     class Handle:
-        def update(self, page: str) -> None:
-            shown.append(page)
+        def update(self, page: dict[str, str], raw: bool) -> None:
+            shown.append(page["text/html"])
 
     kernel, display = types.ModuleType("IPython"), types.ModuleType("IPython.display")
     shell = type("ZMQInteractiveShell", (), {})()
     kernel.get_ipython = lambda: shell  # type: ignore[attr-defined]
-    display.HTML = str  # type: ignore[attr-defined]
-    display.display = lambda page, display_id: Handle()  # type: ignore[attr-defined]
+    display.display = lambda page, raw, display_id: Handle()  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "IPython", kernel)
     monkeypatch.setitem(sys.modules, "IPython.display", display)
     monkeypatch.setattr("gaident.progress_bar._QUIET", 0.0)

@@ -211,9 +211,10 @@ def plot_bode(
 
 def _figure(width: float, height: float) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    fig = Figure(figsize=(width, height), dpi=150, layout="constrained")
+    from gaident.show.picture import Picture
+
+    fig = Picture(figsize=(width, height), dpi=150, layout="constrained")
     FigureCanvasAgg(fig)
     return fig
 
