@@ -83,6 +83,21 @@ def test_irregular_stamps_are_refused_and_resampled_on_request() -> None:
     np.testing.assert_allclose(rec.velocity, expected, atol=5e-3)  # doubles tell such stamps to 256 ns only
 
 
+def test_a_pause_of_the_logger_is_not_bridged(tmp_path: Path) -> None:
+    t = np.concatenate([np.arange(100), 600 + np.arange(100)]) * 1e-3
+    np.savez(tmp_path / "pause.npz", time=t, command=np.ones(200), velocity=np.sin(50 * t))
+    with pytest.raises(ReadError, match=r"irregular.*split the log there into two; if") as caught:
+        read(tmp_path / "pause.npz")
+    assert "resample" not in str(caught.value)
+    with pytest.raises(ReadError, match=r"gap of 0\.501 s, from 0\.099 to 0\.6 s, where.* 0\.001 s.*split the log there"):
+        read(tmp_path / "pause.npz", resample=1e-3)
+    lost = np.delete(np.arange(200), [50, 51, 120]) * 1e-3  # a few lost samples are
+    np.savez(tmp_path / "lost.npz", time=lost, command=np.ones(197), velocity=np.sin(50 * lost))
+    with pytest.raises(ReadError, match=r"resample=0\.001"):
+        read(tmp_path / "lost.npz")
+    assert len(read(tmp_path / "lost.npz", resample=1e-3)) == 200
+
+
 def hdf(path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     with h5py.File(path, "w") as file:

@@ -42,7 +42,9 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
     else:
         dt, values = _block_by_block(table, wanted, named, scales)
     try:
-        if "velocity" not in values:
+        if "velocity" not in values and "position" not in values:
+            values["velocity"] = np.zeros(len(next(iter(values.values()))))
+        elif "velocity" not in values:
             values["velocity"] = differentiate(values["position"], dt, wanted.velocity_cutoff_hz)
         name = stem if wanted.name is None else wanted.name
         return Record(dt, name=name, **{channel: values.get(channel) for channel in CHANNELS})
@@ -123,7 +125,7 @@ def _on_even_axis(table: Table, wanted: Wanted, named: dict[str, Column], scales
 
 def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
     """Channel -> column, complete enough for a Record; time is not among them."""
-    if len(table.columns) == 1:
+    if len(table.columns) == 1 and wanted.measured:
         raise ReadError(
             f"{table.path}: the log holds one column only, {table.columns[0].key!r}, but a record needs "
             "the velocity and a command or torque"
@@ -137,7 +139,7 @@ def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
             for channel, address in wanted.columns.items()
             if address is not None and channel != "time"
         }
-    if "velocity" not in found and "position" not in found:
+    if wanted.measured and "velocity" not in found and "position" not in found:
         raise ReadError(_say_missing(table, "velocity", "the velocity (or the position, to derive it from)"))
     if "command" not in found and "torque" not in found:
         raise ReadError(_say_missing(table, "torque", "the command or the torque"))
