@@ -206,8 +206,9 @@ def test_simulate_writes_csv_that_can_be_read(here: Path, capsys: pytest.Capture
 def test_a_proposed_command_can_be_simulated_as_it_is(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("truth.json").write_text(json.dumps(TRUTH.to_dict()))
     # The drive's logs have names and units of their own, which are not the proposal's.
-    Path("d.toml").write_text("dt = 1e-3\n[columns]\ncommand = 'w_ref'\nvelocity = 'w'\n[units]\ncommand = 'rpm'\n"
-                              "velocity = 'rpm'\n[controller]\nkp = 0.0232\nki = 1.367\n[limits]\nspeed = 100\ntorque = 2\n")  # fmt: skip
+    columns, units = "[columns]\ncommand = 'w_ref'\nvelocity = 'w'\n", "[units]\ncommand = 'rpm'\nvelocity = 'rpm'\n"
+    rest = "[controller]\nkp = 0.0232\nki = 1.367\n[limits]\nspeed = 100\ntorque = 2\n"
+    Path("d.toml").write_text(f"dt = 1e-3\n{columns}{units}{rest}")
     assert main(["experiment", "--drive", "d.toml", "--out", "next.csv"]) == 0
     capsys.readouterr()
     assert main(["simulate", "truth.json", "next.csv", "--drive", "d.toml", "--out", "sim.csv"]) == 0
