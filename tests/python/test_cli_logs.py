@@ -265,6 +265,15 @@ def test_completion_knows_commands_and_options(shell: str, capsys: pytest.Captur
     if shell == "bash":
         ask = f'source {path}; COMP_WORDS=(gaident id); COMP_CWORD=1; _shtab_gaident; printf "%s\\n" "${{COMPREPLY[@]}}"'
         assert subprocess.run(["bash", "-c", ask], capture_output=True, text=True).stdout.split() == ["identify"]
+    if shell == "fish" and shutil.which(shell) is not None:
+        asked = f"source {path}; complete -C 'gaident iden'; complete -C 'gaident identify --velo'"
+        out = subprocess.run(["fish", "--no-config", "-c", asked], capture_output=True, text=True).stdout.splitlines()
+        assert out[0] == "identify\tlog -> structure, parameters, uncertainty" and out[1].startswith("--velocity-cutoff\t")
+    if shell == "zsh" and shutil.which(shell) is not None:  # registered, and its functions are there
+        path.rename(tmp_path / "_gaident")
+        asked = f"fpath=({tmp_path} $fpath); autoload -Uz compinit; compinit -u -D; print $_comps[gaident]; autoload +X _gaident"
+        done = subprocess.run(["zsh", "-f", "-c", asked], capture_output=True, text=True)
+        assert (done.stdout, done.stderr, done.returncode) == ("_gaident\n", "", 0)
 
 
 class Terminal(io.StringIO):
