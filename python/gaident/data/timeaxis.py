@@ -179,8 +179,9 @@ def _printed_step(t: NDArray[np.float64]) -> NDArray[np.float64]:
     step = np.zeros(len(padded))
     unknown = np.ones(len(padded), dtype=bool)
     for digits in range(_DIGITS):
-        scaled = padded[unknown] * 10.0**digits
-        whole = (np.abs(scaled - np.rint(scaled)) <= np.maximum(1e-9, 4e-16 * np.abs(scaled))).all(axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):  # inf - inf is not whole
+            scaled = padded[unknown] * 10.0**digits
+            whole = (np.abs(scaled - np.rint(scaled)) <= np.maximum(1e-9, 4e-16 * np.abs(scaled))).all(axis=1)
         found = np.flatnonzero(unknown)[whole]
         step[found] = 10.0**-digits
         unknown[found] = False
