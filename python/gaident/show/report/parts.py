@@ -139,7 +139,11 @@ def missing_section(view: View, noise: float, drawn: Charts, *before: str) -> Se
         parts.append(tag("p", text))
     elif run.dhat is not None:
         turning = drawn.put(charts.missing_reversals(run, run.dhat, axis))
-        parts += [tag("h3", "Around a reversal"), turning] if turning else []
+        parts += (
+            [tag("h3", "Around a reversal"), turning or tag("p", f"{charts.no_reversals(run)}.")]
+            if run.torque is not None
+            else []
+        )
         place = charts.missing_over_place(run, run.dhat, axis)
         if place:
             parts += [tag("h3", "Against the position"), *(drawn.put(c) for c in place)]
