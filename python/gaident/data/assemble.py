@@ -140,9 +140,9 @@ def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
             if address is not None and channel != "time"
         }
     if wanted.measured and "velocity" not in found and "position" not in found:
-        raise ReadError(_say_missing(table, "velocity", "the velocity (or the position, to derive it from)"))
+        raise ReadError(_say_missing(table, wanted, "velocity", "the velocity (or the position, to derive it from)"))
     if "command" not in found and "torque" not in found:
-        raise ReadError(_say_missing(table, "torque", "the command or the torque"))
+        raise ReadError(_say_missing(table, wanted, "torque", "the command or the torque"))
     if "velocity" in found and wanted.velocity_cutoff_hz is not None:
         raise ReadError(
             f"velocity_cutoff_hz={wanted.velocity_cutoff_hz!r} is for a velocity derived from position, "
@@ -152,10 +152,11 @@ def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
     return found
 
 
-def _say_missing(table: Table, channel: str, what: str) -> str:
+def _say_missing(table: Table, wanted: Wanted, channel: str, what: str) -> str:
+    guess = ", or let gaident init write down what the log shows" if wanted.columns is None and table.form != "DataFrame" else ""
     return (
         f"{table.path}: no column is named for {what}; the file holds {table.listing()}; "
-        f"say which it is with columns={{{channel!r}: ...}}"
+        f"say which it is with columns={{{channel!r}: ...}}{guess}"
     )
 
 

@@ -65,6 +65,7 @@ _FOREIGN = (
     (b"\xd0\xcf\x11\xe0", "an old Excel workbook", "save the sheet as CSV"),
     (b"\x1f\x8b", "compressed with gzip", "unpack it first"),
     (b"\x93NUMPY", "a single numpy array", "save named columns with numpy.savez"),
+    (b"{", "JSON", "export the log as CSV; what gaident saved is loaded with gaident.load"),
     (b"#ROSBAG", "a ROS bag", "export the topic as CSV"),
     (b"\x89MCAP", "an MCAP recording", "export the topic as CSV"),
 )
