@@ -155,7 +155,7 @@ def _simulate(args: argparse.Namespace) -> None:
     model, controller, states = _load_model(args.model)
     if drive.controller_values and drive.controller() != controller:
         controller, states = drive.controller(), {}  # the saved states are of the loop they were found in
-    records = _read_all(drive, args.logs, controller)
+    records = _read_all(drive, args.logs, controller, measured=False)
     several = len(records) > 1
     if several and args.out is None and not args.json:
         raise SettingsError(f"{len(records)} logs are given: name a folder for their CSV files with --out, or use --json")
@@ -164,7 +164,8 @@ def _simulate(args: argparse.Namespace) -> None:
     for rec in records:
         state: Any = states.get(rec.digest) if args.initial_state == "auto" else None
         limited = controller is not None and controller.limited
-        if state is None and args.initial_state == "auto" and not limited and starts_moving(rec, controller):
+        moving = bool(np.any(rec.velocity)) and starts_moving(rec, controller)
+        if state is None and args.initial_state == "auto" and not limited and moving:
             state = initial_state(model, rec, controller)
         results.append(run(model, rec, controller, state))
     texts = [csv_text(rec, result, drive.axis) for rec, result in zip(records, results, strict=True)]
@@ -182,7 +183,8 @@ def _simulate(args: argparse.Namespace) -> None:
     else:
         for target, rec, result in zip(targets, records, results, strict=True):
             rmse, fit = _fit(rec, result)
-            print(f"{rec.name}: fit {fit:.2f} %, rmse {rmse:.4g}; written: {target}")
+            against = f"fit {fit:.2f} %, rmse {rmse:.4g}" if np.any(rec.velocity) else "no measured velocity to compare with"
+            print(f"{rec.name}: {against}; written: {target}")
 
 
 def _effects(args: argparse.Namespace) -> None:
@@ -194,8 +196,8 @@ def _effects(args: argparse.Namespace) -> None:
         print(effects.table())
 
 
-def _read_all(drive: Drive, logs: Sequence[str], controller: PI | None) -> list[Record]:
-    records = [drive.read(log) for log in logs]
+def _read_all(drive: Drive, logs: Sequence[str], controller: PI | None, measured: bool = True) -> list[Record]:
+    records = [drive.read(log, measured) for log in logs]
     for log, rec in zip(logs, records, strict=True):
         if controller is not None and rec.command is None:
             raise SettingsError(
@@ -242,7 +244,7 @@ def _fit(rec: Record, result: Run) -> tuple[float, float]:
 
 
 def _run_dict(rec: Record, result: Run) -> dict[str, Any]:
-    rmse, fit = _fit(rec, result)
+    rmse, fit = _fit(rec, result) if np.any(rec.velocity) else (None, None)
     return {"name": rec.name, "dt": rec.dt, "samples": len(rec), "rmse": rmse, "fit_percent": fit,
             "velocity": result.velocity.tolist(), "torque": result.torque.tolist()}  # fmt: skip
 

@@ -38,7 +38,7 @@ as a self test. Exit code 1 where something that is needed is missing or broken.
 COMPLETION_HELP = """Prints the shell's completion of gaident's commands, options and files."""
 COMPLETION_EXAMPLES = """\
 bash:  gaident completion bash > ~/.local/share/bash-completion/completions/gaident
-zsh:   gaident completion zsh > "${fpath[1]}/_gaident"
+zsh:   gaident completion zsh > ~/.zfunc/_gaident            with fpath+=~/.zfunc before compinit in ~/.zshrc
 fish:  gaident completion fish > ~/.config/fish/completions/gaident.fish
 """
 CONSTANT_HELP = {

@@ -120,5 +120,7 @@ def _parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
     found = [parser]
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
+            for short in action._choices_actions:  # shells show one line of a command
+                action.choices[short.dest].description = short.help
             found += action.choices.values()
     return found

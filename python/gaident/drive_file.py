@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -57,7 +58,8 @@ def _unit(value: object, name: str) -> str | float:
 
 def _pair(value: object, name: str) -> tuple[float, float]:
     if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
-        raise ReadError(f"{name} is {value!r}: give a pair, {name} = [lowest, highest]")
+        hint = ", with decimal points" if isinstance(value, list) and len(value) in (3, 4) else ""
+        raise ReadError(f"{name} is {value!r}: give a pair{hint}, {name} = [lowest, highest]")
     low, high = (_number(v, name) for v in value)
     return low, high
 
@@ -139,11 +141,16 @@ class Drive:
         """ "rotary" or "linear": which units are printed."""
         return str(self.general.get("axis", "rotary"))
 
-    def read(self, path: str) -> Record:
-        """The log as a Record. Raises ReadError or RecordError."""
+    def read(self, path: str, measured: bool = True) -> Record:
+        """The log as a Record; measured: as `gaident.read` takes it. Raises ReadError or RecordError.
+
+        A CSV that gaident wrote itself, of a proposed command, names its columns and units: the drive's are those of its logs.
+        """
+        if not measured and _is_proposal(path) and not {"command", "command [rad/s]", "command [m/s]"} & {*self.columns.values()}:
+            return read(path, measured=False)
         more = {k: v for k, v in self.general.items() if k not in ("axis", "dt")}
         columns = {k: None if v == "" else v for k, v in self.columns.items()}
-        return read(path, columns or None, self.units or None, self.general.get("dt"), **more)
+        return read(path, columns or None, self.units or None, self.general.get("dt"), measured=measured, **more)
 
     def controller(self) -> PI | None:
         """The PI controller; None: open loop. Raises ControllerError where half of it is missing."""
@@ -198,6 +205,15 @@ class Drive:
         return dataclasses.replace(derived, **given, source=f"given: {source}; what is not, {derived.source}")
 
 
+def _is_proposal(path: str) -> bool:
+    """Whether a file is a command as `gaident experiment`, --next-command or a report writes it."""
+    try:
+        with open(path, "rb") as stream:
+            return re.fullmatch(rb"time \[s\],command \[(rad|m)/s\]\r?\n", stream.readline(64)) is not None
+    except OSError:
+        return False
+
+
 def read_drive_file(path: str) -> dict[str, dict[str, Any]]:
     """drive.toml as {section: {key: value}}, checked; raises ReadError with file, key, value and remedy."""
     if sys.version_info >= (3, 11):
@@ -213,7 +229,8 @@ def read_drive_file(path: str) -> dict[str, dict[str, Any]]:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ReadError(f"{path}: this is not TOML ({error}); see gaident identify --help") from None
+        comma = _decimal_comma(text, str(error))
+        raise ReadError(f"{path}: {comma or f'this is not TOML ({error}); see gaident identify --help'}") from None
     if not data:
         raise ReadError(
             f"{path}: this drive file is empty: it holds {_SECTIONS} and {', '.join(KEYS[''])}; leave it out otherwise"
@@ -234,6 +251,19 @@ def read_drive_file(path: str) -> dict[str, dict[str, Any]]:
     return sections
 
 
+def _decimal_comma(text: str, error: str) -> str:
+    """What to write where TOML stumbled over 0,5; "" where it was something else."""
+    at = re.search(r"at line (\d+)", error)
+    lines = text.splitlines()
+    number = int(at[1]) if at is not None else len(lines)
+    found = _WITH_COMMA.match(lines[number - 1]) if 0 < number <= len(lines) else None
+    if found is None:
+        return ""
+    key, value = found.groups()
+    return f"line {number}: {key} is {value}, with a decimal comma: write {value.replace(',', '.')}"
+
+
+_WITH_COMMA = re.compile(r"\s*([\w.-]+)\s*=\s*([-+]?\d+,\d+(?:[eE][-+]?\d+)?)\s*(?:#|$)")
 _SECTIONS = ", ".join(f"[{name}]" for name in KEYS if name)
 
 

@@ -83,19 +83,23 @@ class _NotebookBar:
 
     def __init__(self) -> None:
         display = importlib.import_module("IPython.display")
-        self.html = display.HTML
-        self.handle = display.display(self.html(""), display_id=True)
+        self.handle = display.display({"text/plain": "", "text/html": ""}, raw=True, display_id=True)
         self.last = 0.0
 
     def update(self, done: float, message: str, left: str) -> None:
         if time.monotonic() - self.last < 0.1:
             return
         self.last = time.monotonic()
-        text = escape("  ".join(filter(None, [f"{100.0 * done:.0f} %", left, message])))
-        self.handle.update(self.html(f'<progress max="1" value="{done:.4f}"></progress> {text}'))
+        self._show(
+            f'<progress max="1" value="{done:.4f}"></progress> ',
+            "  ".join(filter(None, [f"{100.0 * done:.0f} %", left, message])),
+        )
 
     def stop(self) -> None:
-        self.handle.update(self.html(""))
+        self._show("", "")
+
+    def _show(self, bar: str, text: str) -> None:
+        self.handle.update({"text/plain": text, "text/html": bar + escape(text)}, raw=True)
 
 
 def progress() -> Progress:
@@ -104,7 +108,7 @@ def progress() -> Progress:
         with ga.progress() as shown:
             idn = ga.identify(rec, controller=ctl, progress=shown)
 
-    Draws on standard error; nothing in a pipe.
+    Draws on standard error, in a notebook below the cell; nothing in a pipe.
     """
     return Progress(sys.stderr)
 
@@ -115,7 +119,7 @@ def _in_notebook() -> bool:
     if shell is None:
         return False
     instance = shell.get_ipython()
-    return instance is not None and type(instance).__name__ == "ZMQInteractiveShell"
+    return any(kind.__name__ == "ZMQInteractiveShell" for kind in type(instance).__mro__)  # Colab's is derived from it
 
 
 def _clock(seconds: float) -> str:

@@ -35,7 +35,14 @@ def load(path: str | os.PathLike[str]) -> Saved:
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError, TypeError) as error:
+    except FileNotFoundError as error:
+        raise GaidentError(f"{path}: there is no such file; check the path (now in {Path.cwd()})") from error
+    except UnicodeDecodeError as error:
+        raise GaidentError(f"{path}: is no text; give a file that save() wrote, or read a log with gaident.read") from error
+    except OSError as error:
+        raise GaidentError(f"{path}: cannot be read ({error.strerror}); give a file that save() wrote") from error
+    except TypeError as error:
+        raise GaidentError(f"path={path!r} is no path; give the file's name as str or pathlib.Path") from error
         raise GaidentError(f"{path}: cannot be read ({error}); give a file that save() wrote") from error
     try:
         data = json.loads(text)

@@ -46,12 +46,19 @@ class Browser:
         self.rest, self.last = b"", 0
         self.errors: list[str] = []
         self.requests: list[str] = []
+        try:
+            self._begin()
+        except BaseException:
+            self.close()
+            raise
+
+    session: str | None = None
+
+    def _begin(self) -> None:
         target = self.ask("Target.createTarget", session=None, url="about:blank")["targetId"]
         self.session = self.ask("Target.attachToTarget", session=None, targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.ask(f"{domain}.enable")
-
-    session: str | None = None
 
     def ask(self, method: str, *, session: str | None = "", **parameters: Any) -> dict[str, Any]:
         """One command and its answer."""

@@ -203,6 +203,27 @@ def test_simulate_writes_csv_that_can_be_read(here: Path, capsys: pytest.Capture
     assert capsys.readouterr().out == Path("sim.csv").read_text()
 
 
+def test_a_proposed_command_can_be_simulated_as_it_is(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("truth.json").write_text(json.dumps(TRUTH.to_dict()))
+    # The drive's logs have names and units of their own, which are not the proposal's.
+    columns, units = "[columns]\ncommand = 'w_ref'\nvelocity = 'w'\n", "[units]\ncommand = 'rpm'\nvelocity = 'rpm'\n"
+    rest = "[controller]\nkp = 0.0232\nki = 1.367\n[limits]\nspeed = 100\ntorque = 2\n"
+    Path("d.toml").write_text(f"dt = 1e-3\n{columns}{units}{rest}")
+    assert main(["experiment", "--drive", "d.toml", "--out", "next.csv"]) == 0
+    capsys.readouterr()
+    assert main(["simulate", "truth.json", "next.csv", "--drive", "d.toml", "--out", "sim.csv"]) == 0
+    assert capsys.readouterr().out == "next: no measured velocity to compare with; written: sim.csv\n"
+    rec = ga.read("next.csv", measured=False)
+    assert rec.command is not None and 50 < rec.command.max() <= 100 and not rec.velocity.any()
+    np.testing.assert_allclose(ga.read("sim.csv").velocity, ga.simulate(TRUTH, rec, ga.PI(0.0232, 1.367)), rtol=1e-9)
+    assert main(["simulate", "truth.json", "next.csv", "--drive", "d.toml", "--json"]) == 0
+    (run,) = json.loads(capsys.readouterr().out)["runs"]
+    assert run["rmse"] is None and run["fit_percent"] is None and len(run["velocity"]) == len(rec)
+    assert "velocity" in refusal(["identify", "next.csv", "--kp", "0.0232", "--ki", "1.367"], capsys)
+    with pytest.raises(ga.GaidentError, match="velocity of the record is constant"):
+        ga.identify(rec, ga.PI(0.0232, 1.367))
+
+
 def test_simulate_takes_the_saved_controller_and_start(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["identify", "step.csv", *NAMES, *LOOP, "--initial-state", "free", "--out", "idn.json"]) == 0
     idn = ga.load("idn.json")
@@ -278,6 +299,9 @@ WRONG_DRIVE_FILES = [
     ("skip = true", "skip is True", "whole number"),
     ('axis = "linaer"', "axis is 'linaer'", "did you mean 'linear'?"),
     ("dt = = 3", "this is not TOML", "line 1"),
+    ("# gains\n[controller]\nkp = 0,0232  # N m s", "line 3: kp is 0,0232, with a decimal comma", "write 0.0232"),
+    ("dt = 1,5e-3", "line 1: dt is 1,5e-3", "write 1.5e-3"),
+    ("[space]\ninertia = [0,1, 0,5]", "[space] inertia is [0, 1, 0, 5]", "with decimal points"),
     ("kp = 0.1", "kp stands at the top", "put it below the line [controller]"),
     ("[controller]\nvelocity = 'w'", "velocity stands in [controller]", "below the line [columns] or below the line [units]"),
     ("[controller]\ndt = 1e-3", "dt stands in [controller]", "at the top, above the first [section]"),

@@ -88,7 +88,7 @@ def test_the_next_command_is_written(here: Path, capsys: pytest.CaptureFixture[s
         (("--noise", "0,1"), "write a decimal point, 0.1"),
         (("--bootstrap", "-3"), "bootstrap is -3"),
         (("--validation", "nowhere.csv"), "there is no such file"),
-        (("--model", "nowhere.json"), "nowhere.json: cannot be read"),
+        (("--model", "nowhere.json"), "nowhere.json: there is no such file"),
         (("--plot", "x.bmp"), "a picture ends in"),
         (("--out", "run0.csv"), "this is the log itself"),
         (("--validation", "run1.csv", "--out", "run1.csv"), "this is the log itself"),

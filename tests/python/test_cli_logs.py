@@ -88,6 +88,18 @@ def test_channels_are_guessed_from_names_and_units(file: str, channels: dict[str
     assert guess.time is not None and guess.time.name == time
 
 
+def test_twins_are_not_guessed_and_a_force_may_be_a_voltage(tmp_path: Path) -> None:
+    t = np.arange(50) * 1e-3
+    rows = "\n".join(f"{x:.3f},{np.sin(x):.6f},{np.cos(x):.6f},{x * x:.6f}" for x in t)
+    (tmp_path / "twins.csv").write_text(f"t [s],u1,u2,w1\n{rows}\n")
+    (tmp_path / "force.csv").write_text(f"t [s],Force [V],Input [V],speed [rpm]\n{rows}\n")
+    assert {channel: c.name for channel, c in guess_channels(columns(tmp_path / "twins.csv")).channels.items()} == {
+        "velocity": "w1"
+    }
+    guess = guess_channels(columns(tmp_path / "force.csv"))
+    assert {channel: c.name for channel, c in guess.channels.items()} == {"velocity": "speed [rpm]", "torque": "Force [V]"}
+
+
 def test_init_writes_a_drive_file_that_identify_takes(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["init", "step.csv"]) == 0
     said = capsys.readouterr().out
@@ -253,6 +265,15 @@ def test_completion_knows_commands_and_options(shell: str, capsys: pytest.Captur
     if shell == "bash":
         ask = f'source {path}; COMP_WORDS=(gaident id); COMP_CWORD=1; _shtab_gaident; printf "%s\\n" "${{COMPREPLY[@]}}"'
         assert subprocess.run(["bash", "-c", ask], capture_output=True, text=True).stdout.split() == ["identify"]
+    if shell == "fish" and shutil.which(shell) is not None:
+        asked = f"source {path}; complete -C 'gaident iden'; complete -C 'gaident identify --velo'"
+        out = subprocess.run(["fish", "--no-config", "-c", asked], capture_output=True, text=True).stdout.splitlines()
+        assert out[0] == "identify\tlog -> structure, parameters, uncertainty" and out[1].startswith("--velocity-cutoff\t")
+    if shell == "zsh" and shutil.which(shell) is not None:  # registered, and its functions are there
+        path.rename(tmp_path / "_gaident")
+        asked = f"fpath=({tmp_path} $fpath); autoload -Uz compinit; compinit -u -D; print $_comps[gaident]; autoload +X _gaident"
+        done = subprocess.run(["zsh", "-f", "-c", asked], capture_output=True, text=True)
+        assert (done.stdout, done.stderr, done.returncode) == ("_gaident\n", "", 0)
 
 
 class Terminal(io.StringIO):
@@ -292,14 +313,13 @@ def test_progress_in_a_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
     shown: list[str] = []
 
     class Handle:
-        def update(self, page: str) -> None:
-            shown.append(page)
+        def update(self, page: dict[str, str], raw: bool) -> None:
+            shown.append(page["text/html"])
 
     kernel, display = types.ModuleType("IPython"), types.ModuleType("IPython.display")
     shell = type("ZMQInteractiveShell", (), {})()
     kernel.get_ipython = lambda: shell  # type: ignore[attr-defined]
-    display.HTML = str  # type: ignore[attr-defined]
-    display.display = lambda page, display_id: Handle()  # type: ignore[attr-defined]
+    display.display = lambda page, raw, display_id: Handle()  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "IPython", kernel)
     monkeypatch.setitem(sys.modules, "IPython.display", display)
     monkeypatch.setattr("gaident.progress_bar._QUIET", 0.0)

@@ -15,10 +15,12 @@ import gaident as ga
 from gaident.diagnosis.excitation import excitation
 from gaident.diagnosis.lattice import lattice_step
 from gaident.diagnosis.missing_torque import missing_torque
+from gaident.diagnosis.offset import Offset
 from gaident.diagnosis.replay import replay
 from gaident.diagnosis.residual_tests import residual_tests
 from gaident.diagnosis.state_space import discretised, disturbed
 from gaident.errors import ModelError, RecordError
+from gaident.show.wording import sentence
 
 DT = 1e-3
 CONTROLLER = ga.PI(kp=0.02, ki=0.5)
@@ -201,6 +203,12 @@ def test_dry_friction_and_load_show_with_their_sign_and_size() -> None:
     loaded = missing_torque(model, drive(load=0.03), CONTROLLER)
     assert loaded.dhat.mean() == pytest.approx(-0.03, abs=5e-4)
     assert abs(loaded.velocity - drive(load=0.03).velocity).std() < 0.15
+
+
+def test_an_offset_is_told_in_the_units_of_the_axis() -> None:
+    text = Offset(0.512, 31.0, 0.0421).sentence
+    assert "load of 0.512 N m in" in text and "0.042 N m of it is left" in text
+    assert "load of 0.512 N in" in sentence(text, "linear") and "0.042 N of it is left" in sentence(text, "linear")
 
 
 def test_a_true_model_misses_nothing_beyond_its_deviation() -> None:

@@ -277,6 +277,7 @@ def test_the_picture_renders_and_a_loaded_diagnosis_asks_for_its_records(dia: ga
         loaded.plot()
     assert len(loaded.plot([rec[:400], rec]).axes) == 6
     assert "the longest of 2" in loaded.plot([rec[:400], rec]).get_suptitle()
+    assert "the first of the longest of 2" in loaded.plot([rec, rec]).get_suptitle()
     with pytest.raises(SettingsError, match="axis is 'round'"):
         dia.plot(axis="round")
 

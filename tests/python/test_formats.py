@@ -83,6 +83,21 @@ def test_irregular_stamps_are_refused_and_resampled_on_request() -> None:
     np.testing.assert_allclose(rec.velocity, expected, atol=5e-3)  # doubles tell such stamps to 256 ns only
 
 
+def test_a_pause_of_the_logger_is_not_bridged(tmp_path: Path) -> None:
+    t = np.concatenate([np.arange(100), 600 + np.arange(100)]) * 1e-3
+    np.savez(tmp_path / "pause.npz", time=t, command=np.ones(200), velocity=np.sin(50 * t))
+    with pytest.raises(ReadError, match=r"irregular.*split the log there into two; if") as caught:
+        read(tmp_path / "pause.npz")
+    assert "resample" not in str(caught.value)
+    with pytest.raises(ReadError, match=r"gap of 0\.501 s, from 0\.099 to 0\.6 s, where.* 0\.001 s.*split the log there"):
+        read(tmp_path / "pause.npz", resample=1e-3)
+    lost = np.delete(np.arange(200), [50, 51, 120]) * 1e-3  # a few lost samples are
+    np.savez(tmp_path / "lost.npz", time=lost, command=np.ones(197), velocity=np.sin(50 * lost))
+    with pytest.raises(ReadError, match=r"resample=0\.001"):
+        read(tmp_path / "lost.npz")
+    assert len(read(tmp_path / "lost.npz", resample=1e-3)) == 200
+
+
 def hdf(path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     with h5py.File(path, "w") as file:
@@ -182,9 +197,8 @@ def test_formats_of_other_libraries(
         read(without_name, columns=columns)
 
 
-# Not MDF: its library ends the process on some damaged files, as little as it minds others.
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize(("file", "make", "columns"), FORMATS[:5], ids=[f"{row[0]}" for row in FORMATS[:5]])
+@pytest.mark.parametrize(("file", "make", "columns"), FORMATS, ids=[f"{row[0]}" for row in FORMATS])
 def test_damaged_files_of_other_libraries_never_end_in_a_foreign_error(
     file: str,
     make: Callable[[Path], None],
@@ -206,7 +220,28 @@ def test_damaged_files_of_other_libraries_never_end_in_a_foreign_error(
             assert "\n" not in str(error) and "log." in str(error)
             refused += 1
     assert refused
-    assert capfd.readouterr().err == ""
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.parametrize("version", ["3.30", "4.10"])
+def test_a_channel_outside_its_record_is_refused(version: str, tmp_path: Path) -> None:
+    """asammdf itself would read there, and end the process."""
+    asammdf = pytest.importorskip("asammdf", reason="asammdf is not installed: pip install 'gaident[mdf]'")
+    file = asammdf.MDF(version=version)
+    file.append([asammdf.Signal(REC.velocity, REC.time, name="w"), asammdf.Signal(REC.torque, REC.time, name="u")])
+    path = Path(file.save(tmp_path / "log.mf4"))
+    file.close()
+    assert len(read(path, columns={"velocity": "w", "torque": "u"})) == len(REC)
+    with asammdf.MDF(path) as written:
+        channel = written.groups[0].channels[1]
+        # Where its block says at which bit (version 3, 2 bytes) or byte (version 4, 4 bytes) of the record it begins.
+        at = channel.address + (186 if version == "3.30" else 24 + 8 * channel.links_nr + 4)
+    raw = bytearray(path.read_bytes())
+    raw[at : at + 2] = b"\xff\xff"
+    path.write_bytes(raw)
+    with pytest.raises(ReadError, match=r"not a whole MDF file \(channel 'w' lies outside its record\)"):
+        read(path, columns={"velocity": "w", "torque": "u"})
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")

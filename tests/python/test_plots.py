@@ -52,7 +52,7 @@ def test_identification_shows_measured_simulated_residual(result: tuple[ga.Recor
     np.testing.assert_array_equal(lines["measured"], rec.velocity)
     np.testing.assert_array_equal(lines["simulated"], idn.simulate(rec))
     drawn = {line.get_label(): line.get_ydata() for line in low.lines}
-    np.testing.assert_array_equal(drawn["measured - simulated"], idn.residual(rec))
+    np.testing.assert_array_equal(drawn["measured − simulated"], idn.residual(rec))
     assert top.get_ylabel() == "velocity [rad/s]" and low.get_xlabel() == "time [s]"
     band = low.patches[0].get_extents().transformed(low.transData.inverted())
     assert band.y1 == pytest.approx(2.0 * idn.adequacy.noise_std)

@@ -203,6 +203,14 @@ def test_the_last_part_of_a_record_is_marked_where_it_is_held_out(dia: ga.Diagno
     assert held_out_chart(run, 0.05, "run", "rotary").panels[0].traces[0].x[0] == pytest.approx(1.12)
 
 
+def test_it_says_which_record_is_shown_and_that_it_never_reverses(dia: ga.Diagnosis, fast: None) -> None:
+    view = view_of(dia, None, None, "rotary")
+    one_way = replace(view.fitted[0], measured=80.0 + view.fitted[0].measured)
+    text = parts.missing_section(replace(view, runs=(one_way, replace(one_way, name="other"))), 0.05, parts.Charts()).body
+    assert "No reversals in the record." in text
+    assert f"Shown for <b>{one_way.name}</b>, the first of the longest of those fitted." in text
+
+
 def test_long_signals_keep_their_peaks_and_clouds_are_thinned() -> None:
     t = np.arange(200_000) * 1e-3
     y = np.sin(t)

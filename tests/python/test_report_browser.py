@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -39,6 +40,19 @@ def browser() -> Iterator[Browser]:
     shown = Browser(program)
     yield shown
     shown.close()
+
+
+def test_a_browser_that_does_not_answer_leaves_no_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mute = tmp_path / "mute"
+    mute.write_text("#!/bin/sh\nexec sleep 60\n")
+    mute.chmod(0o755)
+    monkeypatch.setattr("browser.PATIENCE", 0.1)
+    spawn, begun = os.posix_spawn, []
+    monkeypatch.setattr(os, "posix_spawn", lambda *args, **more: begun.append(spawn(*args, **more)) or begun[0])
+    with pytest.raises(AssertionError, match="does not answer"):
+        Browser(str(mute))
+    with pytest.raises(ProcessLookupError):
+        os.kill(begun[0], 0)
 
 
 def test_it_draws_zooms_and_downloads_without_errors_and_without_a_network(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +91,16 @@ def test_other_versions_are_refused(saved: dict[str, Path], tmp_path: Path, vers
             ga.load(other)
 
 
+def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    (tmp_path / "log.bin").write_bytes(b"\xff\xfe\x80")
+    for name, message in (("nofile", r"nofile: there is no such file; check the path"), ("", "cannot be read .Is a directory"),
+                          ("log.bin", r"log\.bin: is no text.*gaident\.read")):  # fmt: skip
+        with pytest.raises(ga.GaidentError, match=message):
+            ga.load(tmp_path / name)
+    with pytest.raises(ga.GaidentError, match="path=3 is no path"):
+        ga.load(3)  # type: ignore[arg-type]
+
+
 def test_a_damaged_record_is_refused(saved: dict[str, Path], tmp_path: Path) -> None:
     data = json.loads(saved["record"].read_text())
     for change, message in (({"dt": "x"}, "dt"), ({"velocity": [1.0]}, "samples|lengths"), ({"command": None}, "command")):
@@ -116,6 +127,9 @@ def test_tables(diagnosis: ga.Diagnosis, monkeypatch: pytest.MonkeyPatch) -> Non
     assert idn.mechanics is not None
     row = table.loc[("mechanics", "J")]
     assert (row["value"], row["std"], row["unit"]) == (idn.mechanics.J, idn.mechanics.std["J"], "kg m^2")
+    assert not table["at_bound"].any()
+    held = replace(idn, parameters={**idn.parameters, "gain": replace(gain, at_bound=True)})
+    assert held.to_pandas().loc["mechanics", "at_bound"].all()  # what follows from a bound is no better
     found = diagnosis.to_pandas()
     finding = diagnosis.causes[0]
     row = found.loc[(finding.effect, "torque")]

@@ -42,7 +42,9 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
     else:
         dt, values = _block_by_block(table, wanted, named, scales)
     try:
-        if "velocity" not in values:
+        if "velocity" not in values and "position" not in values:
+            values["velocity"] = np.zeros(len(next(iter(values.values()))))
+        elif "velocity" not in values:
             values["velocity"] = differentiate(values["position"], dt, wanted.velocity_cutoff_hz)
         name = stem if wanted.name is None else wanted.name
         return Record(dt, name=name, **{channel: values.get(channel) for channel in CHANNELS})
@@ -123,7 +125,7 @@ def _on_even_axis(table: Table, wanted: Wanted, named: dict[str, Column], scales
 
 def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
     """Channel -> column, complete enough for a Record; time is not among them."""
-    if len(table.columns) == 1:
+    if len(table.columns) == 1 and wanted.measured:
         raise ReadError(
             f"{table.path}: the log holds one column only, {table.columns[0].key!r}, but a record needs "
             "the velocity and a command or torque"
@@ -137,10 +139,10 @@ def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
             for channel, address in wanted.columns.items()
             if address is not None and channel != "time"
         }
-    if "velocity" not in found and "position" not in found:
-        raise ReadError(_say_missing(table, "velocity", "the velocity (or the position, to derive it from)"))
+    if wanted.measured and "velocity" not in found and "position" not in found:
+        raise ReadError(_say_missing(table, wanted, "velocity", "the velocity (or the position, to derive it from)"))
     if "command" not in found and "torque" not in found:
-        raise ReadError(_say_missing(table, "torque", "the command or the torque"))
+        raise ReadError(_say_missing(table, wanted, "torque", "the command or the torque"))
     if "velocity" in found and wanted.velocity_cutoff_hz is not None:
         raise ReadError(
             f"velocity_cutoff_hz={wanted.velocity_cutoff_hz!r} is for a velocity derived from position, "
@@ -150,10 +152,11 @@ def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
     return found
 
 
-def _say_missing(table: Table, channel: str, what: str) -> str:
+def _say_missing(table: Table, wanted: Wanted, channel: str, what: str) -> str:
+    guess = ", or let gaident init write down what the log shows" if wanted.columns is None and table.form != "DataFrame" else ""
     return (
         f"{table.path}: no column is named for {what}; the file holds {table.listing()}; "
-        f"say which it is with columns={{{channel!r}: ...}}"
+        f"say which it is with columns={{{channel!r}: ...}}{guess}"
     )
 
 

@@ -17,12 +17,15 @@ from gaident.errors import ReadError
 
 __all__ = ["frame_table", "is_frame", "open_parquet"]
 
+_BUFFER = 1 << 18  # bytes per column that are read ahead
+
 
 def open_parquet(path: str, file: Path, stack: ExitStack) -> Table:
     """Numeric columns of a Parquet file, read block by block; a field's metadata `unit` or `units` is its unit."""
     parquet = library("pyarrow.parquet", "parquet", path, "a Parquet file")
     try:
-        opened = stack.enter_context(parquet.ParquetFile(file))
+        # Its defaults hold whole row groups, which may be the whole file, before the first row is given out.
+        opened = stack.enter_context(parquet.ParquetFile(file, pre_buffer=False, buffer_size=_BUFFER))
         fields = list(opened.schema_arrow)
     except Exception as error:  # pyarrow's errors share no class
         raise ReadError(f"{path}: not a whole Parquet file ({first_line(error)}); copy it again, or export a CSV") from None

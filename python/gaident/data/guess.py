@@ -80,8 +80,9 @@ def guess_channels(listing: Listing) -> Guess:
     reasons: dict[str, str] = {}
     for channel in ("velocity", "command", "torque", "position"):
         free = [row for row in scored[channel] if row[1].name not in {c.name for c in channels.values()}]
-        if free:
-            _, channels[channel], reasons[channel] = max(free, key=lambda row: row[0])
+        best = max(free, key=lambda row: row[0], default=None)
+        if best is not None and not any(score == best[0] and _numbered(column, best[1]) for score, column, _ in free):
+            _, channels[channel], reasons[channel] = best
     order = {channel: channels[channel] for channel in CHANNELS if channel in channels}
     return Guess(order, reasons, _time(listing, longest))
 
@@ -93,6 +94,12 @@ def _time(listing: Listing, longest: int) -> ColumnInfo | None:
         return named[0]
     even = [c for c in listing.columns if c.rises_evenly and c.samples == longest and c.lowest is not None]
     return even[0] if len(even) == 1 else None
+
+
+def _numbered(one: ColumnInfo, other: ColumnInfo) -> bool:
+    """Whether two columns are told apart by a number only, as u1 and u2 of two motors: which is meant only a person knows."""
+    bare = [re.sub(r"\d+", "#", column.name) for column in (one, other)]
+    return one.name != other.name and bare[0] == bare[1] and "#" in bare[0]
 
 
 def _words(name: str) -> list[str]:
@@ -108,7 +115,7 @@ def _score(column: ColumnInfo, channel: str) -> tuple[int, str]:
         return 0, ""
     by_name = max((_WORDS[quantity].get(word, 0) for word in words), default=0)
     fits = _is_unit_of(column.unit, quantity)
-    if column.unit is not None and not fits and not (quantity == "torque" and column.unit == "%"):
+    if column.unit is not None and not fits and not _converts(column.unit, quantity):
         return 0, ""
     commanded, measured = bool(_COMMAND & set(words)), bool(_MEASURED & set(words))
     score = by_name + (3 if fits else 0)
@@ -125,14 +132,18 @@ def _score(column: ColumnInfo, channel: str) -> tuple[int, str]:
 
 
 def _is_unit_of(unit: str | None, quantity: str) -> bool:
-    if unit is None:
+    if unit is None or not _converts(unit, quantity):
         return False
+    # V and 1 stand for many things.
+    return unit.strip().casefold() not in ("v", "mv", "m", "1", "-") or quantity == "position"
+
+
+def _converts(unit: str, quantity: str) -> bool:
     try:
         factor(quantity, unit, Constants(1.0, 1.0, 1.0, 1.0))
     except ReadError:
         return False
-    # V and 1 stand for many things.
-    return unit.strip().casefold() not in ("v", "mv", "m", "1", "-") or quantity == "position"
+    return True
 
 
 _VELOCITY_UNITS = ("rad/s", "rpm", "deg/s", "rps", "m/s", "mm/s", "m/min", "mm/min")

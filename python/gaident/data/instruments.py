@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import gc
+import io
 import math
 import sys
 import traceback
-from contextlib import ExitStack
+from contextlib import ExitStack, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -63,12 +64,14 @@ def _tdms_column(path: str, channel: Any, key: str, long: str) -> Column:
 def open_mdf(path: str, file: Path, stack: ExitStack) -> Table:
     """Channels of an MDF file of version 3 or 4, each with the master of its group as clock; read when asked for.
 
-    A file that was cut short is refused; on some other damage asammdf itself ends the process.
+    A file that was cut short is refused, and one whose channels lie outside their records, which asammdf would read all the
+    same and end the process.
     """
     asammdf = library("asammdf", "mdf", path, "an MDF measurement")
     flaw = ""
     try:
-        columns, others = _mdf_columns(path, stack.enter_context(asammdf.MDF(file)))
+        with redirect_stdout(io.StringIO()):  # asammdf prints what it finds damaged
+            columns, others = _mdf_columns(path, stack.enter_context(asammdf.MDF(file)))
     except Exception as error:  # asammdf raises its own and whatever a damaged file leads it into
         flaw = first_line(error)
         _forget(error)
@@ -102,6 +105,8 @@ def _mdf_columns(path: str, mdf: Any) -> tuple[list[Column], list[str]]:
         if count == 0:
             others.append(f"{name!r} (empty)")
             continue
+        if _outside(mdf.groups[g].channel_group, mdf.groups[g].channels[c]):
+            raise ValueError(f"channel {name!r} lies outside its record")
         sample = mdf.get(group=g, index=c, record_count=1)
         if sample.samples.ndim != 1 or sample.samples.dtype.kind not in "iufb":
             others.append(f"{name!r} ({'text' if sample.samples.dtype.kind in 'SU' else sample.samples.dtype})")
@@ -113,9 +118,19 @@ def _mdf_columns(path: str, mdf: Any) -> tuple[list[Column], list[str]]:
     return columns, others
 
 
+def _outside(group: Any, channel: Any) -> bool:
+    """Whether the bits of a channel lie outside the record of its group, in MDF of version 3 or 4."""
+    size = 8 * int(group.samples_byte_nr)
+    if hasattr(channel, "start_offset"):
+        return 8 * int(channel.additional_byte_offset) + int(channel.start_offset) + int(channel.bit_count) > size
+    in_record = channel.channel_type in (0, 2)  # values of fixed length, master; others are computed, or stand elsewhere
+    return in_record and 8 * int(channel.byte_offset) + int(channel.bit_offset) + int(channel.bit_count) > size
+
+
 def _mdf_reader(mdf: Any, group: int, index: int, is_master: bool) -> Any:
     def rows(start: int, stop: int) -> NDArray[Any]:
-        signal = mdf.get(group=group, index=index, record_offset=start, record_count=stop - start)
+        with redirect_stdout(io.StringIO()):
+            signal = mdf.get(group=group, index=index, record_offset=start, record_count=stop - start)
         return np.asarray(signal.timestamps if is_master else signal.samples)
 
     return rows

@@ -65,6 +65,7 @@ _FOREIGN = (
     (b"\xd0\xcf\x11\xe0", "an old Excel workbook", "save the sheet as CSV"),
     (b"\x1f\x8b", "compressed with gzip", "unpack it first"),
     (b"\x93NUMPY", "a single numpy array", "save named columns with numpy.savez"),
+    (b"{", "JSON", "export the log as CSV; what gaident saved is loaded with gaident.load"),
     (b"#ROSBAG", "a ROS bag", "export the topic as CSV"),
     (b"\x89MCAP", "an MCAP recording", "export the topic as CSV"),
 )
@@ -86,6 +87,7 @@ def read(
     resample: float | None = None,
     gear_ratio: float | None = None,
     load_side: str | Sequence[str] = (),
+    measured: bool = True,
     delimiter: str | None = None,
     decimal: str | None = None,
     skip: int | None = None,
@@ -118,6 +120,8 @@ def read(
     gear_ratio, load_side
              turns of the motor per turn of the load, and the channels that were measured behind the gear: their
              motion is multiplied by it, their torque divided
+    measured False: a log without velocity and position will do, as a proposed command that is to be simulated; its velocity
+             is 0 then
     delimiter, decimal, skip, encoding
              of a text table, where they cannot be found out: what separates columns (a character, "tab" or
              "space"), decimal mark ("." or ","), lines to leave out at the top, encoding as Python calls it
@@ -135,6 +139,7 @@ def read(
         resample=resample,
         gear_ratio=gear_ratio,
         load_side=(load_side,) if isinstance(load_side, str) else tuple(load_side),
+        measured=measured,
     ).check()
     with open_log(path, TextOptions(delimiter, decimal, skip, encoding)) as table:
         return assemble(table, wanted, "" if is_frame(path) else Path(path).stem)

@@ -23,12 +23,16 @@ def record_html(rec: Record) -> str:
     head = f"<div>{name}Record, {len(rec)} samples, dt {rec.dt:.6g} s, {rec.duration:.4g} s</div>"
     rows = "".join(
         f"<tr><td>{key}</td>"
-        + "".join(f"<td {_CELL}>{value + 0.0:.4g}</td>" for value in (values.min(), values.max(), values.mean()))
+        + "".join(f"<td {_CELL}>{_number(value)}</td>" for value in (values.min(), values.max(), values.mean()))
         + f"<td>{sparkline(values)}</td></tr>"
         for key, values in rec.channels()
     )
     titles = "".join(f"<th {_CELL}>{title}</th>" for title in ("lowest", "highest", "mean"))
     return f"{head}<table><thead><tr><th></th>{titles}<th></th></tr></thead><tbody>{rows}</tbody></table>"
+
+
+def _number(value: float) -> str:
+    return f"{value + 0.0:.4g}".replace("-", "&minus;")  # no -0
 
 
 def sparkline(values: NDArray[np.float64]) -> str:

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from gaident.errors import ReadError
 
-__all__ = ["resampled"]
+__all__ = ["GAP", "resampled"]
 
 _COARSER = 1.5
 _FINER = 100.0
+GAP = 5.0
+"""Of the usual step: what is longer is a pause of the logger, and a straight line through it would be invented."""
 
 
 def resampled(
@@ -21,7 +23,7 @@ def resampled(
     """Each channel by linear interpolation at t0 + n dt, t0 to t1 being what all channels cover.
 
     channels  name -> (time stamps [s], values), shape (n,) each, n may differ; the stamps increase, those without a
-              value (NaN) are left out
+              value (NaN) are left out, and no gap between them may be longer than five of their usual steps
     dt        sample time of the result [s]; at most 1.5 times what the channels have, or high frequencies would fold;
               at least a hundredth of the finest
 
@@ -37,7 +39,15 @@ def resampled(
         if t.size < 2 or back.size:
             where = "has fewer than two values" if t.size < 2 else f"does not increase at {t[back[0]]:.12g} s"
             raise ReadError(f"{path}: the time of {name} {where}; sort the log or remove stamps that stand twice")
-        median = float(np.median(np.diff(t)))
+        steps = np.diff(t)
+        median = float(np.median(steps))
+        at = int(np.argmax(steps))
+        if steps[at] > GAP * median:
+            raise ReadError(
+                f"{path}: {name} has a gap of {steps[at]:.4g} s, from {t[at]:.9g} to {t[at + 1]:.9g} s, where its usual step is "
+                f"{median:.4g} s, and nobody knows what happened in it; split the log there into two records, which can be "
+                "identified together"
+            )
         if dt > _COARSER * median:
             raise ReadError(
                 f"{path}: resample={dt:g} s is coarser than the log, whose {name} has steps of {median:g} s, and would fold high "

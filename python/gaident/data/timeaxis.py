@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.data.resampling import GAP
 from gaident.data.table import Column, Table
 from gaident.errors import ReadError
 
@@ -156,12 +157,14 @@ def _too_coarse(table: Table, column: Column, printed: float) -> None:
 
 
 def _refuse(table: Table, column: Column, t: NDArray[np.float64], step: int, dt: float, shift: int) -> None:
+    usual = float(np.median(np.diff(t)))
+    bridged = t[step + 1] - t[step] <= GAP * usual
+    even = f"cut the log there, or put it on an even axis with resample={dt:.6g}" if bridged else "split the log there into two"
     raise ReadError(
         f"{table.path}, {table.place(step + 1 - shift)}: time column {column.key!r} is irregular: from "
         f"{t[step]:.12g} to "
         f"{t[step + 1]:.12g} it jumps by {t[step + 1] - t[step]:.6g}, elsewhere by "
-        f"{float(np.median(np.diff(t))):.6g}; "
-        f"cut the log there, or put it on an even axis with resample={dt:.6g}; if the samples are in truth evenly spaced, "
+        f"{usual:.6g}; {even}; if the samples are in truth evenly spaced, "
         f"give dt={dt:.6g} and set columns={{'time': None}}"
     )
 
@@ -176,8 +179,9 @@ def _printed_step(t: NDArray[np.float64]) -> NDArray[np.float64]:
     step = np.zeros(len(padded))
     unknown = np.ones(len(padded), dtype=bool)
     for digits in range(_DIGITS):
-        scaled = padded[unknown] * 10.0**digits
-        whole = (np.abs(scaled - np.rint(scaled)) <= np.maximum(1e-9, 4e-16 * np.abs(scaled))).all(axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):  # inf - inf is not whole
+            scaled = padded[unknown] * 10.0**digits
+            whole = (np.abs(scaled - np.rint(scaled)) <= np.maximum(1e-9, 4e-16 * np.abs(scaled))).all(axis=1)
         found = np.flatnonzero(unknown)[whole]
         step[found] = 10.0**-digits
         unknown[found] = False

@@ -30,6 +30,7 @@ class Wanted:
     resample: float | None = None
     gear_ratio: float | None = None
     load_side: tuple[str, ...] = ()
+    measured: bool = True
 
     def check(self) -> Wanted:
         """Itself, once what can be judged without the file is right; else ReadError or RecordError."""

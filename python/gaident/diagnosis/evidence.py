@@ -53,7 +53,7 @@ def overview(dia: Diagnosis, records: Sequence[Record], axis: str = "rotary") ->
         std=float(np.median(missing.std)),
         extended=extended,
         curve=velocity_curve(dia, float(rec.velocity.min()), float(rec.velocity.max())),
-        title=_title(dia, rec, len(records)),
+        title=_title(dia, rec, records),
         axis=axis,
     )
 
@@ -83,7 +83,10 @@ def velocity_curve(dia: Diagnosis, low: float, high: float) -> Curve | None:
     return (w, torque, " + ".join(names)) if names else None
 
 
-def _title(dia: Diagnosis, rec: Record, count: int) -> str:
+def _title(dia: Diagnosis, rec: Record, records: Sequence[Record]) -> str:
     found = ", ".join(" or ".join((f.effect, *f.alternatives)).replace("_", " ") for f in dia.causes)
-    of = f"{rec.name or 'record'}, the longest of {count}: " if count > 1 else f"{rec.name}: " if rec.name else ""
+    of = f"{rec.name}: " if rec.name else ""
+    if len(records) > 1:
+        alone = sum(len(r) == len(rec) for r in records) == 1
+        of = f"{rec.name or 'record'}, {'the longest' if alone else 'the first of the longest'} of {len(records)}: "
     return f"{of}{dia.verdict}{f' - {found}' if found else ''}"

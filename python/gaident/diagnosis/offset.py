@@ -34,11 +34,11 @@ class Offset:
 
     @property
     def sentence(self) -> str:
-        """What looks like an offset, in words; units are left to the reader of the table above it."""
+        """What looks like an offset, in words."""
         return (
-            f"Even dry friction with a constant load of {self.load:.3g} in its place would leave the model {self.behind:.0f} BIC "
-            "units worse: what looks like an offset is mostly viscous friction that depends on the direction, "
-            f"{self.left:.2g} of it is left."
+            f"Even dry friction with a constant load of {self.load:.3g} N m in its place would leave the model "
+            f"{self.behind:.0f} BIC units worse: what looks like an offset is mostly viscous friction that depends on the "
+            f"direction, {self.left:.2g} N m of it is left."
         )
 
 

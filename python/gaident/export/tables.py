@@ -18,13 +18,17 @@ def _pandas() -> Any:
 
 
 def identification_table(idn: Any) -> Any:
-    """One row per parameter, those of the mechanics behind those of the model; see `Identification.to_pandas`."""
+    """One row per parameter, those of the mechanics behind those of the model; see `Identification.to_pandas`.
+
+    at_bound: of the mechanics, whether any parameter that they follow from sits at a bound of its search range.
+    """
     rows = [{"of": "model", "parameter": name, **asdict(e)} for name, e in idn.parameters.items()]
     drive = idn.mechanics
     if drive is not None:
+        bound = any(e.at_bound for e in idn.parameters.values())  # it follows from all of them
         for name, unit in drive.UNITS.items():
             value, std = getattr(drive, name), drive.std.get(name, nan)
-            estimate = {"value": value, "std": std, "unit": unit, "at_bound": False, "identifiable": std < abs(value)}
+            estimate = {"value": value, "std": std, "unit": unit, "at_bound": bound, "identifiable": std < abs(value)}
             rows.append({"of": "mechanics", "parameter": name, **estimate})
     columns = ["of", "parameter", "value", "std", "unit", "at_bound", "identifiable"]
     return _pandas().DataFrame(rows, columns=columns).set_index(["of", "parameter"])

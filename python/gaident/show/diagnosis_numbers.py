@@ -77,11 +77,12 @@ class Reversals:
     """Averages over reversals, turned so that the new direction is positive; time [s] from the reversal, shape (n,).
 
     Per group ("small torque", "large torque", or "all"): mean and standard deviation of torque and mean velocity, (n,) each,
-    and how many reversals.
+    and how many reversals. none: why there is no group, "" where there is one.
     """
 
     time: Vector
     groups: dict[str, tuple[Vector, Vector, Vector, int]]
+    none: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +195,11 @@ def reversal_averages(velocity: Vector, torque: Vector, drive_torque: Vector, dt
             d = np.array([s * torque[c - half : c + half + 1] for c, s in chosen])
             v = np.array([s * velocity[c - half : c + half + 1] for c, s in chosen])
             groups[name] = (d.mean(axis=0), d.std(axis=0), v.mean(axis=0), len(chosen))
-    return Reversals(np.arange(-half, half + 1, dtype=np.float64) * dt, groups)
+    none = ""
+    if not groups:
+        around = f"no reversal with {1e3 * half * dt:.3g} ms of record before and after it"
+        none = around if len(turns) else "no reversals in the record"
+    return Reversals(np.arange(-half, half + 1, dtype=np.float64) * dt, groups, none)
 
 
 def spectrum(x: Vector, dt: float, segments: int = 8) -> Spectrum:

@@ -142,7 +142,7 @@ def _torque_velocity(
     steady = ~(faster | slower)
     step = max(1, len(velocity) // CLOUD)
     if std is not None:
-        ax.axhspan(-2.0 * std, 2.0 * std, color=ORANGE, alpha=0.3, linewidth=0, label="+-2 std")
+        ax.axhspan(-2.0 * std, 2.0 * std, color=ORANGE, alpha=0.3, linewidth=0, label="±2 std")
     ax.axhline(0.0, color=BLACK, linewidth=0.5)
     for mask, color, label in ((steady, GREY, "steady"), (faster, BLUE, "accelerating"), (slower, VERMILION, "decelerating")):
         chosen = np.flatnonzero(mask)[::step]
@@ -155,7 +155,7 @@ def _torque_velocity(
             label = label if not np.any(side) else ""
     mean = binned_mean(velocity, dhat, 40)
     ax.errorbar(
-        mean.x, mean.mean, yerr=mean.std, fmt="o", color=BLACK, markersize=3.2, elinewidth=0.8, capsize=1.8, label="mean +- sd"
+        mean.x, mean.mean, yerr=mean.std, fmt="o", color=BLACK, markersize=3.2, elinewidth=0.8, capsize=1.8, label="mean ± sd"
     )
     if curve is not None:
         ax.plot(curve[0], curve[1], color=GREEN, linewidth=2.0, label=curve[2])
@@ -213,8 +213,11 @@ def _reversals(ax: Axes, velocity: Vector, dhat: Vector, drive_torque: Vector, d
         low.axvline(0.0, color=BLACK, linewidth=0.5)
         low.set_ylabel(f"velocity [{velocity_unit(axis)}]")
     if not found.groups:
-        ax.text(0.5, 0.5, "the velocity never reverses", transform=ax.transAxes, ha="center", va="center", color=GREY)
-        ax.set_yticks([])
+        ax.text(0.5, 0.5, found.none, transform=ax.transAxes, ha="center", va="center", color=GREY)
+        for each in (ax, low) if low is not None else (ax,):
+            each.set_xticks([])
+            each.set_yticks([])
+        return
     ax.margins(x=0.0)
     _plain_numbers(ax)
     ax.set_xlabel("time from the reversal [ms], the new direction positive")
@@ -222,7 +225,7 @@ def _reversals(ax: Axes, velocity: Vector, dhat: Vector, drive_torque: Vector, d
 
 
 def _residual_time(ax: Axes, time: Vector, residual: Vector, noise_std: float, after: Vector | None, axis: str) -> None:
-    ax.axhspan(-2.0 * noise_std, 2.0 * noise_std, color=ORANGE, alpha=0.35, linewidth=0, label="+-2 std of the noise")
+    ax.axhspan(-2.0 * noise_std, 2.0 * noise_std, color=ORANGE, alpha=0.35, linewidth=0, label="±2 std of the noise")
     _line(ax, time, residual, color=VERMILION, linewidth=0.8, label="linear model")
     if after is not None:
         _line(ax, time, after, color=BLACK, linewidth=0.6, label="extended model")
@@ -252,7 +255,7 @@ def _plain_numbers(ax: Axes) -> None:
     """A vertical scale without a common factor, which would stand where the legend does."""
     from matplotlib.ticker import FuncFormatter
 
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: FuncFormatter.fix_minus(f"{value:g}")))
 
 
 def _plain_decades(ax: Axes) -> None:
@@ -261,7 +264,7 @@ def _plain_decades(ax: Axes) -> None:
 
     for each, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
         each.set_major_locator(LogLocator(subs=(1.0,) if high > 1e3 * low else (1.0, 2.0, 5.0)))
-        each.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        each.set_major_formatter(FuncFormatter(lambda value, _: FuncFormatter.fix_minus(f"{value:g}")))
         each.set_minor_formatter(NullFormatter())
 
 

@@ -71,19 +71,27 @@ def number(value: float, digits: int = 4) -> Html:
     return Html(text.replace("-", "&minus;"))
 
 
-def table(columns: Sequence[str], blocks: Sequence[Sequence[Row]], groups: Sequence[tuple[str, int]] = ()) -> Html:
+def table(
+    columns: Sequence[str], blocks: Sequence[Sequence[Row]], groups: Sequence[tuple[str, int]] = (), left: Sequence[int] = ()
+) -> Html:
     """A table of blocks of rows with a line between the blocks.
 
     Text is escaped, numbers are formatted, None is a dash. groups: (title, number of columns) above the header.
+    left: columns set to the left whatever the page's style says, as a notebook has one of its own.
     """
+    sides = [' style="text-align:left"' if k in left else "" for k in range(len(columns))]
     above = "".join(f'<th colspan="{span}">{html.escape(title)}</th>' for title, span in groups)
     head = f'<tr class="groups">{above}</tr>' if groups else ""
-    head += "<tr>" + "".join(f"<th>{safe(name)}</th>" for name in columns) + "</tr>"
+    head += "<tr>" + "".join(f"<th{side}>{safe(name)}</th>" for name, side in zip(columns, sides, strict=True)) + "</tr>"
     lines = []
     for i, block in enumerate(blocks):
         for j, row in enumerate(block):
             mark = ' class="new"' if i > 0 and j == 0 else ""
-            lines.append(f"<tr{mark}>" + "".join(f"<td>{_cell(value)}</td>" for value in row) + "</tr>")
+            lines.append(
+                f"<tr{mark}>"
+                + "".join(f"<td{side}>{_cell(value)}</td>" for value, side in zip(row, sides, strict=True))
+                + "</tr>"
+            )
     body = "\n".join(lines)
     return Html(f'<div class="scroll"><table><thead>{head}</thead><tbody>\n{body}\n</tbody></table></div>')
 

@@ -24,13 +24,13 @@ def diagnosis_html(dia: Any) -> Html:
         for i, (parameter, e) in enumerate(f.parameters.items()):
             cells = (parameter.replace("_", " "), estimate(e.value, e.std), typeset("" if e.unit == "1" else e.unit))
             rows.append((name if i == 0 else "", *cells))
-    causes = table(("cause", "parameter", "value", "unit"), [rows]) if rows else ""
+    causes = table(("cause", "parameter", "value", "unit"), [rows], left=(0, 1, 3)) if rows else ""
     errors: list[Row] = [("linear model", number(dia.before.rmse), f"{dia.before.fit_percent:.2f}")]
     if dia.model.effects:
         errors.append(("extended model", number(dia.after.rmse), f"{dia.after.fit_percent:.2f}"))
     errors.append(("noise", number(dia.after.noise_floor), ""))
     where = f"{UNITS}; {dia.held_out}"
-    return _framed(diagnosis, dia, causes, table(("", "rmse", "fit [%]"), [errors]), where, dia.notes)
+    return _framed(diagnosis, dia, causes, table(("", "rmse", "fit [%]"), [errors], left=(0,)), where, dia.notes)
 
 
 def identification_html(idn: Any) -> Html:
@@ -42,10 +42,10 @@ def identification_html(idn: Any) -> Html:
             (name, estimate(getattr(m, name), m.std.get(name)), typeset(u), meaning_of(name, hasattr(m, "KG"), "rotary"))
             for name, u in m.UNITS.items()
         ]
-        parts = table(("", "value", "unit", ""), [rows])
+        parts = table(("", "value", "unit", ""), [rows], left=(0, 2, 3))
     errors: list[Row] = [("model", number(idn.rmse), f"{idn.fit_percent:.2f}"), ("noise", number(idn.adequacy.noise_std), "")]
     notes = [w for w in idn.warnings if w != idn.adequacy.sentence]
-    return _framed(identification, idn, parts, table(("", "rmse", "fit [%]"), [errors]), f"{UNITS}; in-sample", notes)
+    return _framed(identification, idn, parts, table(("", "rmse", "fit [%]"), [errors], left=(0,)), f"{UNITS}; in-sample", notes)
 
 
 def _framed(book: Any, result: Any, parts: str, errors: str, small: str, notes: Any) -> Html:

@@ -49,9 +49,9 @@ def plot_identification(idn: Any, records: Sequence[Any], axis: str = "rotary") 
         _line(top, rec.time, rec.velocity, color=SKY, linewidth=3.0, label="measured")
         _line(top, rec.time, simulated, color=BLACK, linewidth=0.8, label="simulated")
         band = 2.0 * idn.adequacy.noise_std
-        low.axhspan(-band, band, color=ORANGE, alpha=0.35, linewidth=0, label="+-2 std of the noise")
+        low.axhspan(-band, band, color=ORANGE, alpha=0.35, linewidth=0, label="±2 std of the noise")
         low.axhline(0.0, color=BLACK, linewidth=0.5)
-        _line(low, rec.time, rec.velocity - simulated, color=BLUE, linewidth=0.7, label="measured - simulated")
+        _line(low, rec.time, rec.velocity - simulated, color=BLUE, linewidth=0.7, label="measured − simulated")
         top.set_title(rec.name or f"record {column + 1}", fontsize="medium", loc="right")
         if open_loop:
             _line(grid[2, column], rec.time, rec.torque, color=GREEN, linewidth=0.8)
@@ -162,7 +162,7 @@ def plot_poles_zeros(idn: Any, hz: bool = False) -> Figure:
     u = "Hz" if hz else "rad/s"
     ax.set_xlabel(f"real part [{u}]")
     ax.set_ylabel(f"imaginary part [{u}]")
-    ax.set_title("Poles and zeros, bars +-2 std")
+    ax.set_title("Poles and zeros, bars ±2 std")
     ax.legend()
     _tidy(fig)
     return fig
@@ -211,9 +211,10 @@ def plot_bode(
 
 def _figure(width: float, height: float) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    fig = Figure(figsize=(width, height), dpi=150, layout="constrained")
+    from gaident.show.picture import Picture
+
+    fig = Picture(figsize=(width, height), dpi=150, layout="constrained")
     FigureCanvasAgg(fig)
     return fig
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.show.plots import BLACK, BLUE, ORANGE, SKY, VERMILION, _figure, _locator, _tidy
+from gaident.show.plots import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, _figure, _locator, _tidy
 from gaident.show.wording import unit, velocity_unit
 
 if TYPE_CHECKING:
@@ -41,6 +41,9 @@ def plot_response(responses: Any, hz: bool = False, axis: str = "rotary", title:
     style: dict[str, Any] = {"fmt": "o", "color": SKY, "markersize": 3.5, "elinewidth": 1.0, "zorder": 1}
     # A bar that would reach 0 ends at a hundredth of the value: the axis is logarithmic.
     top.errorbar(f, size, [np.minimum(spread, 0.99 * size), spread], label="record, ±2 std", **style)
+    if not len(f):
+        text = "the record shows nothing here: its coherence is nowhere above chance"
+        middle.text(0.5, 0.5, text, transform=middle.transAxes, ha="center", va="center", color=GREY, fontsize="small")
     middle.errorbar(f, np.degrees(np.angle(g)), np.degrees(np.minimum(spread / size, math.pi)), **style)
     if s is not None:
         top.plot(scale * s.frequency, np.abs(s.value), color=BLACK, linewidth=1.2, label="model, estimated the same way")

@@ -343,5 +343,7 @@ GARBAGE: list[tuple[str, bytes, dict[str, Any], list[str]]] = [
     ("sheet.xlsx", b"PK\x03\x04" + bytes(100), {}, ["Excel", "CSV"]),
     ("log.csv.gz", b"\x1f\x8b\x08" + bytes(100), {}, ["gzip", "unpack"]),
     ("a.npy", b"\x93NUMPY\x01\x00", {}, ["numpy.savez"]),
+    ("run.json", b'{"schema": "gaident/identification"}', {}, ["JSON", "gaident.load"]),
+    ("names.csv", b"t,w_ref,w\n" + b"0,0,0\n" * 30, {}, ["gaident init"]),
     ("a.h5", b"\x89HDF\r\n\x1a\n", {}, ["HDF5"]),
 ]

@@ -182,6 +182,12 @@ def missing_reversals(run: Run, dhat: Vector, axis: str) -> Chart | None:
     return Chart("missing-reversals", "time from the reversal [ms]", panels, text, height=420)
 
 
+def no_reversals(run: Run) -> str:
+    """Why there is no average reversal of a run whose torques are known; "" where there is one."""
+    assert run.torque is not None and run.dhat is not None
+    return reversal_averages(run.measured, run.dhat, run.torque, run.dt).none.capitalize()
+
+
 def residual_spectrum(run: Run, noise: float, axis: str) -> Chart:
     """Where in frequency the error of the velocity lies."""
     traces = []

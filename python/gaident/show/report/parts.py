@@ -124,7 +124,11 @@ def missing_section(view: View, noise: float, drawn: Charts, *before: str) -> Se
         return Section("wrong", "What is wrong", *before, needs_record(view, text))
     parts: list[str] = list(before)
     if len(view.runs) > 1:
-        parts.append(tag("p", "Shown for ", tag("b", run.name or "the longest record"), "."))
+        alone = sum(len(r.time) == len(run.time) for r in view.fitted) == 1
+        which = "the longest" if alone else "the first of the longest"
+        parts.append(
+            tag("p", "Shown for ", tag("b", run.name or f"record {view.runs.index(run) + 1}"), f", {which} of those fitted.")
+        )
     if run.dhat is None:
         parts.append(box(tag("p", f"The missing {charts.torque_word(axis)} could not be worked out, see above."), kind="quiet"))
     else:
@@ -135,7 +139,11 @@ def missing_section(view: View, noise: float, drawn: Charts, *before: str) -> Se
         parts.append(tag("p", text))
     elif run.dhat is not None:
         turning = drawn.put(charts.missing_reversals(run, run.dhat, axis))
-        parts += [tag("h3", "Around a reversal"), turning] if turning else []
+        parts += (
+            [tag("h3", "Around a reversal"), turning or tag("p", f"{charts.no_reversals(run)}.")]
+            if run.torque is not None
+            else []
+        )
         place = charts.missing_over_place(run, run.dhat, axis)
         if place:
             parts += [tag("h3", "Against the position"), *(drawn.put(c) for c in place)]

@@ -63,7 +63,7 @@ def _plain_decades(ax: Axes) -> None:
     for each, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
         if each.get_scale() == "log":
             each.set_major_locator(LogLocator(subs=(1.0,) if high > 300.0 * low else (1.0, 2.0, 5.0)))
-            each.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            each.set_major_formatter(FuncFormatter(lambda value, _: FuncFormatter.fix_minus(f"{value:g}")))
             each.set_minor_formatter(NullFormatter())
 
 
