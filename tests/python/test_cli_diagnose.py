@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import json
 import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import gaident as ga
+from cli_cases import interrupted, refusal
 from drive_cases import random_case
 from gaident.cli import main
 from gaident.cli_output import csv_text
-from test_cli import LONG, refusal
 from test_diagnosis_result import CONTROLLER, drive_record
 
 LOOP = ("--kp", str(CONTROLLER.kp), "--ki", str(CONTROLLER.ki))
@@ -110,16 +106,5 @@ def test_a_folder_that_is_not_there_is_a_failure_before_the_work(here: Path, cap
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_ctrl_c_ends_it_with_one_line(here: Path) -> None:
     arguments = ["diagnose", "run0.csv", *LOOP, "--bootstrap", "100000", "--out", "dia.json"]
-    with subprocess.Popen(
-        [sys.executable, "-c", LONG, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None and process.stderr is not None
-        assert process.stdout.readline() == "ready\n"
-        time.sleep(1.0)
-        began = time.perf_counter()
-        process.send_signal(signal.SIGINT)
-        code = process.wait(30)
-        seconds = time.perf_counter() - began
-        assert process.stderr.read() == "gaident: interrupted\n"
-    assert code == 130 and seconds < 0.5
+    assert interrupted(arguments, after=1.0) < 0.5
     assert not Path("dia.json").exists()
