@@ -48,11 +48,10 @@ inline Doubtful operator/(Doubtful a, Doubtful b) {
 inline Doubtful clamp(Doubtful x, Doubtful, Doubtful) { return x; }
 
 // The bound of |dF| without its last term, Wf1 = 1, for one record; `peak` as the search has it.
-template <int headroom>
-double error_sum_bound(const Factors<double>& exact, const Factors<Doubtful>& doubtful, const Record& r, const Loop& loop,
-                       const SearchRanges& ranges, double peak) {
+inline double error_sum_bound(int headroom, const Factors<double>& exact, const Factors<Doubtful>& doubtful, const Record& r,
+                              const Loop& loop, const SearchRanges& ranges, double peak) {
     constexpr double u = 1.01 / 2147483648.0;  // the hundredth more: products of errors
-    const typename FixedPoint<headroom>::Scaling scaling(Extent{peak, r.size(), &ranges, loop.kp, loop.ki, r.sample_time});
+    const FixedScaling scaling(Extent{peak, r.size(), &ranges, loop.kp, loop.ki, r.sample_time}, headroom);
     const Delta<double> h = close_loop(bilinear_plant(exact, r.sample_time), loop.kp, loop.ki, r.sample_time);
     const Delta<Doubtful> d = close_loop(bilinear_plant(doubtful, r.sample_time), loop.kp, loop.ki, r.sample_time);
     const Prepared start = prepare(exact, r, loop, nullptr);

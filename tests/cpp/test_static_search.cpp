@@ -173,13 +173,13 @@ TEST_CASE("mirror: two records, and records that begin in motion, cost what doub
         for (const double v : *signal) peak = std::max(peak, std::abs(v));
     const Tables<Plain<Doubtful>> tables;
     const GeneValues<Doubtful> values = tables.setup(bench, 0).values;
-    const auto in_fixed_point = [&](auto headroom) {
-        return [&](std::size_t i) {
+    const auto in_fixed_point = [&](int headroom) {
+        return [&, headroom](std::size_t i) {
             const auto doubtful = decode<Plain<Doubtful>>(all[i], genome, values);
             const auto factors = decode(all[i], genome);
             double bound = 4.0 * exact[i] / 2147483648.0;
             for (const Record& r : bench.experiment.records)
-                bound += error_sum_bound<headroom()>(factors, doubtful, r, bench.experiment.loop, genome.ranges(), peak);
+                bound += error_sum_bound(headroom, factors, doubtful, r, bench.experiment.loop, genome.ranges(), peak);
             return bound / exact[i];
         };
     };
@@ -189,12 +189,8 @@ TEST_CASE("mirror: two records, and records that begin in motion, cost what doub
     const struct {
         const char* name;
         std::function<double(std::size_t)> bound;
-    } rows[] = {{"drive_double", within(1e-12)},
-                {"drive_float", within(2e-5)},
-                {"c30", within(2e-5)},
-                {"fixed", in_fixed_point(std::integral_constant<int, 2>())},
-                {"fixed_tight", in_fixed_point(std::integral_constant<int, 0>())},
-                {"fixed_wide", in_fixed_point(std::integral_constant<int, 6>())}};
+    } rows[] = {{"drive_double", within(1e-12)}, {"drive_float", within(2e-5)},      {"c30", within(2e-5)},
+                {"fixed", in_fixed_point(2)},    {"fixed_tight", in_fixed_point(0)}, {"fixed_wide", in_fixed_point(6)}};
     for (const auto& row : rows) {
         const auto mirror = make_mirror(row.name, bench.experiment, genome, {});
         mirror->evaluate(all, found);
