@@ -233,9 +233,10 @@ py::tuple simulate_models(const PyRecord& record, const std::vector<EffectModel>
         angle(all ? shape : std::vector<py::ssize_t>{0, 0});
     const EffectOutputs out{velocity.mutable_data(), all ? torque.mutable_data() : nullptr, all ? angle.mutable_data() : nullptr};
     if (own.empty()) {
-        const py::gil_scoped_release release;
-        simulate_effects(job, models, starts, out);
-    } else {
+        std::atomic<bool> stop{false};
+        job.stop = &stop;
+        run_interruptibly(stop, count * samples, [&] { simulate_effects(job, models, starts, out); });
+    } else {  // Ctrl-C comes through the functions
         PyOwnEffects effects(own, count);
         job.own = &effects;
         simulate_effects(job, models, starts, out);

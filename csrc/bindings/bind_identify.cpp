@@ -42,15 +42,9 @@ struct PyRefined {
     Refined r;
 };
 
-// Work on few samples is over before a thread for it would have started, and before anyone could press Ctrl-C.
 void run_work(PyExperiment& e, std::size_t times, const std::function<void()>& work) {
     e.stop = false;
-    if (times * e.experiment.samples() < 100000) {
-        const py::gil_scoped_release release;
-        work();
-    } else {
-        run_interruptibly(e.stop, work, [] {});
-    }
+    run_interruptibly(e.stop, times * e.experiment.samples(), work);
 }
 
 RefineOptions options_of(const std::optional<SearchRanges>& ranges, const std::vector<double>& whitening,

@@ -28,6 +28,10 @@ RealArray to_array(const std::vector<double>& v);
 // KeyboardInterrupt) and calls `tick`. A Python exception raised by `tick` stops the work likewise.
 void run_interruptibly(std::atomic<bool>& stop, const std::function<void()>& work, const std::function<void()>& tick);
 
+// The same without `tick` for work that runs over so many samples; where these are few it is over before a thread for it would have
+// started, and before anyone could press Ctrl-C.
+void run_interruptibly(std::atomic<bool>& stop, std::size_t samples, const std::function<void()>& work);
+
 void bind_simulate(py::module_& m);
 void bind_filter(py::module_& m);
 void bind_identify(py::module_& m);

@@ -74,3 +74,12 @@ void run_interruptibly(std::atomic<bool>& stop, const std::function<void()>& wor
     if (interruption) std::rethrow_exception(interruption);
     if (error) std::rethrow_exception(error);
 }
+
+void run_interruptibly(std::atomic<bool>& stop, std::size_t samples, const std::function<void()>& work) {
+    if (samples < 100000) {
+        const py::gil_scoped_release release;
+        work();
+    } else {
+        run_interruptibly(stop, work, [] {});
+    }
+}

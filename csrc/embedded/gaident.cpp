@@ -11,10 +11,6 @@ using namespace gaident;
 // Opaque for C.
 struct gaident_search {
     PaperSearch search;
-    double limit;          // of a sample [rad/s]: within it no fixed-point word saturates, nor the deviation from the command
-    bool spoiled = false;  // a sample was none, or beyond the limit
-    explicit gaident_search(const StaticSetup<InDrive>& setup) : search(setup), limit(2.0 * setup.peak) {}
-    bool within(double x) const { return x >= -limit && x <= limit; }
 };
 
 extern "C" {
@@ -46,16 +42,12 @@ gaident_search* gaident_configure(void* memory, size_t bytes, const gaident_sett
     setup.mutation = s->mutation;
     setup.weights = {s->error_weight, s->order_weight};
     setup.seed = s->seed;
-    return new (memory) gaident_search(setup);
+    return new (memory) gaident_search{PaperSearch(setup)};
 }
 
-int gaident_feed(gaident_search* g, double command, double velocity) {
-    if (!g->search.feed(command, velocity)) return 0;
-    g->spoiled = g->spoiled || !g->within(command) || !g->within(velocity);
-    return 1;
-}
+int gaident_feed(gaident_search* g, double command, double velocity) { return g->search.feed(command, velocity) ? 1 : 0; }
 
-int gaident_ready(const gaident_search* g) { return !g->search.full() ? 0 : (g->spoiled ? -1 : 1); }
+int gaident_ready(const gaident_search* g) { return !g->search.full() ? 0 : (g->search.spoiled() ? -1 : 1); }
 
 int gaident_work(gaident_search* g, int individuals) {
     const FlushDenormals flush;
@@ -70,7 +62,7 @@ int gaident_run(gaident_search* g, int generations) {
 }
 
 int gaident_best(const gaident_search* g, gaident_model* model) {
-    if (g->spoiled || !(g->search.best_fitness() < InDrive::worst())) return 0;
+    if (!(g->search.best_fitness() < InDrive::worst())) return 0;
     const Factors<Number> f = g->search.best_model();
     const auto number = [](const Number& x) { return static_cast<double>(x); };
     const auto pair = [&](const Pair<Number>& x) { return gaident_pair{number(x.e1), number(x.e0)}; };

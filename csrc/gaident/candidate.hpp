@@ -40,6 +40,7 @@ struct Plain {
         constexpr Scaling() = default;
         explicit constexpr Scaling(const Extent&) {}
     };
+    static constexpr double room = std::numeric_limits<double>::infinity();          // for signals, in peaks
     static constexpr int orders_in_registers = std::is_floating_point_v<M> ? 7 : 0;  // orders that get a loop of their own
     static constexpr Sample sample(double x, const Scaling&) { return static_cast<M>(x); }
     static constexpr Signal signal(const Sample& x, const Scaling&) { return x; }

@@ -11,41 +11,44 @@ namespace gaident {
 
 class FlushDenormals {
 public:
-#if defined(__SSE2__)
-    FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | flush_to_zero | denormals_are_zero); }
-    ~FlushDenormals() { _mm_setcsr(saved_); }
-
-private:
-    static constexpr unsigned flush_to_zero = 0x8000, denormals_are_zero = 0x0040;
-    unsigned saved_;
-#elif defined(__aarch64__)
-    FlushDenormals() {
-        asm volatile("mrs %0, fpcr" : "=r"(saved_));
-        asm volatile("msr fpcr, %0" : : "r"(saved_ | flush_to_zero));
-    }
-    ~FlushDenormals() { asm volatile("msr fpcr, %0" : : "r"(saved_)); }
-
-private:
-    static constexpr std::uint64_t flush_to_zero = 1ULL << 24;
-    std::uint64_t saved_;
-#elif defined(__ARM_FP)  // Cortex-M with a floating-point unit
-    FlushDenormals() {
-        asm volatile("vmrs %0, fpscr" : "=r"(saved_));
-        asm volatile("vmsr fpscr, %0" : : "r"(saved_ | flush_to_zero));
-    }
-    ~FlushDenormals() { asm volatile("vmsr fpscr, %0" : : "r"(saved_)); }
-
-private:
-    static constexpr std::uint32_t flush_to_zero = 1U << 24;
-    std::uint32_t saved_;
-#else
-    FlushDenormals() = default;
-    ~FlushDenormals() = default;
-
-private:
-#endif
+    FlushDenormals() : saved_(control()) { set_control(saved_ | flush); }
+    ~FlushDenormals() { set_control(saved_); }
     FlushDenormals(const FlushDenormals&) = delete;
     FlushDenormals& operator=(const FlushDenormals&) = delete;
+
+private:
+    // The processor's control word of floating-point arithmetic, and its bits that flush denormals.
+#if defined(__SSE2__)
+    using Control = unsigned;
+    static constexpr Control flush = 0x8000 | 0x0040;  // results, operands
+    static Control control() { return _mm_getcsr(); }
+    static void set_control(Control c) { _mm_setcsr(c); }
+#elif defined(__aarch64__)
+    using Control = std::uint64_t;
+    static constexpr Control flush = 1ULL << 24;
+    static Control control() {
+        Control c;
+        asm volatile("mrs %0, fpcr" : "=r"(c));
+        return c;
+    }
+    static void set_control(Control c) { asm volatile("msr fpcr, %0" : : "r"(c)); }
+#elif defined(__ARM_FP)  // Cortex-M with a floating-point unit
+    using Control = std::uint32_t;
+    static constexpr Control flush = 1U << 24;
+    static Control control() {
+        Control c;
+        asm volatile("vmrs %0, fpscr" : "=r"(c));
+        return c;
+    }
+    static void set_control(Control c) { asm volatile("vmsr fpscr, %0" : : "r"(c)); }
+#else                    // none: denormals cost what they cost
+    using Control = unsigned;
+    static constexpr Control flush = 0;
+    static Control control() { return 0; }
+    static void set_control(Control) {}
+#endif
+
+    Control saved_;
 };
 
 }  // namespace gaident

@@ -49,6 +49,7 @@ public:
     void run() {
         parallel(groups_.size(), job_.own != nullptr ? 1 : job_.workers, [&](std::size_t i) {
             const FlushDenormals flush;
+            if (job_.stop != nullptr && *job_.stop) throw Stopped{};
             const std::span<const std::size_t> group(&order_[groups_[i].first], groups_[i].second - groups_[i].first);
             const Planned& first = planned_[group[0]];
             if (first.substeps == 0 || job_.loop.kind == LoopKind::continuous) linear(group);

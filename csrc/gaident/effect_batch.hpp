@@ -8,6 +8,7 @@
 // which is the bilinear loop exactly where no effect acts, and a fine integration in what effects change.
 #pragma once
 
+#include "batch.hpp"
 #include "effect_kernels/effect_kernels.hpp"
 #include "effect_prepare.hpp"
 
@@ -25,8 +26,9 @@ struct EffectJob {
     int substeps = 0;  // 0: as each model needs
     int workers = 1;
     const EffectKernel* kernel = &best_effects();
-    bool lanes = true;          // false: every model alone; the result is the same
-    OwnEffects* own = nullptr;  // of all models, asked by one thread only: with them `workers` does not count
+    bool lanes = true;                        // false: every model alone; the result is the same
+    OwnEffects* own = nullptr;                // of all models, asked by one thread only: with them `workers` does not count
+    const std::atomic<bool>* stop = nullptr;  // once it is set no further models are begun, and Stopped is thrown
 };
 
 // `starts`: as EffectModel's linear part takes it in prepare(), one per model or none (rest). Models without any effect give no angle

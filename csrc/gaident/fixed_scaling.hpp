@@ -94,6 +94,7 @@ struct FixedPoint {
         Scaling() = default;
         explicit Scaling(const Extent& extent) : FixedScaling(extent, headroom) {}
     };
+    static constexpr double room = static_cast<double>(1 << headroom);
     static constexpr int orders_in_registers = 0;
     static constexpr Sample sample(double x, const Scaling& s) { return FixedSignal::of(x, s.signal_point).word; }
     static constexpr Signal signal(Sample x, const Scaling& s) { return {x, s.signal_point, false}; }

@@ -1,8 +1,7 @@
 #include "check.hpp"
-#include "gaident/batch.hpp"
+#include "drive_bench.hpp"
 #include "gaident/closed_loop.hpp"
 #include "gaident/float_pair.hpp"
-#include "gaident/reference/drives.hpp"
 
 using namespace gaident;
 
@@ -10,16 +9,6 @@ namespace {
 
 Delta<double> closed(const reference::Drive& d) {
     return close_loop(plant_of(d.factors(), d.loop, d.sample_time), d.loop.kp, d.loop.ki, d.sample_time);
-}
-
-template <class R>
-std::vector<double> outputs(const Delta<double>& h, const std::vector<double>& input) {
-    R a[max_loop_order], b[max_loop_order + 1], x[max_loop_order] = {};
-    for (int i = 0; i < h.order; ++i) a[i] = static_cast<R>(h.a[i]);
-    for (int i = 0; i <= h.order; ++i) b[i] = static_cast<R>(h.b[i]);
-    std::vector<double> y;
-    for (const double u : input) y.push_back(static_cast<double>(recurrence_step<R, -1>(h.order, a, b, x, static_cast<R>(u))));
-    return y;
 }
 
 void compare(LoopKind kind, std::uint64_t seed) {

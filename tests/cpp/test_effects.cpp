@@ -191,6 +191,9 @@ TEST_CASE("lanes equal the scalar loop bit for bit, with every effect, loop and 
                 CHECK(lanes_u == u);
                 CHECK(lanes_a == a);
             }
+            const std::atomic<bool> stop{true};
+            job.stop = &stop;
+            CHECK_THROWS(simulate_effects(job, models, {}, {w.data()}), Stopped);
         }
 }
 

@@ -1,25 +1,13 @@
 #include "check.hpp"
+#include "drive_bench.hpp"
 #include "gaident/closed_loop.hpp"
 #include "gaident/held.hpp"
-#include "gaident/reference/drives.hpp"
 
 using namespace gaident;
 
 namespace {
 
-Delta<double> held(const Factors<double>& g, double Ts) {
-    return held_plant(g, Ts, held_doublings(largest_root(g), Ts));
-}
-
-template <class R>
-std::vector<R> outputs(const Delta<double>& h, const std::vector<double>& input) {
-    R a[max_loop_order], b[max_loop_order + 1], x[max_loop_order] = {};
-    for (int i = 0; i < h.order; ++i) a[i] = static_cast<R>(h.a[i]);
-    for (int i = 0; i <= h.order; ++i) b[i] = static_cast<R>(h.b[i]);
-    std::vector<R> y;
-    for (const double u : input) y.push_back(recurrence_step<R, -1>(h.order, a, b, x, static_cast<R>(u)));
-    return y;
-}
+Delta<double> held(const Factors<double>& g, double Ts) { return held_plant(g, Ts, held_doublings(largest_root(g), Ts)); }
 
 }  // namespace
 
@@ -39,11 +27,10 @@ TEST_CASE("held: the plant in open loop equals the referee's matrix exponential"
                     const bool paper = p <= 3 && q <= 3;
                     (paper ? worst : worst_large) = std::max(paper ? worst : worst_large, e);
                     if (p <= 3 && q == 0) no_zeros = std::max(no_zeros, e);
-                    if (paper)
-                        worst_float = std::max(worst_float, reference::deviation(outputs<float>(h, d.input), exact));
+                    if (paper) worst_float = std::max(worst_float, reference::deviation(outputs<float>(h, d.input), exact));
                 }
-        std::printf("family %d: double %.2g (p, q <= 3), %.2g (p, q <= 7); float %.2g\n", static_cast<int>(family),
-                    worst, worst_large, worst_float);
+        std::printf("family %d: double %.2g (p, q <= 3), %.2g (p, q <= 7); float %.2g\n", static_cast<int>(family), worst,
+                    worst_large, worst_float);
         // The numerator comes from sums that cancel where many slow zeros stand beside fast poles: beyond the paper's
         // p, q <= 3 that is the limit.
         CHECK(no_zeros < 1e-13);

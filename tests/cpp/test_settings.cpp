@@ -1,6 +1,6 @@
 #include "check.hpp"
+#include "drive_bench.hpp"
 #include "gaident/engine.hpp"
-#include "gaident/reference/drives.hpp"
 
 using namespace gaident;
 
@@ -13,17 +13,13 @@ TEST_CASE("settings: the defaults are Table II") {
 }
 
 TEST_CASE("settings: settings and spaces that make no sense are refused") {
-    const auto d = reference::paper_drive(true);
-    const reference::Measurement measured(d, 0.3, 17);
-    Experiment experiment;
-    experiment.records.push_back(measured.record());
-    experiment.loop = d.loop;
+    const Bench bench(reference::paper_drive(true), 0.3, 17);
     const auto refused = [&](auto&& change) {
         Settings s;
         s.generations = 5;
         change(s);
         Progress progress;
-        CHECK_THROWS(search(experiment, SearchRanges{}, s, 1, 1, 1, progress), std::invalid_argument);
+        CHECK_THROWS(search(bench.experiment, SearchRanges{}, s, 1, 1, 1, progress), std::invalid_argument);
     };
     const double nan = std::nan("");
     refused([](Settings& s) { s.population = 1; });
@@ -38,8 +34,8 @@ TEST_CASE("settings: settings and spaces that make no sense are refused") {
     refused([](Settings& s) { s.round = 0; });
     refused([](Settings& s) { s.quiet_rounds = 0; });
     Progress progress;
-    CHECK_THROWS(search(experiment, SearchRanges{}, Settings{}, 0, 1, 1, progress), std::invalid_argument);
-    Experiment open = experiment;
+    CHECK_THROWS(search(bench.experiment, SearchRanges{}, Settings{}, 0, 1, 1, progress), std::invalid_argument);
+    Experiment open = bench.experiment;
     open.loop.kind = LoopKind::open;
     CHECK_THROWS(search(open, SearchRanges{}, Settings{}, 1, 1, 1, progress),
                  std::invalid_argument);  // p = 0 has no held form

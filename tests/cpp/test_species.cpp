@@ -1,8 +1,8 @@
 #include "check.hpp"
+#include "drive_bench.hpp"
 #include "gaident/decode.hpp"
 #include "gaident/engine.hpp"
 #include "gaident/parameters.hpp"
-#include "gaident/reference/drives.hpp"
 #include "gaident/species.hpp"
 
 using namespace gaident;
@@ -26,6 +26,15 @@ Settings quick() {
     return s;
 }
 
+// Structure and fitness of a trial's best chromosome, computed anew.
+std::pair<Structure, double> best_of(const Trial& trial, const Experiment& experiment, const SearchRanges& ranges,
+                                     const Settings& s) {
+    const Factors<double> g = decode(trial.best.data(), Genome(ranges, s.code, s.roots));
+    double sum;
+    Batch(experiment, 1, false).errors({&g, 1}, {&sum, 1});
+    return {g.structure, fitness(sum, g.structure, s.weights)};
+}
+
 }  // namespace
 
 TEST_CASE("species: structures by p + q, then by q, every allowed one once") {
@@ -47,25 +56,21 @@ TEST_CASE("species: structures by p + q, then by q, every allowed one once") {
 
 TEST_CASE("species: finds the true structure's optimum, and no smaller structure reaches it") {
     for (const bool two_mass : {false, true}) {
-        const auto d = reference::paper_drive(two_mass);
-        const reference::Measurement measured(d, 0.3, 7);
-        Experiment experiment;
-        experiment.records.push_back(measured.record());
-        experiment.loop = d.loop;
+        const Bench bench(reference::paper_drive(two_mass), 0.3, 7);
         Progress progress;
-        const auto trial = search(experiment, small_ranges(), quick(), 1, 5, 1, progress)[0];
+        const auto trial = search(bench.experiment, small_ranges(), quick(), 1, 5, 1, progress)[0];
         const std::vector<Structure> all = structures(small_ranges());
         CHECK(trial.species.size() == all.size());
         RefineOptions o;
         o.ranges = small_ranges();
-        const Refined truth = Refiner(experiment, o).fit(d.factors(), {}, 60);
+        const Refined truth = Refiner(bench.experiment, o).fit(bench.drive.factors(), {}, 60);
         for (std::size_t i = 0; i < all.size(); ++i) {
             const Refined& found = trial.species[i];
             CHECK(found.factors.structure == all[i]);
             CHECK(found.cost < worst_fitness);
             CHECK(found.at_bound.size() == static_cast<std::size_t>(all[i].parameters()));
-            if (all[i] == d.factors().structure) CHECK(found.cost <= truth.cost * (1 + 1e-6));
-            if (all[i].poles() < d.factors().structure.poles()) CHECK(found.cost > 2.0 * truth.cost);
+            if (all[i] == bench.drive.factors().structure) CHECK(found.cost <= truth.cost * (1 + 1e-6));
+            if (all[i].poles() < bench.drive.factors().structure.poles()) CHECK(found.cost > 2.0 * truth.cost);
         }
     }
 }
@@ -85,37 +90,27 @@ TEST_CASE("species: a structure asked for alone is found as well, by way of smal
     s.generations = 1000;
     s.round = 40;
     for (std::uint64_t seed = 0; seed < 12; ++seed) {
-        const reference::Measurement measured(d, 0.2, seed);
-        Experiment experiment;
-        experiment.records.push_back(measured.record());
-        experiment.loop = d.loop;
+        const Bench bench(d, 0.2, seed);
         Progress progress;
-        const Trial trial = search(experiment, alone, s, 1, seed, 1, progress)[0];
+        const Trial trial = search(bench.experiment, alone, s, 1, seed, 1, progress)[0];
         CHECK(trial.species.size() == 1 && (trial.species[0].factors.structure == Structure{1, 2}));
         RefineOptions o;
         o.ranges = alone;
-        CHECK(trial.species[0].cost <= Refiner(experiment, o).fit(d.factors(), {}, 60).cost * (1 + 1e-6));
+        CHECK(trial.species[0].cost <= Refiner(bench.experiment, o).fit(d.factors(), {}, 60).cost * (1 + 1e-6));
         // What is reported of the genetic search is of that structure, too.
-        const Genome genome(alone, s.code, s.roots);
-        const Factors<double> g = decode(trial.best.data(), genome);
-        double sum;
-        Batch(experiment, 1, false).errors({&g, 1}, {&sum, 1});
-        CHECK((g.structure == Structure{1, 2}) && fitness(sum, g.structure, s.weights) == trial.best_fitness);
+        const auto [structure, cost] = best_of(trial, bench.experiment, alone, s);
+        CHECK((structure == Structure{1, 2}) && cost == trial.best_fitness);
         CHECK(progress.best == trial.best_fitness && progress.done == trial.history.size());
     }
 }
 
 TEST_CASE("species: the log of a run") {
-    const auto d = reference::paper_drive(true);
-    const reference::Measurement measured(d, 0.3, 8);
-    Experiment experiment;
-    experiment.records.push_back(measured.record());
-    experiment.loop = d.loop;
+    const Bench bench(reference::paper_drive(true), 0.3, 8);
     Progress progress;
     Settings s = quick();
     s.population = 10;  // too few for six species: three each are taken
     s.quiet_rounds = 100;
-    const auto trial = search(experiment, small_ranges(), s, 1, 6, 1, progress)[0];
+    const auto trial = search(bench.experiment, small_ranges(), s, 1, 6, 1, progress)[0];
     CHECK(trial.history.size() == 60);
     CHECK(progress.done == 60);
     CHECK(trial.evaluations == 18 * 60);
@@ -124,24 +119,16 @@ TEST_CASE("species: the log of a run") {
     CHECK(progress.best == trial.best_fitness);
     CHECK(trial.history[static_cast<std::size_t>(trial.best_generation)] == trial.best_fitness);
     // The best chromosome is the best fitness.
-    const Genome genome(small_ranges(), s.code, s.roots);
-    const Factors<double> g = decode(trial.best.data(), genome);
-    double sum;
-    Batch(experiment, 1, false).errors({&g, 1}, {&sum, 1});
-    CHECK(fitness(sum, g.structure, s.weights) == trial.best_fitness);
+    CHECK(best_of(trial, bench.experiment, small_ranges(), s).second == trial.best_fitness);
 }
 
 TEST_CASE("species: mutation and crossover leave the structure of a species alone") {
-    const auto d = reference::paper_drive(true);
-    const reference::Measurement measured(d, 0.3, 9);
-    Experiment experiment;
-    experiment.records.push_back(measured.record());
-    experiment.loop = d.loop;
+    const Bench bench(reference::paper_drive(true), 0.3, 9);
     const Genome genome(SearchRanges{}, Code::gray, Scale::linear);
     Settings s;
     s.population = 48;
     s.mutation = 0.2;
-    Breeder breeder(experiment, genome, s, Random(3));
+    Breeder breeder(bench.experiment, genome, s, Random(3));
     breeder.randomise(0, 48);
     std::vector<Breeder::Group> groups;
     const auto all = structures(SearchRanges{});

@@ -1,12 +1,15 @@
 // The search that runs in a drive, against the desk's.
 #include "check.hpp"
 #include "drive_bench.hpp"
+#include "fixed_bound.hpp"
 #include "gaident/c30.hpp"
 #include "gaident/denormals.hpp"
 #include "gaident/engine.hpp"
 #include "gaident/fixed_scaling.hpp"
 #include "gaident/static_search.hpp"
 
+#include <array>
+#include <functional>
 #include <memory>
 
 using namespace gaident;
@@ -62,6 +65,13 @@ Trial run(const Bench& bench, int generations, std::uint64_t seed) {
     return t;
 }
 
+// A record that settles under a constant command, and one that is driven.
+std::array<Bench, 2> records() {
+    reference::Drive driven = two_mass();
+    for (std::size_t i = 100; i < driven.input.size(); ++i) driven.input[i] = -20.0;
+    return {Bench(two_mass()), Bench(driven)};
+}
+
 Trial desk(const Bench& bench, const char* mirror, int generations, std::uint64_t seed) {
     Settings s;
     s.generations = generations;
@@ -78,22 +88,14 @@ bool same(const Trial& a, const Trial& b) {
 }  // namespace
 
 TEST_CASE("static search: in double the desk's run, bit for bit; settling and driven records") {
-    for (const bool step : {true, false}) {
-        reference::Drive d = two_mass();
-        if (!step)
-            for (std::size_t i = 100; i < d.input.size(); ++i) d.input[i] = -20.0;
-        const Bench bench(d);
+    for (const Bench& bench : records()) {
         CHECK(same(run<Plain<double>>(bench, 60, 4), desk(bench, "", 60, 4)));
         CHECK(same(run<Plain<double>>(bench, 60, 4), desk(bench, "drive_double", 60, 4)));
     }
 }
 
 TEST_CASE("static search: in a drive's arithmetic the run of its mirror on the desk, bit for bit") {
-    for (const bool step : {true, false}) {
-        reference::Drive d = two_mass();
-        if (!step)
-            for (std::size_t i = 100; i < d.input.size(); ++i) d.input[i] = -20.0;
-        const Bench bench(d);
+    for (const Bench& bench : records()) {
         CHECK(same(run<Plain<float>>(bench, 30, 4), desk(bench, "drive_float", 30, 4)));
         CHECK(same(run<Plain<C30Word, C30>>(bench, 30, 4), desk(bench, "c30", 30, 4)));
         CHECK(same(run<FixedPoint<2>>(bench, 30, 4), desk(bench, "fixed", 30, 4)));
@@ -126,6 +128,32 @@ TEST_CASE("static search: slices of any size make the same run; a full record ta
     CHECK_NEAR(whole->best_model().gain, f.gain, 1e-6 * f.gain);
 }
 
+TEST_CASE("static search: no model comes of a record with a sample that is none or beyond twice the peak") {
+    const Bench bench(two_mass());
+    const auto best = [&]<class A>(A, double bad, double peak) {
+        const Tables<A> tables;
+        StaticSetup<A> setup = tables.setup(bench, 9);
+        const double largest = setup.peak;
+        setup.peak *= peak;
+        const auto search = std::make_unique<StaticSearch<A, 50, 250>>(setup);
+        for (std::size_t i = 0; i < 250; ++i) {
+            CHECK(!search->spoiled() || i > 100);
+            search->feed(bench.measured.input[i], i == 100 ? bad * largest : bench.measured.output[i]);
+        }
+        search->generation();
+        const bool none = !(search->best_fitness() < A::worst());
+        CHECK(none == search->spoiled());
+        return !none;
+    };
+    const double nan = std::numeric_limits<double>::quiet_NaN(), endless = std::numeric_limits<double>::infinity();
+    CHECK(best(Plain<float>(), 1.9, 1.0) && best(FixedPoint<2>(), 1.9, 1.0));
+    for (const double bad : {nan, endless, -endless, 2.1, -2.1, 1e300})
+        CHECK(!best(Plain<float>(), bad, 1.0) && !best(FixedPoint<2>(), bad, 1.0));
+    // Floats need no peak, and fixed point refuses to go without one.
+    CHECK(best(Plain<float>(), 2.1, 0.0) && !best(Plain<float>(), nan, 0.0) && !best(Plain<double>(), endless, 0.0));
+    CHECK_THROWS(best(FixedPoint<2>(), 1.0, 0.0), std::invalid_argument);
+}
+
 TEST_CASE("mirror: two records, and records that begin in motion, cost what double says; overflows are counted") {
     Bench bench(two_mass());
     bench.experiment.records.push_back(bench.experiment.records[0]);
@@ -140,22 +168,51 @@ TEST_CASE("mirror: two records, and records that begin in motion, cost what doub
     std::vector<double> exact(all.size()), found(all.size());
     Batch(bench.experiment, all.size(), false).errors(all, decoder, exact);
     for (std::size_t i = 0; i < all.size(); ++i) exact[i] = fitness(exact[i], decoder.structure(all[i]), {});
-    // One row of tolerances per arithmetic, relative; docs/dsp.md has more figures.
+    double peak = 0.0;
+    for (const auto* signal : {&bench.measured.input, &bench.measured.output})
+        for (const double v : *signal) peak = std::max(peak, std::abs(v));
+    const Tables<Plain<Doubtful>> tables;
+    const GeneValues<Doubtful> values = tables.setup(bench, 0).values;
+    const auto in_fixed_point = [&](int headroom) {
+        return [&, headroom](std::size_t i) {
+            const auto doubtful = decode<Plain<Doubtful>>(all[i], genome, values);
+            const auto factors = decode(all[i], genome);
+            double bound = 4.0 * exact[i] / 2147483648.0;
+            for (const Record& r : bench.experiment.records)
+                bound += error_sum_bound(headroom, factors, doubtful, r, bench.experiment.loop, genome.ranges(), peak);
+            return bound / exact[i];
+        };
+    };
+    // What a candidate's fitness may be off, relative to double's. Fixed point's: derived. The floats': measured, the worst of these 200 is
+    // 6.6e-6 and 1.5e-5, of 4000 others 1.1e-5 and 2.5e-5 (docs/dsp.md has more figures).
+    const auto within = [](double tolerance) { return [tolerance](std::size_t) { return tolerance; }; };
     const struct {
         const char* name;
-        double tolerance;
-    } rows[] = {{"drive_double", 1e-12}, {"drive_float", 2e-5}, {"c30", 2e-5}, {"fixed", 1e-2}, {"fixed_tight", 1e-3}, {"fixed_wide", 5e-2}};
+        std::function<double(std::size_t)> bound;
+    } rows[] = {{"drive_double", within(1e-12)}, {"drive_float", within(2e-5)},      {"c30", within(2e-5)},
+                {"fixed", in_fixed_point(2)},    {"fixed_tight", in_fixed_point(0)}, {"fixed_wide", in_fixed_point(6)}};
     for (const auto& row : rows) {
         const auto mirror = make_mirror(row.name, bench.experiment, genome, {});
         mirror->evaluate(all, found);
         std::size_t worst = 0;
-        double deviation = 0.0;
+        double deviation = 0.0, share = 0.0;
+        std::vector<double> bounds;
         for (std::size_t i = 0; i < all.size(); ++i) {
-            if (!(found[i] < worst_fitness)) ++worst;
-            else deviation = std::max(deviation, std::abs(found[i] / exact[i] - 1.0));
+            if (!(found[i] < worst_fitness)) {
+                ++worst;
+                continue;
+            }
+            const double off = std::abs(found[i] / exact[i] - 1.0), bound = row.bound(i);
+            CHECK(off <= bound);
+            deviation = std::max(deviation, off);
+            share = std::max(share, off / bound);
+            bounds.push_back(bound);
         }
-        std::printf("%-12s deviation of the fitness %.2g, overflows %zu of %zu\n", row.name, deviation, worst, all.size());
-        CHECK(deviation < row.tolerance);
+        std::nth_element(bounds.begin(), bounds.begin() + bounds.size() / 2, bounds.end());
+        const double median = bounds[bounds.size() / 2];
+        std::printf("%-12s deviation of the fitness %.2g, %.2g of its bound; bound in the median %.2g; overflows %zu of %zu\n",
+                    row.name, deviation, share, median, worst, all.size());
+        CHECK(median < 1e-3);  // a bound that says something
         CHECK(mirror->overflows() == worst && worst < all.size() / 2);
     }
     CHECK(mirror_names().size() == std::size(rows));

@@ -39,6 +39,16 @@ def data_dir() -> Path:
     return folder
 
 
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder to work in, with the log of a two-mass drive: step.csv."""
+    from cli_cases import write_step
+
+    monkeypatch.chdir(tmp_path)
+    write_step("step.csv")
+    return tmp_path
+
+
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     """Let no test of another worker run beside one that is marked `alone`."""

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import gaident as ga
+from cli_cases import interrupted, refusal
 from clock import fastest
 from drive_cases import random_case
 from gaident.cli import main
 from gaident.cli_output import csv_text
-from test_cli import LONG, refusal
 from test_diagnosis_result import CONTROLLER, drive_record
 
 LOOP = ("--kp", str(CONTROLLER.kp), "--ki", str(CONTROLLER.ki))
@@ -111,20 +107,5 @@ def test_a_folder_that_is_not_there_is_a_failure_before_the_work(here: Path, cap
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_ctrl_c_ends_it_with_one_line(here: Path) -> None:
     arguments = ["diagnose", "run0.csv", *LOOP, "--bootstrap", "100000", "--out", "dia.json"]
-
-    def seconds() -> float:
-        with subprocess.Popen(
-            [sys.executable, "-c", LONG, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        ) as process:
-            assert process.stdout is not None and process.stderr is not None
-            assert process.stdout.readline() == "ready\n"
-            time.sleep(1.0)
-            began = time.perf_counter()
-            process.send_signal(signal.SIGINT)
-            assert process.wait(30) == 130
-            ended = time.perf_counter()
-            assert process.stderr.read() == "gaident: interrupted\n"
-        return ended - began
-
-    assert fastest(seconds, below=0.5) < 0.5
+    assert fastest(lambda: interrupted(arguments, after=1.0), below=0.5) < 0.5
     assert not Path("dia.json").exists()

@@ -16,6 +16,7 @@ from independent import (
     random_case,
     random_signal,
 )
+from test_simulate import core
 
 LOOPS = ("continuous", "sampled", "open")
 STRUCTURES = [(p, q) for p in range(4) for q in range(4) if p + q > 0]
@@ -78,19 +79,7 @@ def test_the_recurrence_is_the_simulation(loop: str, family: str) -> None:
     """
     for case in cases(loop, family):
         signal = random_signal(np.random.default_rng(case.order), 30)
-        velocity, _ = _core.simulate(
-            case.gain,
-            case.poles,
-            case.zeros,
-            case.dt,
-            signal,
-            case.loop,
-            case.kp,
-            case.ki,
-            np.inf,
-            np.inf,
-            np.zeros(0),
-        )
+        velocity, _ = core(case, signal)
         tolerance = 1e-11 if family == "fast" else 1e-8
         assert deviation(recurrence(*discrete(case), signal), velocity) < tolerance, case
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import _thread
 import copy
 import json
 import pickle
+import signal
+import threading
+import time
 from typing import Any
 
 import numpy as np
 import pytest
 
 import gaident as ga
+from clock import fastest
 from fine_integrator import Array, FineCase, integrate
 from gaident import _core
 from gaident.cli import main
@@ -201,6 +206,22 @@ def test_many_equal_one_by_one(loop: str) -> None:
         assert np.array_equal(row, ga.simulate(model, rec, ctl), equal_nan=True)
     assert np.array_equal(many, ga.simulate_many(models, rec, ctl, workers=2), equal_nan=True)
     assert ga.simulate_many([], rec, ctl).shape == (0, len(rec))
+
+
+@pytest.mark.alone
+def test_ctrl_c_ends_many_simulations() -> None:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    rec, model = record(1e-3, "open", n=5000), ONE.model().with_effect("coulomb_friction", torque=0.02)
+
+    def seconds() -> float:
+        began = time.perf_counter()
+        threading.Timer(0.1, _thread.interrupt_main).start()
+        with pytest.raises(KeyboardInterrupt):
+            ga.simulate_many([model] * 2000, rec, substeps=64)  # more than a second, if they were let
+        return time.perf_counter() - began
+
+    assert fastest(seconds, below=0.4) < 0.4
+    assert ga.simulate_many([model], rec).shape == (1, 5000)
 
 
 @pytest.mark.parametrize("loop", ["open", "sampled", "continuous"])

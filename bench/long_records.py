@@ -1,0 +1,85 @@
+"""How time and memory of identify() grow with the record's length.
+
+    python bench/long_records.py [--samples N ...]        # GAIDENT_DATA=... for the six runs of a measured servo motor
+
+Each row in a process of its own: the least of several runs (others on the machine can only add), and the peak of resident memory
+during the first identify() above what stood before it (Linux). Every row asserts its structure.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+import gaident as ga
+
+DT = 0.444e-3
+CONTROLLER = ga.PI(0.116, 6.8)
+DRIVE = ga.TwoMass(JM=1.02e-4, DM=0.003, JL=5.815e-4, DL=0.008, KG=2.59).model()
+MOTOR = "the motor's six runs"
+
+
+def record(samples: int) -> ga.Record:
+    """A staircase of 500 samples a stair, white noise of 0.1 rad/s."""
+    rng = np.random.default_rng(0)
+    command = np.repeat(rng.uniform(-40.0, 40.0, samples // 500), 500)
+    w = ga.simulate(DRIVE, ga.Record(dt=DT, command=command, velocity=np.zeros(samples)), CONTROLLER)
+    return ga.Record(dt=DT, command=command, velocity=w + 0.1 * rng.standard_normal(samples))
+
+
+def motor_runs() -> list[ga.Record]:
+    logs = sorted((Path(os.environ["GAIDENT_DATA"]) / "hsm150").glob("*.mat"))
+    return [ga.read(log, columns={"velocity": "data[:,3]", "torque": "data[:,4]", "time": "data[:,0]"}) for log in logs]
+
+
+def mebibytes(field: str) -> float:
+    """A field of /proc/self/status; NaN elsewhere than on Linux."""
+    status = Path("/proc/self/status")
+    if not status.exists():
+        return float("nan")
+    return next(float(line.split()[1]) for line in status.read_text().splitlines() if line.startswith(field)) / 1024.0
+
+
+def measure(what: str) -> str:
+    records = motor_runs() if what == MOTOR else [record(int(what))]
+    controller = None if what == MOTOR else CONTROLLER
+    ga.identify([rec[:2000] for rec in records], controller, workers=1)
+    reset = Path("/proc/self/clear_refs")
+    if reset.exists():
+        reset.write_text("5")
+    before, peak = mebibytes("VmRSS"), 0.0
+    processor, wall = [], []
+    for _ in range(2 if sum(map(len, records)) > 5_000_000 else 5):
+        began = time.perf_counter(), time.process_time()
+        idn = ga.identify(records, controller, workers=1)
+        wall.append(time.perf_counter() - began[0])
+        processor.append(time.process_time() - began[1])
+        peak = peak or mebibytes("VmHWM") - before
+        assert idn.falsified if what == MOTOR else (idn.p, idn.q) == (1, 2), "wrong answer"
+    samples = f"{sum(map(len, records)):_}".replace("_", " ")
+    return f"| {samples}{', ' + what if what == MOTOR else ''} | {min(processor):.2g} s | {min(wall):.2g} s | {peak:.0f} MiB |"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "--samples", type=int, nargs="+", default=[25_000, 100_000, 1_000_000, 10_000_000], help="multiples of 500"
+    )
+    parser.add_argument("--row", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.row:
+        print(measure(options.row))
+        return
+    print("| samples | processor time | wall time | memory beyond the data |\n|---|---|---|---|", flush=True)
+    for row in [*map(str, options.samples), *([MOTOR] if "GAIDENT_DATA" in os.environ else [])]:
+        subprocess.run([sys.executable, __file__, "--row", row], check=True)
+
+
+if __name__ == "__main__":
+    main()
