@@ -85,7 +85,8 @@ def controller_findings(driven: Driven, scales: Scales) -> tuple[list[Finding], 
     off = [r for r in replays if not r.follows]
     if not off:
         return [], AtController(AT_CONTROLLER), []
-    notes = list(dict.fromkeys(r.sentence for r in off))
+    said = [(rec.name or f"a record of {len(rec)} samples", r) for rec, r in zip(driven.read, replays, strict=True)]
+    notes = list(dict.fromkeys(f"{name}: {r.sentence}" if len(said) > 1 else r.sentence for name, r in said if not r.follows))
     plain = driven.replayed_error({})
     floor = len(plain) * max(max(r.resolution for r in replays), 1e-9 * scales.torque) ** 2
     shown = _limits_shown(off, controller)
