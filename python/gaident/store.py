@@ -43,7 +43,6 @@ def load(path: str | os.PathLike[str]) -> Saved:
         raise GaidentError(f"{path}: cannot be read ({error.strerror}); give a file that save() wrote") from error
     except TypeError as error:
         raise GaidentError(f"path={path!r} is no path; give the file's name as str or pathlib.Path") from error
-        raise GaidentError(f"{path}: cannot be read ({error}); give a file that save() wrote") from error
     try:
         data = json.loads(text)
     except json.JSONDecodeError as error:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from gaident.diagnosis.noise_filter import autoregression
+from gaident.diagnosis.noise_filter import WHITE, NoiseFilter, autoregression
+from gaident.diagnosis.problem import Problem, _damped_steps
 from gaident.diagnosis.state_space import steady_covariance, steady_covariances
 from gaident.errors import ModelError
 from gaident.identification.noise import autocorrelation
@@ -75,3 +78,26 @@ def test_covariances_side_by_side_are_those_of_each() -> None:
 def test_a_clamped_sum() -> None:
     np.testing.assert_array_equal(clamped_sum(np.array([1.0, 1.0, 1.0, -1.0, -5.0, 0.5]), 2.0), [1.0, 2.0, 2.0, 1.0, -2.0, -1.5])
     np.testing.assert_array_equal(clamped_sum(np.array([1.0, -1.0]), 2.0, 1.5), [2.0, 1.0])
+
+
+def test_rows_that_overflow_are_whitened_without_a_warning_and_the_callers_rows_stay() -> None:
+    weight = np.ones(100)
+    weight[40:50] = 0.0
+    for w in (np.ones(100), weight):
+        problem = Problem(lambda _, X: X, np.zeros(100), (100,), w)
+        E = RNG.standard_normal((2, 100))
+        E[0, 5] = np.inf
+        before = E.copy()
+        for noise in (WHITE, NoiseFilter(np.array([1.0, -0.5]), np.ones(1), 1)):
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                V = problem.whitened(E, noise)
+            assert not np.isfinite(V[0]).all() and np.isfinite(V[1]).all()
+            np.testing.assert_array_equal(V[1, problem.counted == 0.0], 0.0)
+            np.testing.assert_array_equal(E, before)
+
+
+def test_a_damped_step_that_has_no_solution_is_none() -> None:
+    steps = _damped_steps(np.ones((2, 2)), np.array([1.0, 2.0]), np.array([[0.0, 0.0], [1.0, 1.0]]))
+    np.testing.assert_array_equal(steps[0], 0.0)
+    np.testing.assert_allclose((np.ones((2, 2)) + np.eye(2)) @ steps[1], [1.0, 2.0])

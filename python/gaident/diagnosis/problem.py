@@ -92,7 +92,8 @@ class Problem:
     def whitened(self, E: Matrix, noise: NoiseFilter) -> Matrix:
         """Rows of whitened errors; samples that do not count are 0."""
         V = noise.of(self._bridged(E), self.lengths)
-        return np.multiply(V, self.counted, out=None if V is E else V)
+        with np.errstate(invalid="ignore"):
+            return np.multiply(V, self.counted, out=None if V is E else V)
 
     @cached_property
     def counted(self) -> Vector:
@@ -273,7 +274,14 @@ def _damped_steps(A: Matrix, g: Vector, damping: Matrix) -> Matrix:
     try:
         return np.asarray(np.linalg.solve(M, np.repeat(g[None, :, None], len(M), axis=0))[:, :, 0])
     except np.linalg.LinAlgError:
-        return np.array([np.linalg.solve(m, g) if np.linalg.cond(m) < np.inf else np.zeros_like(g) for m in M])
+        return np.array([_solved(m, g) for m in M])
+
+
+def _solved(M: Matrix, g: Vector) -> Vector:
+    try:
+        return np.asarray(np.linalg.solve(M, g))
+    except np.linalg.LinAlgError:
+        return np.zeros_like(g)
 
 
 def _sums(V: Matrix) -> Vector:
