@@ -33,8 +33,8 @@ filter is uncertain itself. A filter that fits the noise less than perfectly bri
 lets no disturbance through at rest, and under a coarse encoder."""
 
 BESIDE_GAP = 8.0
-"""Times the threshold, what an effect beside a gap has to bring: impacts a little earlier or later bring up to 150 BIC units, on held-out
-data, too, where torques that nobody commanded keep the shaft in motion."""
+"""Times the threshold, what an effect beside a gap has to bring: impacts a little earlier or later bring up to 150 BIC units,
+on held-out data, too, where torques that nobody commanded keep the shaft in motion."""
 
 MARGIN, MARGIN_SHORT = 10.0, 400.0
 """Rivals closer than this many BIC units cannot be told apart in a long record; samples of a record that needs twice that."""
