@@ -176,10 +176,13 @@ def _completed(search: Search, final: Fit, note: Callable[[str], None]) -> Fit:
     while len(final.effects) < MOST:
         note(f"looking beyond {', '.join(e.replace('_', ' ') for e in final.effects) or 'the linear model'}, at all samples")
         found = search.best_extension(final)
-        if found is None or final.bic - found.bic < search.threshold or not search.material(final, found):
+        if found is None:
+            break
+        needed = search.needed(found, found.effects[-1])
+        if final.bic - found.bic < needed or not search.material(final, found):
             break
         final = search.thinned(with_second_mass(search.problem, found))
-    return final
+    return search.leanest(final)
 
 
 def _compared(
@@ -214,7 +217,9 @@ def _rivals(
             continue
         contained = effect in CANDIDATES[rivals[0].effect].parents
         here = twins(effect)
-        needed = search.threshold if contained else search.margin if rivals[0].effect in here else SWAP
+        needed = (
+            search.needed(rivals[0].fit, rivals[0].effect) if contained else search.margin if rivals[0].effect in here else SWAP
+        )
         better = rivals[0] if rivals[0].behind < -needed else None
         if better is None and effect not in FRICTION and "coulomb_friction" in here:
             better = next((r for r in rivals if r.effect == "coulomb_friction" and r.behind < search.margin), None)

@@ -32,9 +32,9 @@ THRESHOLD, SHORT = 25.0, 200.0
 filter is uncertain itself. A filter that fits the noise less than perfectly brings gains up to 25, too: beside friction, which
 lets no disturbance through at rest, and under a coarse encoder."""
 
-BESIDE_GAP = 8.0
-"""Times the threshold, what an effect beside a gap has to bring: impacts a little earlier or later bring up to 150 BIC units,
-on held-out data, too, where torques that nobody commanded keep the shaft in motion."""
+BESIDE_GAP = 0.05
+"""BIC units per sample that an effect beside a gap has to bring: impacts a little earlier or later bring up to 0.04, on held-out
+data, too, where torques that nobody commanded keep the shaft in motion."""
 
 MARGIN, MARGIN_SHORT = 10.0, 400.0
 """Rivals closer than this many BIC units cannot be told apart in a long record; samples of a record that needs twice that."""
@@ -110,7 +110,7 @@ class Search:
             simpler = [self.without(best, effect), *(self.as_parent(best, effect, p) for p in CANDIDATES[effect].parents)]
             for fit in simpler:
                 found = searched(fit)
-                if found.bic - best.bic < BESIDE_GAP * self.threshold or not self.explains(found, best):
+                if found.bic - best.bic < self.needed(best, effect) or not self.explains(found, best):
                     best = found
                     break
         return best
@@ -140,8 +140,7 @@ class Search:
                 continue
             if found is not None and found.layout.looped:
                 best = self.fitter.in_loop(best)
-            enough = self.threshold * (BESIDE_GAP if "backlash" in best.effects else 1.0)
-            if found is None or best.bic - found.bic < enough or not self.material(best, found):
+            if found is None or best.bic - found.bic < self.needed(found, found.effects[-1]) or not self.material(best, found):
                 break
             if set(best.effects) & set(FRICTION) and (inside := self.fitter.in_loop(best)) is not best:
                 # Driven by the torque, what nobody commanded adds up between the stops, for other effects to describe; the loop
@@ -153,6 +152,11 @@ class Search:
             if set(best.effects) & set(FRICTION) and not self.fitter.only_noise(best):
                 best = self.fitter.in_loop(best)
         return best
+
+    def needed(self, fit: Fit, effect: str) -> float:
+        """BIC units that an effect of this model has to bring."""
+        beside_gap = effect != "backlash" and "backlash" in fit.effects
+        return max(self.threshold, BESIDE_GAP * self.problem.count) if beside_gap else self.threshold
 
     def material(self, best: Fit, found: Fit) -> bool:
         """Whether an extension explains a fair part of what the model leaves beyond the noise, or all of it.
@@ -306,13 +310,13 @@ class Search:
             for f in fits:
                 if f.effects[-1] != parent:
                     continue
-                if min(f.bic, self.as_neutral(f, best)) - best.bic < self.threshold:
+                if min(f.bic, self.as_neutral(f, best)) - best.bic < self.needed(best, newest):
                     return f
                 # What led the generalisation to a better place may lead the simpler one there, too.
                 x = best.layout.removed(best.x, newest)
                 again = f.layout.inserted(x, f.x[f.layout.slot(parent)])
                 again_fit = self.problem.settled(self.problem.fit(f.layout, again, best.noise, 12))
-                if again_fit.bic - best.bic < self.threshold:
+                if again_fit.bic - best.bic < self.needed(best, newest):
                     return again_fit
                 if not self.in_both_views(min(f, again_fit, key=lambda g: g.bic), best):
                     return again_fit
@@ -349,7 +353,7 @@ class Search:
         """Without the members (of all, or of all but the newest) whose removal costs less than the threshold."""
         for effect in best.effects if every else best.effects[:-1]:
             less = self.without(best, effect)
-            if less.bic - best.bic < self.threshold:
+            if less.bic - best.bic < self.needed(best, effect):
                 best = less
         return best
 
