@@ -94,7 +94,9 @@ def test_gains_that_the_log_shows_take_the_place_of_the_given_ones() -> None:
     wrong = ga.PI(kp=1.3 * CONTROLLER.kp, ki=CONTROLLER.ki)
     found = ga.diagnose(drive_record(), wrong, validation=drive_record(1))
     assert found.controller is not None and found.controller.kp == pytest.approx(CONTROLLER.kp, rel=1e-4)
-    assert any("All simulations use these (kp = 0.05 N m s/rad, ki = 1.5 N m/rad)" in note for note in found.notes)
+    assert any(
+        "All simulations use these (kp = 0.05 N m s/rad, ki = 1.5 N m/rad, trapezoidal integral)" in note for note in found.notes
+    )
     assert [f.effect for f in found.causes] == ["coulomb_friction"]
     assert found.after.rmse < 1.1 * found.after.noise_floor < found.before.rmse
 

@@ -116,6 +116,35 @@ def test_a_torque_that_does_not_follow_says_why(rec: ga.Record, cause: str, valu
     np.testing.assert_array_equal(found.torque, rec.torque)
 
 
+def test_a_rectangular_integral_is_a_trapezoidal_one_with_another_gain() -> None:
+    rec = drive(rectangular=True)
+    same = replay(rec, CONTROLLER).controller
+    assert same is not None and same.kp == pytest.approx(CONTROLLER.kp + 0.5 * CONTROLLER.ki * DT, rel=1e-9)
+    assert replay(rec, same).follows
+
+
+def test_the_decimals_of_a_text_log_are_no_other_controller() -> None:
+    """A command that is off by the same for long adds up in the integrator: 0.01 rpm here, and the torque to six decimals."""
+    rpm = 30.0 / np.pi
+    good = drive(rectangular=True)
+    rounded = changed(good, torque=np.round(good.torque, 6))
+    rounded = ga.Record(DT, np.round(good.command * rpm + 0.0013, 2) / rpm, good.velocity, torque=rounded.torque)
+    same = replace(CONTROLLER, kp=CONTROLLER.kp + 0.5 * CONTROLLER.ki * DT)
+    found = replay(rounded, same)
+    assert found.follows and found.maximum > 1e-5 and "rounding of the log" in found.sentence
+    for given, cause in ((CONTROLLER, "integration_rule"), (replace(CONTROLLER, kp=0.012), "gains")):
+        found = replay(rounded, given)
+        assert found.follows is False and found.cause == cause, found.sentence
+        assert found.controller is not None and found.controller.kp == pytest.approx(same.kp, rel=1e-3)
+
+
+def test_speeds_in_rpm_show_as_a_factor() -> None:
+    rpm = 30.0 / np.pi
+    rec = ga.Record(DT, drive().command * rpm, drive().velocity * rpm, torque=drive().torque)
+    found = replay(rec, CONTROLLER)
+    assert found.cause == "scale" and "speeds in rpm" in found.sentence
+
+
 def test_departure_gains_start_and_rubbish() -> None:
     clamped = drive(clamp=0.1)
     integral = clamped.torque - 0.02 * (clamped.command - clamped.velocity)

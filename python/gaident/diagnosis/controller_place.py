@@ -47,21 +47,27 @@ class AtController:
 
 
 def as_logged(records: Sequence[Record], controller: PI | None) -> tuple[PI | None, list[str]]:
-    """(the controller with the gains that all logged torques show where they do not follow from the given ones, notes)."""
+    """(the controller with the gains that all logged torques show where they do not follow from the given ones, notes).
+
+    A rectangular integral is a trapezoidal one with kp + ki dt/2, or kp - ki dt/2 where it lacks the newest error.
+    """
     if controller is None or any(r.torque is None or r.command is None for r in records):
         return controller, []
     off = [r for r in (replay(r, controller) for r in records) if r.follows is False]
-    found = [r.controller for r in off if r.controller is not None and r.cause in ("gains", "scale")]
+    found = [r.controller for r in off if r.controller is not None and r.cause in ("gains", "scale", "integration_rule")]
     if not found or len(found) < len(records):
         return controller, []
     gains = np.array([[c.kp, c.ki] for c in found])
     if np.any(np.ptp(gains, axis=0) > SAME_GAINS * gains.max(axis=0)):
         return controller, []
     kp, ki = (float(g) for g in gains.mean(axis=0))
-    used = (
-        f"All simulations use these (kp = {kp:.4g} N m s/rad, ki = {ki:.4g} N m/rad) instead of the given ones "
-        f"({controller.kp:.4g} and {controller.ki:.4g})."
-    )
+    if all(r.cause == "integration_rule" for r in off):
+        used = f"All simulations use kp = {kp:.4g} N m s/rad, with which a trapezoidal integral makes the same torque."
+    else:
+        used = (
+            f"All simulations use these (kp = {kp:.4g} N m s/rad, ki = {ki:.4g} N m/rad, trapezoidal integral) instead of the "
+            f"given ones ({controller.kp:.4g} and {controller.ki:.4g})."
+        )
     return replace(controller, kp=kp, ki=ki), [off[0].sentence, used]
 
 

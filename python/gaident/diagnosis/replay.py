@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.diagnosis.lattice import lattice_step
-from gaident.diagnosis.replay_causes import explain, white_noise
+from gaident.diagnosis.replay_causes import explain, rounded_command, white_noise
 from gaident.errors import RecordError
 from gaident.models.controller import PI
 from gaident.models.pi_torque import pi_torque
@@ -92,6 +92,8 @@ def _compared(rec: Record, command: Vector, controller: PI, logged: Vector, repl
     if maximum <= tolerance:
         to = f"to {maximum:.1g} N m" + (f" (its resolution is {resolution:.2g} N m)" if resolution > 0.0 else "")
         return Replay(*figures, True, "", np.nan, None, f"{head}, {to}.")
+    if rounded_command(off, command, rec.dt, controller):
+        return Replay(*figures, True, "", np.nan, None, f"{head}, to {maximum:.1g} N m, which is the rounding of the log.")
     if noise := white_noise(off, logged):
         text = f"{head} up to white noise of {noise:.2g} N m rms: it is a measured torque, or a coarsely rounded one."
         return Replay(*figures, True, "", np.nan, None, text)

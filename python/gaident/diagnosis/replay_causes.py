@@ -14,7 +14,7 @@ from gaident.models.controller import PI
 from gaident.models.filtering import rate_limited
 from gaident.models.pi_torque import HOLDS, held_torque, pi_torque
 
-__all__ = ["Explanation", "explain", "white_noise"]
+__all__ = ["Explanation", "explain", "rounded_command", "white_noise"]
 
 Vector = NDArray[np.float64]
 
@@ -22,6 +22,8 @@ SHIFTS = (0, 1, -1, 2, -2)  # samples by which what the controller saw may be ol
 RULES = ("trapezoidal", "rectangular", "rectangular, old error")
 PLATEAU = 5  # samples at a limit from which it is one that an integrator is held at
 SAME = 2e-3  # relative difference below which a fitted gain is the configured one
+RPM = 30.0 / np.pi  # rpm in 1 rad/s
+ROUNDED = 5e-5  # part of the largest command, that a command may be off in a log of few decimals
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +66,29 @@ def explain(command: Vector, velocity: Vector, dt: float, controller: PI, logged
     for reason in (_start, _limits, _held, _rate, _linear):
         for found in reason(case):
             off = found.off(logged)
-            if float(np.abs(off).max()) <= tolerance:
+            if float(np.abs(off).max()) <= tolerance or rounded_command(off, command, dt, found.controller or controller):
                 return found
             rms = float(np.sqrt(np.mean(off**2)))
             if rms < 0.99 * least:  # a later, more complicated reason must be better
                 best, least = found, rms
     return best if best is not None and white_noise(best.off(logged), logged) else None
+
+
+def rounded_command(off: Vector, command: Vector, dt: float, controller: PI) -> bool:
+    """Whether what is off [N m] is what the controller makes of a command that is off by no more than a log's decimals.
+
+    A command that is held is off by the same for as long, which adds up in the integrator. The error d(n) of the command that
+    makes off(n), h = ki dt/2:
+
+        off(n) - off(n-1) = (kp + h) d(n) - (kp - h) d(n-1)
+    """
+    from scipy.signal import lfilter
+
+    h = 0.5 * controller.ki * dt
+    if controller.kp <= h or controller.limited:
+        return False
+    d = lfilter([1.0, -1.0], [controller.kp + h, h - controller.kp], off)
+    return float(np.abs(d).max()) <= ROUNDED * float(np.abs(command).max())
 
 
 def white_noise(off: Vector, logged: Vector) -> float:
@@ -190,10 +209,10 @@ def _fitted(case: _Case) -> Iterator[Explanation]:
             torque = np.clip(table @ solved, -top, top)
             kp, start = float(solved[0]), float(solved[-1])
             ki = float(solved[1]) if case.controller.ki else 0.0
-            yield _named(case.controller, kp, ki, start, shift, rule, torque)
+            yield _named(case.controller, kp, ki, case.dt, start, shift, rule, torque)
 
 
-def _named(controller: PI, kp: float, ki: float, start: float, shift: int, rule: str, torque: Vector) -> Explanation:
+def _named(controller: PI, kp: float, ki: float, dt: float, start: float, shift: int, rule: str, torque: Vector) -> Explanation:
     """Says what of a fitted controller differs from the configured one."""
     differs, cause, value = [], "", np.nan
     if shift:
@@ -208,7 +227,7 @@ def _named(controller: PI, kp: float, ki: float, start: float, shift: int, rule:
     if any(abs(f - 1.0) > SAME for f in factors) or fitted_kp:
         if max(factors) - min(factors) <= SAME * abs(factors[0]) and not fitted_kp:
             turned = " (a reversed sign)" if factors[0] < 0.0 else ""
-            differs.append(f"its torque multiplied by {factors[0]:.5g}{turned}: check the unit of the torque or of the gains")
+            differs.append(f"its torque multiplied by {factors[0]:.5g}{turned}: {_check_unit(factors[0])}")
             cause, value = "scale", factors[0]
         else:
             differs.append(f"kp = {kp:.4g} N m s/rad and ki = {ki:.4g} N m/rad")
@@ -218,9 +237,16 @@ def _named(controller: PI, kp: float, ki: float, start: float, shift: int, rule:
         if not cause:
             cause, value = "initial_integral", start
     sentence = f"It does with {', and '.join(differs) or 'these gains'}."
-    known = cause in ("gains", "scale") and rule == RULES[0] and kp >= 0.0 and ki >= 0.0 and kp + ki > 0.0
-    found = replace(controller, kp=kp, ki=ki) if known else None
+    same_kp = kp + {RULES[0]: 0.0, RULES[1]: 0.5, RULES[2]: -0.5}[rule] * ki * dt  # of a trapezoidal integral
+    known = cause in ("gains", "scale", "integration_rule") and same_kp >= 0.0 and ki >= 0.0 and same_kp + ki > 0.0
+    found = replace(controller, kp=same_kp, ki=ki) if known else None
     return Explanation(torque, cause or "gains", value, sentence, abs(shift), len(differs) + 2 * (cause == "gains"), found)
+
+
+def _check_unit(factor: float) -> str:
+    if abs(factor * RPM - 1.0) <= SAME:
+        return "speeds in rpm seem to be taken for rad/s; check their unit"
+    return "check the units of the torque, of the speeds and of the gains"
 
 
 def _sum(e: Vector, rule: str) -> Vector:
