@@ -120,6 +120,8 @@ void judge(guard::Counts& counts, const std::string& name, double count) {
 void rows(guard::Counts& counts, const std::string& only) {
     for (const char* set : {"baseline", "avx2", "avx512"}) {
         const Kernels* kernels = kernels_named(set);
+        if (kernels == nullptr && store)
+            throw std::runtime_error(std::string("to store, a processor with ") + set + " is needed");
         if (kernels == nullptr || (!only.empty() && only != set)) continue;
         for (const bool in_float : {false, true}) {
             const std::string name = std::string(set) + (in_float ? " float " : " double ");

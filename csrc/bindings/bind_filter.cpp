@@ -2,19 +2,22 @@
 #include "../gaident/replay.hpp"
 #include "bindings.hpp"
 
-#include <numeric>
-
 using namespace gaident;
 
 namespace {
+
+std::string wrong_lengths(std::size_t n) {
+    return "lengths: they must add up to the " + std::to_string(n) + " columns of the rows";
+}
 
 // Rows of `values`, each cut into records of these lengths, filtered by b/a.
 RealArray filtered_rows(const RealArray& b, const RealArray& a, const RealArray& values,
                         const std::vector<std::size_t>& lengths) {
     if (values.ndim() != 2) throw std::invalid_argument("rows: a matrix is needed");
     const auto rows = static_cast<std::size_t>(values.shape(0)), n = static_cast<std::size_t>(values.shape(1));
-    if (std::accumulate(lengths.begin(), lengths.end(), std::size_t{0}) != n)
-        throw std::invalid_argument("lengths: they must add up to the " + std::to_string(n) + " columns of the rows");
+    std::size_t at = 0;
+    for (const std::size_t length : lengths) at = length <= n - at ? at + length : throw std::invalid_argument(wrong_lengths(n));
+    if (at != n) throw std::invalid_argument(wrong_lengths(n));
     if (b.size() < 1 || a.size() < 1 || a.size() > max_recursion + 1 || a.data()[0] != 1.0)
         throw std::invalid_argument("b, a: at least one number each, a[0] = 1 and at most " + std::to_string(max_recursion) +
                                     " more");

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from gaident.diagnosis.noise_filter import WHITE, NoiseFilter, autoregression
+import gaident as ga
+from gaident.diagnosis.noise_filter import WHITE, NoiseFilter, ShaftNoise, autoregression
 from gaident.diagnosis.problem import Problem, _damped_steps
-from gaident.diagnosis.state_space import steady_covariance, steady_covariances
+from gaident.diagnosis.state_space import _inverses, steady_covariance, steady_covariances
 from gaident.errors import ModelError
 from gaident.identification.noise import autocorrelation
 from gaident.models.filtering import clamped_sum, filtered
@@ -34,6 +35,8 @@ def test_what_cannot_be_filtered_is_refused() -> None:
     E = np.ones((2, 10))
     with pytest.raises(ValueError, match="add up to the 10 columns"):
         filtered(np.ones(1), np.ones(1), E, (4, 5))
+    with pytest.raises(ValueError, match="add up to the 10 columns"):
+        filtered(np.ones(1), np.ones(1), E, (2**64 - 1, 11))
     with pytest.raises(ValueError, match=r"a\[0\] = 1"):
         filtered(np.ones(1), np.array([2.0, 1.0]), E, (10,))
     with pytest.raises(ValueError, match="at most 16 more"):
@@ -73,6 +76,15 @@ def test_covariances_side_by_side_are_those_of_each() -> None:
     assert not np.isfinite(alone[1]).any()
     with pytest.raises(ModelError, match="does not show in this model's velocity"):
         steady_covariance(unseen[0], H, np.eye(2, dtype=np.complex128))
+
+
+def test_a_singular_step_is_nan_beside_the_others() -> None:
+    M = np.stack([np.eye(2), np.zeros((2, 2)), 2.0 * np.eye(2)]).astype(np.complex128)
+    found = _inverses(M)
+    np.testing.assert_array_equal(found[[0, 2]], np.stack([np.eye(2), 0.5 * np.eye(2)]))
+    assert np.isnan(found[1]).all()
+    # An unstable pole under a zero: no filter of its shaft's noise, and no error.
+    assert None in ShaftNoise(ga.Model(1e3, [50.0, -10.0], [50.0]), 1e-3, None).filters([(0, 0), (4, 7)])
 
 
 def test_a_clamped_sum() -> None:

@@ -142,7 +142,7 @@ def steady_covariances(A: Complex, H: Complex, Q: Complex) -> Complex:
     out = np.full_like(A, np.nan)
     with np.errstate(all="ignore"):
         for _ in range(60):
-            before, inverse = a.conj().swapaxes(1, 2), np.linalg.inv(eye + g @ p)
+            before, inverse = a.conj().swapaxes(1, 2), _inverses(eye + g @ p)
             after = inverse @ a
             step = before @ p @ after
             g = g + a @ inverse @ g @ before
@@ -155,3 +155,17 @@ def steady_covariances(A: Complex, H: Complex, Q: Complex) -> Complex:
             if np.all(settled | ~np.isfinite(p).all(axis=(1, 2))):
                 break
     return out
+
+
+def _inverses(M: Complex) -> Complex:
+    """Of many matrices (k, m, m); nan where there is none."""
+    try:
+        return np.linalg.inv(M)
+    except np.linalg.LinAlgError:
+        out = np.full_like(M, np.nan)
+        for i, matrix in enumerate(M):
+            try:
+                out[i] = np.linalg.inv(matrix)
+            except np.linalg.LinAlgError:
+                continue
+        return out
