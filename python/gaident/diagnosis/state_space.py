@@ -160,7 +160,7 @@ def steady_covariances(A: Complex, H: Complex, Q: Complex) -> Complex:
 def _inverses(M: Complex) -> Complex:
     """Of many matrices (k, m, m); nan where there is none."""
     try:
-        return np.linalg.inv(M)
+        out: Complex = np.asarray(np.linalg.inv(M), dtype=np.complex128)
     except np.linalg.LinAlgError:
         out = np.full_like(M, np.nan)
         for i, matrix in enumerate(M):
@@ -168,4 +168,4 @@ def _inverses(M: Complex) -> Complex:
                 out[i] = np.linalg.inv(matrix)
             except np.linalg.LinAlgError:
                 continue
-        return out
+    return out
