@@ -46,6 +46,7 @@ MOST = 4  # effects in one model
 SHARE, BACKLASH_SHARE = 0.1, 0.5
 """Part of what a model leaves beyond the noise that an extension has to explain; the second beside a gap."""
 
+CLOSE = 4.0  # times the threshold, by which an extension that makes an older effect needless may be behind the best one
 FITTED = 6  # candidates that each of the two rankings sends into a short fit
 FINISHED = 5  # of these, how many are fitted to the end
 FAR = 0.5  # BIC units per sample by which a short fit may be behind the model that it extends, to be fitted to the end
@@ -148,10 +149,23 @@ class Search:
                 self.known.pop(self.key(best), None)
                 best = inside
                 continue
-            best = self.fitter.as_filter(self.fitter.polished(self.thinned(with_second_mass(self.problem, found))))
+            best = self.fitter.as_filter(self.fitter.polished(self.shortest(best, found)))
             if set(best.effects) & set(FRICTION) and not self.fitter.only_noise(best):
                 best = self.fitter.in_loop(best)
         return best
+
+    def shortest(self, best: Fit, found: Fit) -> Fit:
+        """The extension that was found, thinned, or a close one that makes an older effect needless and is then better.
+
+        A lag is a delay at first and a delay with a resonance next, as long as the delay stands in its seat.
+        """
+        taken = self.thinned(with_second_mass(self.problem, found))
+        for f in self.extensions(best):
+            if f is not found and f.bic - found.bic < CLOSE * self.threshold:
+                less = self.thinned(with_second_mass(self.problem, f))
+                if len(less.effects) < len(taken.effects) and less.bic < taken.bic:
+                    taken = less
+        return taken
 
     def needed(self, fit: Fit, effect: str) -> float:
         """BIC units that an effect of this model has to bring."""
