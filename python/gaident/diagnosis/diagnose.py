@@ -24,8 +24,8 @@ from gaident.diagnosis.mechanics import mechanics_of, moved
 from gaident.diagnosis.offset import offset_of
 from gaident.diagnosis.problem import Problem
 from gaident.diagnosis.result import Diagnosis, Finding
+from gaident.diagnosis.rivals import Rival
 from gaident.diagnosis.standing import only_describes, simplified
-from gaident.diagnosis.stepwise import Rival
 from gaident.diagnosis.uncertainty import estimates_of
 from gaident.diagnosis.wording import evidence_of
 from gaident.identification.covariance import Estimate

@@ -15,7 +15,8 @@ from gaident.diagnosis.driven import AT_CONTROLLER, Driven
 from gaident.diagnosis.layout import swings
 from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import Fit, Problem
-from gaident.diagnosis.stepwise import MOST, Rival, Search, with_second_mass
+from gaident.diagnosis.rivals import Rival, rivals_of
+from gaident.diagnosis.stepwise import MOST, Search, with_second_mass
 from gaident.models.model import Model
 from gaident.models.simulate import simulate
 
@@ -94,7 +95,7 @@ def extended(
             if key in search.known:
                 continue
             note(f"what else could be {effect.replace('_', ' ')}")
-            near = [r.fit for r in outline.rivals(on_grid, effect, twins(effect))[1]][:CLOSE]
+            near = [r.fit for r in rivals_of(outline, on_grid, effect, twins(effect))[1]][:CLOSE]
             if effect in FRICTION:  # what reversals look like in detail tells the family apart: all of it, at all samples
                 others = outline.extensions(outline.without(on_grid, effect))
                 near += [f for f in others if f.effects[-1] in FRICTION and f not in near]
@@ -211,7 +212,7 @@ def _rivals(
         known(final)
     for effect in final.effects:
         note(f"rivals of {effect.replace('_', ' ')}")
-        gain, rivals = search.rivals(final, effect, twins(effect))
+        gain, rivals = rivals_of(search, final, effect, twins(effect))
         found[effect] = (gain, rivals)
         if not rivals:
             continue

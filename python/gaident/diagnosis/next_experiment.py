@@ -27,7 +27,7 @@ from gaident.diagnosis.layout import Layout
 from gaident.diagnosis.noise_filter import NoiseFilter
 from gaident.diagnosis.problem import WORST, Fit, Problem, project_out
 from gaident.diagnosis.result import Finding
-from gaident.diagnosis.stepwise import Rival
+from gaident.diagnosis.rivals import Rival
 from gaident.errors import GaidentError
 from gaident.models.controller import PI
 from gaident.models.simulate import run

@@ -8,8 +8,8 @@ is still needed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import WORST, Fit, Problem
 from gaident.diagnosis.screening import Screening
 
-__all__ = ["HINT", "MARGIN", "THRESHOLD", "Rival", "Search", "with_second_mass"]
+__all__ = ["MARGIN", "THRESHOLD", "Search", "with_second_mass"]
 
 Vector = NDArray[np.float64]
 
@@ -39,9 +39,6 @@ data, too, where torques that nobody commanded keep the shaft in motion."""
 MARGIN, MARGIN_SHORT = 10.0, 400.0
 """Rivals closer than this many BIC units cannot be told apart in a long record; samples of a record that needs twice that."""
 
-HINT = 8.0
-"""Fall of N ln V from which a generalisation is no longer ruled out by the simpler effect it contains."""
-
 MOST = 4  # effects in one model
 SHARE, BACKLASH_SHARE = 0.1, 0.5
 """Part of what a model leaves beyond the noise that an extension has to explain; the second beside a gap."""
@@ -50,15 +47,6 @@ CLOSE = 4.0  # times the threshold, by which an extension that makes an older ef
 FITTED = 6  # candidates that each of the two rankings sends into a short fit
 FINISHED = 5  # of these, how many are fitted to the end
 FAR = 0.5  # BIC units per sample by which a short fit may be behind the model that it extends, to be fitted to the end
-
-
-@dataclass(frozen=True)
-class Rival:
-    """Another effect in the place of one: how much worse (BIC units) the whole model is with it."""
-
-    effect: str
-    behind: float
-    fit: Fit
 
 
 class Search:
@@ -375,30 +363,6 @@ class Search:
         """The model refitted without one of its effects."""
         layout = fit.layout.without(effect)
         return self.problem.settled(self.problem.fit(layout, fit.layout.removed(fit.x, effect), fit.noise, 8))
-
-    def rivals(self, final: Fit, effect: str, twins: Collection[str] = ()) -> tuple[float, list[Rival]]:
-        """(gain of `effect` in the final model, other effects in its place that come within reach, or are its twins here)."""
-        less = self.without(final, effect)
-        gain = (self.fitter.in_loop(less) if final.layout.looped else less).bic - final.bic
-        found = []
-        for f in self.extensions(less):
-            name = f.effects[-1]
-            if name == effect or name in final.effects:
-                continue
-            behind = f.bic - final.bic
-            if name in twins:
-                found.append(Rival(name, behind, f))
-                continue
-            if effect in CANDIDATES[name].parents:
-                # A generalisation is never worse by more than its parameters: only a hint of what it adds counts.
-                more = CANDIDATES[name].size - CANDIDATES[effect].size
-                if behind - more * np.log(self.problem.count) > -(HINT + 3.0 * (more - 1)):
-                    continue
-                if behind < -self.threshold and not self.in_both_views(final, f):
-                    continue
-            if behind < self.margin:
-                found.append(Rival(name, behind, f))
-        return gain, found
 
 
 def with_second_mass(problem: Problem, fit: Fit) -> Fit:
