@@ -14,6 +14,7 @@ import pytest
 import gaident as ga
 from gaident.data import delimited, read, read_columns
 from gaident.data import stored as stored_module
+from gaident.data.resampling import resampled
 from gaident.errors import ReadError, RecordError
 from samples.dialects import sample_log
 
@@ -91,6 +92,9 @@ def test_a_pause_of_the_logger_is_not_bridged(tmp_path: Path) -> None:
     assert "resample" not in str(caught.value)
     with pytest.raises(ReadError, match=r"gap of 0\.501 s, from 0\.099 to 0\.6 s, where.* 0\.001 s.*split the log there"):
         read(tmp_path / "pause.npz", resample=1e-3)
+    # What only one channel holds is not used, and no pause of it matters.
+    early = {"v": (np.arange(100) * 1e-3, np.ones(100)), "r": (np.append(-5.0, np.arange(100) * 1e-3), np.ones(101))}
+    assert len(resampled("log", early, 1e-3)["r"]) == 100
     lost = np.delete(np.arange(200), [50, 51, 120]) * 1e-3  # a few lost samples are
     np.savez(tmp_path / "lost.npz", time=lost, command=np.ones(197), velocity=np.sin(50 * lost))
     with pytest.raises(ReadError, match=r"resample=0\.001"):

@@ -23,7 +23,8 @@ def resampled(
     """Each channel by linear interpolation at t0 + n dt, t0 to t1 being what all channels cover.
 
     channels  name -> (time stamps [s], values), shape (n,) each, n may differ; the stamps increase, those without a
-              value (NaN) are left out, and no gap between them may be longer than five of their usual steps
+              value (NaN) are left out, and no gap between them may be longer than five of their usual steps in the time
+              that all cover
     dt        sample time of the result [s]; at most 1.5 times what the channels have, or high frequencies would fold;
               at least a hundredth of the finest
 
@@ -41,13 +42,6 @@ def resampled(
             raise ReadError(f"{path}: the time of {name} {where}; sort the log or remove stamps that stand twice")
         steps = np.diff(t)
         median = float(np.median(steps))
-        at = int(np.argmax(steps))
-        if steps[at] > GAP * median:
-            raise ReadError(
-                f"{path}: {name} has a gap of {steps[at]:.4g} s, from {t[at]:.9g} to {t[at + 1]:.9g} s, where its usual step is "
-                f"{median:.4g} s, and nobody knows what happened in it; split the log there into two records, which can be "
-                "identified together"
-            )
         if dt > _COARSER * median:
             raise ReadError(
                 f"{path}: resample={dt:g} s is coarser than the log, whose {name} has steps of {median:g} s, and would fold high "
@@ -63,5 +57,20 @@ def resampled(
     start, stop = max(t[0] for t, _ in held.values()), min(t[-1] for t, _ in held.values())
     if stop <= start:
         raise ReadError(f"{path}: the channels were not logged at the same time; name columns of one run")
+    for name, (t, _) in held.items():
+        _refuse_gaps(path, name, t, start, stop)
     axis = start + dt * np.arange(int(np.floor((stop - start) / dt + 1e-6)) + 1)
     return {name: np.interp(axis, t, x) for name, (t, x) in held.items()}
+
+
+def _refuse_gaps(path: str, name: str, t: NDArray[np.float64], start: float, stop: float) -> None:
+    """ReadError where a channel pauses inside the time from `start` to `stop`."""
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    at = int(np.argmax(np.where((t[:-1] < stop) & (t[1:] > start), steps, 0.0)))
+    if steps[at] > GAP * usual and t[at] < stop and t[at + 1] > start:
+        raise ReadError(
+            f"{path}: {name} has a gap of {steps[at]:.4g} s, from {t[at]:.9g} to {t[at + 1]:.9g} s, where its usual step is "
+            f"{usual:.4g} s, and nobody knows what happened in it; split the log there into two records, which can be "
+            "identified together"
+        )
