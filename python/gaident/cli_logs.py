@@ -82,7 +82,8 @@ def _experiment(args: argparse.Namespace, drive: Drive) -> None:
     if dt is None:
         raise SettingsError("dt is missing: give --dt (or dt in the drive file), the sample time of the command in seconds")
     inertia = drive.space_values.get("inertia")
-    proposal = first_experiment(dt, drive.limits(), None if inertia is None else inertia[0], drive.controller_values.get("kp"))
+    heaviest = None if inertia is None else inertia[1]  # what its ramps ask for must not exceed the torque
+    proposal = first_experiment(dt, drive.limits(), heaviest, drive.controller_values.get("kp"))
     if args.json:
         print_json({"schema": "gaident/experiment", "schema_version": 1, **proposal.to_dict()})
         return
@@ -91,7 +92,16 @@ def _experiment(args: argparse.Namespace, drive: Drive) -> None:
         print(text, end="")
         return
     write(target, text.encode())
-    print(f"{len(proposal.command)} samples, {len(proposal.command) * proposal.dt:.3g} s: {proposal.reason}\nwritten: {target}")
+    from gaident.show.wording import sentence
+
+    said = sentence(proposal.reason, drive.axis)
+    for name, option in (
+        ("give kp", "--kp"),
+        ("give the inertia", "--inertia LOW HIGH"),
+        ("give the mass", "--inertia LOW HIGH"),
+    ):
+        said = said.replace(f"{name} to", f"{name} ({option}, or in the drive file) to")
+    print(f"{len(proposal.command)} samples, {len(proposal.command) * proposal.dt:.3g} s: {said}\nwritten: {target}")
 
 
 def _doctor(args: argparse.Namespace) -> int:

@@ -229,9 +229,16 @@ def test_log_options_of_drive_file_and_command_line(here: Path, capsys: pytest.C
 def test_experiment_writes_the_command_of_a_first_record(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("d.toml").write_text("dt = 1e-3\n[limits]\nspeed = 100\ntorque = 2\nduration = 2\n")
     assert main(["experiment", "--drive", "d.toml", "--out", "first.csv"]) == 0
-    assert "written: first.csv" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "written: first.csv" in said and "give kp (--kp, or in the drive file) to keep both" in said
+    assert "give the inertia (--inertia LOW HIGH, or in the drive file) to" in said
     held = ga.read_columns("first.csv")
     assert len(held["time [s]"]) <= 2000 and np.abs(held["command [rad/s]"]).max() <= 100
+    gentle = ["experiment", "--drive", "d.toml", "--kp", "0.05", "--inertia", "1e-4", "1e-3", "--json"]
+    assert main(gentle) == 0
+    proposal = json.loads(capsys.readouterr().out)
+    jumps = np.abs(np.subtract(proposal["command"][2:], proposal["command"][:-2]))
+    assert 0.05 * jumps.max() < 2.0 and "give" not in proposal["reason"] and "torque_saturation" not in proposal["separates"]
     assert main(["experiment", "--dt", "1e-3"]) == 2
     assert "the limits lack speed and torque: give --speed and --torque" in capsys.readouterr().err
 

@@ -1,8 +1,13 @@
 """Which experiment to make: before any record the one that excites everything, afterwards a menu to choose from.
 
-Commands keep to the drive's limits: speed; travel, by integrating the command exactly; slopes that the torque can follow where
-the inertia is known. A drive in its loop overshoots: a tenth of speed and travel is kept free for that. One family of steps
-asks for more than the torque limit on purpose, as nothing else shows saturation.
+Commands keep to the drive's limits: speed; travel, by integrating the command exactly; torque, as far as the drive is known:
+
+    u = kp d      what a loop answers to a jump of the command by d, before the drive has moved
+    u = J a       what a ramp of slope a takes; where it ends, the speed overshoots by J a / kp at most
+
+Where kp is known, no jump asks for more than 80 % of the torque, so that nothing shows a saturation, and speeds leave room for the
+overshoot: a third of a jump, and that of the ramps. What is not known, the proposal says. A tenth of speed and travel is kept free
+in any case.
 """
 
 from __future__ import annotations
@@ -16,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.diagnosis.commands import dithered, rest, strokes, swept, triangles
+from gaident.diagnosis.commands import dithered, largest_jump, rest, strokes, swept, triangles
 from gaident.diagnosis.excitation import position_of
 from gaident.diagnosis.replay import replay
 from gaident.errors import SettingsError
@@ -28,6 +33,9 @@ __all__ = ["Limits", "MenuItem", "Proposal", "candidate_commands", "first_experi
 Vector = NDArray[np.float64]
 
 FREE = 0.9  # of speed and travel that commands use
+ASKED = 0.8  # of the torque that kp times a jump asks for; the rest is for the integral
+ROOM = 0.25  # of the speed limit, for the overshoot of ramps where kp is known
+AT_ONCE = 2  # samples within which the command's changes are one jump: reversals have a sample of rest between
 LEAST_SAMPLES = 400
 
 
@@ -143,15 +151,21 @@ class MenuItem:
 
 @dataclass(frozen=True)
 class _Bench:
-    """Limits in the terms of the builders: speed, stroke and slope that may be used, seconds for one item."""
+    """Limits in the terms of the builders: speed, stroke and slope that may be used, seconds for one item; limit: of the speed."""
 
     dt: float
+    limit: float
     speed: float
     travel: float
     slope: float
     seconds: float
     torque: float
     kp: float | None
+
+    @property
+    def jump(self) -> float:
+        """Largest jump of the command [rad/s]; inf: kp is not known."""
+        return math.inf if self.kp is None else ASKED * self.torque / self.kp
 
 
 _Builder = Callable[[_Bench], Vector]
@@ -162,11 +176,11 @@ def first_experiment(dt: float, limits: Limits, inertia: float | None = None, kp
 
     dt       sample time [s]
     inertia  total inertia [kg m^2]: ramps then use at most 60 % of the torque; None: gentle ramps
-    kp       proportional gain of the controller [N m s/rad]: steps and dither are then sized by the torque they ask for
+    kp       proportional gain of the controller [N m s/rad]: no jump of the command then asks for more torque than there is, and
+             none shows torque_saturation; None: jumps are sized by the speed alone, `reason` says what they ask for
 
-    Levels with reversals and dither, slow stairs with rests, reversals with small and large torque, steps of three sizes of
-    which the largest saturates, and the first levels once more at the end. Raises SettingsError for a duration of fewer than
-    400 samples.
+    Levels with reversals and dither, slow stairs with rests, reversals with small and large torque, steps of three sizes, and
+    the first levels once more at the end. Raises SettingsError for a duration of fewer than 400 samples.
     """
     bench = _bench(dt, limits, inertia, kp)
     course: tuple[tuple[_Builder, float], ...] = (
@@ -181,7 +195,34 @@ def first_experiment(dt: float, limits: Limits, inertia: float | None = None, kp
         np.concatenate([_filled(build, replace(bench, seconds=share * bench.seconds)) for build, share in course]), bench
     )
     names = dict.fromkeys(effect for item in _MENU for effect in item[2])
-    return Proposal(command, dt, tuple(names), math.nan, "No record yet: this triggers every effect, as far as travel allows.")
+    if kp is not None:
+        del names["torque_saturation"]
+    return Proposal(command, dt, tuple(names), math.nan, _first_reason(command, limits, inertia, bench))
+
+
+def _first_reason(command: Vector, limits: Limits, inertia: float | None, b: _Bench) -> str:
+    """What the first experiment is for, and which of the limits it cannot promise to keep."""
+    jump = largest_jump(command, AT_ONCE)
+    parts = ["No record yet: this triggers every effect, as far as travel allows."]
+    if b.kp is not None:
+        asked = f"{b.kp * jump:.3g} of {limits.torque:.3g} N m"
+        parts = [
+            "No record yet: this triggers every effect but torque saturation, as far as travel allows: its largest jump, of "
+            f"{jump:.3g} rad/s, asks for {asked}."
+        ]
+    else:
+        top = float(np.abs(command).max())
+        parts.append(
+            f"Torque and speed limit are not promised: its largest jump, of {jump:.3g} rad/s, asks for kp times that, more than "
+            f"{limits.torque:.3g} N m where kp is above {limits.torque / jump:.3g} N m s/rad, and may overshoot its "
+            f"{top:.3g} rad/s; give kp to keep both."
+        )
+    if inertia is None:
+        parts.append(
+            f"Its ramps of up to {b.slope:.3g} rad/s^2 ask for the inertia times that; give the inertia to keep them to 60 % "
+            "of the torque."
+        )
+    return " ".join(parts)
 
 
 def candidate_commands(dt: float, limits: Limits, inertia: float | None = None, kp: float | None = None) -> list[MenuItem]:
@@ -212,12 +253,22 @@ def _bench(dt: float, limits: Limits, inertia: float | None, kp: float | None) -
             f"duration is {limits.duration:g} s, {int(limits.duration / dt)} samples: give {LEAST_SAMPLES * dt:g} s or more"
         )
     stroke = FREE * limits.travel
-    # A stroke lasts 20 samples at least.
-    speed = min(FREE * limits.speed, stroke / (20.0 * dt))
-    slope = 0.6 * limits.torque / inertia if inertia is not None else 150.0 * speed / limits.duration
+    speed, slope = _ramps(limits, inertia, kp)
+    speed = min(speed, stroke / (20.0 * dt))  # a stroke lasts 20 samples at least
     # Half a stroke to rise, half to fall: v^2 = slope * stroke.
     speed = min(speed, 0.8 * math.sqrt(slope * stroke)) if math.isfinite(stroke) else speed
-    return _Bench(dt, speed, stroke, slope, limits.duration, limits.torque, kp)
+    return _Bench(dt, limits.speed, speed, stroke, slope, limits.duration, limits.torque, kp)
+
+
+def _ramps(limits: Limits, inertia: float | None, kp: float | None) -> tuple[float, float]:
+    """(top speed [rad/s], slope [rad/s^2]): top + J a / kp <= speed limit, J a <= 60 % of the torque."""
+    if kp is None or inertia is None:
+        # Not known: the time of a ramp is a share of the record's, with kp a longer one to a lower speed.
+        top, hurry = (FREE, 150.0) if kp is None else (1.0 - ROOM, 100.0)
+        speed = top * limits.speed
+        return speed, hurry * speed / limits.duration if inertia is None else 0.6 * limits.torque / inertia
+    torque = min(0.6 * limits.torque, kp * ROOM * limits.speed)
+    return min(FREE * limits.speed, limits.speed - torque / kp), torque / inertia
 
 
 def _filled(build: _Builder, bench: _Bench) -> Vector:
@@ -234,10 +285,10 @@ def _filled(build: _Builder, bench: _Bench) -> Vector:
 
 
 def _within(command: Vector, bench: _Bench) -> Vector:
-    """The command, lowered where it still is too fast or sweeps too much."""
+    """The command, lowered where it still is too fast, sweeps too much or jumps too far."""
     low, high = swept(command, bench.dt)
     factor = min(1.0, bench.travel / max(high - low, 1e-300), bench.speed / max(float(np.abs(command).max()), 1e-300))
-    return command * factor
+    return command * min(factor, bench.jump / max(largest_jump(command, AT_ONCE), 1e-300))
 
 
 def _speed_ladder(b: _Bench) -> Vector:
@@ -262,7 +313,7 @@ def _slow_stairs(b: _Bench) -> Vector:
     dwell = b.seconds / (3.0 * len(shares))
     parts: list[Vector] = []
     for share in shares:
-        parts += [strokes([share * b.speed], dwell, b.travel, math.inf, b.dt), rest(0.5 * dwell, b.dt)]
+        parts += [strokes([min(share * b.speed, 0.5 * b.jump)], dwell, b.travel, math.inf, b.dt), rest(0.5 * dwell, b.dt)]
     return np.concatenate(parts)
 
 
@@ -275,30 +326,31 @@ def _reversals(b: _Bench) -> Vector:
     parts = []
     for share in (0.02, 0.3):
         dwell = max(b.seconds / 16.0, 10 * b.dt)
-        parts += [strokes([share * b.speed], dwell, b.travel, math.inf if share < 0.1 else b.slope, b.dt)] * 3
+        small = share < 0.1
+        speed = min(share * b.speed, 0.5 * b.jump) if small else share * b.speed
+        parts += [strokes([speed], dwell, b.travel, math.inf if small else b.slope, b.dt)] * 3
     return np.concatenate(parts)
 
 
 def _prbs_moving(b: _Bench) -> Vector:
     """A binary signal on half the speed, three amplitudes, forwards and backwards."""
     stroke = strokes([0.5 * b.speed], b.seconds / 7.0, b.travel, b.slope, b.dt)
-    largest = 0.1 * b.speed if b.kp is None else min(0.2 * b.speed, 0.4 * b.torque / b.kp)
+    largest = 0.1 * b.speed if b.kp is None else min(0.2 * b.speed, 0.25 * b.jump)
     parts = [dithered(stroke, f * largest, c) for f, c in ((0.3, 1), (0.6, 2), (1.0, 4))]
     return np.concatenate(parts)
 
 
 def _prbs_standing(b: _Bench) -> Vector:
-    largest = 0.1 * b.speed if b.kp is None else min(0.2 * b.speed, 0.4 * b.torque / b.kp)
+    largest = 0.1 * b.speed if b.kp is None else min(0.2 * b.speed, 0.25 * b.jump)
     piece = rest(b.seconds / 3.0 - b.dt, b.dt)
     parts = [dithered(piece, f * largest, c) for f, c in ((0.1, 8), (0.4, 4), (1.0, 4))]
     return np.concatenate(parts)
 
 
 def _steps(b: _Bench) -> Vector:
-    """Steps of 10, 30 and 100 %, the last with more torque than there is, where the speed allows that."""
-    full = 0.8 * b.speed  # a jump overshoots more than a ramp
-    if b.kp is not None:
-        full = min(full, 1.5 * b.torque / b.kp)
+    """Steps of 10, 30 and 100 %: forwards, from there backwards, which is a jump of twice the speed, and back to rest."""
+    # A jump overshoots more than a ramp: by a third of 2 v, with kp.
+    full = 0.8 * b.speed if b.kp is None else min(b.speed, 0.6 * b.limit, 0.5 * b.jump)
     return np.concatenate([strokes([share * full], b.seconds / 6.5, b.travel, math.inf, b.dt) for share in (0.1, 0.3, 1.0)])
 
 
@@ -348,7 +400,7 @@ _MENU: tuple[tuple[str, _Builder, tuple[str, ...], str], ...] = (
     ("random signal at standstill", _prbs_standing, ("backlash", "presliding_friction", "torque_dead_band", "coulomb_friction"),
      "A binary signal around standstill, in three amplitudes: friction and play show as what changes with the amplitude."),
     ("steps of three sizes", _steps, ("torque_saturation", "command_rate_limit", "integrator_clamp"),
-     "Steps of which only the largest runs into limits tell them apart by slope and torque."),
+     "Steps of three sizes: a limit of torque, integral or slope holds the largest back, and the others not."),
     ("slow constant speeds", _constant_slow, ("cogging", "velocity_ripple", "unbalance"),
      "Several turns at three slow speeds: a torque ripple keeps its torque, a sensor's ripple grows with speed."),
     ("holds up and down", _holds, ("unbalance", "load_torque", "asymmetric_friction", "coulomb_friction"),
