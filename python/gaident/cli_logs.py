@@ -70,10 +70,11 @@ def _init(args: argparse.Namespace) -> None:
     for channel, name in found.channels.items():
         print(f"  {channel.ljust(9)}{printable(name)}")
     if found.fill_in:
-        print("to be filled in, marked FILL IN:")
+        print("to be filled in, marked FILL IN (write the value, remove the # before it):")
         for line in found.fill_in:
             print(f"  {line}")
-    print(f"then: gaident identify {shlex.quote(str(args.log))} --drive {shlex.quote(str(target))}")
+    then = "then, once that is done" if found.fill_in else "then"
+    print(f"{then}: gaident identify {shlex.quote(str(args.log))} --drive {shlex.quote(str(target))}")
 
 
 def _experiment(args: argparse.Namespace, drive: Drive) -> None:

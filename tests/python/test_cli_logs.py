@@ -65,7 +65,10 @@ def test_names_of_a_file_do_nothing_to_the_terminal(here: Path, capsys: pytest.C
     assert "\x1b" not in shown and "speed \\x1b[31m" in shown
     sections = read_drive_file("drive.toml")
     assert sections["columns"]["torque"] == 'torque "\n[controller]\nkp = 1' and sections["controller"] == {}
-    assert main(["identify", "evil.npz", "--drive", "drive.toml", "--quiet"]) == 0
+    call = ["identify", "evil.npz", "--drive", "drive.toml", "--quiet"]
+    assert main(call) == 2
+    assert "line 18: velocity and torque of [units], marked FILL IN, are not filled in" in capsys.readouterr().err
+    assert main([*call, "--units", "velocity=rad/s,torque=N m"]) == 0
 
 
 @pytest.mark.parametrize(
@@ -103,15 +106,22 @@ def test_twins_are_not_guessed_and_a_force_may_be_a_voltage(tmp_path: Path) -> N
 def test_init_writes_a_drive_file_that_identify_takes(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["init", "step.csv"]) == 0
     said = capsys.readouterr().out
-    assert "written: drive.toml" in said and "FILL IN" not in said
+    assert "written: drive.toml" in said and "to be filled in, marked FILL IN" in said and "  controller.kp: N m s/rad; " in said
     sections = read_drive_file("drive.toml")
     assert sections["columns"] == {
         "time": "t [ms]", "command": "speed_ref [rpm]", "velocity": "speed_act [rpm]", "torque": "torque [Nm]",
     }  # fmt: skip
     assert sections["units"] == {"command": "rpm", "velocity": "rpm", "torque": "Nm"}
-    # At once in open loop; in closed loop once the gains are filled in.
-    assert main(["identify", "step.csv", "--drive", "drive.toml"]) == 0
+    # Open loop where that is asked for; in closed loop once the gains are filled in, by hand or as options.
+    call = ["identify", "step.csv", "--drive", "drive.toml"]
+    for command in (call, ["diagnose", *call[1:]]):
+        assert main(command) == 2
+        refused = capsys.readouterr().err
+        assert "kp and ki of [controller], marked FILL IN, are not filled in" in refused and "--loop open" in refused
+    assert main([*call, "--loop", "open"]) == 0
     assert capsys.readouterr().out.startswith("(p,q) = (1,2)")
+    assert main([*call, "--kp", "0.0232"]) == 2
+    assert ": ki of [controller], marked FILL IN, is not filled in" in capsys.readouterr().err
     text = Path("drive.toml").read_text()
     Path("drive.toml").write_text(text.replace("# kp = 0.0232", "kp = 0.0232").replace("# ki = 1.367", "ki = 1.367"))
     assert main(["identify", "step.csv", "--drive", "drive.toml", "--json"]) == 0
@@ -123,11 +133,12 @@ def test_init_writes_a_drive_file_that_identify_takes(here: Path, capsys: pytest
     assert "drive.toml: there is such a file already" in capsys.readouterr().err
     assert Path("drive.toml").read_bytes() == before
     assert main(["init", "step.csv", "--force", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["fill_in"] == []
+    marked = json.loads(capsys.readouterr().out)["fill_in"]
+    assert [line.split(":")[0] for line in marked] == ["controller.kp", "controller.ki"]
     # The line to go on with is one that a shell takes.
     Path("my step.csv").write_bytes(Path("step.csv").read_bytes())
     assert main(["init", "my step.csv", "--out", "my.toml"]) == 0
-    assert "then: gaident identify 'my step.csv' --drive my.toml" in capsys.readouterr().out
+    assert "then, once that is done: gaident identify 'my step.csv' --drive my.toml" in capsys.readouterr().out
     # Every commented key is one that the file may have.
     for line in text.splitlines():
         key = line.removeprefix("# ").split("=")[0].strip()
