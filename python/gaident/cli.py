@@ -35,11 +35,13 @@ from gaident.cli_output import (
 from gaident.cli_report import report_command, write_report
 from gaident.data.record import Record
 from gaident.diagnosis.diagnose import diagnose
+from gaident.diagnosis.replay import Replay, replay
 from gaident.drive_file import Drive
 from gaident.errors import GaidentError, SettingsError
 from gaident.identification.identify import identify
 from gaident.identification.result import Identification
 from gaident.identification.settings import Settings
+from gaident.identification.space import derive_space
 from gaident.identification.starts import starts_moving
 from gaident.models import effects
 from gaident.models.controller import PI
@@ -50,6 +52,8 @@ from gaident.progress_bar import Progress
 from gaident.store import load
 
 __all__ = ["main"]
+
+_REPLAYED = 1 << 18  # samples of a log on which the controller is run again
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -123,6 +127,9 @@ def _identify(args: argparse.Namespace) -> None:
             workers=args.workers,
             progress=progress,
         )
+    # What the logs say of the controller, which the search takes as given.
+    off = [f"{name}: {said.sentence}" if len(records) > 1 else said.sentence for name, said in _replayed(records, controller)]
+    idn = replace(idn, warnings=(*off, *idn.warnings))
     written = []
     if out is not None:
         with naming(out):
@@ -140,6 +147,14 @@ def _identify(args: argparse.Namespace) -> None:
     print(summary_of(idn, drive.axis))
     if written:
         print(f"\nwritten: {', '.join(map(str, written))}")
+
+
+def _replayed(records: Sequence[Record], controller: PI | None) -> list[tuple[str, Replay]]:
+    """(name, what its replay says) of the records, long ones by their start, whose torque does not follow from the loop."""
+    if controller is None:
+        return []
+    said = [(rec.name, replay(rec[:_REPLAYED], controller)) for rec in records if rec.torque is not None]
+    return [(name, r) for name, r in said if r.follows is False]
 
 
 def _apart(targets: Mapping[str, Path | None]) -> None:
@@ -266,6 +281,8 @@ def _diagnose(args: argparse.Namespace) -> None:
         if not isinstance(loaded, Identification):
             raise SettingsError(f"--model {args.model} holds no identification: give what gaident identify --out saved")
         idn = loaded
+    if idn is None:
+        derive_space(records, controller)  # wrong signs and units are found before anything is searched for
     with Progress(None if args.quiet else sys.stderr) as progress:
         dia = diagnose(
             records,

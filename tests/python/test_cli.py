@@ -38,6 +38,22 @@ def test_warnings_in_the_summary_speak_of_options_too(here: Path, capsys: pytest
     assert out.index("Keep in mind") < out.index("Mechanics")
 
 
+def test_identify_says_what_the_log_says_of_the_controller(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Gains that are not the drive's, none at all, and the right ones."""
+
+    def warnings(*options: str) -> list[str]:
+        assert main(["identify", "step.csv", *NAMES, *options, "--json"]) == 0
+        return list(json.loads(capsys.readouterr().out)["warnings"])
+
+    biased = "The log has a command, but no gains were given"
+    assert warnings("--kp", "0.05", "--ki", "1.367")[0].startswith("The logged torque does not follow from command and velocity")
+    assert warnings("--loop", "open")[0].startswith(biased)
+    for options in (("--columns", "command="), LOOP):
+        assert not any(w.startswith((biased, "The logged torque does not")) for w in warnings(*options))
+    assert main(["identify", "step.csv", *NAMES]) == 0
+    assert "give --kp and --ki." in " ".join(capsys.readouterr().out.split())
+
+
 def test_json_is_what_is_saved_and_valid(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["identify", "step.csv", *NAMES, *LOOP, "--json", "--out", "idn.json"]) == 0
     out, err = capsys.readouterr()

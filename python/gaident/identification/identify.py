@@ -17,7 +17,7 @@ from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
-from gaident.identification.notes import warnings_of
+from gaident.identification.notes import open_loop_notes, warnings_of
 from gaident.identification.parts import search_parts
 from gaident.identification.result import Identification, Rival, Structure, TrialOutcome
 from gaident.identification.selection import MARGIN, Candidate
@@ -303,7 +303,7 @@ class _Work:
                 rivals,
                 model,
                 lowest < bic - MARGIN,
-                [n for r in self.records if (n := doubtful_start(r, self.controller))] if s.initial_state == "auto" else [],
+                [*open_loop_notes(self.records, self.controller), *self.doubtful_starts()],
             ),
             space=self.space,
             settings=s,
@@ -315,6 +315,12 @@ class _Work:
             version=version(),
             records=tuple(self.records),
         )
+
+    def doubtful_starts(self) -> list[str]:
+        """Sentences about records that may start in motion."""
+        if self.settings.initial_state != "auto":
+            return []
+        return [n for r in self.records if (n := doubtful_start(r, self.controller))]
 
     def outcome(self, trial: _core.Trial) -> TrialOutcome:
         """One trial for the report."""
