@@ -1,6 +1,7 @@
 """The command line: arguments -> the package's functions, exit codes, and nothing else.
 
-Exit codes: 0 done, 1 the work failed, 2 wrong use, 130 Ctrl-C; except for 0 with exactly one line on stderr.
+Exit codes: 0 done, 1 the work failed, 2 wrong use, 130 Ctrl-C, each but 0 with exactly one line on stderr; 141, without a word,
+where the reader of the output goes away (as of a process that SIGPIPE ends: `gaident effects | head -2`).
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _failed(130, "interrupted")
     except BrokenPipeError:
         _drop_output()
-        return _failed(1, "the output was closed before all of it was written")
+        return 141
     except OSError as error:
         _drop_output()
         what = f"{error.filename}: {error.strerror}" if error.filename is not None else error.strerror
@@ -82,8 +83,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
+    parser = parser_of(COMMANDS)
+    given = sys.argv[1:] if argv is None else argv
+    if not given:
+        parser.print_help()
+        return 0
     try:
-        args = parser_of(COMMANDS).parse_args(argv)
+        args = parser.parse_args(given)
     except SystemExit as exit_:  # --help, --version, wrong options
         return int(exit_.code or 0)
     if args.quiet and not getattr(args, "json", False):
@@ -166,6 +172,8 @@ def _apart(targets: Mapping[str, Path | None]) -> None:
 
 
 def _simulate(args: argparse.Namespace) -> None:
+    from gaident.show.wording import velocity_unit
+
     drive = drive_of(args)
     model, controller, states = _load_model(args.model)
     if drive.controller_values and drive.controller() != controller:
@@ -198,7 +206,8 @@ def _simulate(args: argparse.Namespace) -> None:
     else:
         for target, rec, result in zip(targets, records, results, strict=True):
             rmse, fit = _fit(rec, result)
-            against = f"fit {fit:.2f} %, rmse {rmse:.4g}" if np.any(rec.velocity) else "no measured velocity to compare with"
+            measured = f"fit {fit:.2f} %, rmse {rmse:.4g} {velocity_unit(drive.axis)}"
+            against = measured if np.any(rec.velocity) else "no measured velocity to compare with"
             print(f"{rec.name}: {against}; written: {target}")
 
 

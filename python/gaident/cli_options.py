@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NoReturn
@@ -350,4 +351,7 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         if message.startswith("unrecognized arguments: ") and not message.split()[2].startswith("-"):
             message += " (name all files in one place, without options between them)"
-        raise SettingsError(f"{message}; see {self.prog} --help")
+        if (wrong := re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)) is not None:
+            near = difflib.get_close_matches(wrong[1], re.findall(r"[\w-]+", wrong[2]), n=1)
+            message += f"; did you mean {near[0]!r}?" if near else ""
+        raise SettingsError(f"{message}{'' if message.endswith('?') else ';'} see {self.prog} --help")

@@ -82,7 +82,7 @@ def test_simulate_writes_csv_that_can_be_read(here: Path, capsys: pytest.Capture
     Path("truth.json").write_text(json.dumps(TRUTH.to_dict()))
     assert main(["simulate", "truth.json", "step.csv", *NAMES, *LOOP, "--out", "sim.csv"]) == 0
     out, _ = capsys.readouterr()
-    assert re.fullmatch(r"step: fit 97\.\d\d %, rmse 0\.\d+; written: sim\.csv\n", out)
+    assert re.fullmatch(r"step: fit 97\.\d\d %, rmse 0\.\d+ rad/s; written: sim\.csv\n", out)
     rec = ga.read("step.csv", columns={"command": "w_ref", "velocity": "w"})
     run = ga.run(TRUTH, rec, ga.PI(0.0232, 1.367, loop="continuous"))
     again = ga.read("sim.csv")
@@ -145,6 +145,7 @@ def test_simulate_several_logs_into_a_folder(here: Path, capsys: pytest.CaptureF
 
 def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
     for args, parts in (
+        ([], ("identify", "simulate", "demo")),
         (["--help"], ("identify", "simulate", "demo")),
         (["--version"], ("gaident ",)),
         (["identify", "--help"], ("examples:", "--drive", "[controller]", "rated_torque", "load_side", "exit codes")),

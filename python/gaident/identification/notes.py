@@ -9,11 +9,12 @@ from gaident.identification.adequacy import Adequacy
 from gaident.identification.covariance import Estimate
 from gaident.identification.result import Rival
 from gaident.identification.selection import MARGIN
+from gaident.identification.starts import doubtful_start
 from gaident.models.controller import PI
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Model
 
-__all__ = ["open_loop_notes", "warnings_of"]
+__all__ = ["open_loop_notes", "record_notes", "warnings_of"]
 
 
 def warnings_of(
@@ -73,3 +74,9 @@ def open_loop_notes(records: Sequence[Record], controller: PI | None) -> list[st
         "The log has a command, but no gains were given: its torque drives the model, and noise that goes through the loop "
         "biases the result; give controller=PI(...)."
     ]
+
+
+def record_notes(records: Sequence[Record], controller: PI | None, initial_state: str) -> list[str]:
+    """What is doubtful about the records themselves: their input, and how they begin."""
+    begun = [n for r in records if (n := doubtful_start(r, controller))] if initial_state == "auto" else []
+    return [*open_loop_notes(records, controller), *begun]
