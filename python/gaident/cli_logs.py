@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import shlex
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -78,6 +79,8 @@ def _init(args: argparse.Namespace) -> None:
 
 
 def _experiment(args: argparse.Namespace, drive: Drive) -> None:
+    from gaident.show.wording import sentence
+
     target = target_of(args.out, [] if args.drive is None else [args.drive])
     dt = drive.general.get("dt")
     if dt is None:
@@ -89,20 +92,17 @@ def _experiment(args: argparse.Namespace, drive: Drive) -> None:
         print_json({"schema": "gaident/experiment", "schema_version": 1, **proposal.to_dict()})
         return
     text = proposal_csv(proposal, drive.axis)
+    said = sentence(proposal.reason, drive.axis)
+    for missing, option in (("kp", "--kp"), ("the inertia", "--inertia LOW HIGH"), ("the mass", "--inertia LOW HIGH")):
+        said = said.replace(f"give {missing} to", f"give {missing} ({option}, or in the drive file) to")
+    said = f"{len(proposal.command)} samples, {len(proposal.command) * proposal.dt:.3g} s: {said}"
     if target is None:
         print(text, end="")
+        if not args.quiet:
+            print(said, file=sys.stderr)  # what it may ask of the axis, beside the CSV
         return
     write(target, text.encode())
-    from gaident.show.wording import sentence
-
-    said = sentence(proposal.reason, drive.axis)
-    for name, option in (
-        ("give kp", "--kp"),
-        ("give the inertia", "--inertia LOW HIGH"),
-        ("give the mass", "--inertia LOW HIGH"),
-    ):
-        said = said.replace(f"{name} to", f"{name} ({option}, or in the drive file) to")
-    print(f"{len(proposal.command)} samples, {len(proposal.command) * proposal.dt:.3g} s: {said}\nwritten: {target}")
+    print(f"{said}\nwritten: {target}")
 
 
 def _doctor(args: argparse.Namespace) -> int:

@@ -353,5 +353,5 @@ class _Parser(argparse.ArgumentParser):
             message += " (name all files in one place, without options between them)"
         if (wrong := re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)) is not None:
             near = difflib.get_close_matches(wrong[1], re.findall(r"[\w-]+", wrong[2]), n=1)
-            message += f"; did you mean {near[0]!r}?" if near else ""
-        raise SettingsError(f"{message}{'' if message.endswith('?') else ';'} see {self.prog} --help")
+            message = f"{message[: wrong.end(1)]}' (did you mean {near[0]!r}?)" if near else message
+        raise SettingsError(f"{message}; see {self.prog} --help")

@@ -233,16 +233,15 @@ class _Draft:
         unit = "N m s/rad", "N m/rad"
         if self.linear:
             unit = "N s/m", "N/m"
-        gain = f"{unit[0]}; the velocity loop's proportional gain"
         text = "as set in the drive"
         if "torque" in self.guess.channels:
-            text += '; loop = "open" instead: the torque drives the model'
+            text += '; or loop = "open"'
         mark = self._todo if "command" in self.guess.channels else lambda line, _, comment: _line(line, comment)
         return [
             "[controller]",
-            mark("# kp = 0.0232", "controller.kp", f"{gain}, {text}"),
-            mark("# ki = 1.367", "controller.ki", f"{unit[1]}; its integral gain"),
-            _line('# loop = "sampled"', 'a digital drive; or "continuous"; or "open": no controller'),
+            mark("# kp = 0.0232", "controller.kp", f"{unit[0]}; proportional gain {text}"),
+            mark("# ki = 1.367", "controller.ki", f"{unit[1]}; integral gain"),
+            _line('# loop = "sampled"', 'a digital drive; or "continuous"; or "open": the torque drives the model'),
             _line("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
         ]
 

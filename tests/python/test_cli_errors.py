@@ -52,7 +52,7 @@ def test_a_forgotten_unit_is_named_and_not_taken_for_a_sign(here: Path, capsys: 
 
 WRONG = [
     (["--quiet"], "COMMAND"),
-    (["identif"], "did you mean 'identify'? see gaident --help"),
+    (["identif"], "invalid choice: 'identif' (did you mean 'identify'?); see gaident --help"),
     (["frobnicate"], "invalid choice: 'frobnicate'"),
     (["identify"], "LOG"),
     (["identify", "stp.csv"], "stp.csv: there is no such file (did you mean 'step.csv'?)"),

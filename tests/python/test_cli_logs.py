@@ -103,7 +103,11 @@ def test_twins_are_not_guessed_and_a_force_may_be_a_voltage(tmp_path: Path) -> N
 def test_init_writes_a_drive_file_that_identify_takes(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["init", "step.csv"]) == 0
     said = capsys.readouterr().out
-    assert "written: drive.toml" in said and "to be filled in, marked FILL IN" in said and "  controller.kp: N m s/rad; " in said
+    assert (
+        "written: drive.toml" in said
+        and "to be filled in, marked FILL IN" in said
+        and "  controller.kp: N m s/rad; proportional gain" in said
+    )
     sections = read_drive_file("drive.toml")
     assert sections["columns"] == {
         "time": "t [ms]", "command": "speed_ref [rpm]", "velocity": "speed_act [rpm]", "torque": "torque [Nm]",
@@ -242,6 +246,9 @@ def test_experiment_writes_the_command_of_a_first_record(here: Path, capsys: pyt
     assert "give the inertia (--inertia LOW HIGH, or in the drive file) to" in said
     held = ga.read_columns("first.csv")
     assert len(held["time [s]"]) <= 2000 and np.abs(held["command [rad/s]"]).max() <= 100
+    assert main(["experiment", "--drive", "d.toml"]) == 0
+    out, err = capsys.readouterr()
+    assert out == Path("first.csv").read_text() and "Torque and speed limit are not promised" in err
     gentle = ["experiment", "--drive", "d.toml", "--kp", "0.05", "--inertia", "1e-4", "1e-3", "--json"]
     assert main(gentle) == 0
     proposal = json.loads(capsys.readouterr().out)

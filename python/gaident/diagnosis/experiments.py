@@ -197,8 +197,8 @@ def _first_reason(command: Vector, limits: Limits, inertia: float | None, b: Ben
         )
     if inertia is None:
         parts.append(
-            f"Its ramps of up to {b.slope:.3g} rad/s^2 ask for the inertia times that; give the inertia to keep them to 60 % "
-            "of the torque."
+            f"Its ramps of up to {b.slope:.3g} rad/s^2 ask for the inertia times that, and overshoot by as much divided by kp "
+            "where they end; give the inertia to size them by torque and speed limit."
         )
     return " ".join(parts)
 
