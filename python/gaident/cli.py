@@ -1,6 +1,7 @@
 """The command line: arguments -> the package's functions, exit codes, and nothing else.
 
-Exit codes: 0 done, 1 the work failed, 2 wrong use, 130 Ctrl-C; except for 0 with exactly one line on stderr.
+Exit codes: 0 done, 1 the work failed, 2 wrong use, 130 Ctrl-C, each but 0 with exactly one line on stderr; 141, without a word,
+where the reader of the output goes away (as of a process that SIGPIPE ends: `gaident effects | head -2`).
 """
 
 from __future__ import annotations
@@ -35,11 +36,13 @@ from gaident.cli_output import (
 from gaident.cli_report import report_command, write_report
 from gaident.data.record import Record
 from gaident.diagnosis.diagnose import diagnose
+from gaident.diagnosis.replay import Replay, replay
 from gaident.drive_file import Drive
 from gaident.errors import GaidentError, SettingsError
 from gaident.identification.identify import identify
 from gaident.identification.result import Identification
 from gaident.identification.settings import Settings
+from gaident.identification.space import derive_space
 from gaident.identification.starts import starts_moving
 from gaident.models import effects
 from gaident.models.controller import PI
@@ -50,6 +53,8 @@ from gaident.progress_bar import Progress
 from gaident.store import load
 
 __all__ = ["main"]
+
+_REPLAYED = 1 << 18  # samples of a log on which the controller is run again
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -68,7 +73,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _failed(130, "interrupted")
     except BrokenPipeError:
         _drop_output()
-        return _failed(1, "the output was closed before all of it was written")
+        return 141
     except OSError as error:
         _drop_output()
         what = f"{error.filename}: {error.strerror}" if error.filename is not None else error.strerror
@@ -78,8 +83,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
+    parser = parser_of(COMMANDS)
+    given = sys.argv[1:] if argv is None else argv
+    if not given:
+        parser.print_help()
+        return 0
     try:
-        args = parser_of(COMMANDS).parse_args(argv)
+        args = parser.parse_args(given)
     except SystemExit as exit_:  # --help, --version, wrong options
         return int(exit_.code or 0)
     if args.quiet and not getattr(args, "json", False):
@@ -123,6 +133,9 @@ def _identify(args: argparse.Namespace) -> None:
             workers=args.workers,
             progress=progress,
         )
+    # What the logs say of the controller, which the search takes as given.
+    off = [f"{name}: {said.sentence}" if len(records) > 1 else said.sentence for name, said in _replayed(records, controller)]
+    idn = replace(idn, warnings=(*off, *idn.warnings))
     written = []
     if out is not None:
         with naming(out):
@@ -142,6 +155,14 @@ def _identify(args: argparse.Namespace) -> None:
         print(f"\nwritten: {', '.join(map(str, written))}")
 
 
+def _replayed(records: Sequence[Record], controller: PI | None) -> list[tuple[str, Replay]]:
+    """(name, what its replay says) of the records, long ones by their start, whose torque does not follow from the loop."""
+    if controller is None:
+        return []
+    said = [(rec.name, replay(rec[:_REPLAYED], controller)) for rec in records if rec.torque is not None]
+    return [(name, r) for name, r in said if r.follows is False]
+
+
 def _apart(targets: Mapping[str, Path | None]) -> None:
     """Raises where two options name the same file."""
     seen: dict[Path, str] = {}
@@ -151,6 +172,8 @@ def _apart(targets: Mapping[str, Path | None]) -> None:
 
 
 def _simulate(args: argparse.Namespace) -> None:
+    from gaident.show.wording import velocity_unit
+
     drive = drive_of(args)
     model, controller, states = _load_model(args.model)
     if drive.controller_values and drive.controller() != controller:
@@ -183,7 +206,8 @@ def _simulate(args: argparse.Namespace) -> None:
     else:
         for target, rec, result in zip(targets, records, results, strict=True):
             rmse, fit = _fit(rec, result)
-            against = f"fit {fit:.2f} %, rmse {rmse:.4g}" if np.any(rec.velocity) else "no measured velocity to compare with"
+            measured = f"fit {fit:.2f} %, rmse {rmse:.4g} {velocity_unit(drive.axis)}"
+            against = measured if np.any(rec.velocity) else "no measured velocity to compare with"
             print(f"{rec.name}: {against}; written: {target}")
 
 
@@ -266,6 +290,8 @@ def _diagnose(args: argparse.Namespace) -> None:
         if not isinstance(loaded, Identification):
             raise SettingsError(f"--model {args.model} holds no identification: give what gaident identify --out saved")
         idn = loaded
+    if idn is None:
+        derive_space(records, controller)  # wrong signs and units are found before anything is searched for
     with Progress(None if args.quiet else sys.stderr) as progress:
         dia = diagnose(
             records,

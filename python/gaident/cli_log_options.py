@@ -30,6 +30,8 @@ examples:
 EXPERIMENT_HELP = """\
 Proposes the command of a first record, before there is any: it excites every effect of the library within the
 limits of the axis ([limits] of the drive file, or the options), as a CSV of time and velocity command.
+A loop answers a jump of its command by X rad/s with kp times X: with kp known the command keeps to the torque
+and leaves room for overshoot, without it the tool says what its jumps ask for.
 """
 DOCTOR_HELP = """\
 Prints versions, the processor's instruction set, threads and optional libraries, and identifies a small drive
@@ -130,7 +132,7 @@ def add_log_commands(command: Callable[..., Any]) -> None:
     sub.add_argument("--json", action="store_true", help="print what was found and what is to be filled in as JSON")
 
     sub = command("experiment", "", "limits of the axis -> the command of a first record", EXPERIMENT_HELP)
-    sub.add_argument("--drive", metavar="FILE", help="drive.toml with dt, [limits] and, for gentler steps, [controller] kp")
+    sub.add_argument("--drive", metavar="FILE", help="drive.toml with dt, [limits], and kp and inertia as below")
     sub.add_argument("--dt", type=number, metavar="S", help="sample time [s]")
     for name, text in (
         ("speed", "highest speed [rad/s]"),
@@ -139,6 +141,9 @@ def add_log_commands(command: Callable[..., Any]) -> None:
         ("duration", "longest record [s] (default 5)"),
     ):
         sub.add_argument(f"--{name}", type=number, metavar="X", help=text)
+    sub.add_argument("--kp", type=number, metavar="X", help="the controller's gain [N m s/rad]: jumps then keep to the torque")
+    inertia = "total inertia [kg m^2]: ramps then keep to the torque, that of HIGH"
+    sub.add_argument("--inertia", nargs=2, type=number, metavar=("LOW", "HIGH"), help=inertia)
     sub.add_argument("--out", metavar="FILE", help="CSV file (default: standard output)")
     sub.add_argument("--json", action="store_true", help="print JSON instead of CSV")
 

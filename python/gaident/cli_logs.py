@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import shlex
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -70,28 +71,38 @@ def _init(args: argparse.Namespace) -> None:
     for channel, name in found.channels.items():
         print(f"  {channel.ljust(9)}{printable(name)}")
     if found.fill_in:
-        print("to be filled in, marked FILL IN:")
+        print("to be filled in, marked FILL IN (write the value, remove the # before it):")
         for line in found.fill_in:
             print(f"  {line}")
-    print(f"then: gaident identify {shlex.quote(str(args.log))} --drive {shlex.quote(str(target))}")
+    then = "then, once that is done" if found.fill_in else "then"
+    print(f"{then}: gaident identify {shlex.quote(str(args.log))} --drive {shlex.quote(str(target))}")
 
 
 def _experiment(args: argparse.Namespace, drive: Drive) -> None:
+    from gaident.show.wording import sentence
+
     target = target_of(args.out, [] if args.drive is None else [args.drive])
     dt = drive.general.get("dt")
     if dt is None:
         raise SettingsError("dt is missing: give --dt (or dt in the drive file), the sample time of the command in seconds")
     inertia = drive.space_values.get("inertia")
-    proposal = first_experiment(dt, drive.limits(), None if inertia is None else inertia[0], drive.controller_values.get("kp"))
+    heaviest = None if inertia is None else inertia[1]  # what its ramps ask for must not exceed the torque
+    proposal = first_experiment(dt, drive.limits(), heaviest, drive.controller_values.get("kp"))
     if args.json:
         print_json({"schema": "gaident/experiment", "schema_version": 1, **proposal.to_dict()})
         return
     text = proposal_csv(proposal, drive.axis)
+    said = sentence(proposal.reason, drive.axis)
+    for missing, option in (("kp", "--kp"), ("the inertia", "--inertia LOW HIGH"), ("the mass", "--inertia LOW HIGH")):
+        said = said.replace(f"give {missing} to", f"give {missing} ({option}, or in the drive file) to")
+    said = f"{len(proposal.command)} samples, {len(proposal.command) * proposal.dt:.3g} s: {said}"
     if target is None:
         print(text, end="")
+        if not args.quiet:
+            print(said, file=sys.stderr)  # what it may ask of the axis, beside the CSV
         return
     write(target, text.encode())
-    print(f"{len(proposal.command)} samples, {len(proposal.command) * proposal.dt:.3g} s: {proposal.reason}\nwritten: {target}")
+    print(f"{said}\nwritten: {target}")
 
 
 def _doctor(args: argparse.Namespace) -> int:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NoReturn
 
 from gaident.cli_log_options import add_log_commands, add_log_options, number
 from gaident.cli_report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
-from gaident.drive_file import COLUMNS, KEYS, Drive, read_drive_file
+from gaident.drive_file import COLUMNS, KEYS, Drive, read_drive_file, unfilled_of
 from gaident.errors import ControllerError, SettingsError
 from gaident.identification.settings import INITIAL_STATES
 from gaident.models._checks import one_of
@@ -222,8 +223,9 @@ def _add_run_options(group: Any) -> None:
 def drive_of(args: argparse.Namespace) -> Drive:
     """The drive file, if one is named, with the options over it."""
     sections: dict[str, dict[str, Any]] = {name: {} for name in KEYS}
+    unfilled: dict[tuple[str, str], str] = {}
     if getattr(args, "drive", None) is not None:
-        sections = read_drive_file(args.drive)
+        sections, unfilled = read_drive_file(args.drive), unfilled_of(args.drive)
     for name, keys in KEYS.items():
         if name in ("columns", "units"):
             sections[name].update(_assignments(getattr(args, name, None) or [], f"--{name}"))
@@ -235,8 +237,15 @@ def drive_of(args: argparse.Namespace) -> Drive:
     if sections["controller"].get("loop") is not None:
         one_of(sections["controller"]["loop"], "loop", (*LOOPS, "open"), ControllerError)
     sections["units"] = {k: _as_number(v) for k, v in sections["units"].items()}
-    names = ("", "columns", "units", "controller", "space", "limits")
-    return Drive(*(sections[name] for name in names))
+    return Drive(
+        sections[""],
+        sections["columns"],
+        sections["units"],
+        sections["controller"],
+        sections["space"],
+        sections["limits"],
+        unfilled,
+    )
 
 
 def _assignments(texts: Sequence[str], option: str) -> dict[str, str]:
@@ -342,4 +351,7 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         if message.startswith("unrecognized arguments: ") and not message.split()[2].startswith("-"):
             message += " (name all files in one place, without options between them)"
+        if (wrong := re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)) is not None:
+            near = difflib.get_close_matches(wrong[1], re.findall(r"[\w-]+", wrong[2]), n=1)
+            message = f"{message[: wrong.end(1)]}' (did you mean {near[0]!r}?)" if near else message
         raise SettingsError(f"{message}; see {self.prog} --help")

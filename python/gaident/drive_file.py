@@ -19,7 +19,7 @@ from gaident.identification.space import SearchSpace, derive_space
 from gaident.models._checks import known_keys, one_of, real_number
 from gaident.models.controller import PI
 
-__all__ = ["AXES", "COLUMNS", "KEYS", "Drive", "read_drive_file"]
+__all__ = ["AXES", "COLUMNS", "KEYS", "Drive", "read_drive_file", "unfilled_of"]
 
 
 COLUMNS = (*CHANNELS, "time")
@@ -135,6 +135,7 @@ class Drive:
     controller_values: Mapping[str, Any]
     space_values: Mapping[str, Any]
     limit_values: Mapping[str, Any] = field(default_factory=dict)
+    unfilled: Mapping[tuple[str, str], str] = field(default_factory=dict)  # (section, key) -> file and line, see `unfilled_of`
 
     @property
     def axis(self) -> str:
@@ -150,12 +151,20 @@ class Drive:
             return read(path, measured=False)
         more = {k: v for k, v in self.general.items() if k not in ("axis", "dt")}
         columns = {k: None if v == "" else v for k, v in self.columns.items()}
-        return read(path, columns or None, self.units or None, self.general.get("dt"), measured=measured, **more)
+        left_out = {k for k, v in columns.items() if v is None}
+        self._refuse_unfilled("units", [k for k in CHANNELS if k not in left_out], "or give it with --units CHANNEL=UNIT")
+        units = {k: v for k, v in self.units.items() if k not in left_out}
+        return read(path, columns or None, units or None, self.general.get("dt"), measured=measured, **more)
 
     def controller(self) -> PI | None:
         """The PI controller; None: open loop. Raises ControllerError where half of it is missing."""
         values = self.controller_values
-        if values.get("loop") == "open" or not values:
+        if values.get("loop") == "open":
+            return None
+        if self.columns.get("command") != "":
+            remedy = "or give --kp and --ki, or --loop open to work from torque to velocity"
+            self._refuse_unfilled("controller", ("kp", "ki"), remedy)
+        if not values:
             return None
         missing = [name for name in ("kp", "ki") if name not in values]
         if missing:
@@ -164,6 +173,17 @@ class Drive:
                 "the drive file), or --loop open to work from torque to velocity"
             )
         return PI(**values)
+
+    def _refuse_unfilled(self, section: str, keys: Sequence[str], remedy: str) -> None:
+        """Raises SettingsError where the file marks keys of a section FILL IN that neither it nor an option gives."""
+        given = {"units": self.units, "controller": self.controller_values}[section]
+        missing = [key for key in keys if (section, key) in self.unfilled and key not in given]
+        if missing:
+            where = self.unfilled[section, missing[0]]
+            raise SettingsError(
+                f"{where}: {' and '.join(missing)} of [{section}], marked FILL IN, {'is' if len(missing) == 1 else 'are'} not "
+                f"filled in: write the value and remove the # before it, {remedy}"
+            )
 
     def limits(self) -> Limits:
         """What an experiment may do. Raises SettingsError where the speed or the torque is missing."""
@@ -251,6 +271,17 @@ def read_drive_file(path: str) -> dict[str, dict[str, Any]]:
     return sections
 
 
+def unfilled_of(path: str) -> dict[tuple[str, str], str]:
+    """(section, key) -> "file: line n" of what `gaident init` marked FILL IN and is commented out still."""
+    found, section = {}, ""
+    for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):
+        if (header := _SECTION.match(line)) is not None:
+            section = header[1]
+        elif (mark := _MARK.match(line)) is not None:
+            found[section, mark[1]] = f"{path}: line {number}"
+    return found
+
+
 def _decimal_comma(text: str, error: str) -> str:
     """What to write where TOML stumbled over 0,5; "" where it was something else."""
     at = re.search(r"at line (\d+)", error)
@@ -263,6 +294,8 @@ def _decimal_comma(text: str, error: str) -> str:
     return f"line {number}: {key} is {value}, with a decimal comma: write {value.replace(',', '.')}"
 
 
+_SECTION = re.compile(r"\s*\[(\w+)\]")
+_MARK = re.compile(r"\s*#\s*(\w+)\s*=.*#\s*FILL IN\b")
 _WITH_COMMA = re.compile(r"\s*([\w.-]+)\s*=\s*([-+]?\d+,\d+(?:[eE][-+]?\d+)?)\s*(?:#|$)")
 _SECTIONS = ", ".join(f"[{name}]" for name in KEYS if name)
 

@@ -230,15 +230,18 @@ class _Draft:
         return lines
 
     def _controller(self) -> list[str]:
-        closed, opened = "command" in self.guess.channels, "torque" in self.guess.channels
-        text = "the velocity loop's gains; left out: open loop, torque to velocity"
-        mark = self._todo if closed and not opened else lambda line, _, comment: _line(line, comment)
-        unit = "N s/m" if self.linear else "N m s/rad"
+        unit = "N m s/rad", "N m/rad"
+        if self.linear:
+            unit = "N s/m", "N/m"
+        text = "as set in the drive"
+        if "torque" in self.guess.channels:
+            text += '; or loop = "open"'
+        mark = self._todo if "command" in self.guess.channels else lambda line, _, comment: _line(line, comment)
         return [
             "[controller]",
-            mark("# kp = 0.0232", "controller.kp and controller.ki", f"{unit}; {text}"),
-            _line("# ki = 1.367", "N/m" if self.linear else "N m/rad"),
-            _line('# loop = "sampled"', 'a digital drive; or "continuous"'),
+            mark("# kp = 0.0232", "controller.kp", f"{unit[0]}; proportional gain {text}"),
+            mark("# ki = 1.367", "controller.ki", f"{unit[1]}; integral gain"),
+            _line('# loop = "sampled"', 'a digital drive; or "continuous"; or "open": the torque drives the model'),
             _line("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
         ]
 
@@ -285,7 +288,8 @@ class _Draft:
 
 _HEAD = """\
 # What belongs to this axis, for `gaident identify LOG --drive drive.toml`. Written by `gaident init` from {log}.
-# FILL IN marks what the log cannot say; all other lines are what it shows. Every key: `gaident identify --help`.
+# FILL IN marks what the log cannot say: write the value and remove the # before it. All other lines are what it shows.
+# Every key: `gaident identify --help`.
 """
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -14,6 +15,10 @@ __all__ = ["Progress", "progress"]
 
 _QUIET = 0.3  # s of work before anything is drawn
 _FRACTION = 0.02  # of the work: before that no time left is told
+
+
+# What is said of a search in 80 columns: gen. 120, best 9.107e+05, (1,2) of 12
+_SHORT = (("generation ", "gen. "), ("best fitness ", "best "), (r"species \((\d+), (\d+)\) of (\d+) leads", r"(\1,\2) of \3"))
 
 
 class Progress:
@@ -69,8 +74,13 @@ class _TerminalBar:
         self.bar.start()
 
     def update(self, done: float, message: str, left: str) -> None:
-        # Where the line is too short, rich would shorten bar, percentage and time too: the message gives way.
-        room = max(0, self.bar.console.width - self.taken - len(left))
+        # Where the line is too short, rich would shorten bar, percentage and time too: the words give way, then the message.
+        width = self.bar.console.width - self.taken
+        if len(left) + len(message) > width:
+            left = left.removeprefix("about ")
+            for words, short in _SHORT:
+                message = re.sub(words, short, message)
+        room = max(0, width - len(left))
         shown = message if len(message) <= room else message[: max(0, room - 1)].rstrip() + "…"[:room]
         self.bar.update(self.task, completed=done, message=shown, left=left)
 

@@ -38,6 +38,22 @@ def test_warnings_in_the_summary_speak_of_options_too(here: Path, capsys: pytest
     assert out.index("Keep in mind") < out.index("Mechanics")
 
 
+def test_identify_says_what_the_log_says_of_the_controller(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Gains that are not the drive's, none at all, and the right ones."""
+
+    def warnings(*options: str) -> list[str]:
+        assert main(["identify", "step.csv", *NAMES, *options, "--json"]) == 0
+        return list(json.loads(capsys.readouterr().out)["warnings"])
+
+    biased = "The log has a command, but no gains were given"
+    assert warnings("--kp", "0.05", "--ki", "1.367")[0].startswith("The logged torque does not follow from command and velocity")
+    assert warnings("--loop", "open")[0].startswith(biased)
+    for options in (("--columns", "command="), LOOP):
+        assert not any(w.startswith((biased, "The logged torque does not")) for w in warnings(*options))
+    assert main(["identify", "step.csv", *NAMES]) == 0
+    assert "give --kp and --ki." in " ".join(capsys.readouterr().out.split())
+
+
 def test_json_is_what_is_saved_and_valid(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["identify", "step.csv", *NAMES, *LOOP, "--json", "--out", "idn.json"]) == 0
     out, err = capsys.readouterr()
@@ -66,7 +82,7 @@ def test_simulate_writes_csv_that_can_be_read(here: Path, capsys: pytest.Capture
     Path("truth.json").write_text(json.dumps(TRUTH.to_dict()))
     assert main(["simulate", "truth.json", "step.csv", *NAMES, *LOOP, "--out", "sim.csv"]) == 0
     out, _ = capsys.readouterr()
-    assert re.fullmatch(r"step: fit 97\.\d\d %, rmse 0\.\d+; written: sim\.csv\n", out)
+    assert re.fullmatch(r"step: fit 97\.\d\d %, rmse 0\.\d+ rad/s; written: sim\.csv\n", out)
     rec = ga.read("step.csv", columns={"command": "w_ref", "velocity": "w"})
     run = ga.run(TRUTH, rec, ga.PI(0.0232, 1.367, loop="continuous"))
     again = ga.read("sim.csv")
@@ -129,6 +145,7 @@ def test_simulate_several_logs_into_a_folder(here: Path, capsys: pytest.CaptureF
 
 def test_help_and_version(capsys: pytest.CaptureFixture[str]) -> None:
     for args, parts in (
+        ([], ("identify", "simulate", "demo")),
         (["--help"], ("identify", "simulate", "demo")),
         (["--version"], ("gaident ",)),
         (["identify", "--help"], ("examples:", "--drive", "[controller]", "rated_torque", "load_side", "exit codes")),

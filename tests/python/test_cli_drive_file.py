@@ -115,3 +115,19 @@ def test_no_utf8_is_no_drive_file(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(ga.GaidentError, match="UTF-8"):
         read_drive_file(str(tmp_path / "bad.toml"))
+
+
+def test_a_channel_that_is_left_out_takes_its_unit_along(here: Path) -> None:
+    Path("drive.toml").write_text(
+        '[columns]\ncommand = "w_ref"\nvelocity = "w"\ntorque = "u"\n[units]\ntorque = "mNm"\n# velocity = "rpm"  # FILL IN\n'
+    )
+
+    def rec(*options: str) -> ga.Record:
+        parser = parser_of(dict.fromkeys(COMMANDS, print))
+        return drive_of(parser.parse_args(["identify", "step.csv", "--drive", "drive.toml", *options])).read("step.csv")
+
+    with pytest.raises(ga.GaidentError, match=r"line 7: velocity of \[units\], marked FILL IN, is not filled in"):
+        rec()
+    known = ("--units", "velocity=rpm")
+    assert rec(*known).torque is not None
+    assert rec(*known, "--columns", "torque=").torque is None

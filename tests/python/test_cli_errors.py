@@ -51,8 +51,9 @@ def test_a_forgotten_unit_is_named_and_not_taken_for_a_sign(here: Path, capsys: 
 
 
 WRONG = [
-    ([], "COMMAND"),
-    (["identif"], "invalid choice: 'identif'"),
+    (["--quiet"], "COMMAND"),
+    (["identif"], "invalid choice: 'identif' (did you mean 'identify'?); see gaident --help"),
+    (["frobnicate"], "invalid choice: 'frobnicate'"),
     (["identify"], "LOG"),
     (["identify", "stp.csv"], "stp.csv: there is no such file (did you mean 'step.csv'?)"),
     (["identify", "step.csv", *NAMES, "--frobnicate"], "unrecognized arguments: --frobnicate"),
@@ -66,6 +67,7 @@ WRONG = [
     (["identify", "step.csv", "--columns", "w"], "channel=value"),
     (["identify", "step.csv", *NAMES, "--columns", "velocity=omega"], "'omega'"),
     (["identify", "step.csv", *NAMES, "--units", "velocity=rpmm"], "did you mean 'rpm'?"),
+    (["identify", "step.csv", *NAMES, "--units", "velocity=rmp"], "did you mean 'rpm'?"),
     (["identify", "step.csv", *NAMES, *LOOP, "--gain", "5", "2"], "gain is"),
     (["identify", "step.csv", *NAMES, *LOOP, "--gain", "2", "5", "--inertia", "1", "2"], "leave one out"),
     (["identify", "step.csv", *NAMES, *LOOP, "--damping", "1", "2"], "damping is given without inertia"),

@@ -1,8 +1,7 @@
-"""The commands around logs, the drive file that init writes, progress, quiet, completion, and a Record in a notebook."""
+"""The commands around logs, the drive file that init writes, progress, quiet, and completion."""
 
 from __future__ import annotations
 
-import html.parser
 import io
 import json
 import re
@@ -11,7 +10,6 @@ import subprocess
 import sys
 import types
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +19,6 @@ from gaident import doctor
 from gaident.cli import main
 from gaident.data.guess import guess_channels, unit_from_position, unit_from_velocity
 from gaident.data.listing import columns
-from gaident.data.record_html import sparkline
 from gaident.drive_file import read_drive_file
 from gaident.progress_bar import Progress
 
@@ -65,7 +62,10 @@ def test_names_of_a_file_do_nothing_to_the_terminal(here: Path, capsys: pytest.C
     assert "\x1b" not in shown and "speed \\x1b[31m" in shown
     sections = read_drive_file("drive.toml")
     assert sections["columns"]["torque"] == 'torque "\n[controller]\nkp = 1' and sections["controller"] == {}
-    assert main(["identify", "evil.npz", "--drive", "drive.toml", "--quiet"]) == 0
+    call = ["identify", "evil.npz", "--drive", "drive.toml", "--quiet"]
+    assert main(call) == 2
+    assert "line 18: velocity and torque of [units], marked FILL IN, are not filled in" in capsys.readouterr().err
+    assert main([*call, "--units", "velocity=rad/s,torque=N m"]) == 0
 
 
 @pytest.mark.parametrize(
@@ -103,15 +103,26 @@ def test_twins_are_not_guessed_and_a_force_may_be_a_voltage(tmp_path: Path) -> N
 def test_init_writes_a_drive_file_that_identify_takes(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["init", "step.csv"]) == 0
     said = capsys.readouterr().out
-    assert "written: drive.toml" in said and "FILL IN" not in said
+    assert (
+        "written: drive.toml" in said
+        and "to be filled in, marked FILL IN" in said
+        and "  controller.kp: N m s/rad; proportional gain" in said
+    )
     sections = read_drive_file("drive.toml")
     assert sections["columns"] == {
         "time": "t [ms]", "command": "speed_ref [rpm]", "velocity": "speed_act [rpm]", "torque": "torque [Nm]",
     }  # fmt: skip
     assert sections["units"] == {"command": "rpm", "velocity": "rpm", "torque": "Nm"}
-    # At once in open loop; in closed loop once the gains are filled in.
-    assert main(["identify", "step.csv", "--drive", "drive.toml"]) == 0
+    # Open loop where that is asked for; in closed loop once the gains are filled in, by hand or as options.
+    call = ["identify", "step.csv", "--drive", "drive.toml"]
+    for command in (call, ["diagnose", *call[1:]]):
+        assert main(command) == 2
+        refused = capsys.readouterr().err
+        assert "kp and ki of [controller], marked FILL IN, are not filled in" in refused and "--loop open" in refused
+    assert main([*call, "--loop", "open"]) == 0
     assert capsys.readouterr().out.startswith("(p,q) = (1,2)")
+    assert main([*call, "--kp", "0.0232"]) == 2
+    assert ": ki of [controller], marked FILL IN, is not filled in" in capsys.readouterr().err
     text = Path("drive.toml").read_text()
     Path("drive.toml").write_text(text.replace("# kp = 0.0232", "kp = 0.0232").replace("# ki = 1.367", "ki = 1.367"))
     assert main(["identify", "step.csv", "--drive", "drive.toml", "--json"]) == 0
@@ -123,11 +134,12 @@ def test_init_writes_a_drive_file_that_identify_takes(here: Path, capsys: pytest
     assert "drive.toml: there is such a file already" in capsys.readouterr().err
     assert Path("drive.toml").read_bytes() == before
     assert main(["init", "step.csv", "--force", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["fill_in"] == []
+    marked = json.loads(capsys.readouterr().out)["fill_in"]
+    assert [line.split(":")[0] for line in marked] == ["controller.kp", "controller.ki"]
     # The line to go on with is one that a shell takes.
     Path("my step.csv").write_bytes(Path("step.csv").read_bytes())
     assert main(["init", "my step.csv", "--out", "my.toml"]) == 0
-    assert "then: gaident identify 'my step.csv' --drive my.toml" in capsys.readouterr().out
+    assert "then, once that is done: gaident identify 'my step.csv' --drive my.toml" in capsys.readouterr().out
     # Every commented key is one that the file may have.
     for line in text.splitlines():
         key = line.removeprefix("# ").split("=")[0].strip()
@@ -229,9 +241,19 @@ def test_log_options_of_drive_file_and_command_line(here: Path, capsys: pytest.C
 def test_experiment_writes_the_command_of_a_first_record(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("d.toml").write_text("dt = 1e-3\n[limits]\nspeed = 100\ntorque = 2\nduration = 2\n")
     assert main(["experiment", "--drive", "d.toml", "--out", "first.csv"]) == 0
-    assert "written: first.csv" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "written: first.csv" in said and "give kp (--kp, or in the drive file) to keep both" in said
+    assert "give the inertia (--inertia LOW HIGH, or in the drive file) to" in said
     held = ga.read_columns("first.csv")
     assert len(held["time [s]"]) <= 2000 and np.abs(held["command [rad/s]"]).max() <= 100
+    assert main(["experiment", "--drive", "d.toml"]) == 0
+    out, err = capsys.readouterr()
+    assert out == Path("first.csv").read_text() and "Torque and speed limit are not promised" in err
+    gentle = ["experiment", "--drive", "d.toml", "--kp", "0.05", "--inertia", "1e-4", "1e-3", "--json"]
+    assert main(gentle) == 0
+    proposal = json.loads(capsys.readouterr().out)
+    jumps = np.abs(np.subtract(proposal["command"][2:], proposal["command"][:-2]))
+    assert 0.05 * jumps.max() < 2.0 and "give" not in proposal["reason"] and "torque_saturation" not in proposal["separates"]
     assert main(["experiment", "--dt", "1e-3"]) == 2
     assert "the limits lack speed and torque: give --speed and --torque" in capsys.readouterr().err
 
@@ -302,7 +324,15 @@ def test_progress_is_drawn_on_a_terminal_and_nowhere_else(monkeypatch: pytest.Mo
     with Progress(stream) as show:
         assert show is not None
         show(0.25, "generation 120, best fitness 9.107e+05, species (1, 2) of 12 leads")
-    assert re.search(r"━━━ +25% \d:\d\d:\d\d about \d+ s left generation 120, best fitness 9\.107e\+\d*…", stream.getvalue())
+    # In 80 columns generation, best fitness and the species that leads are all there.
+    drawn = stream.getvalue()
+    assert re.search(r"━━━ +25% \d:\d\d:\d\d \d+ s left gen\. 120, best 9\.107e\+05, \(1,2\) of 12\n", drawn) and "…" not in drawn
+    monkeypatch.setenv("COLUMNS", "60")
+    stream = Terminal()
+    with Progress(stream) as show:
+        assert show is not None
+        show(0.25, "generation 120, best fitness 9.107e+05, species (1, 2) of 12 leads")
+    assert re.search(r"━━━ +25% \d:\d\d:\d\d \d+ s left gen\. 120, best [\d.e+]*…", stream.getvalue())
     with Progress(io.StringIO()) as show:
         assert show is None
     with Progress(None) as show:
@@ -328,36 +358,6 @@ def test_progress_in_a_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
         show(0.5, "generation 10 <b>")
     assert 'value="0.5000"' in shown[0] and "generation 10 &lt;b&gt;" in shown[0] and "left" in shown[0]
     assert shown[-1] == ""
-
-
-class _Tags(html.parser.HTMLParser):
-    """The tags of a page, and its texts."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.tags: list[str] = []
-        self.texts: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: Any) -> None:
-        self.tags.append(tag)
-
-    def handle_data(self, data: str) -> None:
-        self.texts.append(data)
-
-
-def test_a_record_in_a_notebook() -> None:
-    velocity = np.zeros(5000)
-    velocity[1234] = 7.0
-    rec = ga.Record(1e-3, velocity=velocity, torque=np.ones(5000), name="<script>alert(1)</script>")
-    page = _Tags()
-    page.feed(rec._repr_html_())
-    assert "script" not in page.tags and page.tags.count("svg") == 2
-    assert "<script>alert(1)</script>" in page.texts and "velocity" in page.texts and "command" not in page.texts
-    points = sparkline(velocity).split('points="')[1].split('"')[0].split()
-    heights = [float(point.split(",")[1]) for point in points]
-    assert len(points) == 480 and min(heights) == 1.0 and max(heights) == 27.0  # the one peak is not lost
-    for odd in (np.full(20, 1e308), np.tile([-1.7e308, 1.7e308], 10)):
-        assert "nan" not in sparkline(odd) and "inf" not in sparkline(odd)
 
 
 def test_quiet_prints_nothing_but_what_json_asks_for(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -22,8 +22,8 @@ def test_a_reader_that_goes_away(here: Path) -> None:
         assert process.stdout is not None and process.stderr is not None
         process.stdout.close()
         err = process.stderr.read()
-        assert process.wait(30) == 1
-    assert err == "gaident: the output was closed before all of it was written\n"
+        assert process.wait(30) == 141  # as of a process that SIGPIPE ends
+    assert err == ""
 
 
 @pytest.mark.alone
@@ -58,7 +58,7 @@ def test_progress_bar_on_a_terminal_only(here: Path) -> None:
     text = re.sub(rb"\x1b\[[0-9;?]*[A-Za-z]", b"", seen)
     bars = re.findall(rb" (\d+)%", text)
     assert bars and bars == sorted(bars, key=int)
-    assert re.search(rb"about \d+ s left generation \d+, best fitness [\d.e-]+", text)
+    assert re.search(rb"\d+ s left gen(eration|\.) \d+, best (fitness )?[\d.e-]+", text)
     assert text.split(b"\r")[-1].strip() == b""  # nothing of it stays
     assert called(*args[:-4], "--workers", "1").stderr == ""
 

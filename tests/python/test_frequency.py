@@ -148,4 +148,6 @@ def test_a_loaded_diagnosis_asks_for_its_record() -> None:
     assert len(dia.plot_bode(hz=True).axes) == 3
     with pytest.raises(GaidentError, match=r"plot_bode\(records\)"):
         ga.Diagnosis.from_dict(dia.to_dict()).plot_bode()
-    assert "coulomb friction" in dia._repr_html_() and "<script" not in dia._repr_html_()
+    shown = dia._repr_html_()
+    assert "coulomb friction" in shown and "<script" not in shown
+    assert f"<b>coulomb friction</b>: {dia.causes[0].evidence[:30]}" in shown

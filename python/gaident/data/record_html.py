@@ -15,20 +15,22 @@ __all__ = ["record_html", "sparkline"]
 
 _WIDTH, _HEIGHT = 240, 28
 _CELL = 'style="text-align:right"'
+_UNITS = {"command": "rad/s", "velocity": "rad/s", "torque": "N m", "position": "rad"}
 
 
 def record_html(rec: Record) -> str:
-    """name, samples, dt, duration, and per channel range, mean and course; no script, everything escaped."""
+    """name, samples, dt, duration, and per channel unit, range, mean and course; no script, everything escaped."""
     name = f"<b>{escape(rec.name)}</b> " if rec.name else ""
     head = f"<div>{name}Record, {len(rec)} samples, dt {rec.dt:.6g} s, {rec.duration:.4g} s</div>"
     rows = "".join(
-        f"<tr><td>{key}</td>"
+        f"<tr><td>{key}</td><td>{_UNITS[key]}</td>"
         + "".join(f"<td {_CELL}>{_number(value)}</td>" for value in (values.min(), values.max(), values.mean()))
         + f"<td>{sparkline(values)}</td></tr>"
         for key, values in rec.channels()
     )
     titles = "".join(f"<th {_CELL}>{title}</th>" for title in ("lowest", "highest", "mean"))
-    return f"{head}<table><thead><tr><th></th>{titles}<th></th></tr></thead><tbody>{rows}</tbody></table>"
+    body = f"<tbody>{rows}</tbody></table><div><small>on a linear axis m/s, N, m</small></div>"
+    return f"{head}<table><thead><tr><th></th><th></th>{titles}<th></th></tr></thead>{body}"
 
 
 def _number(value: float) -> str:

@@ -198,5 +198,7 @@ def _number(value: object) -> float | None:
 
 
 def _guess(quantity: str, unit: str) -> str:
-    near = difflib.get_close_matches(_spelling(unit), _UNITS[quantity], n=1)
+    given = _spelling(unit)
+    near = difflib.get_close_matches(given, _UNITS[quantity], n=5)
+    near.sort(key=lambda known: sorted(known) != sorted(given))  # letters in another order come first: rmp is rpm, not rps
     return f" (did you mean {near[0]!r}?)" if near else ""

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["both_ways", "dithered", "levels", "rest", "strokes", "swept", "triangles"]
+__all__ = ["both_ways", "dithered", "largest_jump", "levels", "rest", "strokes", "swept", "triangles"]
 
 Vector = NDArray[np.float64]
 
@@ -61,11 +61,13 @@ def triangles(tops: Sequence[float], period: float, travel: float, dt: float) ->
 
 
 def dithered(command: Vector, amplitude: float, clock: int, seed: int = 0) -> Vector:
-    """`command` with a pseudo-random binary signal of `amplitude` [rad/s] and `clock` samples a bit where it is not at rest.
+    """`command` with a pseudo-random binary signal of `amplitude` [rad/s] and `clock` samples a bit where it holds a speed.
 
-    A command at rest throughout gets it throughout, but for the last sample. The signal's mean is zero.
+    Ramps stay as they are: their torque leaves less for the signal's. A command at rest throughout gets it throughout, but for
+    the last sample. The signal's mean is zero.
     """
-    moving = command != 0.0 if np.any(command != 0.0) else np.arange(len(command)) < len(command) - 1
+    held = (command != 0.0) & (np.diff(command, prepend=0.0) == 0.0)
+    moving = held if np.any(command != 0.0) else np.arange(len(command)) < len(command) - 1
     bits = np.random.default_rng(seed).choice((-1.0, 1.0), -(-len(command) // clock))
     signal = np.repeat(bits, clock)[: len(command)] * moving
     signal -= moving * (signal.sum() / max(int(moving.sum()), 1))
@@ -77,3 +79,9 @@ def swept(command: Vector, dt: float) -> tuple[float, float]:
     """Lowest and highest angle [rad] of a drive that follows the command exactly, from 0, each value held for a sample."""
     angle = dt * np.cumsum(command)
     return min(0.0, float(angle.min())), max(0.0, float(angle.max()))
+
+
+def largest_jump(command: Vector, samples: int) -> float:
+    """Largest change of the command [rad/s] within so many samples, from rest on and back to it."""
+    padded = np.pad(command, samples)
+    return max(float(np.abs(padded[k:] - padded[:-k]).max()) for k in range(1, samples + 1))

@@ -30,6 +30,7 @@ from gaident.diagnosis.uncertainty import estimates_of
 from gaident.diagnosis.wording import evidence_of
 from gaident.identification.covariance import Estimate
 from gaident.identification.identify import identify
+from gaident.identification.notes import open_loop_notes
 from gaident.identification.result import Identification
 from gaident.models.controller import PI
 from gaident.models.simulate import simulate
@@ -74,6 +75,7 @@ def diagnose(
     checked(records, held, controller, identification, bootstrap, seed, progress)
     noise_std = noise_std_of(noise)
     controller, notes = as_logged(records, controller)
+    notes += open_loop_notes(records, controller)
     import scipy.linalg  # noqa: F401  brings a BLAS of its own, to be limited too
     from threadpoolctl import threadpool_limits
 

@@ -1,8 +1,13 @@
 """Which experiment to make: before any record the one that excites everything, afterwards a menu to choose from.
 
-Commands keep to the drive's limits: speed; travel, by integrating the command exactly; slopes that the torque can follow where
-the inertia is known. A drive in its loop overshoots: a tenth of speed and travel is kept free for that. One family of steps
-asks for more than the torque limit on purpose, as nothing else shows saturation.
+Commands keep to the drive's limits: speed; travel, by integrating the command exactly; torque, as far as the drive is known:
+
+    u = kp d      what a loop answers to a jump of the command by d, before the drive has moved
+    u = J a       what a ramp of slope a takes; where it ends, the speed overshoots by J a / kp at most
+
+Where kp is known, no jump asks for more than 80 % of the torque, so that nothing shows a saturation, and speeds leave room
+for the overshoot: a third of a jump, and that of the ramps. What is not known, the proposal says. A tenth of speed and travel
+is kept free in any case.
 """
 
 from __future__ import annotations
@@ -16,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.diagnosis.commands import dithered, rest, strokes, swept, triangles
+from gaident.diagnosis.commands import largest_jump, swept
 from gaident.diagnosis.excitation import position_of
+from gaident.diagnosis.menu import MENU, Bench, Builder, prbs_moving, reversals, slow_stairs, speed_ladder, steps
 from gaident.diagnosis.replay import replay
 from gaident.errors import SettingsError
 from gaident.models._checks import real_number
@@ -28,6 +34,8 @@ __all__ = ["Limits", "MenuItem", "Proposal", "candidate_commands", "first_experi
 Vector = NDArray[np.float64]
 
 FREE = 0.9  # of speed and travel that commands use
+ROOM = 0.25  # of the speed limit, for the overshoot of ramps where kp is known
+AT_ONCE = 2  # samples within which the command's changes are one jump: reversals have a sample of rest between
 LEAST_SAMPLES = 400
 
 
@@ -141,53 +149,64 @@ class MenuItem:
         return Proposal(self.command, self.dt, tuple(separates), margin, self.reason)
 
 
-@dataclass(frozen=True)
-class _Bench:
-    """Limits in the terms of the builders: speed, stroke and slope that may be used, seconds for one item."""
-
-    dt: float
-    speed: float
-    travel: float
-    slope: float
-    seconds: float
-    torque: float
-    kp: float | None
-
-
-_Builder = Callable[[_Bench], Vector]
-
-
 def first_experiment(dt: float, limits: Limits, inertia: float | None = None, kp: float | None = None) -> Proposal:
     """A command for the first record of a drive: it triggers every effect of the library within the limits.
 
     dt       sample time [s]
     inertia  total inertia [kg m^2]: ramps then use at most 60 % of the torque; None: gentle ramps
-    kp       proportional gain of the controller [N m s/rad]: steps and dither are then sized by the torque they ask for
+    kp       proportional gain of the controller [N m s/rad]: no jump of the command then asks for more torque than there is, and
+             none shows torque_saturation; None: jumps are sized by the speed alone, `reason` says what they ask for
 
-    Levels with reversals and dither, slow stairs with rests, reversals with small and large torque, steps of three sizes of
-    which the largest saturates, and the first levels once more at the end. Raises SettingsError for a duration of fewer than
-    400 samples.
+    Levels with reversals and dither, slow stairs with rests, reversals with small and large torque, steps of three sizes, and
+    the first levels once more at the end. Raises SettingsError for a duration of fewer than 400 samples.
     """
     bench = _bench(dt, limits, inertia, kp)
-    course: tuple[tuple[_Builder, float], ...] = (
-        (_speed_ladder, 0.22),
-        (_slow_stairs, 0.18),
-        (_reversals, 0.10),
-        (_prbs_moving, 0.12),
-        (_steps, 0.16),
-        (_speed_ladder, 0.22),
+    course: tuple[tuple[Builder, float], ...] = (
+        (speed_ladder, 0.22),
+        (slow_stairs, 0.18),
+        (reversals, 0.10),
+        (prbs_moving, 0.12),
+        (steps, 0.16),
+        (speed_ladder, 0.22),
     )
     command = _within(
         np.concatenate([_filled(build, replace(bench, seconds=share * bench.seconds)) for build, share in course]), bench
     )
-    names = dict.fromkeys(effect for item in _MENU for effect in item[2])
-    return Proposal(command, dt, tuple(names), math.nan, "No record yet: this triggers every effect, as far as travel allows.")
+    names = dict.fromkeys(effect for item in MENU for effect in item[2])
+    if kp is not None:
+        del names["torque_saturation"]
+    return Proposal(command, dt, tuple(names), math.nan, _first_reason(command, limits, inertia, bench))
+
+
+def _first_reason(command: Vector, limits: Limits, inertia: float | None, b: Bench) -> str:
+    """What the first experiment is for, and which of the limits it cannot promise to keep."""
+    jump = largest_jump(command, AT_ONCE)
+    parts = ["No record yet: this triggers every effect, as far as travel allows."]
+    if b.kp is not None:
+        asked = f"{b.kp * jump:.3g} of {limits.torque:.3g} N m"
+        parts = [
+            "No record yet: this triggers every effect but torque saturation, as far as travel allows: its largest jump, of "
+            f"{jump:.3g} rad/s, asks for {asked}."
+        ]
+    else:
+        top = float(np.abs(command).max())
+        parts.append(
+            f"Torque and speed limit are not promised: its largest jump, of {jump:.3g} rad/s, asks for kp times that, more than "
+            f"{limits.torque:.3g} N m where kp is above {limits.torque / jump:.3g} N m s/rad, and may overshoot its "
+            f"{top:.3g} rad/s; give kp to keep both."
+        )
+    if inertia is None:
+        parts.append(
+            f"Its ramps of up to {b.slope:.3g} rad/s^2 ask for the inertia times that, and overshoot by as much divided by kp "
+            "where they end; give the inertia to size them by torque and speed limit."
+        )
+    return " ".join(parts)
 
 
 def candidate_commands(dt: float, limits: Limits, inertia: float | None = None, kp: float | None = None) -> list[MenuItem]:
     """The menu within the limits; arguments as for `first_experiment`. Each command fills the duration at most."""
     bench = _bench(dt, limits, inertia, kp)
-    return [MenuItem(name, _within(_filled(build, bench), bench), dt, effects, why) for name, build, effects, why in _MENU]
+    return [MenuItem(name, _within(_filled(build, bench), bench), dt, effects, why) for name, build, effects, why in MENU]
 
 
 def separation(
@@ -201,7 +220,7 @@ def separation(
     return float(off @ off)
 
 
-def _bench(dt: float, limits: Limits, inertia: float | None, kp: float | None) -> _Bench:
+def _bench(dt: float, limits: Limits, inertia: float | None, kp: float | None) -> Bench:
     if not isinstance(limits, Limits):
         raise SettingsError(f"limits is {limits!r}: give gaident.Limits(speed, torque, travel, duration)")
     for name, value in (("dt", dt), ("inertia", inertia), ("kp", kp)):
@@ -212,15 +231,25 @@ def _bench(dt: float, limits: Limits, inertia: float | None, kp: float | None) -
             f"duration is {limits.duration:g} s, {int(limits.duration / dt)} samples: give {LEAST_SAMPLES * dt:g} s or more"
         )
     stroke = FREE * limits.travel
-    # A stroke lasts 20 samples at least.
-    speed = min(FREE * limits.speed, stroke / (20.0 * dt))
-    slope = 0.6 * limits.torque / inertia if inertia is not None else 150.0 * speed / limits.duration
+    speed = min(FREE * limits.speed, stroke / (20.0 * dt))  # a stroke lasts 20 samples at least
+    top, slope = _ramps(limits, inertia, kp)
     # Half a stroke to rise, half to fall: v^2 = slope * stroke.
     speed = min(speed, 0.8 * math.sqrt(slope * stroke)) if math.isfinite(stroke) else speed
-    return _Bench(dt, speed, stroke, slope, limits.duration, limits.torque, kp)
+    return Bench(dt, speed, min(speed, top), stroke, slope, limits.duration, limits.torque, kp)
 
 
-def _filled(build: _Builder, bench: _Bench) -> Vector:
+def _ramps(limits: Limits, inertia: float | None, kp: float | None) -> tuple[float, float]:
+    """(speed to go to [rad/s], slope [rad/s^2]): speed + J a / kp <= speed limit, J a <= 60 % of the torque."""
+    if kp is not None and inertia is not None:
+        torque = min(0.6 * limits.torque, kp * ROOM * limits.speed)
+        return min(FREE * limits.speed, limits.speed - torque / kp), torque / inertia
+    # What is not known is left to time: a ramp takes a share of the record's, with kp a longer one to a lower speed.
+    top, hurry = (FREE, 150.0) if kp is None else (1.0 - ROOM, 100.0)
+    slope = hurry * top * limits.speed / limits.duration if inertia is None else 0.6 * limits.torque / inertia
+    return top * limits.speed, slope
+
+
+def _filled(build: Builder, bench: Bench) -> Vector:
     """The pattern, quickened (then slowed down) until it fits the bench's time, as often as it then fits."""
     room = int(bench.seconds / bench.dt + 1e-9)
     pattern = build(bench)
@@ -228,135 +257,14 @@ def _filled(build: _Builder, bench: _Bench) -> Vector:
         if len(pattern) <= room:
             break
         # Ramps of a heavy axis take their time whatever the dwell: lower speeds are reached sooner.
-        bench = replace(bench, seconds=0.85 * bench.seconds, speed=bench.speed * (1.0 if attempt < 10 else 0.9))
+        slower = 1.0 if attempt < 10 else 0.9
+        bench = replace(bench, seconds=0.85 * bench.seconds, speed=slower * bench.speed, top=slower * bench.top)
         pattern = build(bench)
     return np.tile(pattern, max(1, room // len(pattern)))[: max(room, 1)]
 
 
-def _within(command: Vector, bench: _Bench) -> Vector:
-    """The command, lowered where it still is too fast or sweeps too much."""
+def _within(command: Vector, bench: Bench) -> Vector:
+    """The command, lowered where it still is too fast, sweeps too much or jumps too far."""
     low, high = swept(command, bench.dt)
     factor = min(1.0, bench.travel / max(high - low, 1e-300), bench.speed / max(float(np.abs(command).max()), 1e-300))
-    return command * factor
-
-
-def _speed_ladder(b: _Bench) -> Vector:
-    """Five speeds to the top, mixed in order, forwards and backwards, dithered on every other one."""
-    shares = (0.5, 0.1, 1.0, 0.25, 0.75)
-    dwell = b.seconds / (2.6 * len(shares))
-    parts = []
-    for i, share in enumerate(shares):
-        stroke = strokes([share * b.speed], dwell, b.travel, b.slope, b.dt)
-        parts.append(_dither(stroke, b) if i % 2 else stroke)
-    return np.concatenate(parts)
-
-
-def _dither(command: Vector, b: _Bench) -> Vector:
-    size = 0.03 * b.speed if b.kp is None else min(0.05 * b.speed, 0.05 * b.torque / b.kp)
-    return dithered(command, size, 4)
-
-
-def _slow_stairs(b: _Bench) -> Vector:
-    """Half to five per cent of the speed, rests between, both directions."""
-    shares = (0.005, 0.01, 0.02, 0.05)
-    dwell = b.seconds / (3.0 * len(shares))
-    parts: list[Vector] = []
-    for share in shares:
-        parts += [strokes([share * b.speed], dwell, b.travel, math.inf, b.dt), rest(0.5 * dwell, b.dt)]
-    return np.concatenate(parts)
-
-
-def _triangles(b: _Bench) -> Vector:
-    return triangles((0.05 * b.speed, 0.2 * b.speed, 0.6 * b.speed), b.seconds / 3.0, b.travel, b.dt)
-
-
-def _reversals(b: _Bench) -> Vector:
-    """Square waves around zero, small and large."""
-    parts = []
-    for share in (0.02, 0.3):
-        dwell = max(b.seconds / 16.0, 10 * b.dt)
-        parts += [strokes([share * b.speed], dwell, b.travel, math.inf if share < 0.1 else b.slope, b.dt)] * 3
-    return np.concatenate(parts)
-
-
-def _prbs_moving(b: _Bench) -> Vector:
-    """A binary signal on half the speed, three amplitudes, forwards and backwards."""
-    stroke = strokes([0.5 * b.speed], b.seconds / 7.0, b.travel, b.slope, b.dt)
-    largest = 0.1 * b.speed if b.kp is None else min(0.2 * b.speed, 0.4 * b.torque / b.kp)
-    parts = [dithered(stroke, f * largest, c) for f, c in ((0.3, 1), (0.6, 2), (1.0, 4))]
-    return np.concatenate(parts)
-
-
-def _prbs_standing(b: _Bench) -> Vector:
-    largest = 0.1 * b.speed if b.kp is None else min(0.2 * b.speed, 0.4 * b.torque / b.kp)
-    piece = rest(b.seconds / 3.0 - b.dt, b.dt)
-    parts = [dithered(piece, f * largest, c) for f, c in ((0.1, 8), (0.4, 4), (1.0, 4))]
-    return np.concatenate(parts)
-
-
-def _steps(b: _Bench) -> Vector:
-    """Steps of 10, 30 and 100 %, the last with more torque than there is, where the speed allows that."""
-    full = 0.8 * b.speed  # a jump overshoots more than a ramp
-    if b.kp is not None:
-        full = min(full, 1.5 * b.torque / b.kp)
-    return np.concatenate([strokes([share * full], b.seconds / 6.5, b.travel, math.inf, b.dt) for share in (0.1, 0.3, 1.0)])
-
-
-def _constant_slow(b: _Bench) -> Vector:
-    """Three slow speeds, each for five turns where travel and time allow."""
-    dwell = b.seconds / 6.5
-    wanted = 5.0 * math.tau / dwell
-    shares = [min(f * b.speed, g * wanted) for f, g in ((0.1, 0.4), (0.3, 1.0), (0.6, 2.5))]
-    return strokes(shares, dwell, b.travel, b.slope, b.dt)
-
-
-def _holds(b: _Bench) -> Vector:
-    """Eight angles within a turn or the travel, approached from both sides, a hold at each."""
-    angle = min(b.travel, math.tau) / 8.0
-    period = b.seconds / 16.0
-    move, hold = 0.5 * period, rest(0.5 * period, b.dt)
-    count = max(2, round(move / b.dt))
-    shape = np.sin(np.pi * (np.arange(count) + 0.5) / count)
-    move_once = min(b.speed, angle / (b.dt * float(shape.sum()))) * shape
-    once = np.concatenate([move_once, hold])
-    return np.concatenate([np.tile(once, 8), np.tile(-once, 8)])
-
-
-def _repeat(b: _Bench) -> Vector:
-    """The same levels at start and end, a fast warm-up between."""
-    segment = strokes([0.2 * b.speed, 0.6 * b.speed], b.seconds / 17.0, b.travel, b.slope, b.dt)
-    warm = strokes([b.speed] * 3, b.seconds / 13.0, b.travel, b.slope, b.dt)
-    return np.concatenate([segment, warm, segment])
-
-
-def _creep(b: _Bench) -> Vector:
-    """Tiny triangles: torque that rises and falls below break-away."""
-    return triangles((0.001 * b.speed, 0.003 * b.speed, 0.01 * b.speed), b.seconds / 3.0, b.travel, b.dt)
-
-
-_MENU: tuple[tuple[str, _Builder, tuple[str, ...], str], ...] = (
-    ("slow stairs", _slow_stairs,
-     ("coulomb_friction", "stribeck_friction", "presliding_friction", "asymmetric_friction", "torque_dead_band"),
-     "Slow levels with rests show how friction behaves from standstill on."),
-    ("triangle across zero", _triangles, ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "quadratic_drag"),
-     "A speed that sweeps through zero draws the whole friction curve, accelerating and decelerating."),
-    ("reversals", _reversals, ("backlash", "torque_dead_band", "presliding_friction", "coulomb_friction", "hardening_stiffness"),
-     "Reversals with small and with large torque: a gap takes time, a dead band torque, a bristle angle."),
-    ("random signal at speed", _prbs_moving,
-     ("extra_resonance", "torque_lag", "transport_delay", "velocity_filter", "hardening_stiffness"),
-     "A binary signal on a constant speed, dry friction out of the way, shows the dynamics up to half the sampling rate."),
-    ("random signal at standstill", _prbs_standing, ("backlash", "presliding_friction", "torque_dead_band", "coulomb_friction"),
-     "A binary signal around standstill, in three amplitudes: friction and play show as what changes with the amplitude."),
-    ("steps of three sizes", _steps, ("torque_saturation", "command_rate_limit", "integrator_clamp"),
-     "Steps of which only the largest runs into limits tell them apart by slope and torque."),
-    ("slow constant speeds", _constant_slow, ("cogging", "velocity_ripple", "unbalance"),
-     "Several turns at three slow speeds: a torque ripple keeps its torque, a sensor's ripple grows with speed."),
-    ("holds up and down", _holds, ("unbalance", "load_torque", "asymmetric_friction", "coulomb_friction"),
-     "Angles approached from both sides: the mean torque there is load or gravity, half the difference friction."),
-    ("repeated segment", _repeat, ("friction_drift", "quadratic_drag"),
-     "One motion, made cold and again after a warm-up: only what depends on time differs."),
-    ("speeds mixed in time", _speed_ladder, ("quadratic_drag", "friction_drift", "asymmetric_friction", "coulomb_friction"),
-     "Speeds up to the highest, in mixed order and both directions, draw drag against speed."),
-    ("creep below break-away", _creep, ("presliding_friction", "stribeck_friction", "torque_dead_band"),
-     "A torque that rises slowly below break-away: a bristle gives way like a spring, dry friction holds."),
-)  # fmt: skip
+    return command * min(factor, bench.jump / max(largest_jump(command, AT_ONCE), 1e-300))

@@ -17,13 +17,13 @@ from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
-from gaident.identification.notes import warnings_of
+from gaident.identification.notes import record_notes, warnings_of
 from gaident.identification.parts import search_parts
 from gaident.identification.result import Identification, Rival, Structure, TrialOutcome
 from gaident.identification.selection import MARGIN, Candidate
 from gaident.identification.settings import Settings
 from gaident.identification.space import SearchSpace, derive_space
-from gaident.identification.starts import doubtful_start, noise_std, starts_moving
+from gaident.identification.starts import noise_std, starts_moving
 from gaident.models.controller import PI
 from gaident.models.mechanics import mechanics_from_model
 from gaident.models.model import Model
@@ -303,7 +303,7 @@ class _Work:
                 rivals,
                 model,
                 lowest < bic - MARGIN,
-                [n for r in self.records if (n := doubtful_start(r, self.controller))] if s.initial_state == "auto" else [],
+                record_notes(self.records, self.controller, s.initial_state),
             ),
             space=self.space,
             settings=s,

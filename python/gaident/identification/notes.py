@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from gaident.data.record import Record
 from gaident.identification.adequacy import Adequacy
 from gaident.identification.covariance import Estimate
 from gaident.identification.result import Rival
 from gaident.identification.selection import MARGIN
+from gaident.identification.starts import doubtful_start
+from gaident.models.controller import PI
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Model
 
-__all__ = ["warnings_of"]
+__all__ = ["open_loop_notes", "record_notes", "warnings_of"]
 
 
 def warnings_of(
@@ -61,3 +64,19 @@ def _shaft_notes(mechanics: OneMass | TwoMass) -> list[str]:
             f"DG = {damped.DG:.3g}), or look for an effect that the model lacks"
         )
     return [f"The mechanics without shaft damping contradict the model by {100 * found:.2g} +- {100 * std:.2g} %: {remedy}."]
+
+
+def open_loop_notes(records: Sequence[Record], controller: PI | None) -> list[str]:
+    """A sentence where a record's torque is that of a loop, u = C (r - w - noise): no input that is independent of the noise."""
+    if controller is not None or all(rec.command is None for rec in records):
+        return []
+    return [
+        "The log has a command, but no gains were given: its torque drives the model, and noise that goes through the loop "
+        "biases the result; give controller=PI(...)."
+    ]
+
+
+def record_notes(records: Sequence[Record], controller: PI | None, initial_state: str) -> list[str]:
+    """What is doubtful about the records themselves: their input, and how they begin."""
+    begun = [n for r in records if (n := doubtful_start(r, controller))] if initial_state == "auto" else []
+    return [*open_loop_notes(records, controller), *begun]

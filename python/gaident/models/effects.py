@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from html import escape
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -52,6 +53,14 @@ class Table(tuple[Row, ...]):
         widths = [max(len(row[i]) for row in rows) for i in range(3)]
         lines = ["  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[3]]) for row in rows]
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        rows = [(r.name, r.place, ", ".join(f"{p.name} [{p.unit}]" for p in r.parameters), r.meaning) for r in self]
+        left = 'style="text-align:left"'
+        head = "".join(f"<th {left}>{title}</th>" for title in ("effect", "place", "parameters", "meaning"))
+        body = "".join("<tr>" + "".join(f"<td {left}>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+        return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
 @lru_cache(maxsize=1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gaident.show.html import Html, Row, number, table, tag, typeset
+from gaident.show.html import Html, Row, joined, number, table, tag, typeset
 from gaident.show.report import diagnosis, identification
 from gaident.show.report.parts import estimate
 from gaident.show.summary import meaning_of
@@ -17,14 +17,17 @@ UNITS = "rmse in rad/s (m/s on a linear axis)"
 
 
 def diagnosis_html(dia: Any) -> Html:
-    """Verdict, causes with their parameters, error before and after."""
+    """Verdict, causes with their parameters and evidence, error before and after."""
     rows: list[Row] = []
     for f in (f for f in dia.findings if not f.is_noise):
         name = " or ".join((f.effect, *f.alternatives)).replace("_", " ")
         for i, (parameter, e) in enumerate(f.parameters.items()):
             cells = (parameter.replace("_", " "), estimate(e.value, e.std), typeset("" if e.unit == "1" else e.unit))
             rows.append((name if i == 0 else "", *cells))
-    causes = table(("cause", "parameter", "value", "unit"), [rows], left=(0, 1, 3)) if rows else ""
+    evidence = [tag("li", tag("b", f.effect.replace("_", " ")), ": ", typeset(f.evidence)) for f in dia.findings if f.evidence]
+    causes = table(("cause", "parameter", "value", "unit"), [rows], left=(0, 1, 3)) if rows else Html("")
+    if evidence:
+        causes = joined((causes, tag("ul", *evidence)))
     errors: list[Row] = [("linear model", number(dia.before.rmse), f"{dia.before.fit_percent:.2f}")]
     if dia.model.effects:
         errors.append(("extended model", number(dia.after.rmse), f"{dia.after.fit_percent:.2f}"))
