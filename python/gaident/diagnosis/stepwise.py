@@ -328,9 +328,10 @@ class Search:
         """Whether a generalisation is worth the threshold in its loop, too.
 
         Driven by the torque, a model with dry friction comes to rest a little before or after the drive wherever a torque that
-        nobody commanded has turned the shaft, and two levels of friction may describe that better than one.
+        nobody commanded has turned the shaft, and two levels of friction may describe that better than one. Where a model leaves
+        white noise there was no such torque.
         """
-        if child.layout.looped or not self.driven.loopable:
+        if child.layout.looped or not self.driven.loopable or child.noise.size == 0:
             return True
         fits = [self.problem.fit(replace(f.layout, looped=True), f.x, WHITE, 8) for f in (parent, child)]
         inside = [self.problem.settled(f) for f in fits]
