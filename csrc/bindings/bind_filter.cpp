@@ -51,10 +51,10 @@ RealArray replayed(const RealArray& values, double limit, double start) {
     return changed(values, [&](std::span<double> all) { run(all, limit, start); });
 }
 
-RealArray held(const RealArray& error, double kp, double half, double torque_limit, double integrator_limit, Hold rule,
-               double integral) {
+RealArray held(const RealArray& error, double kp, double half, double torque_limit, double integrator_limit,
+               const std::string& rule, double integral) {
     return changed(error,
-                   [&](std::span<double> all) { held_torque(all, kp, half, torque_limit, integrator_limit, rule, integral); });
+                   [&](std::span<double> all) { held_torque(all, kp, half, torque_limit, integrator_limit, hold, integral); });
 }
 
 }  // namespace
@@ -62,7 +62,6 @@ RealArray held(const RealArray& error, double kp, double half, double torque_lim
 void bind_filter(py::module_& m) {
     m.def("filtered", &filtered_rows, py::arg("b"), py::arg("a"), py::arg("rows"), py::arg("lengths"));
     m.def("lagged_products", &products, py::arg("e"), py::arg("lags"));
-    py::enum_<Hold>(m, "Hold").value("held", Hold::held).value("held_back", Hold::held_back).value("tracked", Hold::tracked);
     m.def("held_torque", &held, py::arg("error"), py::arg("kp"), py::arg("half"), py::arg("torque_limit"),
           py::arg("integrator_limit"), py::arg("rule"), py::arg("integral"));
     m.def("clamped_sum", &replayed<clamped_sum>, py::arg("steps"), py::arg("limit"), py::arg("start"));

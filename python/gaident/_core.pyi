@@ -1,7 +1,7 @@
 """The core of gaident: recurrences, genetic search and local fit (csrc/bindings); SI units."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -267,21 +267,13 @@ def filtered(
 def lagged_products(e: NDArray[np.float64], lags: int) -> NDArray[np.float64]:
     """sum_n e(n) e(n-k), k = 0..lags."""
 
-class Hold:
-    """What a controller does with its integrator at the torque limit."""
-
-    held: ClassVar[Hold]
-    held_back: ClassVar[Hold]
-    tracked: ClassVar[Hold]
-    __members__: ClassVar[dict[str, Hold]]
-
 def held_torque(
     error: NDArray[np.float64],
     kp: float,
     half: float,
     torque_limit: float,
     integrator_limit: float,
-    rule: Hold,
+    rule: str,
     integral: float,
 ) -> NDArray[np.float64]:
     """Torque of a PI whose integrator does not wind up at its torque limit; half: ki dt/2."""

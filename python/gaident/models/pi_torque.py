@@ -55,7 +55,6 @@ def held_torque(command: Vector, velocity: Vector, dt: float, controller: PI, ru
     held_back  I(n) = I(n-1) where e(n) v(n) > 0
     tracked    I(n) = u(n) - kp e(n)
     """
-    hold = _core.Hold.__members__[rule]
     return _core.held_torque(
-        command - velocity, controller.kp, 0.5 * controller.ki * dt, *controller.limits, hold, initial_integral
+        command - velocity, controller.kp, 0.5 * controller.ki * dt, *controller.limits, rule, initial_integral
     )
