@@ -2,6 +2,8 @@
 #include "../gaident/replay.hpp"
 #include "bindings.hpp"
 
+#include <algorithm>
+
 using namespace gaident;
 
 namespace {
@@ -53,6 +55,10 @@ RealArray replayed(const RealArray& values, double limit, double start) {
 
 RealArray held(const RealArray& error, double kp, double half, double torque_limit, double integrator_limit,
                const std::string& rule, double integral) {
+    constexpr const char* names[] = {"held", "held_back", "tracked"};
+    const auto found = std::find(std::begin(names), std::end(names), rule);
+    if (found == std::end(names)) throw std::invalid_argument("rule: held, held_back or tracked, not " + rule);
+    const auto hold = static_cast<Hold>(found - std::begin(names));
     return changed(error,
                    [&](std::span<double> all) { held_torque(all, kp, half, torque_limit, integrator_limit, hold, integral); });
 }
