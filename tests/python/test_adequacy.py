@@ -180,7 +180,6 @@ def test_numpy_numbers_are_numbers() -> None:
         ga.SearchSpace(gain=np.array([1e3, 2e4, 3e4]))
 
 
-@pytest.mark.alone
 def test_ctrl_c_returns_within_a_fifth_of_a_second() -> None:
     """From the signal to KeyboardInterrupt, in a search that would take minutes and in a fit of a long record."""
     import _thread

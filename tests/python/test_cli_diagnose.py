@@ -103,7 +103,6 @@ def test_a_folder_that_is_not_there_is_a_failure_before_the_work(here: Path, cap
     assert "create it first" in refusal(["diagnose", "run0.csv", *LOOP, "--out", "no/dia.json"], capsys, 1)
 
 
-@pytest.mark.alone
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_ctrl_c_ends_it_with_one_line(here: Path) -> None:
     arguments = ["diagnose", "run0.csv", *LOOP, "--bootstrap", "100000", "--out", "dia.json"]

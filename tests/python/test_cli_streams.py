@@ -26,7 +26,6 @@ def test_a_reader_that_goes_away(here: Path) -> None:
     assert err == ""
 
 
-@pytest.mark.alone
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_ctrl_c_ends_within_half_a_second(here: Path) -> None:
     args = ["identify", "step.csv", *NAMES, *LOOP, "--trials", "100000", "--out", "idn.json"]

@@ -260,7 +260,6 @@ def test_the_missing_torque_without_a_logged_torque_is_the_same() -> None:
     np.testing.assert_allclose(replayed.dhat, logged.dhat, atol=1e-9)
 
 
-@pytest.mark.alone
 def test_the_smoother_is_fast_and_refuses_what_it_cannot_see() -> None:
     rec = drive(Tc=0.05)
     long = ga.Record(DT, np.tile(rec.command, 50), np.tile(rec.velocity, 50), torque=np.tile(rec.torque, 50))

@@ -208,7 +208,6 @@ def test_many_equal_one_by_one(loop: str) -> None:
     assert ga.simulate_many([], rec, ctl).shape == (0, len(rec))
 
 
-@pytest.mark.alone
 def test_ctrl_c_ends_many_simulations() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     rec, model = record(1e-3, "open", n=5000), ONE.model().with_effect("coulomb_friction", torque=0.02)

@@ -267,7 +267,6 @@ def test_save_and_load(tmp_path: object) -> None:
         ga.load(path.parent / "nowhere.json")
 
 
-@pytest.mark.alone
 def test_progress_is_reported_and_an_error_in_it_stops_the_run() -> None:
     rec, ctl = record(TWO_MASS, "continuous"), controller("continuous")
     seen: list[float] = []
