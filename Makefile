@@ -43,7 +43,7 @@ install: .venv/.installed ## set up .venv and install the package into it
 demo: .venv/.installed ## identify a two-mass drive, find a hidden friction; text on the screen, pictures in build/demo
 	@$(BIN)/gaident demo --out "$(DEMO_DIR)"
 
-# What comes from the network beside what needs the compiler; alone what measures speed.
+# What comes from the network beside what needs the compiler, then the tests.
 test: ## every test, C++ and Python
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target SIDE_BY_SIDE=yes .venv/.requirements build-checked
 	@$(MAKE) --no-print-directory test-checked test-python
@@ -67,8 +67,9 @@ test-sanitized: .venv/.tools ## the C++ tests again under AddressSanitizer and U
 	$(BIN)/cmake --build build/sanitized --target all all_verify_interface_header_sets
 	$(CTEST) build/sanitized
 
+# One more than there are cores: some tests wait for a clock, a browser or a kernel.
 test-python: .venv/.tested
-	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
+	$(BIN)/python -m pytest -n $$(($(JOBS) + 1)) --dist worksteal
 
 bench: .venv/.tools ## build (plainly, without Python) and run the C++ benchmark; BENCH_FLAGS=... goes to it
 	@mkdir -p build/plain
