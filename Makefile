@@ -67,9 +67,8 @@ test-sanitized: .venv/.tools ## the C++ tests again under AddressSanitizer and U
 	$(BIN)/cmake --build build/sanitized --target all all_verify_interface_header_sets
 	$(CTEST) build/sanitized
 
-# One more than there are cores: some tests wait for a clock, a browser or a kernel.
 test-python: .venv/.tested
-	$(BIN)/python -m pytest -n $$(($(JOBS) + 1)) --dist worksteal
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 bench: .venv/.tools ## build (plainly, without Python) and run the C++ benchmark; BENCH_FLAGS=... goes to it
 	@mkdir -p build/plain
