@@ -13,7 +13,7 @@ import pytest
 
 import gaident as ga
 from blind_judge import CLASSES, DRIVERS, Judgement, judge
-from drive_cases import EFFECTS, random_case, records
+from drive_cases import EFFECTS, random_case, random_plant, records
 from drive_rig import OUTSIDE, library
 from gaident.diagnosis.candidates import CANDIDATES, Scales
 from gaident.diagnosis.driven import Driven
@@ -127,6 +127,27 @@ def test_two_effects_of_which_none_is_a_first_step_are_both_found() -> None:
     """Without the friction a lag passes for a delay; without the lag the friction passes for noise."""
     judged = diagnosed(("coulomb_friction", "torque_lag"), noise="encoder", seed=21000001)
     assert judged.in_set and not judged.wrong and len(judged.sets) == 2, judged
+
+
+def test_a_lag_is_no_delay_with_a_resonance() -> None:
+    """A delay is the first step, a delay with an extra resonance the next; the lag alone explains more."""
+    judged = diagnosed(("velocity_filter",), noise="encoder", torque=False, seed=40000000)
+    assert judged.in_set and not judged.wrong and len(judged.sets) == 1, judged
+
+
+def test_small_effects_beside_a_gap_are_not_named() -> None:
+    """A cogging steers the impacts by 140 BIC units, and makes held-out data better."""
+    judged = diagnosed(("backlash",), noise="coloured", seed=31000003)
+    assert judged.exact and not judged.wrong, judged
+
+
+def test_a_small_detail_of_friction_is_seen_where_nothing_but_white_noise_is_left() -> None:
+    """At half its separability limit: its parent would be a wrong name."""
+    rng = np.random.default_rng(41000007)
+    plant = next(p for p in iter(lambda: random_plant(rng), None) if p.name == "small motor")
+    record, validation, controller, truth = random_case(41000007, ("presliding_friction",), factor=0.03094, plant=plant)
+    judged = judge(ga.diagnose(record, controller=controller, validation=validation), truth.effects)
+    assert not judged.wrong and judged.in_set, judged
 
 
 def test_the_angle_behind_a_filter_and_a_ripple_of_the_sensor_is_taken_back() -> None:

@@ -43,7 +43,7 @@ MOST = 4  # effects in one model
 SHARE, BACKLASH_SHARE = 0.1, 0.5
 """Part of what a model leaves beyond the noise that an extension has to explain; the second beside a gap."""
 
-CLOSE = 4.0  # times the threshold, by which an extension that makes an older effect needless may be behind the best one
+NEEDLESS = 4.0  # times the threshold, by which an extension that makes an older effect needless may be behind the best one
 FITTED = 6  # candidates that each of the two rankings sends into a short fit
 FINISHED = 5  # of these, how many are fitted to the end
 FAR = 0.5  # BIC units per sample by which a short fit may be behind the model that it extends, to be fitted to the end
@@ -149,7 +149,7 @@ class Search:
         """
         taken = self.thinned(with_second_mass(self.problem, found))
         for f in self.extensions(best):
-            if f is not found and f.bic - found.bic < CLOSE * self.threshold:
+            if f is not found and f.bic - found.bic < NEEDLESS * self.threshold:
                 less = self.thinned(with_second_mass(self.problem, f))
                 if len(less.effects) < len(taken.effects) and less.bic < taken.bic:
                     taken = less
