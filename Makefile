@@ -15,10 +15,10 @@ endif
 
 BIN := .venv/bin
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --no-compile
-# Built in folders that stay, so that a small change is a small build. The checks take warnings for errors and add tests
-# and benchmark to the same objects.
+# Built in folders that stay, so that a small change is a small build. The checks take warnings for errors, and build the C++ tests and
+# the benchmark from the same objects at the same time.
 PACKAGE := --no-build-isolation --config-settings=build-dir=build/python
-CHECKED := --no-build-isolation --config-settings=build-dir=build/checked --config-settings=build.targets=_core \
+CHECKED := --no-build-isolation --config-settings=build-dir=build/checked \
 	$(patsubst %,--config-settings=cmake.define.GAIDENT_%=ON,WERROR TESTS BENCH)
 CMAKE := $(BIN)/cmake -S . -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja)
 CTEST := $(BIN)/ctest --output-on-failure --no-tests=error -j $(JOBS) --test-dir
