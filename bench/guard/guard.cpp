@@ -4,7 +4,7 @@
 // Compilers differ: with one that has no rows the most stored for any is the guide and twice that the limit.
 //
 //     gaident_guard COUNTS            compare; exit code 0: held, 1: lost, 2: wrong use, 77: nothing can be counted here
-//     gaident_guard COUNTS SET        one instruction set alone
+//     gaident_guard COUNTS SET        one instruction set alone; "best": the widest that this processor has
 //     gaident_guard COUNTS --store    renew the rows of this compiler, on a processor with all instruction sets
 #include "counts.hpp"
 #include "instructions.hpp"
@@ -138,9 +138,10 @@ void rows(guard::Counts& counts, const std::string& only) {
 
 int main(int argc, char** argv) {
     store = argc == 3 && std::strcmp(argv[2], "--store") == 0;
-    const std::string only = argc == 3 && !store ? argv[2] : "";
+    std::string only = argc == 3 && !store ? argv[2] : "";
+    if (only == "best") only = best_kernels().name;
     if (argc < 2 || argc > 3 || (!only.empty() && kernels_named(only.c_str()) == nullptr)) {
-        std::fprintf(stderr, "usage: gaident_guard COUNTS [--store | an instruction set that this processor has]\n");
+        std::fprintf(stderr, "usage: gaident_guard COUNTS [--store | best | an instruction set that this processor has]\n");
         return 2;
     }
     volatile double x = 1.0;
