@@ -127,7 +127,7 @@ def local_fit_from_truth(case: Case, rec: ga.Record) -> float:
     return float(2.0 * least_squares(residual, np.ones_like(values), x_scale="jac", xtol=1e-12, ftol=1e-12).cost)
 
 
-def run(name: str, cases: int, settings: ga.Settings, first: int, verbose: bool) -> dict[str, float]:
+def run(name: str, cases: int, settings: ga.Settings, first: int, given: bool, verbose: bool) -> dict[str, float]:
     make, space_options = CASES[name]
     right = structure_right = 0
     seconds, deviations, excess = [], [], []
@@ -139,12 +139,14 @@ def run(name: str, cases: int, settings: ga.Settings, first: int, verbose: bool)
         space = None
         if settings.engine == "plain":
             space = ga.SearchSpace(gain=(1e3, 2e4), real=(0.0, 60.0), imaginary=(0.0, 250.0))
-        elif space_options:
+        elif space_options or given:
             from dataclasses import replace
 
             from gaident.identification.space import derive_space
 
-            space = replace(derive_space([rec], case.controller), **space_options)
+            p, q = case.model.p, case.model.q
+            narrowed = {"p": (p, p), "q": (q, q)} if given else space_options
+            space = replace(derive_space([rec], case.controller), **narrowed)
         began = time.perf_counter()
         idn = ga.identify(rec, case.controller, space=space, settings=settings, seed=1000 + k, workers=1)
         seconds.append(time.perf_counter() - began)
@@ -178,11 +180,12 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", nargs="*", help=f"from: {', '.join(CASES)}")
     parser.add_argument("--paper", action="store_true", help="Settings.paper() with the ranges of the paper's records")
+    parser.add_argument("--given", action="store_true", help="the structure is given: SearchSpace with one p and one q")
     parser.add_argument("--verbose", action="store_true", help="show the cases that went wrong")
     options = parser.parse_args()
     settings = ga.Settings.paper() if options.paper else ga.Settings()
     for name in options.only or list(CASES):
-        figures = run(name, options.cases, settings, options.first, options.verbose)
+        figures = run(name, options.cases, settings, options.first, options.given, options.verbose)
         print(
             f"{name}: {figures.pop('right'):.0f} of {options.cases} right; "
             + ", ".join(f"{k} {v:.4g}" for k, v in figures.items()),

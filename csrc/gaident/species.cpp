@@ -38,6 +38,8 @@ constexpr std::size_t least_in_species = 3;
 constexpr double out_of_reach = 2.0;
 // A structure whose error sum is within so many times the least describes the data about as well as any.
 constexpr double close_to_best = 1.2;
+// What a better optimum leaves of the error sum, at most: less is the end of a valley, and no reason for another round.
+constexpr double worth_a_round = 0.95;
 
 // Power of white noise on a smooth signal, from its third differences (median, so robust), whose variance is 1 + 9 + 9 + 1 = 20 times
 // the noise's. Of a long record an evenly spaced part will do.
@@ -159,14 +161,19 @@ private:
         }
     }
 
-    // Local fits, from small structures to large; true where one got better.
+    // Local fits, from small structures to large; true where one that is close to the best found a better optimum.
     bool fit_round(const Effort& effort) {
-        better_.assign(all_.size(), 0);
+        std::vector<double> before;
+        for (const Refined& r : trial_.species) before.push_back(r.cost);
         Level level;
         do level = fit_level(level, effort);
         while (level.first < all_.size());
         fit_smaller();
-        return std::any_of(better_.begin(), better_.end(), [](char c) { return c != 0; });
+        for (std::size_t i = 0; i < all_.size(); ++i) {
+            const double now = trial_.species[i].cost;
+            if (now < close_to_best * lead() && now < worth_a_round * before[i]) return true;
+        }
+        return false;
     }
 
     // Where a species' local fits may start: its best individual (from == own index), or a smaller structure's optimum, grown.
@@ -258,7 +265,6 @@ private:
     void keep_better(std::size_t i, Refined& found) {
         Refined& own = trial_.species[i];
         if (!(found.cost < own.cost) && own.cost < worst_fitness) return;
-        if (found.cost < 0.999 * own.cost) better_[i] = 1;
         own = std::move(found);
     }
 
@@ -316,7 +322,6 @@ private:
     std::size_t asked_islands_ = 0;  // the first so many; the last may hold smaller structures
     std::vector<Place> places_;      // of each structure
     Trial trial_;
-    std::vector<char> better_;                // per species: improved in the round under way
     double slowest_ = 1e300, fastest_ = 0.0;  // rad/s, where a module can still be seen
     double noise_ = 0.0;                      // error sum that the noise of the measured velocity alone makes
 };
