@@ -48,7 +48,7 @@ test: ## every test, C++ and Python
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target SIDE_BY_SIDE=yes .venv/.requirements build-checked
 	@$(MAKE) --no-print-directory test-checked test-python
 
-lint: .venv/.requirements ## ruff and mypy
+lint: .venv/.requirements .venv/.tidied ## ruff and mypy
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
