@@ -14,7 +14,7 @@ from cli_cases import interrupted, refusal
 from clock import fastest
 from drive_cases import random_case
 from gaident.cli import main
-from gaident.cli_output import csv_text
+from gaident.cli.output import csv_text
 from test_diagnosis_result import CONTROLLER, drive_record
 
 LOOP = ("--kp", str(CONTROLLER.kp), "--ki", str(CONTROLLER.ki))

@@ -10,7 +10,7 @@ import pytest
 
 from cli_cases import LOOP, NAMES, command, refusal
 from gaident.cli import main
-from gaident.cli_options import in_options
+from gaident.cli.options import in_options
 
 
 def test_messages_speak_of_options(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gaident.cli import COMMANDS
-from gaident.cli_options import parser_of
+from gaident.cli.options import parser_of
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -17,7 +17,7 @@ import pytest
 
 import gaident as ga
 from gaident.cli import main
-from gaident.cli_output import csv_text
+from gaident.cli.output import csv_text
 from gaident.errors import GaidentError, SettingsError
 from gaident.reporting import report_page, view_of
 from gaident.show.html import Html, tag, typeset

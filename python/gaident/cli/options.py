@@ -8,8 +8,8 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NoReturn
 
-from gaident.cli_log_options import add_log_commands, add_log_options, number
-from gaident.cli_report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
+from gaident.cli.log_options import add_log_commands, add_log_options, number
+from gaident.cli.report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
 from gaident.drive_file import COLUMNS, KEYS, Drive, read_drive_file, unfilled_of
 from gaident.errors import ControllerError, SettingsError
 from gaident.identification.settings import INITIAL_STATES

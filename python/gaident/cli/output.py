@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gaident.cli_options import in_options
+from gaident.cli.options import in_options
 from gaident.data.record import Record
 from gaident.diagnosis.experiments import Proposal
 from gaident.errors import SettingsError

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gaident import demo as demonstration
-from gaident.cli_output import csv_text, draw, print_json, save_figure, summary_of, write
+from gaident.cli.output import csv_text, draw, print_json, save_figure, summary_of, write
 from gaident.progress_bar import Progress
 
 __all__ = ["demo_command"]

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from gaident.cli_demo import demo_command
-from gaident.cli_logs import log_commands
-from gaident.cli_options import PICTURES, drive_of, in_options, parser_of
-from gaident.cli_output import (
+from gaident.cli.demo import demo_command
+from gaident.cli.logs import log_commands
+from gaident.cli.options import PICTURES, drive_of, in_options, parser_of
+from gaident.cli.output import (
     csv_targets,
     csv_text,
     draw,
@@ -33,7 +33,7 @@ from gaident.cli_output import (
     target_of,
     write,
 )
-from gaident.cli_report import report_command, write_report
+from gaident.cli.report import report_command, write_report
 from gaident.data.record import Record
 from gaident.diagnosis.diagnose import diagnose
 from gaident.diagnosis.replay import Replay, replay

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gaident import doctor
-from gaident.cli_output import print_json, proposal_csv, target_of, write
+from gaident.cli.output import print_json, proposal_csv, target_of, write
 from gaident.data.listing import columns, printable
 from gaident.data.readers import read_columns
 from gaident.diagnosis.experiments import first_experiment
