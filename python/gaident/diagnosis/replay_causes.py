@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gaident.identification.noise import ljung_box
 from gaident.models.controller import PI
-from gaident.models.filtering import rate_limited
+from gaident.models.filtering import filtered, rate_limited
 from gaident.models.pi_torque import HOLDS, held_torque, pi_torque
 
 __all__ = ["Explanation", "explain", "rounded_command", "white_noise"]
@@ -82,13 +82,24 @@ def rounded_command(off: Vector, command: Vector, dt: float, controller: PI) -> 
 
         off(n) - off(n-1) = (kp + h) d(n) - (kp - h) d(n-1)
     """
-    from scipy.signal import lfilter
-
     h = 0.5 * controller.ki * dt
     if controller.kp <= h or controller.limited:
         return False
-    d = lfilter([1.0, -1.0], [controller.kp + h, h - controller.kp], off)
+    d = _error_of(off, controller.kp, h)
     return float(np.abs(d).max()) <= ROUNDED * float(np.abs(command).max())
+
+
+def _error_of(torque: Vector, kp: float, h: float) -> Vector:
+    """The control error e [rad/s] that makes this torque u [N m], h = ki dt/2:
+
+        (kp + h) e(n) = (kp - h) e(n-1) + u(n) - u(n-1)
+
+    Both are 0 before the record.
+    """
+    rise = np.array([1.0, -1.0]) / (kp + h)
+    decay = np.array([1.0, (h - kp) / (kp + h)])
+    error: Vector = filtered(rise, decay, torque[None, :], [len(torque)])[0]
+    return error
 
 
 def white_noise(off: Vector, logged: Vector) -> float:
@@ -163,12 +174,10 @@ def _rate(case: _Case) -> Iterator[Explanation]:
 
     moves with the slope of the limit where it is not the logged one.
     """
-    from scipy.signal import lfilter
-
     kp, h = case.controller.kp, 0.5 * case.controller.ki * case.dt
     if kp <= h or case.controller.limited:
         return
-    seen = lfilter([1.0, -1.0], [kp + h, h - kp], case.logged) + case.velocity
+    seen = _error_of(case.logged, kp, h) + case.velocity
     behind = np.abs(seen - case.command)[1:] > 1e-3 * float(np.abs(case.command).max())
     slopes = np.abs(np.diff(seen))[behind] / case.dt
     if len(slopes) == 0:
