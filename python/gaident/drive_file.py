@@ -9,23 +9,25 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gaident.data.readers import read
 from gaident.data.record import CHANNELS, Record
-from gaident.diagnosis.experiments import Limits
 from gaident.errors import ControllerError, ReadError, SettingsError, SpaceError
 from gaident.identification.space import SearchSpace, derive_space
 from gaident.models._checks import known_keys, one_of, real_number
 from gaident.models.controller import PI
+from gaident.show.wording import AXES
 
-__all__ = ["AXES", "COLUMNS", "KEYS", "Drive", "read_drive_file", "unfilled_of"]
+if TYPE_CHECKING:
+    from gaident.diagnosis.experiments import Limits
+
+__all__ = ["COLUMNS", "KEYS", "Drive", "read_drive_file", "unfilled_of"]
 
 
 COLUMNS = (*CHANNELS, "time")
 CONSTANTS = ("counts_per_turn", "torque_constant", "rated_torque", "torque_per_volt")
 RANGES = ("inertia", "resonance_hz", "damping", "gain", "real", "imaginary", "p", "q")
-AXES = ("rotary", "linear")
 
 Check = Callable[[object, str], object]
 
@@ -187,6 +189,8 @@ class Drive:
 
     def limits(self) -> Limits:
         """What an experiment may do. Raises SettingsError where the speed or the torque is missing."""
+        from gaident.diagnosis.experiments import Limits
+
         missing = [name for name in ("speed", "torque") if name not in self.limit_values]
         if missing:
             raise SettingsError(

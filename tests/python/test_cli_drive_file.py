@@ -10,7 +10,8 @@ import pytest
 import gaident as ga
 from cli_cases import LOOP, NAMES, refusal
 from gaident.cli import COMMANDS
-from gaident.cli.options import drive_of, parser_of
+from gaident.cli.drive import drive_of
+from gaident.cli.options import parser_of
 from gaident.drive_file import read_drive_file
 
 ROOT = Path(__file__).resolve().parents[2]

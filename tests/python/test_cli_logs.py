@@ -220,7 +220,8 @@ def test_log_options_of_drive_file_and_command_line(here: Path, capsys: pytest.C
     )
     Path("g.toml").write_text(Path("g.toml").read_text().replace("[units]", "[units]\ntime = 'ms'"))
     from gaident.cli import COMMANDS
-    from gaident.cli.options import drive_of, parser_of
+    from gaident.cli.drive import drive_of
+    from gaident.cli.options import parser_of
 
     def rec(*more: str) -> ga.Record:
         return drive_of(parser_of(COMMANDS).parse_args(["identify", "step.csv", "--drive", "g.toml", *more])).read("step.csv")

@@ -22,7 +22,7 @@ CALLS = [
 @pytest.mark.parametrize("call", CALLS)
 def test_every_command_is_one(call: str) -> None:
     command, *options = shlex.split(call)
-    arguments = parser_of({name: name for name in COMMANDS}).parse_args([command, *options])  # type: ignore[arg-type]
+    arguments = parser_of({name: name for name in COMMANDS}).parse_args([command, *options])
     assert arguments.run == command
 
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from gaident.drive_file import AXES
+from gaident.show.wording import AXES
 
 __all__ = ["SHELLS", "add_log_commands", "add_log_options", "number"]
 

@@ -1,43 +1,25 @@
-"""The commands around logs: columns, init, experiment, doctor, completion."""
+"""gaident columns, and gaident init."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import shlex
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gaident import doctor
-from gaident.cli.output import print_json, proposal_csv, target_of, write
+from gaident.cli.output import print_json, target_of, write
 from gaident.data.listing import columns, printable
 from gaident.data.readers import read_columns
-from gaident.diagnosis.experiments import first_experiment
-from gaident.drive_file import Drive
 from gaident.drive_init import draft
 from gaident.errors import SettingsError
 
-__all__ = ["log_commands"]
+__all__ = ["columns_command", "init_command"]
 
 _LOOKED_INTO = 1 << 26  # bytes of a log whose values `init` compares, too
 
 
-def log_commands(drive_of: Callable[[argparse.Namespace], Drive]) -> dict[str, Callable[[argparse.Namespace], int | None]]:
-    """name -> what runs it; `drive_of`: the drive file with the options over it."""
-
-    def experiment(args: argparse.Namespace) -> None:
-        _experiment(args, drive_of(args))
-
-    return {"columns": _columns, "init": _init, "experiment": experiment, "doctor": _doctor, "completion": _completion}
-
-
-def _text_options(args: argparse.Namespace) -> dict[str, Any]:
-    return {name: getattr(args, name) for name in ("delimiter", "decimal", "skip", "encoding")}
-
-
-def _columns(args: argparse.Namespace) -> None:
+def columns_command(args: argparse.Namespace) -> None:
     found = [columns(log, **_text_options(args)) for log in args.logs]
     if args.json:
         listed = [listing.to_dict() for listing in found]
@@ -46,7 +28,7 @@ def _columns(args: argparse.Namespace) -> None:
         print("\n\n".join(map(str, found)))
 
 
-def _init(args: argparse.Namespace) -> None:
+def init_command(args: argparse.Namespace) -> None:
     target = target_of(args.out, [args.log])
     assert target is not None
     if target.exists() and not args.force:
@@ -78,60 +60,5 @@ def _init(args: argparse.Namespace) -> None:
     print(f"{then}: gaident identify {shlex.quote(str(args.log))} --drive {shlex.quote(str(target))}")
 
 
-def _experiment(args: argparse.Namespace, drive: Drive) -> None:
-    from gaident.show.wording import sentence
-
-    target = target_of(args.out, [] if args.drive is None else [args.drive])
-    dt = drive.general.get("dt")
-    if dt is None:
-        raise SettingsError("dt is missing: give --dt (or dt in the drive file), the sample time of the command in seconds")
-    inertia = drive.space_values.get("inertia")
-    heaviest = None if inertia is None else inertia[1]  # what its ramps ask for must not exceed the torque
-    proposal = first_experiment(dt, drive.limits(), heaviest, drive.controller_values.get("kp"))
-    if args.json:
-        print_json({"schema": "gaident/experiment", "schema_version": 1, **proposal.to_dict()})
-        return
-    text = proposal_csv(proposal, drive.axis)
-    said = sentence(proposal.reason, drive.axis)
-    for missing, option in (("kp", "--kp"), ("the inertia", "--inertia LOW HIGH"), ("the mass", "--inertia LOW HIGH")):
-        said = said.replace(f"give {missing} to", f"give {missing} ({option}, or in the drive file) to")
-    said = f"{len(proposal.command)} samples, {len(proposal.command) * proposal.dt:.3g} s: {said}"
-    if target is None:
-        print(text, end="")
-        if not args.quiet:
-            print(said, file=sys.stderr)  # what it may ask of the axis, beside the CSV
-        return
-    write(target, text.encode())
-    print(f"{said}\nwritten: {target}")
-
-
-def _doctor(args: argparse.Namespace) -> int:
-    found = doctor.examine()
-    if args.json:
-        print_json(found.to_dict())
-    else:
-        print(found)
-    return 1 if found.flaws else 0
-
-
-def _completion(args: argparse.Namespace) -> None:
-    import shtab
-
-    for parser in _parsers(args.whole_parser):
-        for action in parser._actions:
-            takes_file = action.metavar in ("FILE", "LOG", "PATH", "MODEL.json")
-            takes_folder = action.metavar == "DIR"
-            if takes_file or takes_folder:
-                action.complete = shtab.FILE if takes_file else shtab.DIRECTORY  # type: ignore[attr-defined]
-    print(shtab.complete(args.whole_parser, args.shell))
-
-
-def _parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
-    """The parser and those of its commands."""
-    found = [parser]
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for short in action._choices_actions:  # shells show one line of a command
-                action.choices[short.dest].description = short.help
-            found += action.choices.values()
-    return found
+def _text_options(args: argparse.Namespace) -> dict[str, Any]:
+    return {name: getattr(args, name) for name in ("delimiter", "decimal", "skip", "encoding")}

@@ -1,22 +1,20 @@
-"""The commands' options and their help, and the options that override the drive file."""
+"""The commands' options and their help. Every call parses, so nothing heavy is imported here."""
 
 from __future__ import annotations
 
 import argparse
 import difflib
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
 from gaident.cli.log_options import add_log_commands, add_log_options, number
 from gaident.cli.report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
-from gaident.drive_file import COLUMNS, KEYS, Drive, read_drive_file, unfilled_of
-from gaident.errors import ControllerError, SettingsError
+from gaident.errors import SettingsError
 from gaident.identification.settings import INITIAL_STATES
-from gaident.models._checks import one_of
 from gaident.models.controller import LOOPS
 
-__all__ = ["PICTURES", "drive_of", "in_options", "parser_of"]
+__all__ = ["PICTURES", "parser_of"]
 
 PICTURES = (".png", ".pdf", ".svg")
 IDENTIFY_HELP = """\
@@ -102,16 +100,14 @@ and where the paper disagrees with itself. Writes paper.html, which holds its pi
 """
 
 
-def parser_of(commands: Mapping[str, Callable[[argparse.Namespace], int | None]]) -> argparse.ArgumentParser:
-    """The parser; commands: name -> what runs it, set as `run`."""
-    from gaident import __version__
-
+def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
+    """The parser; commands: name -> where the function that runs it stands, set as `run`."""
     parser = _Parser(
         prog="gaident",
         description="From a servo drive's log to a model of its mechanics, and what it is worth.",
         epilog="gaident COMMAND --help explains a command, with examples.",
     )
-    parser.add_argument("--version", action="version", version=f"gaident {__version__}")
+    parser.add_argument("--version", action=_Version)
     parser.set_defaults(whole_parser=parser)
     subparsers = parser.add_subparsers(metavar="COMMAND", required=True)
 
@@ -220,87 +216,6 @@ def _add_run_options(group: Any) -> None:
     group.add_argument("--workers", type=int, metavar="N", help="threads (default: all processors)")
 
 
-def drive_of(args: argparse.Namespace) -> Drive:
-    """The drive file, if one is named, with the options over it."""
-    sections: dict[str, dict[str, Any]] = {name: {} for name in KEYS}
-    unfilled: dict[tuple[str, str], str] = {}
-    if getattr(args, "drive", None) is not None:
-        sections, unfilled = read_drive_file(args.drive), unfilled_of(args.drive)
-    for name, keys in KEYS.items():
-        if name in ("columns", "units"):
-            sections[name].update(_assignments(getattr(args, name, None) or [], f"--{name}"))
-            continue
-        for key in keys:
-            value = getattr(args, key, None)
-            if value is not None:
-                sections[name][key] = value
-    if sections["controller"].get("loop") is not None:
-        one_of(sections["controller"]["loop"], "loop", (*LOOPS, "open"), ControllerError)
-    sections["units"] = {k: _as_number(v) for k, v in sections["units"].items()}
-    return Drive(
-        sections[""],
-        sections["columns"],
-        sections["units"],
-        sections["controller"],
-        sections["space"],
-        sections["limits"],
-        unfilled,
-    )
-
-
-def _assignments(texts: Sequence[str], option: str) -> dict[str, str]:
-    """{"velocity": "w", "torque": "data[:,4]"} of ["velocity=w,torque=data[:,4]"]."""
-    found = {}
-    for text in texts:
-        for part in re.split(r",(?=\s*\w+\s*=)", text):
-            name, sign, value = part.partition("=")
-            if not sign:
-                raise SettingsError(f"{option} {text!r}: write channel=value, for example {option} velocity=w")
-            found[one_of(name.strip(), f"{option}: channel", COLUMNS, SettingsError)] = value.strip()
-    return found
-
-
-def _as_number(text: str | float) -> str | float:
-    try:
-        return float(text)
-    except ValueError:
-        return text
-
-
-# What messages of the library say in Python -> the options that do it.
-_IN_OPTIONS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
-    (r"columns=\{'(\w+)': None\}", r"--columns \1="),
-    (r"(columns|units)=\{'(\w+)': '([^']*)'\}", r"--\1 \2=\3"),
-    (r"(columns|units)=\{'(\w+)': ([^}]*)\}", r"--\1 \2=\3"),
-    (r"space=SearchSpace\(gain=\.\.\.\)", "--gain LOW HIGH"),
-    (r"space=SearchSpace\(\.\.\.\)", "--inertia LOW HIGH or --gain LOW HIGH"),
-    (r"PI\(\.\.\., loop=['\"]continuous['\"]\)", "--loop continuous"),
-    (r"\bloop='(\w+)'", r"--loop \1"),
-    (r"controller=None", "--loop open"),
-    (r"controller=PI\(\.\.\.\)", "--kp and --ki"),
-    (r"PI\(kp=\.\.\., ki=\.\.\.\)", "--kp and --ki"),
-    (r"Record\((\w+)=\.\.\.\)", r"--columns \1=..."),
-    (r"\b([pq])=\((\d+), (\d+)\)", r"--\1 \2..\3"),
-    (r"\bki=0\b", "--ki 0"),
-    (r"\bkp=0\b", "--kp 0"),
-    (
-        r"\b(dt|delimiter|decimal|skip|encoding|counts_per_turn|torque_constant|rated_torque|torque_per_volt|gear_ratio|load_side"
-        r"|decimate|resample|loop|trials|seed|workers)=(?=[^=]|$)",
-        r"--\1 ",
-    ),
-    (r"\bvelocity_cutoff_hz=", "--velocity-cutoff "),
-    (r"(?<!\S)--(counts|torque|rated|gear|load)_(\w+)", lambda found: f"--{found[1]}-{found[2].replace('_', '-')}"),
-    (r" +(?=[,;)](?:\s|$)|$)", ""),
-)
-
-
-def in_options(message: str) -> str:
-    """A message of the library for the command line: `columns={'velocity': ...}` becomes `--columns velocity=...`."""
-    for pattern, words in _IN_OPTIONS:
-        message = re.sub(pattern, words, message)
-    return message
-
-
 def _whole_range(text: str) -> tuple[int, int]:
     """(1, 1) of "1", (0, 3) of "0..3"."""
     match = re.fullmatch(r"(\d+)(?:\.\.(\d+))?", text.strip())
@@ -355,3 +270,19 @@ class _Parser(argparse.ArgumentParser):
             near = difflib.get_close_matches(wrong[1], re.findall(r"[\w-]+", wrong[2]), n=1)
             message = f"{message[: wrong.end(1)]}' (did you mean {near[0]!r}?)" if near else message
         raise SettingsError(f"{message}; see {self.prog} --help")
+
+
+class _Version(argparse._VersionAction):
+    """--version, which is looked up only when it is asked for."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: str | Sequence[Any] | None,
+        option_string: str | None = None,
+    ) -> None:
+        from gaident.version import version
+
+        self.version = f"gaident {version()}"
+        super().__call__(parser, namespace, values, option_string)

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gaident.cli.options import in_options
-from gaident.data.record import Record
-from gaident.diagnosis.experiments import Proposal
+from gaident.cli.remedies import in_options
 from gaident.errors import SettingsError
 from gaident.files import write_whole
-from gaident.identification.result import Identification, json_text
-from gaident.models.simulate import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from gaident.data.record import Record
+    from gaident.diagnosis.experiments import Proposal
+    from gaident.identification.result import Identification
+    from gaident.models.simulate import Run
+
 __all__ = [
+    "apart",
     "csv_targets",
     "csv_text",
     "draw",
@@ -71,6 +73,14 @@ def target_of(path: str | None, logs: Sequence[str], suffixes: Sequence[str] = (
     if not target.parent.is_dir():
         raise FileNotFoundError(f"cannot write {path}: there is no folder {target.parent}; create it first")
     return target
+
+
+def apart(targets: Mapping[str, Path | None]) -> None:
+    """Raises where two options name the same file."""
+    seen: dict[Path, str] = {}
+    for option, target in targets.items():
+        if target is not None and (first := seen.setdefault(target.resolve(), option)) != option:
+            raise SettingsError(f"{first} and {option} both name {target}: the second would overwrite the first; give two files")
 
 
 def csv_targets(path: str | None, logs: Sequence[str], several: bool) -> list[Path]:
@@ -126,4 +136,6 @@ def save_figure(figure: Figure, path: Path) -> None:
 
 def print_json(data: dict[str, Any]) -> None:
     """A result for programs."""
+    from gaident.identification.result import json_text
+
     print(json_text(data))

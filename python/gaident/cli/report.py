@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from gaident.cli.options import drive_of, in_options
+from gaident.cli.drive import drive_of
 from gaident.cli.output import print_json, target_of, write
+from gaident.cli.remedies import in_options
 from gaident.data.record import Record
 from gaident.diagnosis.result import Diagnosis
 from gaident.errors import GaidentError

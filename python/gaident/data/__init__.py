@@ -1,9 +1,8 @@
 """Records of drives: what they are, how they are read from logs, and how signals are prepared."""
 
-from gaident.data.alignment import Alignment, align
-from gaident.data.conditioning import differentiate
-from gaident.data.listing import Listing, columns
-from gaident.data.readers import read, read_columns
-from gaident.data.record import Record
+from __future__ import annotations
 
-__all__ = ["Alignment", "Listing", "Record", "align", "columns", "differentiate", "read", "read_columns"]
+import lazy_loader
+
+# The names stand in __init__.pyi; a name's module is imported when the name is first used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,7 +1,8 @@
 """Diagnosis: what a record says beyond the linear model: evidence, causes, extended models, next experiments."""
 
-from gaident.diagnosis.diagnose import diagnose
-from gaident.diagnosis.experiments import Limits, Proposal, first_experiment
-from gaident.diagnosis.result import Diagnosis, Finding
+from __future__ import annotations
 
-__all__ = ["Diagnosis", "Finding", "Limits", "Proposal", "diagnose", "first_experiment"]
+import lazy_loader
+
+# The names stand in __init__.pyi; a name's module is imported when the name is first used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,20 +1,8 @@
 """Identification: from records to structure and parameters."""
 
-from gaident.identification.covariance import Estimate
-from gaident.identification.identify import identify
-from gaident.identification.least_squares import LeastSquares, least_squares
-from gaident.identification.m_sequence import m_sequence
-from gaident.identification.result import Identification
-from gaident.identification.settings import Settings
-from gaident.identification.space import SearchSpace
+from __future__ import annotations
 
-__all__ = [
-    "Estimate",
-    "Identification",
-    "LeastSquares",
-    "SearchSpace",
-    "Settings",
-    "identify",
-    "least_squares",
-    "m_sequence",
-]
+import lazy_loader
+
+# The names stand in __init__.pyi; a name's module is imported when the name is first used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

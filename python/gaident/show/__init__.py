@@ -1,34 +1,8 @@
 """Results as text and pictures: pure functions of what a result says about itself."""
 
-from gaident.show.diagnosis_plots import (
-    plot_evidence,
-    plot_orders,
-    plot_residual,
-    plot_reversals,
-    plot_torque_velocity,
-)
-from gaident.show.plots import (
-    plot_bode,
-    plot_convergence,
-    plot_identification,
-    plot_poles_zeros,
-    plot_structures,
-)
-from gaident.show.response_plots import plot_response
-from gaident.show.summary import identification_summary, mechanics_comparison
+from __future__ import annotations
 
-__all__ = [
-    "identification_summary",
-    "mechanics_comparison",
-    "plot_bode",
-    "plot_convergence",
-    "plot_evidence",
-    "plot_identification",
-    "plot_orders",
-    "plot_poles_zeros",
-    "plot_residual",
-    "plot_response",
-    "plot_reversals",
-    "plot_structures",
-    "plot_torque_velocity",
-]
+import lazy_loader
+
+# The names stand in __init__.pyi; a name's module is imported when the name is first used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,80 @@
+"""What the options say of the axis, over its drive file, and its logs read that way."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from gaident.data.record import Record
+from gaident.drive_file import COLUMNS, KEYS, Drive, read_drive_file, unfilled_of
+from gaident.errors import ControllerError, SettingsError
+from gaident.models._checks import one_of
+from gaident.models.controller import LOOPS, PI
+
+__all__ = ["drive_of", "read_all"]
+
+
+def drive_of(args: argparse.Namespace) -> Drive:
+    """The drive file, if one is named, with the options over it."""
+    sections: dict[str, dict[str, Any]] = {name: {} for name in KEYS}
+    unfilled: dict[tuple[str, str], str] = {}
+    if getattr(args, "drive", None) is not None:
+        sections, unfilled = read_drive_file(args.drive), unfilled_of(args.drive)
+    for name, keys in KEYS.items():
+        if name in ("columns", "units"):
+            sections[name].update(_assignments(getattr(args, name, None) or [], f"--{name}"))
+            continue
+        for key in keys:
+            value = getattr(args, key, None)
+            if value is not None:
+                sections[name][key] = value
+    if sections["controller"].get("loop") is not None:
+        one_of(sections["controller"]["loop"], "loop", (*LOOPS, "open"), ControllerError)
+    sections["units"] = {k: _as_number(v) for k, v in sections["units"].items()}
+    return Drive(
+        sections[""],
+        sections["columns"],
+        sections["units"],
+        sections["controller"],
+        sections["space"],
+        sections["limits"],
+        unfilled,
+    )
+
+
+def read_all(drive: Drive, logs: Sequence[str], controller: PI | None, measured: bool = True) -> list[Record]:
+    """The logs, each with what drives its simulation; raises SettingsError where that is missing."""
+    records = [drive.read(log, measured) for log in logs]
+    for log, rec in zip(logs, records, strict=True):
+        if controller is not None and rec.command is None:
+            raise SettingsError(
+                f"{log}: there is no command, which drives the loop with a controller: name its column "
+                "(--columns command=...), or use --loop open to work from torque to velocity"
+            )
+        if controller is None and rec.torque is None:
+            raise SettingsError(
+                f"{log}: there is no torque, which drives the model in open loop: name its column "
+                "(--columns torque=...), or give the controller (--kp, --ki)"
+            )
+    return records
+
+
+def _assignments(texts: Sequence[str], option: str) -> dict[str, str]:
+    """{"velocity": "w", "torque": "data[:,4]"} of ["velocity=w,torque=data[:,4]"]."""
+    found = {}
+    for text in texts:
+        for part in re.split(r",(?=\s*\w+\s*=)", text):
+            name, sign, value = part.partition("=")
+            if not sign:
+                raise SettingsError(f"{option} {text!r}: write channel=value, for example {option} velocity=w")
+            found[one_of(name.strip(), f"{option}: channel", COLUMNS, SettingsError)] = value.strip()
+    return found
+
+
+def _as_number(text: str | float) -> str | float:
+    try:
+        return float(text)
+    except ValueError:
+        return text
