@@ -10,8 +10,27 @@ from pathlib import Path
 
 import pytest
 
-from cli_cases import LOOP, NAMES, called, command, interrupted
+from cli_cases import LOOP, NAMES, command, interrupted
 from clock import fastest
+from gaident.cli import main
+
+# The bar without its 0.3 s of waiting, so that a short run shows it.
+AT_ONCE = """
+import sys
+from gaident import cli, progress_bar
+progress_bar._QUIET = 0.0
+sys.exit(cli.main(sys.argv[1:]))
+"""
+# What identify has imported; before, that parsing and help import none of it.
+IMPORTED = """
+import sys
+from gaident.cli import main
+heavy = ("numpy", "scipy", "matplotlib", "gaident.data.record", "gaident.diagnosis")
+assert main(["identify", "--help"]) == 0 and main(["--help"]) == 0 and main(["identify", "--kp", "x"]) == 2
+assert not [name for name in heavy if name in sys.modules]
+assert main(sys.argv[1:]) == 0
+print(*sys.modules, file=sys.stderr)
+"""
 
 
 def test_a_reader_that_goes_away(here: Path) -> None:
@@ -26,6 +45,18 @@ def test_a_reader_that_goes_away(here: Path) -> None:
     assert err == ""
 
 
+def test_a_command_imports_what_it_needs(here: Path) -> None:
+    args = ["identify", "step.csv", *NAMES, *LOOP]
+    done = subprocess.run([sys.executable, "-c", IMPORTED, *args], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    imported = done.stderr.splitlines()[-1].split()
+    assert "gaident.identification.identify" in imported
+    assert not {"scipy", "matplotlib", "gaident.store", "gaident.demo"} & {*imported}
+    # The controller is run again on the log; nothing else of the diagnosis is needed.
+    replay = {"gaident.diagnosis", *(f"gaident.diagnosis.{name}" for name in ("replay", "replay_causes", "lattice"))}
+    assert {name for name in imported if name.startswith("gaident.diagnosis")} == replay
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_ctrl_c_ends_within_half_a_second(here: Path) -> None:
     args = ["identify", "step.csv", *NAMES, *LOOP, "--trials", "100000", "--out", "idn.json"]
@@ -34,12 +65,12 @@ def test_ctrl_c_ends_within_half_a_second(here: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pseudo terminals")
-def test_progress_bar_on_a_terminal_only(here: Path) -> None:
+def test_progress_bar_on_a_terminal_only(here: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     import pty
 
-    args = ("identify", "step.csv", *NAMES, *LOOP, "--paper", "--trials", "200", "--workers", "1")
+    args = ["identify", "step.csv", *NAMES, *LOOP, "--paper", "--trials", "10", "--workers", "1"]
     ours, theirs = pty.openpty()
-    with subprocess.Popen(command(*args), stdout=subprocess.PIPE, stderr=theirs, text=True) as process:
+    with subprocess.Popen([sys.executable, "-c", AT_ONCE, *args], stdout=subprocess.PIPE, stderr=theirs, text=True) as process:
         os.close(theirs)
         seen = b""
         while True:
@@ -59,7 +90,9 @@ def test_progress_bar_on_a_terminal_only(here: Path) -> None:
     assert bars and bars == sorted(bars, key=int)
     assert re.search(rb"\d+ s left gen(eration|\.) \d+, best (fitness )?[\d.e-]+", text)
     assert text.split(b"\r")[-1].strip() == b""  # nothing of it stays
-    assert called(*args[:-4], "--workers", "1").stderr == ""
+    monkeypatch.setattr("gaident.progress_bar._QUIET", 0.0)
+    assert main(args) == 0
+    assert capfd.readouterr().err == ""
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, which only Linux has")

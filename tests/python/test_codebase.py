@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import re
 import shutil
 import subprocess
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import gaident
+from gaident import cli
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = ROOT / "csrc" / "gaident"
@@ -300,3 +302,18 @@ def test_public_names_exist_and_explain_themselves() -> None:
             assert (thing.__doc__ or "").strip(), f"gaident.{name} has no docstring"
             # A dataclass writes its own signature where there is no docstring.
             assert not (thing.__doc__ or "").startswith(f"{name}("), f"gaident.{name} has no docstring"
+
+
+def test_names_of_the_rooms_are_there() -> None:
+    """Those of a module's name, too: gaident.identification.identify is the function, although its module is imported."""
+    for stub in sources(PACKAGE, ".pyi"):
+        if stub.stem == "__init__":
+            room = importlib.import_module(".".join(["gaident", *stub.parent.relative_to(PACKAGE).parts]))
+            assert room.__all__
+            modules = {name for name in room.__all__ if isinstance(getattr(room, name), types.ModuleType)}
+            assert modules <= {"effects", "errors"}
+
+
+def test_every_command_has_a_function() -> None:
+    for where in cli.COMMANDS.values():
+        assert callable(cli._command(where)), where
