@@ -32,6 +32,18 @@ RealArray filtered_rows(const RealArray& b, const RealArray& a, const RealArray&
     return out;
 }
 
+// A (m, m), drive (n, m), start (m): all x(0..n-1), with `newest` x(1..n), (n, m).
+ComplexArray states(const ComplexArray& A, const ComplexArray& drive, const ComplexArray& start, bool newest) {
+    const py::ssize_t m = start.size();
+    if (A.ndim() != 2 || A.shape(0) != m || A.shape(1) != m || drive.ndim() != 2 || drive.shape(1) != m)
+        throw std::invalid_argument("A, drive, start: (m, m), (n, m) and (m,) are needed");
+    ComplexArray out({drive.shape(0), m});
+    std::copy_n(drive.data(), drive.size(), out.mutable_data());
+    state_recursion(A.data(), {start.data(), static_cast<std::size_t>(m)}, out.mutable_data(),
+                    static_cast<std::size_t>(drive.shape(0)), newest);
+    return out;
+}
+
 RealArray products(const RealArray& e, int lags) {
     if (lags < 0) throw std::invalid_argument("lags: 0 or more");
     RealArray out(lags + 1);
@@ -67,6 +79,7 @@ RealArray held(const RealArray& error, double kp, double half, double torque_lim
 
 void bind_filter(py::module_& m) {
     m.def("filtered", &filtered_rows, py::arg("b"), py::arg("a"), py::arg("rows"), py::arg("lengths"));
+    m.def("state_recursion", &states, py::arg("A"), py::arg("drive"), py::arg("start"), py::arg("newest"));
     m.def("lagged_products", &products, py::arg("e"), py::arg("lags"));
     m.def("held_torque", &held, py::arg("error"), py::arg("kp"), py::arg("half"), py::arg("torque_limit"),
           py::arg("integrator_limit"), py::arg("rule"), py::arg("integral"));

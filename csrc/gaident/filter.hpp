@@ -6,14 +6,16 @@
 //
 //     v(n) = f(n) + z_1,   z_i = z_{i+1} - a_i v(n),
 //
-// a few rows side by side, since each waits for itself.
+// a few rows side by side, since each waits for itself; and linear recursions of complex states.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <complex>
 #include <cstddef>
 #include <span>
 #include <utility>
+#include <vector>
 
 namespace gaident {
 
@@ -72,6 +74,26 @@ inline void lagged_products(const double* e, std::size_t n, std::span<double> pr
             for (std::size_t j = 0; j < 4; ++j) part[j] += e[i + j] * e[i + j - k];
         for (; i < n; ++i) part[0] += e[i] * e[i - k];
         products[k] = (part[0] + part[1]) + (part[2] + part[3]);
+    }
+}
+
+// x(k+1) = A x(k) + f(k) from x(0): rows f(0..n-1) of m states become x(0..n-1), with `newest` x(1..n). A row-major.
+inline void state_recursion(const std::complex<double>* A, std::span<const std::complex<double>> start, std::complex<double>* f,
+                            std::size_t n, bool newest) {
+    const std::size_t m = start.size();
+    std::vector<std::complex<double>> now(start.begin(), start.end()), next(m);
+    for (std::size_t k = 0; k < n; ++k, f += m) {
+        for (std::size_t i = 0; i < m; ++i) {
+            double re = f[i].real(), im = f[i].imag();  // the library's product looks for infinities
+            for (std::size_t j = 0; j < m; ++j) {
+                const std::complex<double> a = A[i * m + j], x = now[j];
+                re += a.real() * x.real() - a.imag() * x.imag();
+                im += a.real() * x.imag() + a.imag() * x.real();
+            }
+            next[i] = {re, im};
+        }
+        std::copy_n((newest ? next : now).begin(), m, f);
+        now.swap(next);
     }
 }
 

@@ -264,6 +264,9 @@ def filtered(
 ) -> NDArray[np.float64]:
     """v(n) = sum_i b_i e(n-i) - sum_{i>=1} a_i v(n-i) of rows of e, each cut into records of these lengths, from rest."""
 
+def state_recursion(
+    A: NDArray[np.complex128], drive: NDArray[np.complex128], start: NDArray[np.complex128], newest: bool
+) -> NDArray[np.complex128]: ...
 def lagged_products(e: NDArray[np.float64], lags: int) -> NDArray[np.float64]:
     """sum_n e(n) e(n-k), k = 0..lags."""
 

@@ -14,7 +14,7 @@ from gaident.diagnosis.problem import Problem, _damped_steps
 from gaident.diagnosis.state_space import _inverses, steady_covariance, steady_covariances
 from gaident.errors import ModelError
 from gaident.identification.noise import autocorrelation
-from gaident.models.filtering import clamped_sum, filtered
+from gaident.models.filtering import clamped_sum, filtered, recursion
 
 RNG = np.random.default_rng(5)
 
@@ -85,6 +85,20 @@ def test_a_singular_step_is_nan_beside_the_others() -> None:
     assert np.isnan(found[1]).all()
     # An unstable pole under a zero: no filter of its shaft's noise, and no error.
     assert None in ShaftNoise(ga.Model(1e3, [50.0, -10.0], [50.0]), 1e-3, None).filters([(0, 0), (4, 7)])
+
+
+@pytest.mark.parametrize("m", [1, 4])
+def test_a_recursion_of_complex_states(m: int) -> None:
+    A = 0.6 / m * (RNG.standard_normal((m, m)) + 1j * RNG.standard_normal((m, m)))
+    drive, start = RNG.standard_normal((50, m)), RNG.standard_normal(m) + 1j
+    states = [start]
+    for f in drive:
+        states.append(A @ states[-1] + f)
+    np.testing.assert_allclose(recursion(A, drive, start), states[:-1], rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(recursion(A, drive, start, newest=True), states[1:], rtol=1e-12, atol=1e-14)
+    np.testing.assert_array_equal(recursion(A.T, drive)[0], 0.0)  # not in the order of rows; from rest
+    with pytest.raises(ValueError, match="A, drive, start"):
+        recursion(A, drive, np.zeros(m + 1))
 
 
 def test_a_clamped_sum() -> None:

@@ -22,6 +22,7 @@ from gaident.identification.space import torque_of
 from gaident.identification.starts import noise_std, starts_moving
 from gaident.models.controller import PI
 from gaident.models.filtering import filtered, rate_limited
+from gaident.models.model import Model
 from gaident.models.own_effects import OWN
 from gaident.models.simulate import simulate_values
 
@@ -225,19 +226,17 @@ class Driven:
     def twist(self, layout: Layout, x: Vector) -> Vector:
         """Twist of the shaft of two masses, to scale, as the linear part of the model x has it: u e0/(s^2 + e1 s + e0)."""
         _, _, e1, e0, *_ = layout.base_values(x[None, :])[0]
-        twist: Vector = self._second_order(self.torque[None, :], [e0], e1, e0)[0]
+        twist: Vector = self._second_order(self.torque[None, :], e0, (), e1, e0)[0]
         return twist
 
     def coupling_response(self, layout: Layout, x: Vector, torques: Matrix) -> Matrix:
         """Motor velocity under rows of a torque between the masses: -K s/(s^2 + e1 s + e0), open loop."""
         K, _, e1, e0, *_ = layout.base_values(x[None, :])[0]
-        return self._second_order(torques, [-K, 0.0], e1, e0)
+        return self._second_order(torques, -K, (0.0,), e1, e0)
 
-    def _second_order(self, rows: Matrix, numerator: list[float], e1: float, e0: float) -> Matrix:
-        from scipy.signal import cont2discrete
-
-        b, a, _ = cont2discrete((numerator, [1.0, max(e1, 0.0), abs(e0)]), self.records[0].dt)
-        return filtered(b.ravel(), a, rows, self.lengths)
+    def _second_order(self, rows: Matrix, gain: float, zeros: tuple[float, ...], e1: float, e0: float) -> Matrix:
+        held = Model(1.0, list(np.roots([1.0, max(e1, 0.0), abs(e0)])), zeros).discrete(self.records[0].dt)
+        return filtered(gain * held.alpha, np.concatenate([[1.0], -held.beta]), rows, self.lengths)
 
     def commanded(self, rate: float) -> Driven:
         """The same with commands that change by `rate` [rad/s^2] at most, as the controller of a closed loop then reads them."""

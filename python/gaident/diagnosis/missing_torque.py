@@ -7,7 +7,7 @@ A random-walk torque d rides on the model's input; a Kalman filter and its smoot
 no covariance is inverted) estimate it from the whole record. Coulomb friction shows as -Tc sign(w), a load T as -T. No
 derivative is taken, resonances are undone correctly, and what the sensor's noise hides stays within `std`.
 
-The gains are the steady ones, so that the recursions are triangular linear filters over whole arrays; the initial state is the
+The gains are the steady ones, so that the recursions are linear ones of constant coefficients; the initial state is the
 one that makes the innovations smallest. The plant is discretised as the loop says: by zero-order hold, or bilinearly for
 loop="continuous".
 """
@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.diagnosis.replay import replay
-from gaident.diagnosis.state_space import Discretised, discretised, recursion, steady_covariance
+from gaident.diagnosis.state_space import Discretised, discretised, steady_covariance
 from gaident.errors import ModelError, RecordError
 from gaident.models._checks import real_number
 from gaident.models.controller import PI
+from gaident.models.filtering import recursion
 from gaident.models.model import Model
 
 __all__ = ["MissingTorque", "missing_torque"]

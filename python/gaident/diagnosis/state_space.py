@@ -1,17 +1,18 @@
-"""The factored model as a chain of first-order sections, discretised; linear recursions over whole arrays; Riccati's equation."""
+"""The factored model as a chain of first-order sections, discretised; Riccati's equation."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gaident.errors import ModelError
 from gaident.models.controller import PI
+from gaident.models.filtering import recursion
 from gaident.models.model import Model
 
-__all__ = ["Discretised", "discretised", "disturbed", "recursion", "steady_covariance", "steady_covariances"]
+__all__ = ["Discretised", "discretised", "disturbed", "steady_covariance", "steady_covariances"]
 
 Complex = NDArray[np.complex128]
 
@@ -95,30 +96,6 @@ def disturbed(plant: Discretised, controller: PI | None, dt: float) -> Discretis
     A[m] -= 2.0 * h * C
     B = np.append((1.0 - k * D) * plant.B, -2.0 * h * D)
     return Discretised(A, B, C, D)
-
-
-def recursion(A: Complex, drive: ArrayLike, start: ArrayLike | None = None, newest: bool = False) -> Complex:
-    """x(n+1) = A x(n) + drive(n) from x(0) = start (None: 0); drive (n, m) -> x(0..n-1) (n, m), with `newest` x(1..n).
-
-    Schur's form A = Z T Z*, T triangular, makes it a cascade of first-order filters, last state first.
-    """
-    from scipy.linalg import schur
-    from scipy.signal import lfilter
-
-    m = len(A)
-    T, Z = schur(A, output="complex")
-    # einsum: such flat products are slower in a BLAS that spreads them over threads.
-    f = np.einsum("ji,nj->in", Z.conj(), np.asarray(drive, dtype=np.complex128))
-    first = np.zeros(m) if start is None else Z.conj().T @ np.asarray(start)
-    y = np.empty((m, f.shape[1] + 1), dtype=np.complex128)  # x(0..n), one state a row
-    y[:, 0] = first
-    for i in range(m - 1, -1, -1):
-        inflow = f[i]
-        for j in range(i + 1, m):
-            inflow = inflow + T[i, j] * y[j, :-1]
-        y[i, 1:], _ = lfilter([1.0], [1.0, -T[i, i]], inflow, zi=np.array([T[i, i] * first[i]]))
-    out: Complex = np.einsum("ij,jn->ni", Z, y[:, 1:] if newest else y[:, :-1])
-    return out
 
 
 def steady_covariance(A: Complex, H: Complex, Q: Complex) -> Complex:

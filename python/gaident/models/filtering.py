@@ -1,18 +1,19 @@
-"""What only one sample after the other gives, in the core: rational filters over rows, clamped sums, limited slopes."""
+"""What only one sample after the other gives, in the core: rational filters over rows, states, clamped sums, limited slopes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gaident import _core
 
-__all__ = ["clamped_sum", "filtered", "rate_limited"]
+__all__ = ["clamped_sum", "filtered", "rate_limited", "recursion"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 
 def filtered(b: Vector, a: Vector, rows: Matrix, lengths: Sequence[int]) -> Matrix:
@@ -22,6 +23,15 @@ def filtered(b: Vector, a: Vector, rows: Matrix, lengths: Sequence[int]) -> Matr
     lengths are not those of the rows, and for more than 16 numbers a_i behind a_0.
     """
     return _core.filtered(b, a, rows, lengths)
+
+
+def recursion(A: Complex, drive: ArrayLike, start: ArrayLike | None = None, newest: bool = False) -> Complex:
+    """x(n+1) = A x(n) + drive(n) from x(0) = start (None: 0); drive (n, m) -> x(0..n-1) (n, m), with `newest` x(1..n).
+
+    Raises ValueError where the sizes do not fit.
+    """
+    first = np.zeros(len(A)) if start is None else start
+    return _core.state_recursion(A, np.asarray(drive, np.complex128), np.asarray(first, np.complex128), newest)
 
 
 def clamped_sum(steps: Vector, limit: float, start: float = 0.0) -> Vector:
