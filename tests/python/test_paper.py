@@ -32,7 +32,7 @@ from gaident.paper.facts import (
     TWO_MASSES,
     Mechanism,
 )
-from gaident.paper.rig import NO_FRICTION, Friction, Rig
+from gaident.paper.rig import NO_FRICTION, Friction, Rig, integrate
 from gaident.show.html import number, table
 
 TRIALS, SEEDS = 4, 6
@@ -108,7 +108,7 @@ def test_the_rig_without_friction_is_the_linear_loop(mechanism: Mechanism) -> No
     rec = rig.record(command, 0)
     run = ga.run(mechanism.sheet, rec, rig.controller)
     silence = np.zeros((len(command), 1))
-    errors = [np.abs(rig._integrate(command, silence, steps)[0][:, 0] - run.velocity).max() for steps in (20, 40, 80)]
+    errors = [np.abs(integrate([rig], command[:, None], silence, steps)[0][:, 0] - run.velocity).max() for steps in (20, 40, 80)]
     assert errors[0] < 1e-3
     # Steps of second order.
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1) and errors[1] / errors[2] == pytest.approx(4.0, rel=0.1)
@@ -119,7 +119,7 @@ def test_the_rig_without_friction_is_the_linear_loop(mechanism: Mechanism) -> No
 def test_the_rig_with_friction_converges_and_agrees_with_the_core(mechanism: Mechanism) -> None:
     rig = rig_of(mechanism)
     command = np.repeat([STEP, -20.0, 2.0], 120)
-    coarse, fine = (rig._integrate(command, np.zeros((len(command), 1)), steps)[0][:, 0] for steps in (20, 80))
+    coarse, fine = (integrate([rig], command[:, None], np.zeros((len(command), 1)), steps)[0][:, 0] for steps in (20, 80))
     assert np.abs(coarse - fine).max() < 0.02
     rec = ga.Record(DT, command, coarse)
     law = {"torque": FRICTION.coulomb, "static_torque": FRICTION.static, "stribeck_velocity": FRICTION.stribeck_velocity}
@@ -230,7 +230,7 @@ def test_the_page_is_whole_and_needs_nothing_else(made: tuple[Path, dict[str, An
 
 
 def test_the_same_seed_gives_the_same_numbers_whatever_the_threads() -> None:
-    one, two = (compare(ONE_MASS, FRICTION, 3, 5, workers) for workers in (1, 2))
+    (one,), (two,) = (compare(ONE_MASS, [FRICTION], 3, 5, workers) for workers in (1, 2))
     for a, b in zip(one.methods, two.methods, strict=True):
         np.testing.assert_array_equal(a.coefficients, b.coefficients)
 
