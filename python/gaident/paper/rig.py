@@ -88,7 +88,7 @@ def side_by_side(runs: Sequence[Run]) -> list[Record]:
 
 
 def integrate(rigs: Sequence[Rig], command: Vector, noise: Vector, substeps: int = SUBSTEPS) -> tuple[Vector, Vector]:
-    """(velocity as read, torque); all arrays are (samples, runs), and a run has its rig. A column does not depend on its neighbours."""
+    """(velocity as read, torque), arrays as given: (samples, runs), a rig for each run. No column depends on its neighbours."""
     JM, DM, JL, DL, KG = np.array([rig._constants() for rig in rigs]).T
     kp, ki, dt = np.array([(rig.controller.kp, rig.controller.ki, rig.dt) for rig in rigs]).T
     T_c, T_s, v_s = np.array([(f.coulomb, f.static, f.stribeck_velocity) for f in (rig.friction for rig in rigs)]).T
