@@ -5,6 +5,9 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 2)
 DEMO_DIR ?= build/demo
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export CXX
+# Packages are installed without bytecode: it is written as they are imported, once and not by each of the many interpreters of the tests,
+# whatever the environment says.
+unexport PYTHONDONTWRITEBYTECODE
 
 # Recorded data, for the tests and the part of the demo that use real drives; both go without it where there is none.
 ifeq ($(origin GAIDENT_DATA),undefined)

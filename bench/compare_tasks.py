@@ -14,6 +14,7 @@ import gaident as ga
 from gaident.paper.experiment import rig_of
 from gaident.paper.facts import MECHANISMS, SAMPLES
 from gaident.paper.friction import LEVELS, OTHER_LEVELS
+from gaident.paper.rig import Run, side_by_side
 
 Vector = np.ndarray
 
@@ -50,13 +51,13 @@ class Task:
 
 def rig_tasks() -> list[Task]:
     """Two rigs of the paper: trained on reversing steps, tested on other levels and other noise."""
-    tasks = []
-    for mechanism in MECHANISMS:
-        rig = rig_of(mechanism)
-        train, test = np.repeat(LEVELS, SAMPLES), np.repeat(OTHER_LEVELS, SAMPLES)
-        name = f"rig, {mechanism.words}"
-        tasks.append(Task(name, rig.record(train, 1), rig.record(test, 2), rig.controller, "rad/s", 1.0, (1, 4, 16)))
-    return tasks
+    train, test = np.repeat(LEVELS, SAMPLES), np.repeat(OTHER_LEVELS, SAMPLES)
+    rigs = [rig_of(mechanism) for mechanism in MECHANISMS]
+    made = side_by_side([Run(rig, command, seed) for rig in rigs for command, seed in ((train, 1), (test, 2))])
+    return [
+        Task(f"rig, {mechanism.words}", made[2 * i], made[2 * i + 1], rigs[i].controller, "rad/s", 1.0, (1, 4, 16))
+        for i, mechanism in enumerate(MECHANISMS)
+    ]
 
 
 def emps_tasks(folder: Path) -> list[Task]:

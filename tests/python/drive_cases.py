@@ -246,7 +246,21 @@ def random_case(
     position_logged: bool = False,
     settle: int = 0,
 ) -> tuple[ga.Record, ga.Record | None, ga.PI, Truth]:
-    """Draw record, validation record (None for a single step), controller and truth; the same arguments give the same case.
+    """Draw record, validation record (None for a single step), controller and truth; arguments as in `random_truth`."""
+    truth = random_truth(seed, effect, kind, noise, factor, plant, settle)
+    return *records(truth, torque_logged, position_logged), truth.plant.controller, truth
+
+
+def random_truth(
+    seed: int,
+    effect: str | Sequence[str] | None = None,
+    kind: str = "multi",
+    noise: str | Noise = "white",
+    factor: float | None = None,
+    plant: Plant | None = None,
+    settle: int = 0,
+) -> Truth:
+    """Draw a drive, what hides in it and the commands; the same arguments give the same case.
 
     `factor` None: log-uniform in 0.5..2, for each effect of a pair its own. Random numbers depend on seed, effect and kind,
     not on noise or factor, so that curves over the size follow one drive.
@@ -270,10 +284,8 @@ def random_case(
             command=commands[0], validation_command=None if kind == "step" else commands[1], settle=settle,
         )  # fmt: skip
         if stable(now, hidden) and acts(truth):
-            break
-    else:
-        raise RuntimeError(f"no drive found on which {effects} acts in a {kind} record at factor {factor}")
-    return *records(truth, torque_logged, position_logged), now.controller, truth
+            return truth
+    raise RuntimeError(f"no drive found on which {effects} acts in a {kind} record at factor {factor}")
 
 
 def records(truth: Truth, torque_logged: bool = True, position_logged: bool = False) -> tuple[ga.Record, ga.Record | None]:

@@ -11,12 +11,6 @@ of the library's table; OUTSIDE lists what the library does not know.
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import os
-import re
-import shutil
-import subprocess
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -26,15 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+import compiled
 import gaident as ga
 
 Array = NDArray[np.float64]
 Effects = Mapping[str, Mapping[str, float]]
 
-ROOT = Path(__file__).resolve().parents[2]
-SOURCE = ROOT / "tests" / "cpp" / "drive_rig.cpp"
+SOURCE = Path(__file__).resolve().parents[2] / "tests" / "cpp" / "drive_rig.cpp"
 SUBSTEPS, MOST_SUBSTEPS = 40, 400
-MATH = ("-std=c++20", "-O2", "-ffp-contract=off", "-shared", "-fPIC")
 
 
 @dataclass(frozen=True)
@@ -133,34 +126,15 @@ class RanAwayError(RuntimeError):
     """The simulated drive is unstable with these settings."""
 
 
-@lru_cache(maxsize=1)
 def fields() -> dict[str, float]:
-    """Name -> neutral value of the fields of the drive, in their order, from the C++ source."""
-    block = SOURCE.read_text().split("// fields")[1].split("// end of fields")[0]
-    found = re.findall(r"^\s*double (\w+) = ([^;]+);", block, re.MULTILINE)
-    return {name: float(value) for name, value in found}
+    """Name -> neutral value of the fields of the drive, in their order."""
+    return compiled.fields(SOURCE)
 
 
 @lru_cache(maxsize=1)
 def library() -> ctypes.CDLL:
-    """Compile the drive, once for each text of its source, into build/rig; else, where that is not writable, for this run."""
-    compiler = shutil.which(os.environ.get("CXX", "g++").split()[0]) or shutil.which("c++")
-    if compiler is None:
-        raise RuntimeError("the simulated drive needs a C++ compiler: install g++ or name one in CXX")
-    key = hashlib.sha256(SOURCE.read_bytes() + " ".join(MATH).encode()).hexdigest()[:16]
-    folder = ROOT / "build" / "rig"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        folder = Path(tempfile.mkdtemp(prefix="drive_rig"))
-    target = folder / f"drive_rig_{key}.so"
-    if not target.exists():
-        # Under a name of its own first: several processes may be here at once.
-        with tempfile.TemporaryDirectory(dir=folder) as own:
-            made = Path(own) / "drive_rig.so"
-            subprocess.run([compiler, *MATH, str(SOURCE), "-o", str(made)], check=True, capture_output=True)
-            os.replace(made, target)
-    loaded = ctypes.CDLL(str(target))
+    """The drive's functions. Raises RuntimeError without a compiler."""
+    loaded = compiled.library(SOURCE)
     pointer = ctypes.POINTER(ctypes.c_double)
     loaded.drive_rig_run.argtypes = [pointer, ctypes.c_int, ctypes.c_double, ctypes.c_int, *[pointer] * 9]
     return loaded

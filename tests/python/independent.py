@@ -5,7 +5,8 @@
     u(n) = kp*e(n) + I(n)                                      clamped to +-torque_limit
 
 `exact`  works with polynomials in z, which need many more digits than a double has: 120. The zero-order hold
-         is a power series of the step response. Slow, short, obvious; the referee for all the rest.
+         is a power series of the step response. Slow, short, obvious; the referee for all the rest. (Its samples are
+         computed in the standard library's decimals, which are written in C.)
 `scipy_` works in state space: a cascade of sections in normalised time, scipy.signal.cont2discrete (bilinear,
          or the hold by its matrix exponential), the algebraic loop solved for the error, or by a bracketing
          root finder where something may be clamped. Fast enough for long records; good to some 1e-12.
@@ -17,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from decimal import Context, Decimal, localcontext
 from math import factorial
 from typing import Any
 
@@ -29,8 +31,10 @@ from scipy.signal import cont2discrete, dlsim
 Array = NDArray[np.float64]
 State = Array | Sequence[float]
 INF = float("inf")
+DIGITS = 120
+SLACK = Decimal(10) ** -80
 mp = mpmath.mp.clone()
-mp.dps = 120
+mp.dps = DIGITS
 
 
 @dataclass(frozen=True)
@@ -157,37 +161,48 @@ def _clamp(value: Any, limit: Any) -> Any:
     return max(-limit, min(limit, value))
 
 
-def _exact_torque(case: Case, command: Any, free: Any, feed: Any, stored: Any) -> tuple[Any, Any]:
+def _decimal(value: Any) -> Decimal:
+    """The same number, to all the digits that it has."""
+    return Decimal(mp.nstr(mp.mpf(value), DIGITS + 5))
+
+
+def _exact_torque(case: Case, command: Decimal, free: Decimal, feed: Decimal, stored: Decimal) -> tuple[Decimal, Decimal]:
     """u(n) and e(n), e = r - free - feed*u: all combinations of clamps are tried, one is consistent."""
-    kp, half = mp.mpf(case.kp), mp.mpf(case.ki) * mp.mpf(case.dt) / 2
-    big_i, big_u = case.integrator_limit, case.torque_limit
-    slack = mp.mpf(10) ** -80
-    pieces = [(kp + half, stored)] + ([(kp, mp.mpf(big_i)), (kp, -mp.mpf(big_i))] if big_i < INF else [])
-    pieces += [(mp.zero, mp.mpf(big_u)), (mp.zero, -mp.mpf(big_u))] if big_u < INF else []
+    kp, half = Decimal(case.kp), Decimal(case.ki) * Decimal(case.dt) / 2
+    big_i, big_u = Decimal(case.integrator_limit), Decimal(case.torque_limit)
+    pieces = [(kp + half, stored)] + ([(kp, big_i), (kp, -big_i)] if big_i.is_finite() else [])
+    pieces += [(Decimal(0), big_u), (Decimal(0), -big_u)] if big_u.is_finite() else []
     for slope, offset in pieces:
         error = (command - free - feed * offset) / (1 + feed * slope)
         torque = slope * error + offset
         wanted = _clamp(kp * error + _clamp(stored + half * error, big_i), big_u)
-        if abs(torque - wanted) <= slack * (1 + abs(torque) + abs(stored)):
+        if abs(torque - wanted) <= SLACK * (1 + abs(torque) + abs(stored)):
             return torque, error
     raise AssertionError("no consistent combination of clamps")
 
 
 def exact_simulate(case: Case, signal: Array, state: State = ()) -> tuple[Array, Array]:
     """Velocity and torque, sample by sample in 120 digits; `state` as gaident._core.simulate takes it."""
-    num, den = exact_plant(case)
+    with localcontext(Context(prec=DIGITS)):
+        return _exact_samples(case, signal, state)
+
+
+def _exact_samples(case: Case, signal: Array, state: State) -> tuple[Array, Array]:
+    in_z = exact_plant(case)
+    num, den = ([_decimal(v) for v in polynomial] for polynomial in in_z)
     order, closed = len(den) - 1, case.loop != "open"
-    x = _state_in_z(den, state[:order]) if len(state) else [mp.zero] * order
-    stored = mp.mpf(state[order]) if len(state) and closed else mp.zero
-    half = mp.mpf(case.ki) * mp.mpf(case.dt) / 2
+    x = [_decimal(v) for v in _state_in_z(in_z[1], state[:order])] if len(state) else [Decimal(0)] * order
+    stored = Decimal(float(state[order])) if len(state) and closed else Decimal(0)
+    half = Decimal(case.ki) * Decimal(case.dt) / 2
+    limit = Decimal(case.integrator_limit)
     velocity, torque = [], []
-    for value in signal:
-        free = x[0] if order else mp.zero
+    for value in map(float, signal):
+        free = x[0] if order else Decimal(0)
         if closed:
-            u, e = _exact_torque(case, mp.mpf(value), free, num[0], stored)
-            stored = _clamp(stored + half * e, case.integrator_limit) + half * e
+            u, e = _exact_torque(case, Decimal(value), free, num[0], stored)
+            stored = _clamp(stored + half * e, limit) + half * e
         else:
-            u = mp.mpf(value)
+            u = Decimal(value)
         y = free + num[0] * u
         x = [(x[i + 1] if i + 1 < order else 0) + num[i + 1] * u - den[i + 1] * y for i in range(order)]
         velocity.append(float(y))

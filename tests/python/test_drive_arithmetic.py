@@ -15,6 +15,7 @@ from gaident.errors import ModelError, SettingsError
 from gaident.identification.settings import ARITHMETICS, DRIVE_ARITHMETICS
 
 ROOT = Path(__file__).resolve().parents[2]
+EMBEDDED = ROOT / "csrc" / "embedded"
 MODEL = ga.Model(6545.29, poles=(-15.41, -10.3 + 150.9j, -10.3 - 150.9j), zeros=(-4.26 + 93.98j, -4.26 - 93.98j))
 LOOP = ga.PI(0.0232 * 5.5637, 1.367 * 5.5637, loop="continuous")
 SPACE = ga.SearchSpace(gain=(1e3, 2e4), real=(0.0, 60.0), imaginary=(0.0, 250.0))
@@ -117,36 +118,51 @@ def test_the_c_interface_is_c99() -> None:
     if compiler is None:
         pytest.skip("no C compiler on the path")
     flags = "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Werror -fsyntax-only -x c -"
-    command = [compiler, *flags.split(), "-I", str(ROOT / "csrc" / "embedded")]
+    command = [compiler, *flags.split(), "-I", str(EMBEDDED)]
     text = '#include "gaident.h"\nint ready(gaident_search *g) { return gaident_ready(g); }\n'
     built = subprocess.run(command, input=text, capture_output=True, text=True)
     assert built.returncode == 0, built.stderr
 
 
+def built(*command: object, given: str = "") -> str:
+    """What a compiler, or what it made, says."""
+    done = subprocess.run([str(c) for c in command], input=given, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def genes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder with genes.hpp."""
+    cxx = shutil.which("g++")
+    if cxx is None:
+        pytest.skip("no g++ on the path")
+    folder = tmp_path_factory.mktemp("genes")
+    tables = folder / "make_tables"
+    built(cxx, "-std=c++20", "-O0", "-ffp-contract=off", "-o", tables, EMBEDDED / "make_tables.cpp")
+    (folder / "genes.hpp").write_text(built(tables, "genes"))
+    return folder
+
+
 @pytest.mark.parametrize("name, arithmetic", [("Float", "drive_float"), ("Fixed", "fixed")])
-def test_the_c_interface_makes_the_desks_run(rec: ga.Record, tmp_path: Path, name: str, arithmetic: str) -> None:
+def test_the_c_interface_makes_the_desks_run(rec: ga.Record, tmp_path: Path, genes: Path, name: str, arithmetic: str) -> None:
     """tests/cpp/c_interface.c also checks what the interface refuses, and what a bad sample does."""
     cc, cxx = shutil.which("gcc"), shutil.which("g++")
     if cc is None or cxx is None:
         pytest.skip("no gcc or g++ on the path")
-
-    def run(*command: object, given: str = "") -> str:
-        done = subprocess.run([str(c) for c in command], input=given, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
-
-    core, tables, program = ROOT / "csrc" / "embedded", tmp_path / "make_tables", tmp_path / "program"
-    run(cxx, "-std=c++20", "-O1", "-ffp-contract=off", "-o", tables, core / "make_tables.cpp")
-    (tmp_path / "genes.hpp").write_text(run(tables, "genes"))
-    flags = f"-std=c++20 -O1 -ffp-contract=off -ffreestanding -fno-exceptions -fno-rtti -DGAIDENT_ARITHMETIC={name} -I{tmp_path}"
-    run(cxx, *flags.split(), "-c", "-o", tmp_path / "core.o", core / "gaident.cpp")
+    program = tmp_path / "program"
+    # Unoptimised: the same operations, compiled sooner.
+    flags = f"-std=c++20 -O0 -ffp-contract=off -ffreestanding -fno-exceptions -fno-rtti -DGAIDENT_ARITHMETIC={name} -I{genes}"
+    built(cxx, *flags.split(), "-c", "-o", tmp_path / "core.o", EMBEDDED / "gaident.cpp")
     caller = ROOT / "tests" / "cpp" / "c_interface.c"
-    run(cc, "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{core}", "-o", program, caller, tmp_path / "core.o")
+    built(
+        cc, "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{EMBEDDED}", "-o", program, caller, tmp_path / "core.o"
+    )
 
     command = np.full(250, 43.6)
     numbers = [LOOP.kp, LOOP.ki, rec.dt, max(43.6, float(np.max(np.abs(rec.velocity))))]
     numbers += np.column_stack([command, rec.velocity]).ravel().tolist()
-    p, q, gain, fitness, generation = run(program, given="\n".join(float(x).hex() for x in numbers)).split()
+    p, q, gain, fitness, generation = built(program, given="\n".join(float(x).hex() for x in numbers)).split()
 
     settings = ga.Settings(code="binary", scale="linear", engine="plain", generations=30, arithmetic=arithmetic)
     found = ga.identify(rec, LOOP, SPACE, settings, seed=1)

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS, nominal_plants, random_case, random_plant
+from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS, nominal_plants, random_case, random_plant, random_truth
 from drive_rig import NOISES, OUTSIDE, Array, Effects, Plant, RanAwayError, drive_values, fields, library, rig, run_drive
 
 try:
@@ -175,7 +175,7 @@ def test_effects_agree_with_scipy(effect: str, parameters: dict[str, float], way
 @pytest.mark.parametrize("effect", [e for e in (*EFFECTS, *OUTSIDE) if e not in NOISE_EFFECTS])
 def test_half_the_step_is_the_same_drive(effect: str) -> None:
     for seed in (1, 2):
-        *_, truth = random_case(seed, effect)
+        truth = random_truth(seed, effect)
         command = truth.command[:2000]
         whole, half = (run_drive(truth.plant, command, truth.effects, substeps=n).truth for n in (40, 80))
         size = np.std(whole - run_drive(truth.plant, command).truth)
@@ -264,9 +264,9 @@ def test_random_cases_repeat_themselves_and_obey() -> None:
         assert len(record) == (250 if kind == "step" else 3500)
         assert (controller.kp, controller.ki) == (truth.plant.kp, truth.plant.ki)
         assert truth.names == ("coulomb_friction", "transport_delay")
-    sizes = [random_case(s, "coulomb_friction")[3].effects["coulomb_friction"]["torque"] for s in range(12)]
+    sizes = [random_truth(s, "coulomb_friction").effects["coulomb_friction"]["torque"] for s in range(12)]
     assert 0.025 <= min(sizes) < 0.045 and 0.06 < max(sizes) <= 0.1
-    assert random_case(1, "torque_lag", factor=3.0)[3].effects["torque_lag"]["time_constant"] == pytest.approx(3e-3)
+    assert random_truth(1, "torque_lag", factor=3.0).effects["torque_lag"]["time_constant"] == pytest.approx(3e-3)
 
 
 def test_plants_stay_near_the_nominal_ones_and_are_well_tuned() -> None:

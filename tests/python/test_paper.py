@@ -32,10 +32,11 @@ from gaident.paper.facts import (
     TWO_MASSES,
     Mechanism,
 )
-from gaident.paper.rig import NO_FRICTION, Friction, Rig
+from gaident.paper.rig import NO_FRICTION, Friction, Rig, integrate
 from gaident.show.html import number, table
 
 TRIALS, SEEDS = 4, 6
+REVERSING = np.repeat([STEP, -20.0, 2.0], 120)
 BOTH = pytest.mark.parametrize("mechanism", MECHANISMS, ids=["one mass", "two masses"])
 
 
@@ -101,14 +102,34 @@ def test_the_loop_gain_factors_are_a_fit_of_the_alphas(mechanism: Mechanism) -> 
 # --- the rig
 
 
+def velocities(rigs: list[Rig], command: np.ndarray, *substeps: int) -> list[np.ndarray]:
+    """Without noise: for each number of substeps an array (samples, rigs)."""
+    commands = np.column_stack([command] * len(rigs))
+    return [integrate(rigs, commands, np.zeros_like(commands), steps)[0] for steps in substeps]
+
+
+@pytest.fixture(scope="module")
+def linear() -> dict[str, list[np.ndarray]]:
+    """Key of the mechanism -> velocity without friction in ever more substeps."""
+    rigs = [Rig(mechanism.sheet, mechanism.controller("sampled"), DT) for mechanism in MECHANISMS]
+    found = velocities(rigs, ga.m_sequence(5, STEP, 12), 20, 40, 80)
+    return {mechanism.key: [v[:, k] for v in found] for k, mechanism in enumerate(MECHANISMS)}
+
+
+@pytest.fixture(scope="module")
+def sticking() -> dict[str, list[np.ndarray]]:
+    """Key of the mechanism -> velocity with friction in few and in many substeps."""
+    found = velocities([rig_of(mechanism) for mechanism in MECHANISMS], REVERSING, 20, 80)
+    return {mechanism.key: [v[:, k] for v in found] for k, mechanism in enumerate(MECHANISMS)}
+
+
 @BOTH
-def test_the_rig_without_friction_is_the_linear_loop(mechanism: Mechanism) -> None:
+def test_the_rig_without_friction_is_the_linear_loop(linear: dict[str, list[np.ndarray]], mechanism: Mechanism) -> None:
     rig = Rig(mechanism.sheet, mechanism.controller("sampled"), DT)
     command = ga.m_sequence(5, STEP, 12)
     rec = rig.record(command, 0)
     run = ga.run(mechanism.sheet, rec, rig.controller)
-    silence = np.zeros((len(command), 1))
-    errors = [np.abs(rig._integrate(command, silence, steps)[0][:, 0] - run.velocity).max() for steps in (20, 40, 80)]
+    errors = [np.abs(velocity - run.velocity).max() for velocity in linear[mechanism.key]]
     assert errors[0] < 1e-3
     # Steps of second order.
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1) and errors[1] / errors[2] == pytest.approx(4.0, rel=0.1)
@@ -116,12 +137,13 @@ def test_the_rig_without_friction_is_the_linear_loop(mechanism: Mechanism) -> No
 
 
 @BOTH
-def test_the_rig_with_friction_converges_and_agrees_with_the_core(mechanism: Mechanism) -> None:
+def test_the_rig_with_friction_converges_and_agrees_with_the_core(
+    sticking: dict[str, list[np.ndarray]], mechanism: Mechanism
+) -> None:
     rig = rig_of(mechanism)
-    command = np.repeat([STEP, -20.0, 2.0], 120)
-    coarse, fine = (rig._integrate(command, np.zeros((len(command), 1)), steps)[0][:, 0] for steps in (20, 80))
+    coarse, fine = sticking[mechanism.key]
     assert np.abs(coarse - fine).max() < 0.02
-    rec = ga.Record(DT, command, coarse)
+    rec = ga.Record(DT, REVERSING, coarse)
     law = {"torque": FRICTION.coulomb, "static_torque": FRICTION.static, "stribeck_velocity": FRICTION.stribeck_velocity}
     model = mechanism.sheet.model().with_effect("stribeck_friction", **law)
     np.testing.assert_allclose(ga.simulate(model, rec, rig.controller), coarse, atol=0.05)
@@ -230,7 +252,7 @@ def test_the_page_is_whole_and_needs_nothing_else(made: tuple[Path, dict[str, An
 
 
 def test_the_same_seed_gives_the_same_numbers_whatever_the_threads() -> None:
-    one, two = (compare(ONE_MASS, FRICTION, 3, 5, workers) for workers in (1, 2))
+    (one,), (two,) = (compare(ONE_MASS, [FRICTION], 3, 5, workers) for workers in (1, 2))
     for a, b in zip(one.methods, two.methods, strict=True):
         np.testing.assert_array_equal(a.coefficients, b.coefficients)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ from gaident.models.mechanics import Mechanics, mechanics_from_model
 from gaident.models.model import Discrete
 from gaident.paper.experiment import rig_of
 from gaident.paper.facts import STEP, Mechanism
-from gaident.paper.rig import NO_FRICTION, Friction
+from gaident.paper.rig import NO_FRICTION, Friction, Rig, Run, side_by_side
 
 __all__ = ["METHODS", "Comparison", "Method", "compare"]
 
@@ -75,11 +75,16 @@ class Comparison:
         return next(m for m in self.methods if m.key == key)
 
 
-def compare(mechanism: Mechanism, friction: Friction, seeds: int, seed: int, workers: int | None) -> Comparison:
+def compare(mechanism: Mechanism, frictions: Sequence[Friction], seeds: int, seed: int, workers: int | None) -> list[Comparison]:
+    """The methods with each friction in the rig. Every rig runs with the same noise seeds, all side by side."""
+    command, title = m_sequence(REGISTER, AMPLITUDE, HOLD), f"M-sequence, {mechanism.title}"
+    rigs = [rig_of(mechanism, friction) for friction in frictions]
+    records = side_by_side([Run(rig, command, seed + k, title) for rig in rigs for k in range(seeds)])
+    return [_compared(mechanism, rig, records[i * seeds : (i + 1) * seeds], seed, workers) for i, rig in enumerate(rigs)]
+
+
+def _compared(mechanism: Mechanism, rig: Rig, records: Sequence[Record], seed: int, workers: int | None) -> Comparison:
     """All methods on the same records of the rig."""
-    rig = rig_of(mechanism, friction)
-    command = m_sequence(REGISTER, AMPLITUDE, HOLD)
-    records = rig.records(command, range(seed, seed + seeds), f"M-sequence, {mechanism.title}")
     controller, model = rig.controller, mechanism.sheet.model()
     settings = Settings(initial_state="rest")
 
@@ -112,15 +117,15 @@ def compare(mechanism: Mechanism, friction: Friction, seeds: int, seed: int, wor
     truth = model.discrete(rig.dt, controller)
     return Comparison(
         mechanism,
-        friction,
+        rig.friction,
         np.r_[truth.alpha, truth.beta],
         np.array([getattr(mechanism.sheet, name) for name in mechanism.names]),
         (run("plain", plain), run("refined", refined), run("genetic", genetic)),
-        seeds,
+        len(records),
     )
 
 
 def both(mechanism: Mechanism, friction: Friction, seeds: int, seed: int, workers: int | None) -> tuple[Comparison, Comparison]:
     """(without friction: what noise alone does, with friction: what the linear form does)."""
-    without, with_ = (compare(mechanism, f, seeds, seed, workers) for f in (NO_FRICTION, friction))
+    without, with_ = compare(mechanism, (NO_FRICTION, friction), seeds, seed, workers)
     return without, with_

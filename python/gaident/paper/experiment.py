@@ -21,7 +21,7 @@ from gaident.identification.settings import Settings
 from gaident.identification.space import SearchSpace
 from gaident.models.simulate import simulate
 from gaident.paper.facts import DT, ERROR_WEIGHT, ORDER_WEIGHT, SAMPLES, STEP, Mechanism
-from gaident.paper.rig import Friction, Rig
+from gaident.paper.rig import Friction, Rig, Run, side_by_side
 
 __all__ = ["FRICTION", "NOISE", "Engine", "StepTest", "rig_of", "step_test"]
 
@@ -93,7 +93,13 @@ def step_test(mechanism: Mechanism, trials: int, seed: int, workers: int | None,
     """The paper's experiment: 250 samples of a step of 43.6 rad/s."""
     rig = rig_of(mechanism)
     command = np.full(SAMPLES, STEP)
-    rec = rig.record(command, seed, f"step, {mechanism.title}")
+    scaled = replace(rig, controller=mechanism.scaled_controller("sampled"))
+    rec, other = side_by_side(
+        [
+            Run(rig, command, seed, f"step, {mechanism.title}"),
+            Run(scaled, command, seed, f"step with the loop gain of Table V, {mechanism.title}"),
+        ]
+    )
     model = mechanism.sheet.model()
     nominal = simulate(model, rec, rig.controller)
     runs: dict[str, list[Identification]] = {}
@@ -107,8 +113,6 @@ def step_test(mechanism: Mechanism, trials: int, seed: int, workers: int | None,
     )
     bilinear = identify(rec, mechanism.controller(), SPACE, seed=seed, workers=workers)
     say(f"{mechanism.title}: {trials} trials with the loop gain of Table V")
-    scaled = replace(rig, controller=mechanism.scaled_controller("sampled"))
-    other = scaled.record(command, seed, f"step with the loop gain of Table V, {mechanism.title}")
     found = [identify(other, scaled.controller, SPACE, Settings.paper(), seed=seed + k, workers=workers) for k in range(trials)]
     return StepTest(
         mechanism,

@@ -12,7 +12,7 @@ from gaident.diagnosis.result import Diagnosis
 from gaident.models.mechanics import Mechanics, mechanics_from_model
 from gaident.paper.experiment import rig_of
 from gaident.paper.facts import SAMPLES, STEP, Mechanism
-from gaident.paper.rig import Friction
+from gaident.paper.rig import Friction, Run, side_by_side
 
 __all__ = ["FrictionTest", "friction_test"]
 
@@ -43,8 +43,12 @@ class FrictionTest:
 def friction_test(mechanism: Mechanism, step: Record, seed: int) -> FrictionTest:
     """step: the record of the paper's experiment on the same rig."""
     rig = rig_of(mechanism)
-    reversals = rig.record(np.repeat(LEVELS, SAMPLES), seed + 1, f"reversals, {mechanism.title}")
-    others = rig.record(np.repeat(OTHER_LEVELS, SAMPLES), seed + 2, f"other reversals, {mechanism.title}")
+    reversals, others = side_by_side(
+        [
+            Run(rig, np.repeat(LEVELS, SAMPLES), seed + 1, f"reversals, {mechanism.title}"),
+            Run(rig, np.repeat(OTHER_LEVELS, SAMPLES), seed + 2, f"other reversals, {mechanism.title}"),
+        ]
+    )
     alone = diagnose(step, rig.controller, seed=seed)
     found = diagnose([step, reversals], rig.controller, validation=others, seed=seed)
     return FrictionTest(

@@ -22,7 +22,7 @@ from gaident.data.record import Record
 from gaident.models.controller import PI
 from gaident.models.mechanics import OneMass, TwoMass
 
-__all__ = ["Friction", "Rig"]
+__all__ = ["Friction", "Rig", "Run", "integrate", "side_by_side"]
 
 Vector = NDArray[np.float64]
 SUBSTEPS = 20
@@ -60,37 +60,57 @@ class Rig:
         return self.records(command, [seed], name)[0]
 
     def records(self, command: Vector, seeds: Sequence[int], name: str = "") -> list[Record]:
-        """One run from rest per seed of the noise, all integrated side by side."""
-        samples, runs = len(command), len(seeds)
-        noise = np.column_stack([np.random.default_rng(seed).standard_normal(samples) for seed in seeds])
-        velocity, torque = self._integrate(command, self.noise * noise)
-        return [Record(self.dt, command, velocity[:, k], torque[:, k], name=name) for k in range(runs)]
-
-    def _integrate(self, command: Vector, noise: Vector, substeps: int = SUBSTEPS) -> tuple[Vector, Vector]:
-        """(velocity as read, torque), both (samples, runs)."""
-        h, c = self.dt / substeps, self.controller
-        JM, DM, JL, DL, KG = self._constants()
-        damp_M, damp_L = 0.5 * h * DM / JM, 0.5 * h * DL / JL
-        w, w_L, x, integral, last_error = (np.zeros(noise.shape[1]) for _ in range(5))
-        velocity, torque = np.empty_like(noise), np.empty_like(noise)
-        for n, r in enumerate(command):
-            velocity[n] = w + noise[n]
-            error = r - velocity[n]
-            integral = integral + 0.5 * c.ki * self.dt * (error + last_error)
-            last_error = error
-            u = torque[n] = c.kp * error + integral
-            for _ in range(substeps):
-                x = x + 0.5 * h * (w - w_L)
-                shaft = KG * x
-                free = ((1.0 - damp_M) * w + h / JM * (u - shaft)) / (1.0 + damp_M)
-                reach = h / JM * self.friction.level(0.5 * (w + free))
-                w = np.sign(free) * np.maximum(np.abs(free) - reach, 0.0)
-                w_L = ((1.0 - damp_L) * w_L + h / JL * shaft) / (1.0 + damp_L)
-                x = x + 0.5 * h * (w - w_L)
-        return velocity, torque
+        """One run from rest per seed of the noise."""
+        return side_by_side([Run(self, command, seed, name) for seed in seeds])
 
     def _constants(self) -> tuple[float, float, float, float, float]:
         """(J_M, D_M, J_L, D_L, K_G); without a load arm the load is there but not coupled."""
         if isinstance(self.drive, OneMass):
             return self.drive.J, self.drive.D, self.drive.J, self.drive.D, 0.0
         return self.drive.JM, self.drive.DM, self.drive.JL, self.drive.DL, self.drive.KG
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a rig from rest."""
+
+    rig: Rig
+    command: Vector
+    seed: int  # of the noise
+    name: str = ""
+
+
+def side_by_side(runs: Sequence[Run]) -> list[Record]:
+    """The record of each run, all integrated at once; their commands have the same length."""
+    noise = np.column_stack([r.rig.noise * np.random.default_rng(r.seed).standard_normal(len(r.command)) for r in runs])
+    velocity, torque = integrate([r.rig for r in runs], np.column_stack([r.command for r in runs]), noise)
+    return [Record(r.rig.dt, r.command, velocity[:, k], torque[:, k], name=r.name) for k, r in enumerate(runs)]
+
+
+def integrate(rigs: Sequence[Rig], command: Vector, noise: Vector, substeps: int = SUBSTEPS) -> tuple[Vector, Vector]:
+    """(velocity as read, torque), arrays as given: (samples, runs), a rig for each run. No column depends on its neighbours."""
+    JM, DM, JL, DL, KG = np.array([rig._constants() for rig in rigs]).T
+    kp, ki, dt = np.array([(rig.controller.kp, rig.controller.ki, rig.dt) for rig in rigs]).T
+    T_c, T_s, v_s = np.array([(f.coulomb, f.static, f.stribeck_velocity) for f in (rig.friction for rig in rigs)]).T
+    friction = Friction(T_c, T_s, v_s)
+    h = dt / substeps
+    half, per_JM, per_JL, damp_M, damp_L = 0.5 * h, h / JM, h / JL, 0.5 * h * DM / JM, 0.5 * h * DL / JL
+    kept_M, lost_M, kept_L, lost_L = 1.0 - damp_M, 1.0 + damp_M, 1.0 - damp_L, 1.0 + damp_L
+    w, w_L, x, half_twist, integral, last_error = np.zeros((6, len(rigs)))
+    velocity, torque = np.empty_like(noise), np.empty_like(noise)
+    for n, r in enumerate(command):
+        velocity[n] = w + noise[n]
+        error = r - velocity[n]
+        integral = integral + 0.5 * ki * dt * (error + last_error)
+        last_error = error
+        u = torque[n] = kp * error + integral
+        for _ in range(substeps):
+            x = x + half_twist
+            shaft = KG * x
+            free = (kept_M * w + per_JM * (u - shaft)) / lost_M
+            reach = per_JM * friction.level(0.5 * (w + free))
+            w = np.copysign(np.maximum(np.abs(free) - reach, 0.0), free)
+            w_L = (kept_L * w_L + per_JL * shaft) / lost_L
+            half_twist = half * (w - w_L)
+            x = x + half_twist
+    return velocity, torque

@@ -1,0 +1,234 @@
+// A drive with effects, integrated finely: what the core is compared with. It shares no code with the library.
+//
+// Explicit steps of a hundredth of a sample or less, the twist half before and half after the velocity (leapfrog), friction by
+// clipping the velocity that the other torques would bring (Moreau), delay by a buffer of fine steps, filters by the midpoint
+// rule, the bristle by Heun, an analog controller's torque extrapolated by half a step. The equations are those of the public
+// table of effects.
+//
+// Compiled and called by tests/python/fine_integrator.py, which reads the list of fields below.
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+namespace {
+
+constexpr double inf = std::numeric_limits<double>::infinity();
+
+struct Case {  // SI units, rad; neutral values; effect_parameter
+    // fields
+    double dt = 1e-3;  // s
+    double closed = 0;
+    double analog = 0;
+    double kp = 0;  // N m s/rad
+    double ki = 0;  // N m/rad
+    double JM = 1;  // kg m2
+    double DM = 0;  // N m s/rad
+    double JL = 0;  // 0: one mass
+    double DL = 0;
+    double K = 0;  // N m/rad
+    double D = 0;
+    double coulomb_friction_torque = 0;
+    double stribeck_friction_torque = 0;
+    double stribeck_friction_static_torque = 0;
+    double stribeck_friction_stribeck_velocity = 1;
+    double asymmetric_friction_torque_positive = 0;
+    double asymmetric_friction_torque_negative = 0;
+    double asymmetric_friction_viscous_positive = 0;
+    double asymmetric_friction_viscous_negative = 0;
+    double presliding_friction_torque = 1;
+    double presliding_friction_stiffness = 0;
+    double quadratic_drag_coefficient = 0;
+    double load_torque_torque = 0;
+    double unbalance_amplitude = 0;
+    double unbalance_phase = 0;
+    double cogging_amplitude = 0;
+    double cogging_order = 2;
+    double cogging_phase = 0;
+    double friction_drift_torque = 0;
+    double friction_drift_rate = 0;
+    double backlash_gap = 0;
+    double hardening_stiffness_cubic_stiffness = 0;
+    double torque_saturation_limit = inf;
+    double torque_dead_band_width = 0;
+    double transport_delay_delay = 0;
+    double torque_lag_time_constant = 0;
+    double integrator_clamp_limit = inf;
+    double command_rate_limit_rate = inf;
+    double velocity_filter_time_constant = 0;
+    double velocity_ripple_amplitude = 0;
+    double velocity_ripple_order = 1;
+    double velocity_ripple_phase = 0;
+    double velocity_quantisation_step = 0;
+    double extra_resonance_frequency = 1;
+    double extra_resonance_damping = 1;
+    double extra_resonance_zero_frequency = 1;
+    double extra_resonance_zero_damping = 1;
+    // end of fields
+};
+
+double clip(double x, double limit) { return std::clamp(x, -limit, limit); }
+
+// x less what lies between -width and width.
+double beyond(double x, double width) { return std::copysign(std::max(std::abs(x) - width, 0.0), x); }
+
+// A lag in steps of h by the midpoint rule: its share of the way to the input; without a time constant it follows at once.
+double share(double h, double time_constant) { return time_constant > 0 ? h / (time_constant + 0.5 * h) : 1; }
+
+class Drive {
+public:
+    Drive(const Case& its, int steps)
+        : c(its),
+          h(c.dt / steps),
+          control_time(c.analog != 0 ? h : c.dt),
+          delay(c.transport_delay_delay / h),
+          ring(static_cast<std::size_t>(delay) + 3) {}
+
+    double u = 0;      // of the controller, N m
+    double angle = 0;  // of the motor
+
+    // What the sensor shows.
+    double sensed() const {
+        const double step = c.velocity_quantisation_step;
+        return step > 0 ? std::nearbyint(filtered / step) * step : filtered;
+    }
+
+    void control(double r) {
+        command += clip(r - command, c.command_rate_limit_rate * control_time);
+        const double e = command - sensed();
+        integral = clip(integral + 0.5 * c.ki * control_time * (e + error), c.integrator_clamp_limit);
+        error = e;
+        u = c.kp * e + integral;
+    }
+
+    // One fine step under the torque command v, its middle at time t.
+    void step(double v, double t) {
+        const double T =
+            shaft_torque(resonant(lagged(late(beyond(clip(v, c.torque_saturation_limit), c.torque_dead_band_width)))));
+        const bool load = c.JL > 0;
+        twist += 0.5 * h * (w - wL);
+        const double Tc = load ? coupling() : 0;
+        const double damp = 0.5 * h * c.DM / c.JM;
+        const double free = ((1 - damp) * w + h / c.JM * (T - Tc - smooth())) / (1 + damp);
+        const double next = beyond(free, h / c.JM * level(free, t));
+        if (load) {
+            const double damp_L = 0.5 * h * c.DL / c.JL;
+            wL = ((1 - damp_L) * wL + h / c.JL * Tc) / (1 + damp_L);
+        }
+        angle += 0.5 * h * (w + next);
+        w = next;
+        twist += 0.5 * h * (w - wL);
+        const double order = c.velocity_ripple_order, amplitude = c.velocity_ripple_amplitude;
+        const double ripple = amplitude != 0 ? amplitude * order * std::cos(order * angle + c.velocity_ripple_phase) : 0;
+        filtered += share(h, c.velocity_filter_time_constant) * (w * (1 + ripple) - filtered);
+    }
+
+private:
+    const Case& c;
+    const double h, control_time;
+    const double delay;  // fine steps
+    std::vector<double> ring;
+    std::size_t k = 0;
+    double w = 0, wL = 0, twist = 0, z = 0, x1 = 0, x2 = 0, lag = 0, filtered = 0, integral = 0, error = 0, command = 0;
+
+    // The torque at the middle of the fine step, `delay` steps ago.
+    double late(double v) {
+        const auto whole = static_cast<std::size_t>(delay);
+        const std::size_t size = ring.size();
+        ring[k % size] = v;
+        const double after = ring[(k + size - whole) % size], before = ring[(k + size - whole - 1) % size];
+        ++k;
+        return after + (delay - static_cast<double>(whole)) * (before - after);
+    }
+
+    double lagged(double v) {
+        if (!(c.torque_lag_time_constant > 0)) return v;
+        const double step = share(h, c.torque_lag_time_constant) * (v - lag);
+        lag += step;
+        return lag - 0.5 * step;
+    }
+
+    double resonant(double T) {
+        const double wp = c.extra_resonance_frequency, zp = c.extra_resonance_damping;
+        const double wz = c.extra_resonance_zero_frequency, zz = c.extra_resonance_zero_damping;
+        if (wp == wz && zp == zz) return T;
+        const double old1 = x1, old2 = x2;
+        x2 += h * (T - 2 * zp * wp * x2 - wp * wp * x1);
+        x1 += h * x2;
+        // Its mean over the step: at both ends, the half step between x1 and x2 taken back.
+        const double x1_mean = 0.5 * (old1 + x1) - 0.5 * h * 0.5 * (x2 - old2);
+        return (wp / wz) * (wp / wz) * (T + (zz * wz - zp * wp) * (old2 + x2) + (wz * wz - wp * wp) * x1_mean);
+    }
+
+    double shaft_torque(double T) const {
+        const double theta = angle + 0.5 * h * w;
+        T -= c.load_torque_torque;
+        if (c.unbalance_amplitude != 0) T -= c.unbalance_amplitude * std::sin(theta + c.unbalance_phase);
+        if (c.cogging_amplitude != 0) T -= c.cogging_amplitude * std::sin(c.cogging_order * theta + c.cogging_phase);
+        return T;
+    }
+
+    double coupling() const {
+        const double half_gap = 0.5 * c.backlash_gap, x = beyond(twist, half_gap);
+        const double damping = std::abs(twist) < half_gap ? 0 : c.D * (w - wL);
+        return c.K * x + c.hardening_stiffness_cubic_stiffness * x * x * x + damping;
+    }
+
+    // Friction and drag without a jump at standstill.
+    double smooth() {
+        const double viscous = w > 0 ? c.asymmetric_friction_viscous_positive : c.asymmetric_friction_viscous_negative;
+        double T = c.quadratic_drag_coefficient * w * std::abs(w) + viscous * w;
+        if (const double s0 = c.presliding_friction_stiffness; s0 > 0) {
+            const double per_zc = s0 / c.presliding_friction_torque;
+            const double half = z + 0.5 * h * (w - std::abs(w) * z * per_zc);
+            T += s0 * half;
+            z += h * (w - std::abs(w) * half * per_zc);
+        }
+        return T;
+    }
+
+    // Dry friction, where the other torques bring the velocity `free`.
+    double level(double free, double t) const {
+        double T =
+            c.coulomb_friction_torque + c.stribeck_friction_torque + c.friction_drift_torque * (1 + c.friction_drift_rate * t);
+        if (const double more = c.stribeck_friction_static_torque - c.stribeck_friction_torque; more != 0) {
+            const double ratio = 0.5 * (w + free) / c.stribeck_friction_stribeck_velocity;
+            T += more * std::exp(-ratio * ratio);
+        }
+        return T + (free > 0 ? c.asymmetric_friction_torque_positive : c.asymmetric_friction_torque_negative);
+    }
+};
+
+}  // namespace
+
+// `samples` samples in `fine` steps each; source: the command, in open loop the torque. velocity: as the sensor shows it.
+extern "C" void fine_integrator(const Case* its, int samples, int fine, const double* source, double* velocity, double* torque,
+                                double* angle) {
+    const Case& c = *its;
+    const bool analog = c.analog != 0, digital = c.closed != 0 && !analog;
+    Drive drive(c, fine);
+    double before = 0;
+    const auto write = [&](int n) {
+        velocity[n] = drive.sensed();
+        torque[n] = drive.u;
+        angle[n] = drive.angle;
+    };
+    for (int n = 0; n < samples; ++n) {
+        const double target = source[n];
+        if (digital) {
+            drive.control(target);
+        } else if (!analog) {
+            drive.u = target;
+        }
+        if (!analog) write(n);
+        for (int j = 0; j < fine; ++j) {
+            const double last = drive.u;
+            if (analog) drive.control(before + (target - before) * (static_cast<double>(j) / fine));
+            const double middle = (n + (j + 0.5) / fine - (analog ? 1 : 0)) * c.dt;
+            drive.step(analog ? 1.5 * drive.u - 0.5 * last : drive.u, std::max(middle, 0.0));
+        }
+        before = target;
+        if (analog) write(n);  // the continuous loop's sample is the end of the interval
+    }
+}
