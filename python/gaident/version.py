@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from functools import cache
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as installed
 
 __all__ = ["version"]
 
@@ -10,9 +12,6 @@ __all__ = ["version"]
 @cache
 def version() -> str:
     """Version of the installed package."""
-    from importlib.metadata import PackageNotFoundError  # takes as long as half of `gaident --help`
-    from importlib.metadata import version as installed
-
     try:
         return installed("gaident")
     except PackageNotFoundError:

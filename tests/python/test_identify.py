@@ -340,3 +340,15 @@ def test_numbers_beyond_reason_are_refused_before_the_core() -> None:
     for arguments in ({"trials": 10**14}, {"workers": 10**9}, {"seed": 2**70}):
         with pytest.raises(SettingsError, match=next(iter(arguments))):
             ga.identify(rec, ctl, **arguments)
+
+
+def test_rounds_go_on_only_for_better_optima() -> None:
+    """A model without the friction stays far above the noise; still the second round, which finds nothing new, is the last."""
+    model, loop = ONE_MASS.with_effect("coulomb_friction", torque=1.0), controller("sampled")
+    rec = record(ONE_MASS, "sampled")
+    w = ga.simulate(model, rec, loop)
+    rubbing = ga.Record(DT, rec.command, w + 0.1 * np.random.default_rng(0).standard_normal(len(w)))
+    idn = ga.identify(rubbing, loop, workers=1)
+    assert idn.rmse > 1.0
+    assert idn.trials[0].generations == 2 * ga.Settings().round
+    assert ga.identify(rec, loop, workers=1).trials[0].generations == ga.Settings().round

@@ -24,6 +24,7 @@ from gaident.models.controller import PI
 from gaident.models.filtering import filtered, rate_limited
 from gaident.models.model import Model
 from gaident.models.own_effects import OWN
+from gaident.models.roots import quadratic_roots
 from gaident.models.simulate import simulate_values
 
 __all__ = ["Driven"]
@@ -235,8 +236,8 @@ class Driven:
         return self._second_order(torques, -K, (0.0,), e1, e0)
 
     def _second_order(self, rows: Matrix, gain: float, zeros: tuple[float, ...], e1: float, e0: float) -> Matrix:
-        held = Model(1.0, list(np.roots([1.0, max(e1, 0.0), abs(e0)])), zeros).discrete(self.records[0].dt)
-        return filtered(gain * held.alpha, np.concatenate([[1.0], -held.beta]), rows, self.lengths)
+        held = Model(1.0, quadratic_roots(max(e1, 0.0), abs(e0)), zeros).discrete(self.records[0].dt)
+        return filtered(gain * held.alpha, np.append(1.0, -held.beta), rows, self.lengths)
 
     def commanded(self, rate: float) -> Driven:
         """The same with commands that change by `rate` [rad/s^2] at most, as the controller of a closed loop then reads them."""

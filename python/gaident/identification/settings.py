@@ -32,8 +32,7 @@ class Settings:
     population: individuals in all; the species engine keeps at least three per structure.
     tournament: contestants; crossover, mutation: rates, per pair and per bit.
     generations: of the plain engine; at most so many of the species engine, which works in rounds of `round` generations, fits
-    every
-        species' best locally after each, and stops after `quiet_rounds` rounds without progress.
+        every species' best locally after each, and stops after `quiet_rounds` rounds without a better optimum close to the best.
     elites: survivors of the plain engine (species always keep one each).
     code: "gray" or "binary"; scale: "logarithmic" or "linear" coding of real and imaginary parts (K is always logarithmic).
     error_weight, order_weight: Wf1, Wf2 of fitness (6).

@@ -70,7 +70,7 @@ class Rig:
         return self.drive.JM, self.drive.DM, self.drive.JL, self.drive.DL, self.drive.KG
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Run:
     """One run of a rig from rest."""
 
