@@ -35,12 +35,16 @@ RealArray filtered_rows(const RealArray& b, const RealArray& a, const RealArray&
 // A (m, m), drive (n, m), start (m): all x(0..n-1), with `newest` x(1..n), (n, m).
 ComplexArray states(const ComplexArray& A, const ComplexArray& drive, const ComplexArray& start, bool newest) {
     const py::ssize_t m = start.size();
-    if (A.ndim() != 2 || A.shape(0) != m || A.shape(1) != m || drive.ndim() != 2 || drive.shape(1) != m)
+    if (A.ndim() != 2 || A.shape(0) != m || A.shape(1) != m || drive.ndim() != 2 || drive.shape(1) != m || start.ndim() != 1)
         throw std::invalid_argument("A, drive, start: (m, m), (n, m) and (m,) are needed");
     ComplexArray out({drive.shape(0), m});
-    std::copy_n(drive.data(), drive.size(), out.mutable_data());
-    state_recursion(A.data(), {start.data(), static_cast<std::size_t>(m)}, out.mutable_data(),
-                    static_cast<std::size_t>(drive.shape(0)), newest);
+    std::complex<double>* const x = out.mutable_data();
+    std::copy_n(drive.data(), drive.size(), x);
+    {
+        const py::gil_scoped_release release;
+        state_recursion(A.data(), {start.data(), static_cast<std::size_t>(m)}, x, static_cast<std::size_t>(drive.shape(0)),
+                        newest);
+    }
     return out;
 }
 

@@ -21,7 +21,7 @@ struct Settings {
     FitnessWeights weights;
     bool species = false;  // one species per structure, local fits, comparison left to the caller
     int round = 40;        // generations between two local fits of every species
-    int quiet_rounds = 1;  // rounds without progress after which the search ends
+    int quiet_rounds = 1;  // rounds that find no better optimum, after which the search ends
     bool in_float = false;
     std::string mirror;  // name of a drive's arithmetic (mirror.hpp) to evaluate in; empty: none
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import hashlib
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -27,20 +29,24 @@ def fields(source: Path) -> dict[str, float]:
 @lru_cache
 def library(source: Path) -> ctypes.CDLL:
     """Compile it, once for each text of the source, into build/rig; else, where that is not writable, for this run."""
-    compiler = shutil.which(os.environ.get("CXX", "g++").split()[0]) or shutil.which("c++")
-    if compiler is None:
+    command = shlex.split(os.environ.get("CXX", "")) or ["g++"]
+    if shutil.which(command[0]) is None:
+        command = ["c++"]
+    if shutil.which(command[0]) is None:
         raise RuntimeError("the simulated drive needs a C++ compiler: install g++ or name one in CXX")
     key = hashlib.sha256(source.read_bytes() + " ".join(MATH).encode()).hexdigest()[:16]
     folder = ROOT / "build" / "rig"
-    try:
+    with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
+    if not os.access(folder, os.W_OK):
         folder = Path(tempfile.mkdtemp(prefix=source.stem))
     target = folder / f"{source.stem}_{key}.so"
     if not target.exists():
         # Under a name of its own first: several processes may be here at once.
         with tempfile.TemporaryDirectory(dir=folder) as own:
             made = Path(own) / target.name
-            subprocess.run([compiler, *MATH, str(source), "-o", str(made)], check=True, capture_output=True)
+            done = subprocess.run([*command, *MATH, str(source), "-o", str(made)], capture_output=True, text=True)
+            if done.returncode != 0:
+                raise RuntimeError(f"{source.name} does not compile: {done.stderr}")
             os.replace(made, target)
     return ctypes.CDLL(str(target))

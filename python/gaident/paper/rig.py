@@ -30,11 +30,11 @@ SUBSTEPS = 20
 
 @dataclass(frozen=True)
 class Friction:
-    """Dry friction at the motor: T_c, T_s [N m], v_s [rad/s]."""
+    """Dry friction at the motor: T_c, T_s [N m], v_s [rad/s]; or of several runs, an array of each."""
 
-    coulomb: float
-    static: float
-    stribeck_velocity: float
+    coulomb: float | Vector
+    static: float | Vector
+    stribeck_velocity: float | Vector
 
     def level(self, w: Vector) -> Vector:
         """T(w) [N m] >= 0."""
