@@ -273,13 +273,14 @@ def lagged_products(e: NDArray[np.float64], lags: int) -> NDArray[np.float64]:
 def held_torque(
     error: NDArray[np.float64],
     kp: float,
-    half: float,
+    newest: float,
+    before: float,
     torque_limit: float,
     integrator_limit: float,
     rule: str,
     integral: float,
 ) -> NDArray[np.float64]:
-    """Torque of a PI whose integrator does not wind up at its torque limit; half: ki dt/2."""
+    """Torque of a PI whose integrator does not wind up at its torque limit; it adds newest e(n) + before e(n-1)."""
 
 def clamped_sum(steps: NDArray[np.float64], limit: float, start: float) -> NDArray[np.float64]:
     """I(n) = I(n-1) + steps(n), clamped to +-limit after each update, from I(-1) = start."""

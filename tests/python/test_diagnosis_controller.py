@@ -117,6 +117,38 @@ def test_an_anti_windup_is_named(hold: str) -> None:
     assert found.cause == "anti_windup" and found.value == pytest.approx(0.5, rel=0.005), found.sentence
 
 
+def issued(e: np.ndarray, limit: float, share: float, hold: str) -> np.ndarray:
+    """The PI's torque sample by sample; share, hold: as `held_torque` has them, hold "": the integrator winds up."""
+    kp, step, integral, last, torque = CONTROLLER.kp, CONTROLLER.ki * DT, 0.0, 0.0, []
+    for now in e:
+        after = integral + step * ((0.5 + share) * now + (0.5 - share) * last)
+        wanted = kp * now + after
+        torque.append(min(max(wanted, -limit), limit))
+        if torque[-1] == wanted or hold == "" or (hold == "held_back" and now * wanted <= 0.0):
+            integral = after
+        elif hold == "tracked":
+            integral = torque[-1] - kp * now
+        last = now
+    return np.array(torque)
+
+
+@pytest.mark.parametrize("hold", ["", "held", "held_back", "tracked"])
+@pytest.mark.parametrize("share", [0.0, 0.5, -0.5])
+def test_limits_and_rules_of_integration_are_found_in_a_text_log(share: float, hold: str) -> None:
+    rec = limited_drive(0.5)
+    assert rec.command is not None
+    log = [rec.command, rec.velocity, issued(rec.command - rec.velocity, 0.5, share, hold)]
+    for digits in (7, 5) if hold == "" else (7,):  # one digit more or less decides when an integrator is held
+        r, w, u = ([float(f"{x:.{digits}g}") for x in column] for column in log)
+        found = replay(ga.Record(DT, command=r, velocity=w, torque=u), CONTROLLER)
+        assert found.cause == ("anti_windup" if hold else "torque_limit"), found.sentence
+        assert found.value == 0.5 and ("rectangular" in found.sentence) == (share != 0.0)
+        assert ("lacks the newest error" in found.sentence) == (share < 0.0)
+        same = ga.PI(CONTROLLER.kp + share * CONTROLLER.ki * DT, CONTROLLER.ki, torque_limit=0.5)
+        assert found.controller is not None and found.controller.kp == pytest.approx(same.kp, rel=1e-12)
+        assert found.controller.limits == same.limits
+
+
 def test_a_torque_channel_of_zeros_is_no_controller() -> None:
     rec = limited_drive(0.5)
     found = replay(ga.Record(DT, command=rec.command, velocity=rec.velocity, torque=np.zeros(len(rec))), CONTROLLER)

@@ -13,7 +13,7 @@ from scipy import signal
 
 import gaident as ga
 from gaident.diagnosis.excitation import excitation
-from gaident.diagnosis.lattice import lattice_step
+from gaident.diagnosis.lattice import lattice_step, rounding_step
 from gaident.diagnosis.missing_torque import missing_torque
 from gaident.diagnosis.offset import Offset
 from gaident.diagnosis.replay import replay
@@ -158,6 +158,15 @@ def test_departure_gains_start_and_rubbish() -> None:
     assert strange.follows is False and strange.cause == "" and "none of the simple reasons" in strange.sentence
     with pytest.raises(RecordError, match=r"no torque and nothing to make it from"):
         replay(changed(drive()), None)
+
+
+def test_the_digits_of_a_text_log_are_found_and_not_invented() -> None:
+    x = 40.0 * np.random.default_rng(3).standard_normal(3000)
+    assert 100.0 < np.abs(x).max() < 1000.0
+    for digits in (5, 7, 9):
+        assert rounding_step(np.array([float(f"{v:.{digits}g}") for v in x])) == pytest.approx(10.0 ** (3 - digits))
+    assert rounding_step(x) == 0.0 and rounding_step(np.zeros(10)) == 0.0
+    assert rounding_step(np.round(x / 0.3) * 0.3) == pytest.approx(0.3)
 
 
 def test_lattices_are_found_and_not_invented() -> None:

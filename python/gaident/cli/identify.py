@@ -44,7 +44,10 @@ def identify_command(args: argparse.Namespace) -> None:
             progress=progress,
         )
     # What the logs say of the controller, which the search takes as given.
-    off = [f"{name}: {said.sentence}" if len(records) > 1 else said.sentence for name, said in _replayed(records, controller)]
+    off = [
+        (f"{name}: " if len(records) > 1 else "") + said.sentence + _instead(said, controller)
+        for name, said in _replayed(records, controller)
+    ]
     idn = replace(idn, warnings=(*off, *idn.warnings))
     written = []
     if out is not None:
@@ -73,3 +76,12 @@ def _replayed(records: Sequence[Record], controller: PI | None) -> list[tuple[st
         return []
     said = [(rec.name, replay(rec[:_REPLAYED], controller)) for rec in records if rec.torque is not None]
     return [(name, r) for name, r in said if r.follows is False]
+
+
+def _instead(said: Replay, given: PI | None) -> str:
+    """The options of the controller that the log shows, where a PI with a trapezoidal integral has what differs."""
+    found = said.controller
+    if found is None or given is None or said.cause == "scale":  # a wrong unit is not to be mended by gains
+        return ""
+    options = (("kp", found.kp, given.kp), ("ki", found.ki, given.ki), ("torque-limit", found.torque_limit, given.torque_limit))
+    return f" Give {' '.join(f'--{name} {value:.6g}' for name, value, old in options if value is not None and value != old)}."

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["lattice_step"]
+__all__ = ["lattice_step", "rounding_step"]
 
 Vector = NDArray[np.float64]
+
+DIGITS = range(4, 10)  # significant digits that text logs are written with; more round off nothing that matters
 
 
 def lattice_step(values: Vector) -> float:
@@ -30,3 +32,21 @@ def lattice_step(values: Vector) -> float:
     off = np.abs(places - np.round(places))
     # On no lattice, the gaps are no multiples of the least one and `off` is spread evenly over 0..0.5.
     return step if float(off.max()) < 0.1 else 0.0
+
+
+def rounding_step(values: Vector) -> float:
+    """The step that all `values` are rounded to, in their unit: their lattice's, or, where a text log keeps so many significant
+    digits, the last digit of the largest; 0.0 where they are not rounded.
+    """
+    step = lattice_step(values)
+    if step > 0.0:
+        return step
+    size = np.abs(values[values != 0.0])
+    if len(size) < 4:
+        return 0.0
+    exponent = np.floor(np.log10(size))
+    for digits in DIGITS:
+        places = size * 10.0 ** (digits - 1 - exponent)
+        if float(np.abs(places - np.round(places)).max()) < 1e-4:
+            return float(10.0 ** (exponent.max() + 1 - digits))
+    return 0.0

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.diagnosis.lattice import lattice_step
+from gaident.diagnosis.lattice import lattice_step, rounding_step
 from gaident.diagnosis.replay_causes import explain, rounded_command, white_noise
 from gaident.errors import RecordError
 from gaident.models.controller import PI
@@ -84,7 +84,7 @@ def _unchecked(torque: Vector, replayed: Vector | None, sentence: str) -> Replay
 
 def _compared(rec: Record, command: Vector, controller: PI, logged: Vector, replayed: Vector) -> Replay:
     resolution = lattice_step(logged)
-    tolerance = _tolerance(rec, controller, logged, resolution)
+    tolerance = _tolerance(rec, command, controller, logged)
     off = logged - replayed
     rms, maximum = float(np.sqrt(np.mean(off**2))), float(np.abs(off).max())
     figures = (logged, replayed, rms, maximum, resolution)
@@ -114,12 +114,19 @@ def _compared(rec: Record, command: Vector, controller: PI, logged: Vector, repl
     return Replay(*figures, False, "", np.nan, departs, text)
 
 
-def _tolerance(rec: Record, controller: PI, logged: Vector, resolution: float) -> float:
-    """Three steps of the log's resolution, and what rounded decimals of the velocity do to P part and integral [N m].
+def _tolerance(rec: Record, command: Vector, controller: PI, logged: Vector) -> float:
+    """Three steps of the torque's rounding, and what rounded decimals of velocity and command do to P part and integral [N m].
 
-    A coarse lattice of the velocity is the encoder's, and the controller read the same numbers; a fine one is the text log's.
+    A coarse lattice of the velocity is the encoder's, and the controller read the same numbers; a fine one is the text log's,
+    and then the command's decimals are no finer. Each of N velocities is rounded by itself, a command once for all the samples
+    that it is held; the integrator adds up what is off, evenly within +-q/2:
+
+        sum of the squares = ki^2 dt^2 (N q_w^2 + sum L_i^2 q_r^2)/12        L_i: samples for which a command is held
     """
-    q = lattice_step(rec.velocity)
-    rounded = q if q < 1e-3 * float(np.ptp(rec.velocity)) else 0.0
-    drift = controller.ki * rec.dt * rounded * np.sqrt(len(rec) / 12.0)
-    return float(3.0 * resolution + controller.kp * rounded + 3.0 * drift + 1e-6 * np.abs(logged).max())
+    q = rounding_step(rec.velocity)
+    q_w = q if q < 1e-3 * float(np.ptp(rec.velocity)) else 0.0
+    q_r = min(q_w, rounding_step(command))
+    held = np.diff(np.flatnonzero(np.concatenate([[True], np.diff(command) != 0.0, [True]])))
+    drift = controller.ki * rec.dt * np.sqrt((len(rec) * q_w**2 + float(held @ held) * q_r**2) / 12.0)
+    own = 3.0 * rounding_step(logged) + 1e-6 * float(np.abs(logged).max())
+    return float(own + controller.kp * (q_w + q_r) + 3.0 * drift)

@@ -19,7 +19,8 @@ __all__ = ["Explanation", "explain", "rounded_command", "white_noise"]
 Vector = NDArray[np.float64]
 
 SHIFTS = (0, 1, -1, 2, -2)  # samples by which what the controller saw may be older (+) than the log's
-RULES = ("trapezoidal", "rectangular", "rectangular, old error")
+# By how much of ki dt the newest error counts more than half, and the one before less: the rule of integration in words.
+RULES = {0.0: "", 0.5: "a rectangular integral", -0.5: "a rectangular integral that lacks the newest error"}
 PLATEAU = 5  # samples at a limit from which it is one that an integrator is held at
 SAME = 2e-3  # relative difference below which a fitted gain is the configured one
 RPM = 30.0 / np.pi  # rpm in 1 rad/s
@@ -122,9 +123,15 @@ def _limits(case: _Case) -> Iterator[Explanation]:
     if not highest > 0.0:
         return
     for limited in _limited(case):
-        limit, torque = float(limited.limits[0]), case.torque(limited)
-        sentence = f"It does with a torque limit of {limit:.4g} N m, which acts at {_acting(torque, limit)} samples."
-        yield Explanation(torque, "torque_limit", limit, sentence, controller=limited)
+        limit = float(limited.limits[0])
+        for share, words in _rules(controller):
+            alike = _trapezoidal(limited, share, case.dt)
+            torque = case.torque(alike)
+            acting = _acting(torque, limit)
+            if share and acting < PLATEAU:  # the log's largest torque may have another reason
+                continue
+            sentence = f"It does with {words}a torque limit of {limit:.4g} N m, which acts at {acting} samples."
+            yield Explanation(torque, "torque_limit", limit, sentence, controller=alike)
     proportional = controller.kp * (case.command - case.velocity)
     for torque_limit in (controller.torque_limit, highest):
         free = np.ones(len(proportional), bool) if torque_limit is None else np.abs(case.logged) < 0.999 * torque_limit
@@ -149,6 +156,18 @@ def _limited(case: _Case) -> list[PI]:
     return [replace(case.controller, torque_limit=limit) for limit in dict.fromkeys((highest, middle))]
 
 
+def _rules(controller: PI) -> Iterator[tuple[float, str]]:
+    """(share, words to go before others) of the rules of integration; one alone where nothing is integrated."""
+    for share, words in RULES.items():
+        if share == 0.0 or controller.ki:
+            yield share, f"{words} and " if words else ""
+
+
+def _trapezoidal(controller: PI, share: float, dt: float) -> PI:
+    """The PI whose trapezoidal integral does, within the limits, what this one does with a rule of that share."""
+    return replace(controller, kp=max(controller.kp + share * controller.ki * dt, 0.0))
+
+
 def _acting(torque: Vector, limit: float) -> int:
     return int(np.sum(np.abs(torque) >= 0.999 * limit))
 
@@ -159,12 +178,15 @@ def _held(case: _Case) -> Iterator[Explanation]:
         return
     for limited in _limited(case) or [case.controller]:
         limit = float(limited.limits[0])
-        for rule, words in HOLDS.items():
-            torque = held_torque(case.command, case.velocity, case.dt, limited, rule)
-            acting = _acting(torque, limit)
-            if acting >= PLATEAU:
-                sentence = f"It does with {words} (anti-windup): the limit of {limit:.4g} N m acts at {acting} samples."
-                yield Explanation(torque, "anti_windup", limit, sentence, controller=limited)
+        for share, integral in _rules(limited):
+            for rule, words in HOLDS.items():
+                torque = held_torque(case.command, case.velocity, case.dt, limited, rule, share=share)
+                acting = _acting(torque, limit)
+                if acting < PLATEAU:
+                    continue
+                sentence = f"It does with {integral}{words} (anti-windup): the limit of {limit:.4g} N m acts at {acting} samples."
+                alike = _trapezoidal(limited, share, case.dt)
+                yield Explanation(torque, "anti_windup", limit, sentence, controller=alike)
 
 
 def _rate(case: _Case) -> Iterator[Explanation]:
@@ -206,8 +228,8 @@ def _fitted(case: _Case) -> Iterator[Explanation]:
     top = case.controller.limits[0]
     for shift in SHIFTS:
         e = _shifted(case.command - case.velocity, shift)
-        for rule in RULES if case.controller.ki else RULES[:1]:
-            columns = [e, case.dt * _sum(e, rule), np.ones(len(e))] if case.controller.ki else [e, np.ones(len(e))]
+        for share, _ in _rules(case.controller):
+            columns = [e, case.dt * _sum(e, share), np.ones(len(e))] if case.controller.ki else [e, np.ones(len(e))]
             table = np.column_stack(columns)
             used = np.abs(case.logged) < 0.999 * top
             used[: abs(shift)] = used[len(used) - abs(shift) :] = False
@@ -218,18 +240,20 @@ def _fitted(case: _Case) -> Iterator[Explanation]:
             torque = np.clip(table @ solved, -top, top)
             kp, start = float(solved[0]), float(solved[-1])
             ki = float(solved[1]) if case.controller.ki else 0.0
-            yield _named(case.controller, kp, ki, case.dt, start, shift, rule, torque)
+            yield _named(case.controller, kp, ki, case.dt, start, shift, share, torque)
 
 
-def _named(controller: PI, kp: float, ki: float, dt: float, start: float, shift: int, rule: str, torque: Vector) -> Explanation:
+def _named(
+    controller: PI, kp: float, ki: float, dt: float, start: float, shift: int, share: float, torque: Vector
+) -> Explanation:
     """Says what of a fitted controller differs from the configured one."""
     differs, cause, value = [], "", np.nan
     if shift:
         age = "older" if shift > 0 else "newer"
         differs.append(f"command and velocity {abs(shift)} sample{'s' if abs(shift) > 1 else ''} {age} than the log's")
         cause, value = "shift", float(shift)
-    if rule != RULES[0]:
-        differs.append("a rectangular integral" + (" that lacks the newest error" if rule == RULES[2] else ""))
+    if share:
+        differs.append(RULES[share])
         cause = cause or "integration_rule"
     factors = [found / given for found, given in ((kp, controller.kp), (ki, controller.ki)) if given]
     fitted_kp = abs(kp) > SAME * ki and not controller.kp
@@ -246,7 +270,7 @@ def _named(controller: PI, kp: float, ki: float, dt: float, start: float, shift:
         if not cause:
             cause, value = "initial_integral", start
     sentence = f"It does with {', and '.join(differs) or 'these gains'}."
-    same_kp = kp + {RULES[0]: 0.0, RULES[1]: 0.5, RULES[2]: -0.5}[rule] * ki * dt  # of a trapezoidal integral
+    same_kp = kp + share * ki * dt  # of a trapezoidal integral
     known = cause in ("gains", "scale", "integration_rule") and same_kp >= 0.0 and ki >= 0.0 and same_kp + ki > 0.0
     found = replace(controller, kp=same_kp, ki=ki) if known else None
     return Explanation(torque, cause or "gains", value, sentence, abs(shift), len(differs) + 2 * (cause == "gains"), found)
@@ -258,11 +282,8 @@ def _check_unit(factor: float) -> str:
     return "check the units of the torque, of the speeds and of the gains"
 
 
-def _sum(e: Vector, rule: str) -> Vector:
-    total = np.cumsum(e)
-    if rule == RULES[0]:
-        return total - 0.5 * e
-    return total if rule == RULES[1] else total - e
+def _sum(e: Vector, share: float) -> Vector:
+    return np.cumsum(e) - (0.5 - share) * e
 
 
 def _shifted(x: Vector, shift: int) -> Vector:

@@ -47,14 +47,18 @@ HOLDS = {
 """Ways in which a controller keeps its integrator from winding up at the torque limit."""
 
 
-def held_torque(command: Vector, velocity: Vector, dt: float, controller: PI, rule: str, initial_integral: float = 0.0) -> Vector:
+def held_torque(
+    command: Vector, velocity: Vector, dt: float, controller: PI, rule: str, initial_integral: float = 0.0, share: float = 0.0
+) -> Vector:
     """`pi_torque` of a controller with a torque limit U whose integrator does not wind up there, by a rule of `HOLDS`:
 
     v(n) = kp e(n) + I(n),  u(n) = clip(v(n), +-U); where |v(n)| > U afterwards
     held       I(n) = I(n-1)
     held_back  I(n) = I(n-1) where e(n) v(n) > 0
     tracked    I(n) = u(n) - kp e(n)
+
+    share: by how much of ki dt the newest error counts more than half, and the one before less: 0 a trapezoidal integral, 0.5 a
+    rectangular one, -0.5 one that lacks the newest error.
     """
-    return _core.held_torque(
-        command - velocity, controller.kp, 0.5 * controller.ki * dt, *controller.limits, rule, initial_integral
-    )
+    newest, before = ((0.5 + s) * controller.ki * dt for s in (share, -share))
+    return _core.held_torque(command - velocity, controller.kp, newest, before, *controller.limits, rule, initial_integral)
