@@ -1,9 +1,9 @@
 // The loop with effects: ns per sample for one candidate and per candidate in lanes, next to the linear loop. Each row first checks its
 // answer: the lanes against the scalar loop bit for bit, the scalar loop against finer steps.
-#include "../csrc/gaident/effect_batch.hpp"
+#include "../csrc/gaident/nonlinear/effect_batch.hpp"
 
-#include "../csrc/gaident/denormals.hpp"
-#include "../csrc/gaident/roots.hpp"
+#include "../csrc/gaident/numeric/denormals.hpp"
+#include "../csrc/gaident/plant/roots.hpp"
 
 #include <algorithm>
 #include <chrono>

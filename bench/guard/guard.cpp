@@ -9,10 +9,10 @@
 #include "counts.hpp"
 #include "instructions.hpp"
 
-#include "../../csrc/gaident/breeder.hpp"
-#include "../../csrc/gaident/decode.hpp"
-#include "../../csrc/gaident/denormals.hpp"
-#include "../../csrc/gaident/simulate.hpp"
+#include "../../csrc/gaident/search/breeder.hpp"
+#include "../../csrc/gaident/genetic/decode.hpp"
+#include "../../csrc/gaident/numeric/denormals.hpp"
+#include "../../csrc/gaident/simulation/simulate.hpp"
 
 #include <cstdio>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include "../gaident/effect_batch.hpp"
+#include "../gaident/nonlinear/effect_batch.hpp"
 #include "bindings.hpp"
 
 using namespace gaident;
@@ -249,8 +249,8 @@ py::array simulate_values(const PyRecord& record, const RealArray& values, const
                           const OwnList& own) {
     const auto [real_poles, pole_pairs, real_zeros, zero_pairs] = structure;
     const int poles = real_poles + 2 * pole_pairs, zeros = real_zeros + 2 * zero_pairs;
-    if (std::min({real_poles, pole_pairs, real_zeros, zero_pairs}) < 0 || poles > max_plant_order || zeros > max_plant_order / 2 ||
-        zeros > poles)
+    if (std::min({real_poles, pole_pairs, real_zeros, zero_pairs}) < 0 || poles > max_plant_order ||
+        zeros > max_plant_order / 2 || zeros > poles)
         throw std::invalid_argument("structure: at most 14 poles and 7 zeros, and no more zeros than poles");
     const int factors = 1 + real_poles + 2 * pole_pairs + real_zeros + 2 * zero_pairs;
     std::vector<Effect> chosen;

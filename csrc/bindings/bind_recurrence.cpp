@@ -1,6 +1,6 @@
 // A model as the numbers of its recurrence, for writing it in another language.
-#include "../gaident/batch.hpp"
-#include "../gaident/effect_prepare.hpp"
+#include "../gaident/simulation/batch.hpp"
+#include "../gaident/nonlinear/effect_prepare.hpp"
 #include "bindings.hpp"
 
 using namespace gaident;

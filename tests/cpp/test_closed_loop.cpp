@@ -1,7 +1,7 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
-#include "gaident/closed_loop.hpp"
-#include "gaident/float_pair.hpp"
+#include "gaident/control/closed_loop.hpp"
+#include "gaident/numeric/float_pair.hpp"
 
 using namespace gaident;
 

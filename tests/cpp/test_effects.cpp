@@ -1,7 +1,7 @@
 // The loop with effects: elementary functions, registry, neutral parameters, lanes against scalar, standstill. Accuracy against an
 // independent integrator is tested in tests/python/test_effects.py.
-#include "../../csrc/gaident/effect_batch.hpp"
-#include "../../csrc/gaident/roots.hpp"
+#include "../../csrc/gaident/nonlinear/effect_batch.hpp"
+#include "../../csrc/gaident/plant/roots.hpp"
 
 #include "check.hpp"
 

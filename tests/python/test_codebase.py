@@ -22,40 +22,12 @@ ROOT = Path(__file__).resolve().parents[2]
 CORE = ROOT / "csrc" / "gaident"
 PACKAGE = ROOT / "python" / "gaident"
 
-# The core, lowest first: a file includes only what stands above it. Files of one folder share its place.
-CORE_ORDER = [
-    *(
-        "wrong_use",
-        "rng",
-        "arithmetic",
-        "float_pair",
-        "lanes",
-        "c30",
-        "fixed",
-        "counting",
-        "denormals",
-        "chromosome",
-        "population",
-    ),
-    *("genome", "factors", "roots", "decode", "encode", "decoder", "parameters", "neighbours", "delta", "bilinear", "held"),
-    *("controller", "closed_loop", "loop", "record", "fitness", "candidate", "fixed_scaling", "operators", "static_search"),
-    *("kernels/", "elementary", "effects/", "filter", "replay", "friction", "two_mass", "effect_constants", "effect_plant"),
-    *(
-        "own_effects",
-        "effect_loop",
-        "effect_kernels/",
-        "advance",
-        "parallel",
-        "batch",
-        "simulate",
-        "mirror",
-        "linear",
-        "sweep",
-        "refine",
-        "statistics",
-    ),
-    *("settings", "breeder", "island", "species", "engine", "reference/", "effect_prepare", "effect_batch"),
+# The rooms of the core, lowest first: a file includes its own room and rooms before it. Folders inside a room belong to it.
+CORE_ROOMS = [
+    *("numeric", "runtime", "plant", "control", "simulation", "effects", "nonlinear"),
+    *("estimation", "genetic", "target", "search", "reference"),
 ]
+MOST_FILES = 20  # of code in one folder
 
 # Python: what each room may import of gaident, beside itself, and what inside a function only. A room is a
 # module or a folder of the package. Nothing but python -m gaident imports cli.
@@ -115,12 +87,11 @@ def sources(folder: Path, *suffixes: str) -> list[Path]:
     return sorted(f for f in folder.rglob("*") if f.suffix in suffixes)
 
 
-def place(file: Path) -> int:
-    """Return the place of a core file in CORE_ORDER."""
-    relative = file.relative_to(CORE)
-    name = f"{relative.parts[0]}/" if len(relative.parts) > 1 else relative.stem
-    assert name in CORE_ORDER, f"{file.relative_to(ROOT)}: give it a place in CORE_ORDER ({Path(__file__).name})"
-    return CORE_ORDER.index(name)
+def core_room(file: Path) -> int:
+    """Return the place of a core file's room in CORE_ROOMS."""
+    room = file.relative_to(CORE).parts[0]
+    assert room in CORE_ROOMS, f"{file.relative_to(ROOT)}: a file stands in one of the rooms {', '.join(CORE_ROOMS)}"
+    return CORE_ROOMS.index(room)
 
 
 def includes(file: Path) -> list[tuple[str, bool]]:
@@ -137,22 +108,44 @@ def resolved(file: Path, name: str) -> Path:
     raise AssertionError(f'{file.relative_to(ROOT)}: #include "{name}" names no file of the core')
 
 
-def test_core_includes_only_what_stands_above() -> None:
+def test_core_rooms_include_only_lower_rooms() -> None:
     wrong = []
     for file in sources(CORE, ".hpp", ".cpp"):
-        own_place = place(file)
         for name, in_brackets in includes(file):
             if in_brackets:
                 # Headers of the standard library have no suffix; intrinsics are the compiler's own.
                 if "." in name and name not in {"immintrin.h", "xmmintrin.h", "emmintrin.h"}:
                     wrong.append(f"{file.relative_to(ROOT)}: <{name}> is not the standard library")
-                continue
-            target = resolved(file, name)
-            own_header = target.with_suffix("") == file.with_suffix("")
-            same_folder = target.parent == file.parent != CORE
-            if not (own_header or same_folder or place(target) < own_place):
-                wrong.append(f"{file.relative_to(ROOT)}: {name} does not stand above it")
+            elif core_room(resolved(file, name)) > core_room(file):
+                wrong.append(f"{file.relative_to(ROOT)}: {name} stands in a higher room")
     assert not wrong, "\n".join(wrong)
+
+
+def test_core_includes_in_no_circle() -> None:
+    above: dict[Path, list[Path]] = {
+        file: [resolved(file, name) for name, in_brackets in includes(file) if not in_brackets]
+        for file in sources(CORE, ".hpp", ".cpp")
+    }
+    done: set[Path] = set()
+
+    def visit(file: Path, way: list[Path]) -> None:
+        circle = [f.relative_to(CORE) for f in way[way.index(file) :]] if file in way else []
+        assert not circle, " includes ".join(map(str, [*circle, file.relative_to(CORE)]))
+        if file not in done:
+            for included in above[file]:
+                visit(included, [*way, file])
+            done.add(file)
+
+    for file in above:
+        visit(file, [])
+
+
+def test_folders_of_the_core_stay_small() -> None:
+    folders = {f.parent for f in sources(ROOT / "csrc", ".hpp", ".cpp", ".h", ".c")}
+    many = {
+        str(d.relative_to(ROOT)): n for d in folders if (n := sum(f.parent == d for f in sources(d, ".hpp", ".cpp"))) > MOST_FILES
+    }
+    assert not many, f"more than {MOST_FILES} files: {many}"
 
 
 def test_only_the_bindings_name_pybind11_and_python() -> None:

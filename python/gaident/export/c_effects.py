@@ -1,4 +1,4 @@
-"""The loop with effects in C: one piece of text per place, put together in the order of csrc/gaident/effect_loop.hpp.
+"""The loop with effects in C: one piece of text per place, put together in the order of csrc/gaident/nonlinear/effect_loop.hpp.
 
 The pieces are compared with `gaident.simulate`, effect by effect, in tests/python/test_to_c.py.
 """

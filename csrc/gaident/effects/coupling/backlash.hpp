@@ -1,0 +1,46 @@
+// Play in the coupling: no torque while abs(twist) < gap/2, then stiffness on the rest. As a correction to the linear coupling torque
+// K x + D dx/dt:
+//
+//     c(x) = -K clamp(x, -gap/2, gap/2),   and inside the gap -D dx/dt as well
+//
+// Over a substep in which the twist goes evenly from x0 to x1 its mean is, with S the integral of clamp,
+//
+//     -K (S(x1) - S(x0))/(x1 - x0) - D dx/dt (clamp(x1) - clamp(x0))/(x1 - x0)
+//
+// so that contact begins and ends within the substep, not at its borders.
+#pragma once
+
+#include "../../numeric/elementary.hpp"
+#include "../effect.hpp"
+
+namespace gaident {
+
+struct Backlash {
+    static constexpr EffectInfo info{.name = "backlash",
+                                     .place = Place::coupling,
+                                     .meaning = "play between motor and load; gap is its full width",
+                                     .parameter = {{"gap", "rad", 0.0, 0.0}},
+                                     .needs_two_masses = true};
+
+    template <class R>
+    [[gnu::always_inline]] static R correction(R half_gap, R K, R D, R x, R dx) {
+        const R damping = greater(half_gap, absolute(x), D * dx, R(0.0));
+        return -(K * clamp(x, -half_gap, half_gap) + damping);
+    }
+
+    template <class R>
+    [[gnu::always_inline]] static R mean_correction(R half_gap, R K, R D, R x0, R x1, R dx) {
+        const R c0 = clamp(x0, -half_gap, half_gap), c1 = clamp(x1, -half_gap, half_gap), step = x1 - x0;
+        // S = c (x - c/2)
+        const R S = c1 * (x1 - R(0.5) * c1) - c0 * (x0 - R(0.5) * c0);
+        // Next to no movement, next to no difference: there the mean of both ends serves.
+        const R shortest = R(1e-6) * half_gap;
+        const R moves = absolute(step), per_step = R(1.0) / greater(moves, shortest, step, R(1.0));
+        const R inside = greater(half_gap, absolute(x0), R(1.0), R(0.0));
+        const R spring = greater(moves, shortest, S * per_step, R(0.5) * (c0 + c1));
+        const R share = greater(moves, shortest, (c1 - c0) * per_step, inside);
+        return -(K * spring + (D * dx) * share);
+    }
+};
+
+}  // namespace gaident
