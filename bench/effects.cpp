@@ -33,9 +33,9 @@ std::vector<EffectModel> drives(bool with_effects) {
         all[i].linear = factors_from_roots(9803.92 * f, poles, zeros);
         if (!with_effects) continue;
         const double lag[] = {1e-3 * f}, friction[] = {0.04 * f, 0.07 * f, 2.0}, cogging[] = {0.03, 12.0, 0.4 * f};
-        all[i].add(Effect::torque_lag, lag);
-        all[i].add(Effect::stribeck_friction, friction);
-        all[i].add(Effect::cogging, cogging);
+        all[i].add(effect<TorqueLag>, lag);
+        all[i].add(effect<StribeckFriction>, friction);
+        all[i].add(effect<Cogging>, cogging);
     }
     return all;
 }

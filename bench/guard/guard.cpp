@@ -1,6 +1,8 @@
 // The regression guard: fails when the fast path executes 15 % more instructions than it did (counts.txt), on records so short that
 // this is a loss of some 20 to 30 % in the sample loop. It counts and does not time, so a busy machine changes nothing; what costs time
 // but no instructions is for gaident_bench to show.
+// Of the loop with effects it counts what one more sample costs with each effect alone and with all, eight candidates in lanes and one by
+// itself.
 // Compilers differ: with one that has no rows the most stored for any is the guide and twice that the limit.
 //
 //     gaident_guard COUNTS            compare; exit code 0: held, 1: lost, 2: wrong use, 77: nothing can be counted here
@@ -11,6 +13,7 @@
 
 #include "../../csrc/gaident/search/breeder.hpp"
 #include "../../csrc/gaident/genetic/decode.hpp"
+#include "../../csrc/gaident/nonlinear/effect_batch.hpp"
 #include "../../csrc/gaident/numeric/denormals.hpp"
 #include "../../csrc/gaident/simulation/simulate.hpp"
 
@@ -96,13 +99,93 @@ private:
     Breeder breeder_;
 };
 
+// Typical sizes of each effect.
+struct Sizes {
+    const char* name;
+    double values[4];
+};
+constexpr Sizes sizes[] = {
+    {"coulomb_friction", {0.05}},
+    {"stribeck_friction", {0.04, 0.07, 2.0}},
+    {"asymmetric_friction", {0.05, 0.035, 1e-4, 4e-4}},
+    {"presliding_friction", {0.05, 3.0}},
+    {"quadratic_drag", {1.5e-5}},
+    {"load_torque", {0.03}},
+    {"unbalance", {0.05, 0.3}},
+    {"cogging", {0.03, 12.0, 0.4}},
+    {"friction_drift", {0.05, -0.2}},
+    {"backlash", {0.01}},
+    {"hardening_stiffness", {1e4}},
+    {"torque_saturation", {0.5}},
+    {"torque_dead_band", {0.03}},
+    {"transport_delay", {0.3e-3}},
+    {"torque_lag", {1e-3}},
+    {"integrator_clamp", {0.05}},
+    {"command_rate_limit", {3000.0}},
+    {"velocity_filter", {1e-3}},
+    {"velocity_ripple", {0.005, 2.0, 0.2}},
+    {"velocity_quantisation", {0.6}},
+};
+
+// The loop with effects, two masses, two substeps: what one more sample costs. `chosen`: all but those of the coupling, or one by name.
+double effect_instructions(const EffectKernel* lanes, const std::string& chosen) {
+    const std::complex<double> poles[] = {-15.41, {-10.30, 150.9}, {-10.30, -150.9}};
+    const std::complex<double> zeros[] = {{-4.26, 93.98}, {-4.26, -93.98}};
+    std::vector<EffectModel> models(lanes != nullptr ? effect_lanes : 1);
+    for (EffectModel& m : models) {
+        m.linear = factors_from_roots(6545.29, poles, zeros);
+        for (int e = 0; e < effect_count; ++e) {
+            const EffectInfo& info = effect_table[static_cast<std::size_t>(e)];
+            for (const Sizes& s : sizes)
+                if (s.name == std::string(info.name) && (chosen == "all" ? !info.needs_two_masses : chosen == s.name))
+                    m.add(static_cast<Effect>(e), s.values);
+        }
+    }
+    const std::size_t width = models.size();
+    constexpr std::size_t few = 8, more = 32;
+    std::vector<double> input(more), velocity(more * width), constants(effect_constants * width), history(4 * width);
+    for (std::size_t k = 0; k < more; ++k) input[k] = k % 12 < 7 ? 30.0 : -20.0;
+    EffectRecord record;
+    record.sample_time = Ts;
+    EffectRun run;
+    run.loop.kind = LoopKind::sampled;
+    run.loop.kp = kp;
+    run.loop.ki = ki;
+    run.effects = models[0].effects;
+    run.sample_time = Ts;
+    run.substeps = 2;
+    run.order = 3;
+    run.velocity = velocity.data();
+    std::vector<Effects::Tables> tables(width);
+    for (std::size_t lane = 0; lane < width; ++lane) {
+        PreparedEffects c;
+        prepare_effects(models[lane], record, run.loop, run.substeps, nullptr, c);
+        double flat[effect_constants];
+        std::memcpy(flat, &c.constants, sizeof flat);
+        for (std::size_t k = 0; k < effect_constants; ++k) constants[k * width + lane] = flat[k];
+        tables[lane] = c.tables;
+        run.two_masses = c.two_masses;
+    }
+    run.tables = tables.data();
+    run.history = history.data();
+    run.history_mask = 3;
+    const auto go = [&](std::size_t samples_to_run) {
+        run.input = std::span(input).first(samples_to_run);
+        if (lanes != nullptr) lanes->run(run, constants.data());
+        else run_effects<double>(run, load_constants<double>(constants.data()));
+    };
+    go(more);
+    const auto count = [&](std::size_t n) { return static_cast<double>(guard::instructions([&] { go(n); })); };
+    return (count(more) - count(few)) / static_cast<double>((more - few) * width);
+}
+
 bool store = false, lost = false;
 
 void judge(guard::Counts& counts, const std::string& name, double count) {
     const std::string here = guard::compiler();
     if (store) {
         counts.set(here, name, count);
-        std::printf("%-28s %7.3f stored\n", name.c_str(), count);
+        std::printf("%-36s %7.3f stored\n", name.c_str(), count);
         return;
     }
     const bool own = counts.of(here, name) > 0.0;
@@ -110,7 +193,7 @@ void judge(guard::Counts& counts, const std::string& name, double count) {
     const double limit = stored * (own ? most_share : most_share_elsewhere);
     const bool bad = count > limit || stored == 0.0;
     lost = lost || bad;
-    std::printf("%-28s %7.3f instructions per candidate and sample; stored %7.3f, limit %7.3f%s\n", name.c_str(), count, stored,
+    std::printf("%-36s %7.3f instructions per candidate and sample; stored %7.3f, limit %7.3f%s\n", name.c_str(), count, stored,
                 limit,
                 stored == 0.0 ? "  NOT STORED"
                               : (bad ? "  LOST" : (own && most_share * count < stored ? "  fewer: renew the counts" : "")));
@@ -131,6 +214,16 @@ void rows(guard::Counts& counts, const std::string& only) {
             if (!in_float)
                 judge(counts, name + "sampled", Row(*kernels, in_float, LoopKind::sampled, Command::step).generation());
         }
+    }
+}
+
+void effect_rows(guard::Counts& counts, const std::string& only) {
+    for (const char* set : {"alone", "baseline", "avx2", "avx512"}) {
+        const bool alone = set == std::string("alone");
+        const EffectKernel* lanes = alone ? nullptr : effects_named(set);
+        if (!alone && (lanes == nullptr || (!only.empty() && only != set))) continue;
+        for (const Sizes& s : sizes) judge(counts, std::string(set) + " effect " + s.name, effect_instructions(lanes, s.name));
+        judge(counts, std::string(set) + " effect all", effect_instructions(lanes, "all"));
     }
 }
 
@@ -157,6 +250,7 @@ int main(int argc, char** argv) {
         std::printf("gaident_guard: %s%s\n", here.c_str(),
                     store || counts.knows(here) ? "" : " has no stored counts: twice the most of any compiler is the limit");
         rows(counts, only);
+        effect_rows(counts, only);
         if (store) counts.save();
     } catch (const std::exception& e) {
         std::fprintf(stderr, "gaident_guard: %s\n", e.what());

@@ -1,78 +1,92 @@
-// THE registry of effects, in the order of the public table. A new effect is its header and one line in each of the two lists.
+// THE list of effects: the registry, the order of the public table, and the order in which effects that share a hook act. A new effect is
+// its header and one line in each of the two lists here; all else follows from it.
 #pragma once
 
-#include "friction/asymmetric_friction.hpp"
-#include "coupling/backlash.hpp"
-#include "load/cogging.hpp"
-#include "controller/command_rate_limit.hpp"
-#include "friction/coulomb_friction.hpp"
-#include "coupling/extra_resonance.hpp"
-#include "friction/friction_drift.hpp"
-#include "coupling/hardening_stiffness.hpp"
-#include "controller/integrator_clamp.hpp"
-#include "load/load_torque.hpp"
-#include "sensor/outliers.hpp"
-#include "friction/presliding_friction.hpp"
-#include "friction/quadratic_drag.hpp"
-#include "friction/stribeck_friction.hpp"
 #include "actuator/torque_dead_band.hpp"
 #include "actuator/torque_lag.hpp"
 #include "actuator/torque_saturation.hpp"
 #include "actuator/transport_delay.hpp"
+#include "controller/command_rate_limit.hpp"
+#include "controller/integrator_clamp.hpp"
+#include "coupling/backlash.hpp"
+#include "coupling/extra_resonance.hpp"
+#include "coupling/hardening_stiffness.hpp"
+#include "friction/asymmetric_friction.hpp"
+#include "friction/coulomb_friction.hpp"
+#include "friction/friction_drift.hpp"
+#include "friction/presliding_friction.hpp"
+#include "friction/quadratic_drag.hpp"
+#include "friction/stribeck_friction.hpp"
+#include "load/cogging.hpp"
+#include "load/load_torque.hpp"
 #include "load/unbalance.hpp"
+#include "sensor/outliers.hpp"
 #include "sensor/velocity_filter.hpp"
 #include "sensor/velocity_quantisation.hpp"
 #include "sensor/velocity_ripple.hpp"
 
-#include <array>
-#include <cstdint>
+#include "registry.hpp"
 
 namespace gaident {
 
-enum class Effect : std::uint8_t {
-    coulomb_friction,
-    stribeck_friction,
-    asymmetric_friction,
-    presliding_friction,
-    quadratic_drag,
-    load_torque,
-    unbalance,
-    cogging,
-    friction_drift,
-    backlash,
-    hardening_stiffness,
-    torque_saturation,
-    torque_dead_band,
-    transport_delay,
-    torque_lag,
-    integrator_clamp,
-    command_rate_limit,
-    velocity_filter,
-    velocity_ripple,
-    velocity_quantisation,
-    extra_resonance,
-    outliers,
-};
+using Effects = EffectList<CoulombFriction,       //
+                           StribeckFriction,      //
+                           AsymmetricFriction,    //
+                           PreslidingFriction,    //
+                           QuadraticDrag,         //
+                           LoadTorque,            //
+                           Unbalance,             //
+                           Cogging,               //
+                           FrictionDrift,         //
+                           Backlash,              //
+                           HardeningStiffness,    //
+                           TorqueSaturation,      //
+                           TorqueDeadBand,        //
+                           TransportDelay,        //
+                           TorqueLag,             //
+                           IntegratorClamp,       //
+                           CommandRateLimit,      //
+                           VelocityFilter,        //
+                           VelocityRipple,        //
+                           VelocityQuantisation,  //
+                           ExtraResonance,        //
+                           Outliers>;
 
-inline constexpr std::array effect_table{
-    CoulombFriction::info,  StribeckFriction::info, AsymmetricFriction::info, PreslidingFriction::info,
-    QuadraticDrag::info,    LoadTorque::info,       Unbalance::info,          Cogging::info,
-    FrictionDrift::info,    Backlash::info,         HardeningStiffness::info, TorqueSaturation::info,
-    TorqueDeadBand::info,   TransportDelay::info,   TorqueLag::info,          IntegratorClamp::info,
-    CommandRateLimit::info, VelocityFilter::info,   VelocityRipple::info,     VelocityQuantisation::info,
-    ExtraResonance::info,   Outliers::info,
-};
-inline constexpr int effect_count = static_cast<int>(effect_table.size());
+inline constexpr auto& effect_table = Effects::table;
+inline constexpr int effect_count = Effects::size;
+
+// An effect's number: its place in the list.
+template <class E>
+inline constexpr Effect effect = Effects::number<E>;
+
+// By name; throws std::invalid_argument for a name that is none.
+inline Effect effect_named(std::string_view name) {
+    for (int i = 0; i < effect_count; ++i)
+        if (name == effect_table[static_cast<std::size_t>(i)].name) return static_cast<Effect>(i);
+    throw std::invalid_argument("effects: '" + std::string(name) + "' is no effect");
+}
+constexpr const EffectInfo& info_of(Effect e) { return effect_table[static_cast<std::size_t>(e)]; }
 
 // A set of effects; in a model each appears at most once.
 struct EffectSet {
     std::uint32_t bits = 0;
+    static_assert(effect_count <= 32);
 
     static constexpr std::uint32_t bit(Effect e) { return std::uint32_t{1} << static_cast<unsigned>(e); }
     constexpr bool has(Effect e) const { return (bits & bit(e)) != 0; }
-    template <class... More>
-    constexpr bool has_any(More... e) const {
-        return (bits & (bit(e) | ...)) != 0;
+    template <class E>
+    constexpr bool has() const {
+        return has(effect<E>);
+    }
+    // Whether one of them is so.
+    template <class Property>
+    constexpr bool any(Property&& property) const {
+        for (int i = 0; i < effect_count; ++i)
+            if (has(static_cast<Effect>(i)) && property(effect_table[static_cast<std::size_t>(i)])) return true;
+        return false;
+    }
+    constexpr bool needs_two_masses() const {
+        return any([](const EffectInfo& info) { return info.needs_two_masses; });
     }
     constexpr void add(Effect e) { bits |= bit(e); }
     constexpr void remove(Effect e) { bits &= ~bit(e); }
@@ -83,13 +97,13 @@ struct EffectSet {
 struct EffectModel {
     Factors<double> linear;
     EffectSet effects;
-    double parameter[effect_count][max_effect_parameters] = {};
+    double parameter[Effects::parameters] = {};  // one effect's after the other's
 
-    const double* of(Effect e) const { return parameter[static_cast<int>(e)]; }
+    const double* of(Effect e) const { return parameter + Effects::first_parameter[static_cast<std::size_t>(e)]; }
     void add(Effect e, const double* values) {
         effects.add(e);
-        for (int i = 0; i < effect_table[static_cast<std::size_t>(e)].parameters(); ++i)
-            parameter[static_cast<int>(e)][i] = values[i];
+        for (int i = 0; i < info_of(e).count(); ++i)
+            parameter[Effects::first_parameter[static_cast<std::size_t>(e)] + i] = values[i];
     }
 };
 

@@ -135,7 +135,7 @@ private:
         const std::size_t width = alone ? 1 : effect_lanes;
         const Planned& first = planned_[group[0]];
         std::vector<double> constants(effect_constants * width);
-        std::vector<DelayTable> delay(width);
+        std::vector<Effects::Tables> tables(width);
         EffectRun run;
         int back = 0;
         for (std::size_t lane = 0; lane < width; ++lane) {
@@ -147,10 +147,13 @@ private:
             double flat[effect_constants];
             std::memcpy(flat, &c.constants, sizeof flat);
             for (std::size_t k = 0; k < effect_constants; ++k) constants[k * width + lane] = flat[k];
-            delay[lane] = c.delay;
+            tables[lane] = c.tables;
             run.two_masses = c.two_masses;
             const int steps = job_.loop.kind == LoopKind::continuous ? 1 : p.substeps;
-            for (int j = 0; j < steps; ++j) back = std::max(back, c.delay.back[j]);
+            Effects::each([&]<class E>() {
+                if constexpr (HasTable<E>)
+                    if (set.has<E>()) back = std::max(back, E::reach(c.tables.template of<E>(), steps));
+            });
         }
         run.effects = set;
         run.loop = job_.loop;
@@ -161,10 +164,12 @@ private:
         run.input = job_.record.input;
         run.position = job_.record.position;
         run.start_angle = job_.record.start_angle;
-        run.delay = delay.data();
+        run.tables = tables.data();
+        bool looks_back = false;
+        Effects::each([&]<class E>() { looks_back = looks_back || (HasTable<E> && set.has<E>()); });
         std::size_t ring = 2;
         while (ring < static_cast<std::size_t>(back) + 2) ring *= 2;
-        std::vector<double> history(set.has(Effect::transport_delay) ? ring * width : 0);
+        std::vector<double> history(looks_back ? ring * width : 0);
         run.history = history.data();
         run.history_mask = ring - 1;
 

@@ -1,15 +1,15 @@
 // The closed loop with effects at their places, written once for one candidate (R = double) and for lanes of candidates that have the same
 // effects with different parameters; every lane equals the scalar bit for bit. Which effects there are is the same for all lanes and may
-// be asked with a branch; on numbers there are selections only. The chain:
+// be asked with a branch; on numbers there are selections only. The loop names no effect: it runs over the list (effects/list.hpp) at each
+// hook (effects/effect.hpp). The chain, with a user's own effects (own_effects.hpp) at those marked with a star:
 //
-//     command -> rate limit -> PI -> saturation -> dead band -> delay -> lag -> shaft -> mechanism -> ripple -> filter -> quantisation
+//     command -> PI -> *actuator -> actuator_dynamics -> *torque -> coupling, *friction -> *sensor -> sensor_dynamics -> reading
 //
 // One sample is `substeps` steps of h. In the sampled and the open loop the torque is held over the sample; in the continuous one the
 // controller acts every substep on the linearly interpolated command, and its torque is extrapolated to the substep's mean (third order).
 #pragma once
 
-#include "effect_plant.hpp"
-#include "../effects/friction/law.hpp"
+#include "mechanism.hpp"
 #include "own_effects.hpp"
 
 #include <span>
@@ -34,8 +34,8 @@ struct EffectRun {
     double* torque = nullptr;
     double* angle = nullptr;
 
-    const DelayTable* delay = nullptr;  // one per lane
-    double* history = nullptr;          // past torques: (history_mask + 1) * width numbers
+    const Effects::Tables* tables = nullptr;  // one per lane
+    double* history = nullptr;                // past torques: (history_mask + 1) * width numbers
     std::size_t history_mask = 0;
 
     OwnEffects* own = nullptr;           // asked through these
@@ -43,43 +43,60 @@ struct EffectRun {
     const double* own_answer = nullptr;  // and answering there
 };
 
+// The torques issued so far, as an effect of the actuator looks back on them.
+struct PastTorques {
+    const EffectRun& run;
+    std::size_t width, newest;
+    int substep;
+
+    // Number `at`, counted as `newest` is.
+    [[gnu::always_inline]] double torque(std::size_t at, std::size_t lane) const {
+        return run.history[(at & run.history_mask) * width + lane];
+    }
+    template <class E>
+    [[gnu::always_inline]] const typename E::Table& table(std::size_t lane) const {
+        return run.tables[lane].template of<E>();
+    }
+};
+
 template <class R, class Plant>
 class EffectLoop {
 public:
     EffectLoop(const EffectRun& run, const EffectConstants<R>& constants)
         : run_(run), set_(run.effects), c_(constants), plant_(constants, run.order), pi_(run.loop, run.sample_time) {
-        using enum Effect;
         const bool continuous = run.loop.kind == LoopKind::continuous;
         h_ = run.sample_time / run.substeps;
         if (continuous) pi_ = Controller<R>(run.loop, h_);
-        if (set_.has(integrator_clamp)) pi_.integrator_limit = minimum(pi_.integrator_limit, c_.integrator_limit);
+        turning_ = run.own != nullptr;
+        const Beginning<R> start{plant_.velocity(), c_.before, R(run.moving && !run.input.empty() ? run.input[0] : 0.0)};
+        Effects::each([&]<class E>() {
+            if (!set_.has<E>()) return;
+            const auto& c = c_.effects.template of<E>();
+            turning_ = turning_ || E::info.turns;
+            dry_ = dry_ || hook::law<E> || hook::level<E> || hook::friction<E>;
+            actuator_in_time_ = actuator_in_time_ || hook::actuator_dynamics<E>;
+            looking_back_ = looking_back_ || HasTable<E>;
+            filtering_ = filtering_ || hook::sensor_dynamics<E>;
+            if constexpr (hook::controller<E>) E::controller(c, pi_);
+            if constexpr (hook::law<E>) E::law(c, law_);
+            if constexpr (hook::begin<E>) E::begin(c, states_.template of<E>(), start);
+        });
         pi_.s = c_.stored;
-        friction_ = set_.has_any(coulomb_friction, stribeck_friction, asymmetric_friction, presliding_friction, quadratic_drag,
-                                 friction_drift);
-        steep_ = set_.has_any(asymmetric_friction, quadratic_drag);
-        actuator_in_time_ = set_.has_any(transport_delay, torque_lag);
-        turning_ = set_.has_any(unbalance, cogging, velocity_ripple) || run.own != nullptr;
         if (run.own != nullptr) {
             own_torque_ = run.own->at(OwnPlace::torque);
             own_friction_ = run.own->at(OwnPlace::friction);
             own_shaft_ = own_torque_ || own_friction_;
             own_actuator_ = run.own->at(OwnPlace::actuator);
             own_sensor_ = run.own->at(OwnPlace::sensor);
-            friction_ = friction_ || own_friction_;
+            dry_ = dry_ || own_friction_;
         }
-        bristle_.torque = c_.bristle_torque;
-        bristle_.stiffness = c_.bristle_stiffness;
-        bristle_.per_break = c_.bristle_per_break;
         angle_ = R(run.start_angle);
         theta_middle_ = angle_ + plant_.velocity() * R(0.5 * h_);
-        lagging_ = c_.before;
-        filtered_ = filter_input_ = plant_.velocity();
-        limited_command_ = R(run.moving && !run.input.empty() ? run.input[0] : 0.0);
-        w_before_ = own_w_before_ = plant_.velocity();
-        if (set_.has(transport_delay))
+        own_w_before_ = plant_.velocity();
+        if (looking_back_)
             for (std::size_t i = 0; i <= run.history_mask; ++i) Pack<R>::store(c_.before, run.history + i * width);
         // Friction that would push is no friction: such a candidate is as good as diverged.
-        if (friction_) plant_.x[0] = greater(plant_.beta(), R(0.0), plant_.x[0], R(any_value));
+        if (dry_) plant_.x[0] = greater(plant_.beta(), R(0.0), plant_.x[0], R(any_value));
         per_beta_ = R(1.0) / plant_.beta();
     }
 
@@ -90,6 +107,13 @@ public:
 
 private:
     static constexpr std::size_t width = static_cast<std::size_t>(Pack<R>::width);
+
+    // All zero.
+    static typename Effects::States<R> no_states() {
+        typename Effects::States<R> s;
+        std::memset(static_cast<void*>(&s), 0, sizeof s);
+        return s;
+    }
 
     void held() {
         const bool open = run_.loop.kind == LoopKind::open;
@@ -105,7 +129,7 @@ private:
             for (int j = 0; j < run_.substeps; ++j) {
                 middle(here, next, (j + 0.5) * share);
                 substep(j, (static_cast<double>(n) + (j + 0.5) * share) * run_.sample_time);
-                if (set_.has(Effect::velocity_filter)) {
+                if (filtering_) {
                     theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
                     time_ = (static_cast<double>(n) + (j + 1) * share) * run_.sample_time;
                     filter();
@@ -130,7 +154,7 @@ private:
                 substep(0, (static_cast<double>(n) - 1.0 + (j + 0.5) * share) * run_.sample_time);
                 theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
                 time_ = (static_cast<double>(n) - 1.0 + (j + 1) * share) * run_.sample_time;
-                if (set_.has(Effect::velocity_filter)) filter();
+                if (filtering_) filter();
                 y = sensor();
                 u_long_before = u_before;
                 u_before = u;
@@ -167,28 +191,50 @@ private:
         if (run_.angle != nullptr) Pack<R>::store(angle_, run_.angle + n * width);
     }
 
-    [[gnu::always_inline]] R rippled() const {
+    // What the sensor measures, before it is filtered.
+    [[gnu::always_inline]] R measured() const {
         R w = plant_.velocity();
         if (own_sensor_) [[unlikely]]
             w = asked(OwnPlace::sensor, w, held_, time_);
-        if (!set_.has(Effect::velocity_ripple)) return w;
-        return VelocityRipple::seen(c_.ripple_amplitude, c_.ripple_order, c_.ripple_phase, theta_, w);
+        return Effects::chain(w, [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::sensor<E>)
+                if (set_.has<E>()) return E::sensor(c_.effects.template of<E>(), theta_, x);
+            return x;
+        });
     }
 
     [[gnu::always_inline]] void filter() {
-        const R w = rippled();
-        filtered_ = VelocityFilter::step(c_.filter_decay, c_.filter_old, c_.filter_new, filter_input_, w, filtered_);
-        filter_input_ = w;
+        Effects::chain(measured(), [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::sensor_dynamics<E>)
+                if (set_.has<E>()) return E::sensor_dynamics(c_.effects.template of<E>(), states_.template of<E>(), x);
+            return x;
+        });
     }
 
     [[gnu::always_inline]] R sensor() const {
-        const R y = set_.has(Effect::velocity_filter) ? filtered_ : rippled();
-        return set_.has(Effect::velocity_quantisation) ? VelocityQuantisation::seen(c_.quantum, y) : y;
+        R y = R(0.0);
+        bool filtered = false;
+        Effects::each([&]<class E>() __attribute__((always_inline)) {
+            if constexpr (hook::sensor_dynamics<E>)
+                if (set_.has<E>()) {
+                    y = states_.template of<E>().output;
+                    filtered = true;
+                }
+        });
+        if (!filtered) y = measured();
+        return Effects::chain(y, [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::reading<E>)
+                if (set_.has<E>()) return E::reading(c_.effects.template of<E>(), x);
+            return x;
+        });
     }
 
     [[gnu::always_inline]] R control(R r, R y) {
-        if (set_.has(Effect::command_rate_limit))
-            r = limited_command_ = CommandRateLimit::follow(c_.rate_step, r, limited_command_);
+        r = Effects::chain(r, [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::command<E>)
+                if (set_.has<E>()) return E::command(c_.effects.template of<E>(), states_.template of<E>(), x);
+            return x;
+        });
         return pi_.step(r - y);
     }
 
@@ -202,48 +248,43 @@ private:
 
     // The torque u is issued, to be held until the next.
     [[gnu::always_inline]] void act(R u) {
-        using enum Effect;
         if (own_actuator_) [[unlikely]]
             u = asked(OwnPlace::actuator, plant_.velocity(), u, time_);
-        if (set_.has(torque_saturation)) u = clamp(u, -c_.saturation, c_.saturation);
-        if (set_.has(torque_dead_band)) u = TorqueDeadBand::step(c_.dead_band, u);
+        u = Effects::chain(u, [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::actuator<E>)
+                if (set_.has<E>()) return E::actuator(c_.effects.template of<E>(), x);
+            return x;
+        });
         held_ = u;
-        if (set_.has(transport_delay)) {
+        if (looking_back_) {
             ++issued_;
             Pack<R>::store(u, run_.history + (issued_ & run_.history_mask) * width);
         }
     }
 
-    [[gnu::always_inline]] R delayed(int j) const {
-        alignas(64) double old[width], young[width], share[width];
-        for (std::size_t lane = 0; lane < width; ++lane) {
-            const DelayTable& table = run_.delay[lane];
-            const std::size_t at = issued_ - static_cast<std::size_t>(table.back[j]);
-            old[lane] = run_.history[(at & run_.history_mask) * width + lane];
-            young[lane] = run_.history[((at + (table.back[j] > 0 ? 1U : 0U)) & run_.history_mask) * width + lane];
-            share[lane] = table.share[j];
-        }
-        const R from = Pack<R>::load(old), to = Pack<R>::load(young);
-        return from + (to - from) * Pack<R>::load(share);
-    }
-
     [[gnu::always_inline]] void substep(int j, double t) {
-        using enum Effect;
         R T = held_;
         if (actuator_in_time_) {
-            if (set_.has(transport_delay)) T = delayed(j);
-            if (set_.has(torque_lag)) T = TorqueLag::step(c_.lag_decay, c_.lag_mean, T, lagging_);
+            const PastTorques past{run_, width, issued_, j};
+            T = Effects::chain(T, [&]<class E>(R x) __attribute__((always_inline)) {
+                if constexpr (hook::actuator_dynamics<E>)
+                    if (set_.has<E>())
+                        return E::actuator_dynamics(c_.effects.template of<E>(), states_.template of<E>(), past, x);
+                return x;
+            });
         }
-        if (set_.has(load_torque)) T = T - c_.load;
-        if (set_.has(unbalance)) T = T - Unbalance::torque(c_.unbalance_amplitude, c_.unbalance_phase, theta_);
-        if (set_.has(cogging)) T = T - Cogging::torque(c_.cogging_amplitude, c_.cogging_order, c_.cogging_phase, theta_);
+        T = Effects::chain(T, [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::torque<E>)
+                if (set_.has<E>()) return x - E::torque(c_.effects.template of<E>(), theta_);
+            return x;
+        });
 
         const R w = plant_.velocity();
         if (own_shaft_) [[unlikely]]
             T = with_own(w, T, t);
         const R w_free = plant_.free_velocity(T, friction_torque_);
         R w_next = w_free;
-        if (friction_) {
+        if (dry_) {
             w_next = under_friction(w, w_free, t);
             friction_torque_ = (w_free - w_next) * per_beta_;
             T = T - friction_torque_;
@@ -261,35 +302,25 @@ private:
     }
 
     [[gnu::always_inline]] R under_friction(R w, R w_free, double t) {
-        using enum Effect;
-        FrictionLaw<R> law = c_.law;
-        if (own_friction_) {
-            law.level_positive = law.level_positive + own_level_;
-            law.level_negative = law.level_negative + own_level_;
-        }
-        R beta = plant_.beta();
-        const bool bristle = set_.has(presliding_friction);
-        if (bristle) bristle_.join(R(h_), w, other_friction_, w_free, beta);
-        if (set_.has(friction_drift)) {
-            const R level = FrictionDrift::level(c_.drift_torque, c_.drift_rate, R(t > 0.0 ? t : 0.0));
-            law.level_positive = law.level_positive + level;
-            law.level_negative = law.level_negative + level;
-        }
-        if (set_.has(stribeck_friction)) {
-            // The level at the mean velocity, which is foreseen, but never beyond a stop: at rest the static level holds.
-            const R zero = R(0.0), foreseen = w + (w - w_before_) * R(0.5);
-            const R middle = greater(w * foreseen, zero, foreseen, zero);
-            const R level = StribeckFriction::level(c_.stribeck_torque, c_.stribeck_static, c_.stribeck_slowness, middle);
-            law.level_positive = law.level_positive + level;
-            law.level_negative = law.level_negative + level;
-            law.more_at_rest = c_.stribeck_static - level;
-            w_before_ = w;
-        }
-        const R w_next = velocity_under_friction(law, w, w_free, beta, steep_);
-        if (bristle) {
-            other_friction_ = (w_free - w_next) / beta;
-            bristle_.move(w, w_next);
-        }
+        FrictionStep<R> step{R(h_), w, w_free, plant_.beta(), law_};
+        const auto add = [&](R level) __attribute__((always_inline)) {
+            step.law.level_positive = step.law.level_positive + level;
+            step.law.level_negative = step.law.level_negative + level;
+        };
+        if (own_friction_) add(own_level_);
+        Effects::each([&]<class E>() __attribute__((always_inline)) {
+            if constexpr (hook::level<E>)
+                if (set_.has<E>()) add(E::level(c_.effects.template of<E>(), R(t > 0.0 ? t : 0.0)));
+        });
+        Effects::each([&]<class E>() __attribute__((always_inline)) {
+            if constexpr (hook::friction<E>)
+                if (set_.has<E>()) E::friction(c_.effects.template of<E>(), states_.template of<E>(), step);
+        });
+        const R w_next = velocity_under_friction(step.law, w, step.w_free, step.beta);
+        Effects::each([&]<class E>() __attribute__((always_inline)) {
+            if constexpr (hook::after_friction<E>)
+                if (set_.has<E>()) E::after_friction(c_.effects.template of<E>(), states_.template of<E>(), step, w_next);
+        });
         return w_next;
     }
 
@@ -299,18 +330,16 @@ private:
     Plant plant_;
     Controller<R> pi_;
     double h_;
-    bool friction_, steep_, actuator_in_time_, turning_;
+    bool dry_ = false, actuator_in_time_ = false, looking_back_ = false, filtering_ = false, turning_ = false;
     bool own_shaft_ = false, own_torque_ = false, own_friction_ = false, own_actuator_ = false, own_sensor_ = false;
     double time_ = 0.0;
 
+    typename Effects::States<R> states_ = no_states();
+    FrictionLaw<R> law_;
     R angle_, theta_ = R(0.0), theta_middle_;
-    R held_ = R(0.0), lagging_;
-    R filtered_, filter_input_;
-    R limited_command_;
+    R held_ = R(0.0);
     R friction_torque_ = R(0.0), per_beta_;
-    R w_before_, other_friction_ = R(0.0);
     R own_w_before_, own_level_ = R(0.0);
-    Bristle<R> bristle_;
     std::size_t issued_ = 0;
 };
 

@@ -6,19 +6,6 @@ namespace gaident {
 
 namespace {
 
-// e^-x and (1 - e^-x)/x for x >= 0 or infinite.
-struct Decay {
-    double power, mean;
-
-    explicit Decay(double x) : power(exp_of_minus(x)), mean(x < 0.5 ? series(x) : (1.0 - power) / x) {}
-
-    static double series(double x) {
-        double sum = 0.0;
-        for (int k = 14; k >= 1; --k) sum = (1.0 - x * sum) / k;
-        return sum;
-    }
-};
-
 double resonance(const Pair<double>& f) { return f.e1 * f.e1 < 4.0 * f.e0 ? std::sqrt(f.e0) : 0.0; }
 
 // The state of a plant at the substep that continues as `start` does at the sample time. Both are compared by what they do under the
@@ -109,17 +96,17 @@ void two_masses(const EffectModel& model, double h, double sample_time, const De
     c.KG = m.KG;
     c.DG = m.DG;
     c.per_scale = 1.0 / step.scale;
-    c.half_gap = model.effects.has(Effect::backlash) ? 0.5 * model.of(Effect::backlash)[0] : 0.0;
-    c.cubic = model.effects.has(Effect::hardening_stiffness) ? model.of(Effect::hardening_stiffness)[0] : 0.0;
     if (start == nullptr) return;
     const TwoMassStep sample = two_mass_step(m, sample_time);
     if (!same_motion(3, sample.phi, sample.motor, *whole, start, u, c.x)) std::fill(c.x, c.x + 3, any_value);
     // The nonlinear coupling carries the same torque: K x + k3 x^3 = K x_linear beyond the gap.
     const double linear = c.x[2] / sample.scale;
     double x = linear;
-    for (int i = 0; i < 50 && c.cubic > 0.0; ++i)
-        x -= (m.KG * (x - linear) + c.cubic * x * x * x) / (m.KG + 3.0 * c.cubic * x * x);
-    if (linear != 0.0) c.x[2] = (x + std::copysign(c.half_gap, linear)) * step.scale;
+    Effects::each_backwards([&]<class E>() {
+        if constexpr (hook::coupling<E>)
+            if (model.effects.has<E>()) x = E::loaded_twist(c.effects.template of<E>(), m.KG, linear, x);
+    });
+    if (linear != 0.0) c.x[2] = x * step.scale;
 }
 
 }  // namespace
@@ -128,40 +115,40 @@ EffectModel reduced(const EffectModel& model, bool moving) {
     EffectModel r = model;
     for (int i = 0; i < effect_count; ++i) {
         const auto e = static_cast<Effect>(i);
-        if (moving && e == Effect::extra_resonance) continue;
-        if (r.effects.has(e) && effect_table[static_cast<std::size_t>(i)].neutral(r.of(e))) r.effects.remove(e);
+        if (moving && info_of(e).place == Place::plant) continue;
+        if (r.effects.has(e) && info_of(e).neutral(r.of(e))) r.effects.remove(e);
     }
-    if (r.effects.has(Effect::extra_resonance)) {
-        r.linear = ExtraResonance::times(r.linear, r.of(Effect::extra_resonance));
-        r.effects.remove(Effect::extra_resonance);
-    }
+    Effects::each([&]<class E>() {
+        if constexpr (hook::plant<E>) {
+            if (!r.effects.has<E>()) return;
+            r.linear = E::plant(r.of(effect<E>), r.linear);
+            r.effects.remove(effect<E>);
+        }
+    });
     return r;
 }
 
 int substeps_for(const EffectModel& model, const EffectRecord& record, const Loop& loop, bool own) {
-    using enum Effect;
     const Factors<double>& g = model.linear;
     const double Ts = record.sample_time;
+    const Circumstances at{g, loop, Ts, record.top_speed};
     double wanted = 1.0;
-    const bool in_time =
-        own || model.effects.has_any(coulomb_friction, stribeck_friction, asymmetric_friction, presliding_friction,
-                                     quadratic_drag, unbalance, cogging, friction_drift, backlash, hardening_stiffness,
-                                     transport_delay, torque_lag, velocity_filter);
-    if (in_time) {
+    Pace pace = own ? Pace::fine : Pace::sample;
+    Effects::each([&]<class E>() {
+        if (!model.effects.has<E>()) return;
+        if constexpr (requires { E::pace; }) pace = std::max(pace, E::pace);
+        if constexpr (requires { E::substeps(model.parameter, at); })
+            wanted = std::max(wanted, E::substeps(model.of(effect<E>), at));
+    });
+    if (pace != Pace::sample) {
         double fastest = 0.0;
         for (int i = 0; i < g.structure.pole_pairs(); ++i) fastest = std::max(fastest, resonance(g.pole_pair[i]));
         for (int i = 0; i < g.structure.zero_pairs(); ++i) fastest = std::max(fastest, resonance(g.zero_pair[i]));
-        // A nonlinear coupling is part of the resonance itself, and a friction that falls with speed drives it: both need finer steps.
-        const bool finer = model.effects.has_any(backlash, hardening_stiffness, stribeck_friction);
+        const bool finer = pace == Pace::finer;
         wanted = std::max({wanted, finer ? 4.0 : 2.0, fastest * Ts / (finer ? 0.0215 : 0.045)});
     }
-    const auto turning = [&](double order) { wanted = std::max(wanted, order * record.top_speed * Ts / 0.3); };
-    if (model.effects.has(unbalance)) turning(1.0);
-    if (model.effects.has(cogging)) turning(model.of(cogging)[1]);
-    if (model.effects.has(presliding_friction) && g.structure.p == 1)
-        wanted = std::max(wanted, std::sqrt(std::abs(g.gain * model.of(presliding_friction)[1])) * Ts / 0.3);
     if (loop.kind == LoopKind::continuous && g.structure.p == 1)
-        wanted = std::max({wanted, model.effects.has(torque_dead_band) ? 16.0 : 8.0, std::abs(g.gain * loop.kp) * Ts / 0.06});
+        wanted = std::max({wanted, 8.0, std::abs(g.gain * loop.kp) * Ts / 0.06});
     int m = 1;
     while (m < wanted && m < 16) m *= 2;
     return m;
@@ -169,12 +156,11 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
 
 void prepare_effects(const EffectModel& model, const EffectRecord& record, const Loop& loop, int substeps, const double* start,
                      PreparedEffects& out) {
-    using enum Effect;
     const Structure s = model.linear.structure;
     if (s.p < 1) throw std::invalid_argument("poles: a model with effects needs more poles than zeros");
     const double Ts = record.sample_time, h = Ts / substeps;
     const bool continuous = loop.kind == LoopKind::continuous, open = loop.kind == LoopKind::open;
-    const double hold = continuous ? h : Ts;
+    const Timing time{h, continuous ? h : Ts, continuous ? 1 : substeps};
     EffectConstants<double>& c = out.constants;
     c = EffectConstants<double>{};
 
@@ -182,56 +168,20 @@ void prepare_effects(const EffectModel& model, const EffectRecord& record, const
     const double u = moving && !open ? start[s.poles()] : 0.0;
     c.stored = u;
     c.before = !moving ? 0.0 : open && !record.input.empty() ? record.input[0] : u;
+    bool possible = true;
+    Effects::each([&]<class E>() {
+        if (!model.effects.has<E>()) return;
+        const double* const p = model.of(effect<E>);
+        if constexpr (HasCoefficients<E>) E::prepare(p, time, c.effects.template of<E>());
+        if constexpr (HasTable<E>) E::tabulate(p, time, out.tables.template of<E>());
+        if constexpr (requires { E::possible(p); }) possible = possible && E::possible(p);
+    });
     Delta<double> whole;
     if (moving) whole = plant_of(model.linear, loop, Ts);
-    out.two_masses = model.effects.has_any(backlash, hardening_stiffness);
+    out.two_masses = model.effects.needs_two_masses();
     if (out.two_masses) two_masses(model, h, Ts, &whole, start, u, c);
     else observer(model.linear, h, substeps, &whole, start, u, c);
-
-    const auto with = [&](Effect e, auto&& take) {
-        if (model.effects.has(e)) take(model.of(e));
-    };
-    with(coulomb_friction, [&](const double* p) { CoulombFriction::add(p, c.law); });
-    with(asymmetric_friction, [&](const double* p) { AsymmetricFriction::add(p, c.law); });
-    with(quadratic_drag, [&](const double* p) { QuadraticDrag::add(p, c.law); });
-    with(stribeck_friction, [&](const double* p) {
-        c.stribeck_torque = p[0];
-        c.stribeck_static = p[1];
-        c.stribeck_slowness = 1.0 / p[2];
-    });
-    with(presliding_friction, [&](const double* p) {
-        c.bristle_torque = p[0];
-        c.bristle_stiffness = p[1];
-        c.bristle_per_break = p[1] / p[0];
-    });
-    with(friction_drift, [&](const double* p) { c.drift_torque = p[0], c.drift_rate = p[1]; });
-    with(load_torque, [&](const double* p) { c.load = p[0]; });
-    with(unbalance, [&](const double* p) { c.unbalance_amplitude = p[0], c.unbalance_phase = p[1]; });
-    with(cogging, [&](const double* p) { c.cogging_amplitude = p[0], c.cogging_order = p[1], c.cogging_phase = p[2]; });
-    with(torque_saturation, [&](const double* p) { c.saturation = p[0]; });
-    with(torque_dead_band, [&](const double* p) { c.dead_band = p[0]; });
-    with(torque_lag, [&](const double* p) {
-        const Decay decay(h / p[0]);
-        c.lag_decay = decay.power;
-        c.lag_mean = decay.mean;
-    });
-    with(integrator_clamp, [&](const double* p) { c.integrator_limit = p[0]; });
-    with(command_rate_limit, [&](const double* p) { c.rate_step = p[0] * hold; });
-    with(velocity_filter, [&](const double* p) {
-        const Decay decay(h / p[0]);
-        c.filter_decay = decay.power;
-        c.filter_new = 1.0 - decay.mean;
-        c.filter_old = decay.mean - decay.power;
-    });
-    with(velocity_ripple, [&](const double* p) { c.ripple_amplitude = p[0], c.ripple_order = p[1], c.ripple_phase = p[2]; });
-    with(velocity_quantisation, [&](const double* p) { c.quantum = p[0]; });
-
-    const double delay = model.effects.has(transport_delay) ? model.of(transport_delay)[0] : 0.0;
-    const bool usable = delay >= 0.0 && delay <= longest_delay;
-    const int steps = continuous ? 1 : substeps;
-    for (int j = 0; j < steps; ++j)
-        TransportDelay::mean(usable ? delay : 0.0, hold, j, steps, out.delay.back[j], out.delay.share[j]);
-    if (!usable) c.x[0] = any_value;
+    if (!possible) c.x[0] = any_value;
 }
 
 }  // namespace gaident

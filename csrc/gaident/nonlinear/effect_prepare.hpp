@@ -1,7 +1,7 @@
 // From a model with effects to the numbers of its sample loop.
 #pragma once
 
-#include "effect_constants.hpp"
+#include "coefficients.hpp"
 #include "../simulation/record.hpp"
 
 #include <span>
@@ -16,8 +16,8 @@ struct EffectRecord {
     double top_speed = 0.0;  // of the measured velocity [rad/s], for the choice of substeps
 };
 
-// The model without the effects whose parameters are neutral, and with the linear one (extra_resonance) multiplied into its factors: that
-// one also where it is neutral and the record begins in motion, as its states are among those given.
+// The model without the effects whose parameters are neutral, and with those that change the mechanism linearly multiplied into its factors:
+// these also where they are neutral and the record begins in motion, as their states are among those given.
 EffectModel reduced(const EffectModel& model, bool moving);
 
 // Steps per sample that the reduced model needs: a power of two, so that neighbouring models have the same.
@@ -26,7 +26,7 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
 
 struct PreparedEffects {
     EffectConstants<double> constants;
-    DelayTable delay;
+    typename Effects::Tables tables{};
     bool two_masses = false;
 };
 

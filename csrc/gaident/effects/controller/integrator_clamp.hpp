@@ -6,10 +6,24 @@
 namespace gaident {
 
 struct IntegratorClamp {
-    static constexpr EffectInfo info{"integrator_clamp",
-                                     Place::controller,
-                                     "the controller's integrator is limited",
-                                     {{"limit", "N m", infinite, 0.0, infinite, true}}};
+    static constexpr EffectParameter parameters[] = {{"limit", "N m", infinite, 0.0, infinite, true}};
+    static constexpr EffectInfo info{
+        .name = "integrator_clamp",
+        .place = Place::controller,
+        .meaning = "the controller's integrator is limited",
+        .parameters = parameters,
+    };
+
+    template <class R>
+    struct Coefficients {
+        R limit;
+    };
+    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.limit = p[0]; }
+
+    template <class R>
+    static void controller(const Coefficients<R>& c, Controller<R>& pi) {
+        pi.integrator_limit = minimum(pi.integrator_limit, c.limit);
+    }
 };
 
 }  // namespace gaident

@@ -11,18 +11,21 @@
 namespace gaident {
 
 struct ExtraResonance {
+    static constexpr EffectParameter parameters[] = {
+        {"frequency", "rad/s", any_value, 0.0, infinite, true},
+        {"damping", "1", any_value, 0.0},
+        {"zero_frequency", "rad/s", any_value, 0.0, infinite, true},
+        {"zero_damping", "1", any_value, 0.0},
+    };
     static constexpr EffectInfo info{
         .name = "extra_resonance",
         .place = Place::plant,
         .meaning = "one more resonance of the mechanism, with gain 1 at standstill",
-        .parameter = {{"frequency", "rad/s", any_value, 0.0, infinite, true},
-                      {"damping", "1", any_value, 0.0},
-                      {"zero_frequency", "rad/s", any_value, 0.0, infinite, true},
-                      {"zero_damping", "1", any_value, 0.0}},
+        .parameters = parameters,
         .identity = [](const double* p) { return p[0] == p[2] && p[1] == p[3]; },
     };
 
-    static Factors<double> times(Factors<double> g, const double* p) {
+    static Factors<double> plant(const double* p, Factors<double> g) {
         const double wp = p[0], zp = p[1], wz = p[2], zz = p[3];
         if (g.structure.poles() + 2 > max_plant_order || g.structure.q + 2 > max_plant_order / 2)
             throw std::invalid_argument("extra_resonance: the model already has as many poles or zeros as a model can have");

@@ -2,18 +2,30 @@
 #pragma once
 
 #include "../effect.hpp"
+#include "law.hpp"
 
 namespace gaident {
 
 struct QuadraticDrag {
-    static constexpr EffectInfo info{"quadratic_drag",
-                                     Place::shaft,
-                                     "drag of a fan or fluid, growing with the square of speed",
-                                     {{"coefficient", "N m s^2/rad^2", 0.0, 0.0}}};
+    static constexpr EffectParameter parameters[] = {{"coefficient", "N m s^2/rad^2", 0.0, 0.0}};
+    static constexpr EffectInfo info{
+        .name = "quadratic_drag",
+        .place = Place::shaft,
+        .meaning = "drag of a fan or fluid, growing with the square of speed",
+        .parameters = parameters,
+    };
 
     template <class R>
-    static void add(const R* p, FrictionLaw<R>& law) {
-        law.drag = law.drag + p[0];
+    struct Coefficients {
+        R coefficient;
+    };
+    static constexpr Pace pace = Pace::fine;
+    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.coefficient = p[0]; }
+
+    template <class R>
+    static void law(const Coefficients<R>& c, FrictionLaw<R>& friction) {
+        friction.drag = friction.drag + c.coefficient;
+        friction.steep = true;
     }
 };
 

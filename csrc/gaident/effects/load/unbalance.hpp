@@ -1,20 +1,31 @@
 // Gravity on an eccentric load: -A sin(theta + phase).
 #pragma once
 
-#include "../../numeric/elementary.hpp"
 #include "../effect.hpp"
 
 namespace gaident {
 
 struct Unbalance {
-    static constexpr EffectInfo info{"unbalance",
-                                     Place::shaft,
-                                     "load once per turn: gravity on an eccentric load",
-                                     {{"amplitude", "N m", 0.0, 0.0}, {"phase", "rad"}}};
+    static constexpr EffectParameter parameters[] = {{"amplitude", "N m", 0.0, 0.0}, {"phase", "rad"}};
+    static constexpr EffectInfo info{
+        .name = "unbalance",
+        .place = Place::shaft,
+        .meaning = "load once per turn: gravity on an eccentric load",
+        .parameters = parameters,
+        .turns = true,
+    };
 
     template <class R>
-    [[gnu::always_inline]] static R torque(R A, R phase, R theta) {
-        return A * sine(theta + phase);
+    struct Coefficients {
+        R amplitude, phase;
+    };
+    static constexpr Pace pace = Pace::fine;
+    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[0], p[1]}; }
+    static double substeps(const double*, const Circumstances& at) { return at.for_turns(1.0); }
+
+    template <class R>
+    [[gnu::always_inline]] static R torque(const Coefficients<R>& c, R theta) {
+        return c.amplitude * sine(theta + c.phase);
     }
 };
 

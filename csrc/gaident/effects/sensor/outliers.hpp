@@ -6,11 +6,14 @@
 namespace gaident {
 
 struct Outliers {
-    static constexpr EffectInfo info{.name = "outliers",
-                                     .place = Place::record,
-                                     .meaning = "isolated wrong samples (noise); found and masked, not simulated",
-                                     .parameter = {{"fraction", "1", 0.0, 0.0, 1.0}},
-                                     .simulated = false};
+    static constexpr EffectParameter parameters[] = {{"fraction", "1", 0.0, 0.0, 1.0}};
+    static constexpr EffectInfo info{
+        .name = "outliers",
+        .place = Place::record,
+        .meaning = "isolated wrong samples (noise); found and masked, not simulated",
+        .parameters = parameters,
+        .simulated = false,
+    };
 };
 
 }  // namespace gaident

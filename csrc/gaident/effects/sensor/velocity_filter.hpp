@@ -8,12 +8,37 @@
 namespace gaident {
 
 struct VelocityFilter {
+    static constexpr EffectParameter parameters[] = {{"time_constant", "s", 0.0, 0.0}};
     static constexpr EffectInfo info{
-        "velocity_filter", Place::sensor, "the measured velocity is filtered, first order", {{"time_constant", "s", 0.0, 0.0}}};
+        .name = "velocity_filter",
+        .place = Place::sensor,
+        .meaning = "the measured velocity is filtered, first order",
+        .parameters = parameters,
+    };
 
     template <class R>
-    [[gnu::always_inline]] static R step(R decay, R old_share, R new_share, R w, R w_next, R y) {
-        return (decay * y + old_share * w) + new_share * w_next;
+    struct Coefficients {
+        R decay, of_old, of_new;  // e^-x, 1 - e^-x - c, c
+    };
+    template <class R>
+    struct State {
+        R output, w;  // rad/s
+    };
+    static constexpr Pace pace = Pace::fine;
+    static void prepare(const double* p, const Timing& time, Coefficients<double>& c) {
+        const Decay decay(time.step / p[0]);
+        c = {decay.power, decay.mean - decay.power, 1.0 - decay.mean};
+    }
+    template <class R>
+    static void begin(const Coefficients<R>&, State<R>& s, const Beginning<R>& start) {
+        s.output = s.w = start.velocity;
+    }
+
+    template <class R>
+    [[gnu::always_inline]] static R sensor_dynamics(const Coefficients<R>& c, State<R>& s, R w_next) {
+        s.output = (c.decay * s.output + c.of_old * s.w) + c.of_new * w_next;
+        s.w = w_next;
+        return s.output;
     }
 };
 

@@ -2,7 +2,7 @@
 // torque, to the velocity that friction left.
 #pragma once
 
-#include "effect_constants.hpp"
+#include "coefficients.hpp"
 
 namespace gaident {
 
@@ -38,16 +38,23 @@ struct ObserverPlant {
 };
 
 // Two masses with a nonlinear coupling. Its correction over the substep is the mean along a twist that goes evenly to where the
-// correction at the substep's start, and the friction of the substep before, would bring it (second order).
+// correction at the substep's start, and the friction of the substep before, would bring it (second order). An effect of the coupling has
+//
+//     coupling(c, K, D, x, dx)               its correction at the twist x [rad] that goes at dx [rad/s]
+//     mean_coupling(c, K, D, x0, x1, dx)     its mean along a twist that goes evenly from x0 to x1
+//     loaded_twist(c, K, linear, x)          the twist that carries the torque K linear, from that without the effect
+//
+// and is the identity where all its coefficients are zero, as those of an effect that is not there are: computing it costs less than asking.
+// Each leaves in x is left of the twist to the effects that follow.
 template <class R>
 struct TwoMassPlant {
     R phi[3][3], motor[3], coupling[3];
-    R KG, DG, per_scale, half_gap, cubic;
+    R KG, DG, per_scale;
     R x[3];  // w_M, w_L, psi
     R correction = R(0.0);
+    const typename Effects::Coefficients<R>& effects;
 
-    TwoMassPlant(const EffectConstants<R>& c, int)
-        : KG(c.KG), DG(c.DG), per_scale(c.per_scale), half_gap(c.half_gap), cubic(c.cubic) {
+    TwoMassPlant(const EffectConstants<R>& c, int) : KG(c.KG), DG(c.DG), per_scale(c.per_scale), effects(c.effects) {
         for (int i = 0; i < 3; ++i) {
             for (int j = 0; j < 3; ++j) phi[i][j] = c.phi[i][j];
             motor[i] = c.motor[i];
@@ -64,14 +71,19 @@ struct TwoMassPlant {
     }
 
     [[gnu::always_inline]] R free_velocity(R T, R friction_before) {
-        const R half = R(0.5), x0 = x[2] * per_scale, dx0 = x[0] - x[1], beyond0 = x0 - clamp(x0, -half_gap, half_gap);
-        const R hardening = HardeningStiffness::correction(cubic, beyond0);
-        const R now = Backlash::correction(half_gap, KG, DG, x0, dx0) + hardening, T_total = T - friction_before;
-        const R x1 = (linear(2, T_total) + coupling[2] * now) * per_scale;
-        const R dx1 = (linear(0, T_total) - linear(1, T_total)) + (coupling[0] - coupling[1]) * now;
-        const R beyond1 = x1 - clamp(x1, -half_gap, half_gap);
-        correction = Backlash::mean_correction(half_gap, KG, DG, x0, x1, (dx0 + dx1) * half) +
-                     (hardening + HardeningStiffness::correction(cubic, beyond1)) * half;
+        const R x0 = x[2] * per_scale, dx0 = x[0] - x[1], T_total = T - friction_before;
+        R now = R(0.0), left0 = x0;
+        Effects::each([&]<class E>() __attribute__((always_inline)) {
+            if constexpr (hook::coupling<E>) now = now + E::coupling(effects.template of<E>(), KG, DG, left0, dx0);
+        });
+        R left1 = (linear(2, T_total) + coupling[2] * now) * per_scale;
+        const R dx1 = (linear(0, T_total) - linear(1, T_total)) + (coupling[0] - coupling[1]) * now, dx = (dx0 + dx1) * R(0.5);
+        left0 = x0;
+        correction = R(0.0);
+        Effects::each([&]<class E>() __attribute__((always_inline)) {
+            if constexpr (hook::coupling<E>)
+                correction = correction + E::mean_coupling(effects.template of<E>(), KG, DG, left0, left1, dx);
+        });
         return linear(0, T) + coupling[0] * correction;
     }
 

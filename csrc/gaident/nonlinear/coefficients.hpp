@@ -5,8 +5,6 @@
 #include "../effects/list.hpp"
 #include "../plant/two_mass.hpp"
 
-#include "../control/closed_loop.hpp"
-
 #include <cstring>
 #include <type_traits>
 
@@ -18,36 +16,15 @@ struct EffectConstants {
     R a[max_plant_order], b[max_plant_order + 1], x[max_plant_order];
     // ... or two masses (two_mass.hpp)
     R phi[3][3], motor[3], coupling[3];
-    R KG, DG, per_scale, half_gap, cubic;
+    R KG, DG, per_scale;
 
-    FrictionLaw<R> law;  // the part with constant coefficients
-    R stribeck_torque, stribeck_static, stribeck_slowness;
-    R bristle_torque, bristle_stiffness, bristle_per_break;
-    R drift_torque, drift_rate;
-    R load;
-    R unbalance_amplitude, unbalance_phase;
-    R cogging_amplitude, cogging_order, cogging_phase;
-
-    R saturation, dead_band, lag_decay, lag_mean;
-    R integrator_limit, rate_step;
-    R filter_decay, filter_old, filter_new;
-    R ripple_amplitude, ripple_order, ripple_phase;
-    R quantum;
+    typename Effects::Coefficients<R> effects;
 
     R stored;  // the controller's stored torque at the start
     R before;  // torque that acted before the record's start
 };
 
 inline constexpr std::size_t effect_constants = sizeof(EffectConstants<double>) / sizeof(double);
-
-// Substeps per sample at most.
-inline constexpr int max_substeps = 64;
-
-// The delayed torque's mean over substep j: (1 - share) u(n - back) + share u(n - back + 1).
-struct DelayTable {
-    int back[max_substeps];
-    double share[max_substeps];
-};
 
 template <class R>
 EffectConstants<R> load_constants(const double* interleaved) {
