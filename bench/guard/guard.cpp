@@ -102,13 +102,14 @@ private:
 // Typical sizes of each effect.
 struct Sizes {
     const char* name;
-    double values[4];
+    double values[5];
 };
 constexpr Sizes sizes[] = {
     {"coulomb_friction", {0.05}},
     {"stribeck_friction", {0.04, 0.07, 2.0}},
     {"asymmetric_friction", {0.05, 0.035, 1e-4, 4e-4}},
     {"presliding_friction", {0.05, 3.0}},
+    {"lugre_friction", {0.04, 0.07, 2.0, 10.0, 0.005}},
     {"quadratic_drag", {1.5e-5}},
     {"load_torque", {0.03}},
     {"unbalance", {0.05, 0.3}},

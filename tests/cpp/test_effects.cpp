@@ -39,6 +39,7 @@ const Sizes sizes[] = {
     {effect<StribeckFriction>, {0.04, 0.07, 2.0}, {1e-14, 2e-14, 2.0}},
     {effect<AsymmetricFriction>, {0.05, 0.035, 1e-4, 4e-4}, {1e-14, 1e-14, 1e-16, 1e-16}},
     {effect<PreslidingFriction>, {0.05, 3.0}, {1e-14, 3.0}},
+    {effect<LugreFriction>, {0.04, 0.07, 2.0, 10.0, 0.005}, {1e-14, 2e-14, 2.0, 10.0, 1e-16}},
     {effect<QuadraticDrag>, {1.5e-5}, {1e-18}},
     {effect<LoadTorque>, {0.03}, {1e-14}},
     {effect<Unbalance>, {0.05, 0.3}, {1e-14, 0.3}},
@@ -229,6 +230,26 @@ TEST_CASE("a stiff bristle does not ring, even in one step per sample") {
     int turns = 0;
     for (std::size_t k = 21; k < w.size(); ++k) turns += w[k] * w[k - 1] < 0.0 && std::abs(w[k]) > 0.02;
     CHECK(turns <= 2);
+}
+
+TEST_CASE("a stiff LuGre bristle is stable at any step, holds below its static level and slides at the level of motion") {
+    constexpr std::size_t n = 600;
+    for (const double damping : {0.1, 1.0})
+        for (const double stiffness : {100.0, 1e3, 1e6}) {
+            std::vector<double> torque(n, 0.065);  // below Ts
+            std::fill(torque.begin() + 200, torque.begin() + 400, 0.09);
+            std::fill(torque.begin() + 400, torque.end(), 0.0);
+            EffectJob job = job_of(torque, LoopKind::open);
+            job.substeps = 1;
+            const EffectModel model = model_with(one_mass(), effect<LugreFriction>, {0.04, 0.07, 2.0, stiffness, damping});
+            const std::vector<double> w = velocity_of(job, model);
+            for (std::size_t k = 150; k < 200; ++k) CHECK(std::abs(w[k]) < 1e-3);
+            // Sliding: T = g(w) + D w + J dw/dt, D = 0.005, J = 5e-4
+            const double v = w[399], g = 0.04 + 0.03 * std::exp(-(v / 2.0) * (v / 2.0));
+            CHECK(v > 5.0);
+            CHECK_NEAR(g + 0.005 * v + 5e-4 * (v - w[398]) / Ts, 0.09, 2e-4);
+            for (std::size_t k = 560; k < n; ++k) CHECK(std::abs(w[k]) < 1e-3);
+        }
 }
 
 TEST_CASE("two masses are recovered from the factors, with shaft damping") {

@@ -74,7 +74,7 @@ def test_sdist_holds_the_sources(sdist: Path) -> None:
     def files(root: Path) -> set[str]:
         parts = ("csrc", "python", "tests", "bench")
         found = (f for part in parts for f in (root / part).rglob("*"))
-        kinds = {".hpp", ".cpp", ".py", ".pyi", ".typed", ".txt", ".css", ".js"}
+        kinds = {".hpp", ".cpp", ".py", ".pyi", ".typed", ".txt", ".css", ".js", ".c", ".h"}
         return {str(f.relative_to(root)) for f in found if f.suffix in kinds or f.name == "py.typed"}
 
     assert files(sdist) == files(ROOT)

@@ -14,6 +14,7 @@
 #include "friction/asymmetric_friction.hpp"
 #include "friction/coulomb_friction.hpp"
 #include "friction/friction_drift.hpp"
+#include "friction/lugre_friction.hpp"
 #include "friction/presliding_friction.hpp"
 #include "friction/quadratic_drag.hpp"
 #include "friction/stribeck_friction.hpp"
@@ -33,6 +34,7 @@ using Effects = EffectList<CoulombFriction,       //
                            StribeckFriction,      //
                            AsymmetricFriction,    //
                            PreslidingFriction,    //
+                           LugreFriction,         //
                            QuadraticDrag,         //
                            LoadTorque,            //
                            Unbalance,             //

@@ -80,6 +80,19 @@ static void gaident_presliding(const gaident_drive *k, gaident_memory *s, gaiden
     gaident_join(&s->presliding_friction, stiffness, per_break, f);
 }
 
+static void gaident_lugre(const gaident_drive *k, gaident_memory *s, gaident_friction *f) {
+    const double Ts = k->lugre_friction.static_torque, stiffness = k->lugre_friction.stiffness, damping = k->lugre_friction.damping;
+    const double g = gaident_falling(k->lugre_friction.torque, Ts, k->lugre_friction.slowness, f->w, s->lugre_friction.w_before);
+    const double per_break = stiffness / fmax(g, 1e-6 * Ts);
+    gaident_bristle *r = &s->lugre_friction.bristle;
+    double bending;
+    gaident_weigh(r, k->h, k->h * fabs(f->w) * per_break + f->beta * damping, f->beta * k->h * stiffness);
+    bending = damping / r->e;
+    f->w_free += f->beta * bending * r->z;
+    gaident_join(r, stiffness + bending, per_break, f);
+    s->lugre_friction.w_before = f->w;
+}
+
 /* w+ of a motor at w, and w_free without friction; t: time in the middle of the substep. */
 static double gaident_dry(const gaident_drive *k, gaident_memory *s, double w, double w_free, double beta, double t) {
     gaident_friction f = {0.0, 0.0, 0.0, {0.0, 0.0}, {0.0, 0.0}, 0.0, 0.0};
@@ -97,9 +110,12 @@ static double gaident_dry(const gaident_drive *k, gaident_memory *s, double w, d
         gaident_add_level(&f, k->friction_drift.torque * fmax(1.0 + k->friction_drift.rate * t, 0.0));
     if (k->effects & GAIDENT_STRIBECK_FRICTION) gaident_stribeck(k, s, &f);
     if (k->effects & GAIDENT_PRESLIDING_FRICTION) gaident_presliding(k, s, &f);
+    if (k->effects & GAIDENT_LUGRE_FRICTION) gaident_lugre(k, s, &f);
     w_next = gaident_under_friction(&f);
     if (k->effects & GAIDENT_PRESLIDING_FRICTION)
         gaident_move(&s->presliding_friction, &f, w_next, 1.0 / k->presliding_friction.per_break);
+    if (k->effects & GAIDENT_LUGRE_FRICTION)
+        gaident_move(&s->lugre_friction.bristle, &f, w_next, k->lugre_friction.static_torque / k->lugre_friction.stiffness);
     return w_next;
 }
 

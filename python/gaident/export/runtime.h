@@ -28,8 +28,9 @@ enum { /* the effects that act */
     GAIDENT_VELOCITY_FILTER = 1 << 17,
     GAIDENT_VELOCITY_RIPPLE = 1 << 18,
     GAIDENT_VELOCITY_QUANTISATION = 1 << 19,
+    GAIDENT_LUGRE_FRICTION = 1 << 20,
     GAIDENT_DRY = GAIDENT_COULOMB_FRICTION | GAIDENT_STRIBECK_FRICTION | GAIDENT_ASYMMETRIC_FRICTION |
-                  GAIDENT_PRESLIDING_FRICTION | GAIDENT_QUADRATIC_DRAG | GAIDENT_FRICTION_DRIFT
+                  GAIDENT_PRESLIDING_FRICTION | GAIDENT_LUGRE_FRICTION | GAIDENT_QUADRATIC_DRAG | GAIDENT_FRICTION_DRIFT
 };
 
 typedef struct {
@@ -50,6 +51,7 @@ typedef struct {
     struct { double torque, static_torque, slowness; } stribeck_friction;
     struct { double torque_positive, torque_negative, viscous_positive, viscous_negative; } asymmetric_friction;
     struct { double stiffness, per_break; } presliding_friction;
+    struct { double torque, static_torque, slowness, stiffness, damping; } lugre_friction;
     struct { double coefficient; } quadratic_drag;
     struct { double load; } load_torque;
     struct { double amplitude, phase; } unbalance;
@@ -82,6 +84,7 @@ typedef struct {
     int newest;              /* of the torques on their way */
     struct { double w_before; } stribeck_friction;
     gaident_bristle presliding_friction;
+    struct { gaident_bristle bristle; double w_before; } lugre_friction;
     struct { double T; } torque_lag;
     struct { double before; } command_rate_limit;
     struct { double output, w; } velocity_filter;
