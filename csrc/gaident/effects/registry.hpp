@@ -101,7 +101,7 @@ struct EffectList {
     // x through step.operator()<E>(x) of each effect.
     template <class R, class Step>
     [[gnu::always_inline]] static constexpr R chain(R x, Step&& step) {
-        ((x = step.template operator()<E>(x)), ...);
+        static_cast<void>(((x = step.template operator()<E>(x)), ...));
         return x;
     }
     template <class Call>

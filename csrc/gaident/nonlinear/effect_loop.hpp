@@ -206,22 +206,23 @@ private:
     [[gnu::always_inline]] void filter() {
         Effects::chain(measured(), [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::sensor_dynamics<E>)
-                if (set_.has<E>()) return E::sensor_dynamics(c_.effects.template of<E>(), states_.template of<E>(), x);
+                if (set_.has<E>()) [[likely]]
+                    return E::sensor_dynamics(c_.effects.template of<E>(), states_.template of<E>(), x);
+            return x;
+        });
+    }
+
+    // Of the last filter there is.
+    [[gnu::always_inline]] R filter_output() const {
+        return Effects::chain(plant_.velocity(), [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::sensor_dynamics<E>)
+                if (set_.has<E>()) return R(states_.template of<E>().output);
             return x;
         });
     }
 
     [[gnu::always_inline]] R sensor() const {
-        R y = R(0.0);
-        bool filtered = false;
-        Effects::each([&]<class E>() __attribute__((always_inline)) {
-            if constexpr (hook::sensor_dynamics<E>)
-                if (set_.has<E>()) {
-                    y = states_.template of<E>().output;
-                    filtered = true;
-                }
-        });
-        if (!filtered) y = measured();
+        const R y = filtering_ ? filter_output() : measured();
         return Effects::chain(y, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::reading<E>)
                 if (set_.has<E>()) return E::reading(c_.effects.template of<E>(), x);
@@ -314,12 +315,14 @@ private:
         });
         Effects::each([&]<class E>() __attribute__((always_inline)) {
             if constexpr (hook::friction<E>)
-                if (set_.has<E>()) E::friction(c_.effects.template of<E>(), states_.template of<E>(), step);
+                if (set_.has<E>()) [[unlikely]]  // keeps what it needs out of the registers of the others
+                    E::friction(c_.effects.template of<E>(), states_.template of<E>(), step);
         });
         const R w_next = velocity_under_friction(step.law, w, step.w_free, step.beta);
         Effects::each([&]<class E>() __attribute__((always_inline)) {
             if constexpr (hook::after_friction<E>)
-                if (set_.has<E>()) E::after_friction(c_.effects.template of<E>(), states_.template of<E>(), step, w_next);
+                if (set_.has<E>()) [[unlikely]]
+                    E::after_friction(c_.effects.template of<E>(), states_.template of<E>(), step, w_next);
         });
         return w_next;
     }

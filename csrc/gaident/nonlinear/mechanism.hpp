@@ -72,17 +72,17 @@ struct TwoMassPlant {
 
     [[gnu::always_inline]] R free_velocity(R T, R friction_before) {
         const R x0 = x[2] * per_scale, dx0 = x[0] - x[1], T_total = T - friction_before;
-        R now = R(0.0), left0 = x0;
-        Effects::each([&]<class E>() __attribute__((always_inline)) {
-            if constexpr (hook::coupling<E>) now = now + E::coupling(effects.template of<E>(), KG, DG, left0, dx0);
+        R left0 = x0;
+        const R now = Effects::chain(R(0.0), [&]<class E>(R sum) __attribute__((always_inline)) {
+            if constexpr (hook::coupling<E>) return sum + E::coupling(effects.template of<E>(), KG, DG, left0, dx0);
+            else return sum;
         });
         R left1 = (linear(2, T_total) + coupling[2] * now) * per_scale;
         const R dx1 = (linear(0, T_total) - linear(1, T_total)) + (coupling[0] - coupling[1]) * now, dx = (dx0 + dx1) * R(0.5);
         left0 = x0;
-        correction = R(0.0);
-        Effects::each([&]<class E>() __attribute__((always_inline)) {
-            if constexpr (hook::coupling<E>)
-                correction = correction + E::mean_coupling(effects.template of<E>(), KG, DG, left0, left1, dx);
+        correction = Effects::chain(R(0.0), [&]<class E>(R sum) __attribute__((always_inline)) {
+            if constexpr (hook::coupling<E>) return sum + E::mean_coupling(effects.template of<E>(), KG, DG, left0, left1, dx);
+            else return sum;
         });
         return linear(0, T) + coupling[0] * correction;
     }
