@@ -115,6 +115,6 @@ def test_a_bug_is_1_and_no_traceback(here: Path, capsys: pytest.CaptureFixture[s
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("one\nover zero")
 
-    monkeypatch.setattr("gaident.cli.identify.identify", broken)
+    monkeypatch.setattr("gaident.cli.commands.identify.identify", broken)
     assert main(["identify", "step.csv", *NAMES, *LOOP]) == 1
     assert capsys.readouterr().err == ("gaident: internal error, please report it: ZeroDivisionError: one over zero\n")

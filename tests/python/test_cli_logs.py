@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident import doctor
+from gaident.cli import examination as doctor
 from gaident.cli import main
 from gaident.data.guess import guess_channels, unit_from_position, unit_from_velocity
 from gaident.data.listing import columns
-from gaident.drive_file import read_drive_file
-from gaident.progress_bar import Progress
+from gaident.drive.drive_file import read_drive_file
+from gaident.show.progress_bar import Progress
 
 SAMPLES = Path(__file__).parent / "samples"
 TRUTH = ga.TwoMass(JM=1.02e-4, DM=0.003, JL=5.815e-4, DL=0.008, KG=2.59)
@@ -315,7 +315,7 @@ def test_progress_is_drawn_on_a_terminal_and_nowhere_else(monkeypatch: pytest.Mo
         stream = Terminal()
         with Progress(stream) as show:
             assert show is not None
-            monkeypatch.setattr("gaident.progress_bar._QUIET", 0.0)
+            monkeypatch.setattr("gaident.show.progress_bar._QUIET", 0.0)
             show(0.25, "generation 120, best fitness 0.01, species (1, 2) of [bold]10")
         drawn = stream.getvalue()
         assert "25%" in drawn and "species (1, 2) of [bold]10" in drawn and "left" in drawn
@@ -353,7 +353,7 @@ def test_progress_in_a_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
     display.display = lambda page, raw, display_id: Handle()  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "IPython", kernel)
     monkeypatch.setitem(sys.modules, "IPython.display", display)
-    monkeypatch.setattr("gaident.progress_bar._QUIET", 0.0)
+    monkeypatch.setattr("gaident.show.progress_bar._QUIET", 0.0)
     with Progress(io.StringIO()) as show:
         assert show is not None  # although the stream is no terminal
         show(0.5, "generation 10 <b>")

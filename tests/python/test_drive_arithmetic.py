@@ -12,7 +12,7 @@ import pytest
 
 import gaident as ga
 from gaident.errors import ModelError, SettingsError
-from gaident.identification.settings import ARITHMETICS, DRIVE_ARITHMETICS
+from gaident.results.settings import ARITHMETICS, DRIVE_ARITHMETICS
 
 ROOT = Path(__file__).resolve().parents[2]
 EMBEDDED = ROOT / "csrc" / "embedded"

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.diagnosis.excitation import excitation
-from gaident.diagnosis.experiments import Limits, candidate_commands, first_experiment, separation
+from gaident.diagnosis.experiments.excitation import excitation
+from gaident.diagnosis.experiments.first_experiment import candidate_commands, first_experiment, separation
 from gaident.errors import SettingsError
+from gaident.results.experiment import Limits
 
 DT = 1e-3
 MASS = ga.OneMass(J=2e-4, D=3e-3)

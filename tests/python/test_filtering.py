@@ -9,12 +9,12 @@ import pytest
 from scipy.signal import lfilter
 
 import gaident as ga
+from gaident.control.filtering import clamped_sum, filtered, recursion
 from gaident.diagnosis.noise_filter import WHITE, NoiseFilter, ShaftNoise, autoregression
 from gaident.diagnosis.problem import Problem, _damped_steps
 from gaident.diagnosis.state_space import _inverses, steady_covariance, steady_covariances
 from gaident.errors import ModelError
 from gaident.identification.noise import autocorrelation
-from gaident.models.filtering import clamped_sum, filtered, recursion
 
 RNG = np.random.default_rng(5)
 

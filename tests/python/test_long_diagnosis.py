@@ -8,8 +8,8 @@ import pytest
 import gaident as ga
 from gaident.diagnosis.coarse import blocks_of, coarsened
 from gaident.diagnosis.driven import Driven
-from gaident.diagnosis.folded import folded
 from gaident.diagnosis.noise_filter import ShaftNoise, autoregression
+from gaident.diagnosis.records.folded import folded
 
 DT = 1e-3
 

@@ -15,7 +15,7 @@ from gaident.identification.adequacy import independence_p
 from gaident.identification.noise import chi2_tail, fit_autoregression, ljung_box
 from gaident.identification.parts import search_parts
 from gaident.identification.space import derive_space, torque_of
-from gaident.identification.starts import noise_std, stretches
+from gaident.models.starts import noise_std, stretches
 
 DT = 0.444e-3
 CTL = ga.PI(0.116, 6.8)

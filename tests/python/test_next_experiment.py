@@ -11,7 +11,7 @@ import gaident as ga
 from drive_cases import Truth, random_case
 from drive_rig import library, rig
 from gaident.diagnosis.candidates import TWINS
-from gaident.diagnosis.next_experiment import BEYOND, CLEAR
+from gaident.diagnosis.experiments.next_experiment import BEYOND, CLEAR
 
 try:
     library()

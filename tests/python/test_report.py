@@ -19,7 +19,7 @@ import gaident as ga
 from gaident.cli import main
 from gaident.cli.output import csv_text
 from gaident.errors import GaidentError, SettingsError
-from gaident.reporting import report_page, view_of
+from gaident.reporting.report import report_page, view_of
 from gaident.show.html import Html, tag, typeset
 from gaident.show.report import parts
 from gaident.show.report.chart import BINS, PALETTES, Band, Chart, Mark, Panel, Trace, cloud, series

@@ -7,11 +7,11 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+from gaident.checks import one_of
+from gaident.control.pi import LOOPS, PI
 from gaident.data.record import Record
-from gaident.drive_file import COLUMNS, KEYS, Drive, read_drive_file, unfilled_of
+from gaident.drive.drive_file import COLUMNS, KEYS, Drive, read_drive_file, unfilled_of
 from gaident.errors import ControllerError, SettingsError
-from gaident.models._checks import one_of
-from gaident.models.controller import LOOPS, PI
 
 __all__ = ["drive_of", "read_all"]
 

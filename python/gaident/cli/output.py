@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gaident.data.record import Record
-    from gaident.diagnosis.experiments import Proposal
-    from gaident.identification.result import Identification
     from gaident.models.simulate import Run
+    from gaident.results.experiment import Proposal
+    from gaident.results.identification import Identification
 
 __all__ = [
     "apart",
@@ -136,6 +136,6 @@ def save_figure(figure: Figure, path: Path) -> None:
 
 def print_json(data: dict[str, Any]) -> None:
     """A result for programs."""
-    from gaident.identification.result import json_text
+    from gaident.results.json_text import json_text
 
     print(json_text(data))

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gaident.data.arrays import MINIMUM_SAMPLES, channel, positive_number
-from gaident.data.decimation import low_passed
-from gaident.data.lags import Fit, coarse_lags, refine
 from gaident.data.record import CHANNELS, Record
+from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number
+from gaident.data.signals.decimation import low_passed
+from gaident.data.signals.lags import Fit, coarse_lags, refine
 from gaident.errors import RecordError
 
 __all__ = ["Alignment", "align"]

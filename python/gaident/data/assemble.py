@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.arrays import MINIMUM_SAMPLES
 from gaident.data.clock import axis_of, clock_of, common_clock, part_of, second_of
-from gaident.data.conditioning import differentiate
-from gaident.data.decimation import Decimator, decimated, factor_of
+from gaident.data.formats.table import Column, Table
 from gaident.data.record import CHANNELS, Record
-from gaident.data.resampling import resampled
-from gaident.data.table import Column, Table
+from gaident.data.signals.arrays import MINIMUM_SAMPLES
+from gaident.data.signals.conditioning import differentiate
+from gaident.data.signals.decimation import Decimator, decimated, factor_of
+from gaident.data.signals.resampling import resampled
 from gaident.data.timeaxis import TimeAxis
 from gaident.data.wanted import Wanted, si_factor
 from gaident.errors import ReadError, RecordError

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gaident.data.table import Column, Table
+from gaident.data.formats.table import Column, Table
 from gaident.data.timeaxis import TimeAxis, stamp_unit, time_column
 from gaident.data.wanted import Wanted, si_factor
 from gaident.errors import ReadError

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.data.formats.units import Constants, factor
 from gaident.data.listing import ColumnInfo, Listing
 from gaident.data.record import CHANNELS
-from gaident.data.units import Constants, factor
 from gaident.errors import ReadError
 
 __all__ = ["Guess", "guess_channels", "position_and_velocity", "unit_from_position", "unit_from_velocity"]

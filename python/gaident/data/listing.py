@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.delimited import TextOptions
+from gaident.data.formats.delimited import TextOptions
+from gaident.data.formats.table import Column, Table
+from gaident.data.formats.units import factor
 from gaident.data.readers import open_log
-from gaident.data.table import Column, Table
 from gaident.data.timeaxis import TimeAxis, stamp_unit, time_column
-from gaident.data.units import factor
 from gaident.errors import ReadError
 
 __all__ = ["ColumnInfo", "Listing", "columns", "printable"]

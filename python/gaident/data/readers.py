@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.assemble import assemble
-from gaident.data.binary import read_mat, read_npz
-from gaident.data.delimited import TextOptions, open_text
-from gaident.data.frames import frame_table, is_frame, open_parquet
-from gaident.data.hdf import open_hdf
-from gaident.data.instruments import open_mdf, open_tdms
+from gaident.data.formats.binary import read_mat, read_npz
+from gaident.data.formats.delimited import TextOptions, open_text
+from gaident.data.formats.frames import frame_table, is_frame, open_parquet
+from gaident.data.formats.hdf import open_hdf
+from gaident.data.formats.instruments import open_mdf, open_tdms
+from gaident.data.formats.table import Table
+from gaident.data.formats.units import Constants
 from gaident.data.record import Record
-from gaident.data.table import Table
-from gaident.data.units import Constants
 from gaident.data.wanted import Wanted
 from gaident.errors import ReadError
 

@@ -13,9 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gaident.data.arrays import MINIMUM_SAMPLES, channel, positive_number
+from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number
+from gaident.data.signals.decimation import decimated, factor_of
 from gaident.errors import RecordError, check_schema
 from gaident.files import write_whole
+from gaident.providers import provided
+from gaident.version import version
 
 __all__ = ["CHANNELS", "Record"]
 
@@ -166,8 +169,6 @@ class Record:
         longer in the record: identify a decimated record in open loop, or with a continuous controller. At least 20
         samples remain. Raises RecordError.
         """
-        from gaident.data.decimation import decimated, factor_of
-
         factor = factor_of(factor, "decimate", "({!r})")
         count = -(-len(self) // factor)
         if count < MINIMUM_SAMPLES:
@@ -208,8 +209,6 @@ class Record:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes JSON, all digits, for `gaident.load`; the file appears whole or not at all."""
-        from gaident.version import version
-
         write_whole(path, json.dumps({**self.to_dict(), "gaident_version": version()}).encode())
 
     def __eq__(self, other: object) -> bool:
@@ -230,9 +229,8 @@ class Record:
         return f"Record({label}{len(self)} samples, dt={self.dt:.6g} s, {self.duration:.4g} s; {held})"
 
     def _repr_html_(self) -> str:
-        from gaident.data.record_html import record_html
-
-        return record_html(self)
+        html: str = provided("record_html")(self)
+        return html
 
     def __reduce__(self) -> tuple[type[Record], tuple[Any, ...]]:
         # Arrays come out of a pickle writable; through the constructor they are checked and locked again.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.resampling import GAP
-from gaident.data.table import Column, Table
+from gaident.data.formats.table import Column, Table
+from gaident.data.signals.resampling import GAP
 from gaident.errors import ReadError
 
 __all__ = ["TimeAxis", "stamp_unit", "time_column"]

@@ -6,11 +6,11 @@ import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from gaident.data.arrays import positive_number
-from gaident.data.decimation import factor_of
+from gaident.data.formats.table import Column, Table
+from gaident.data.formats.units import QUANTITIES, Constants, factor, is_any_unit
 from gaident.data.record import CHANNELS
-from gaident.data.table import Column, Table
-from gaident.data.units import QUANTITIES, Constants, factor, is_any_unit
+from gaident.data.signals.arrays import positive_number
+from gaident.data.signals.decimation import factor_of
 from gaident.errors import ReadError
 
 __all__ = ["Wanted", "si_factor"]

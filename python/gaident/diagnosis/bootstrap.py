@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import Fit, Problem
-from gaident.diagnosis.result import Diagnosis
 from gaident.diagnosis.stepwise import Search
+from gaident.results.diagnosis import Diagnosis
 
 if TYPE_CHECKING:
     from gaident.diagnosis.driven import Driven

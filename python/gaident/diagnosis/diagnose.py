@@ -9,34 +9,34 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.arguments import ProgressCallback, checked, noise_std_of, records_of
 from gaident.diagnosis.candidates import CANDIDATES, TWINS, Scales, conditional_twins
-from gaident.diagnosis.controller_place import as_logged, as_read, controller_findings
+from gaident.diagnosis.controller.controller_place import as_logged, as_read, controller_findings
 from gaident.diagnosis.driven import AT_CONTROLLER, Driven
-from gaident.diagnosis.excitation import excitation
+from gaident.diagnosis.experiments.excitation import excitation
+from gaident.diagnosis.explain.wording import evidence_of
 from gaident.diagnosis.extension import Extension, extended
-from gaident.diagnosis.folded import ADVICE, FOLDED, folded
 from gaident.diagnosis.gains import Gains, measured_gains
-from gaident.diagnosis.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.leftover import leftover
 from gaident.diagnosis.mechanics import mechanics_of, moved
 from gaident.diagnosis.offset import offset_of
 from gaident.diagnosis.problem import Problem
-from gaident.diagnosis.result import Diagnosis, Finding
+from gaident.diagnosis.records.arguments import ProgressCallback, checked, noise_std_of, records_of
+from gaident.diagnosis.records.folded import ADVICE, FOLDED, folded
+from gaident.diagnosis.records.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.rivals import Rival
 from gaident.diagnosis.standing import only_describes, simplified
 from gaident.diagnosis.uncertainty import estimates_of
-from gaident.diagnosis.wording import evidence_of
-from gaident.identification.covariance import Estimate
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
-from gaident.identification.result import Identification
-from gaident.models.controller import PI
 from gaident.models.simulate import simulate
+from gaident.results.diagnosis import Diagnosis, Finding
+from gaident.results.estimate import Estimate
+from gaident.results.identification import Identification
 from gaident.version import version
 
-__all__ = ["diagnose"]
+__all__ = ["Diagnosis", "Finding", "diagnose"]
 
 Vector = NDArray[np.float64]
 FREE_RUN = 5.0  # times the noise of the measured velocity: what the free run of an explained record may miss
@@ -240,7 +240,7 @@ class _Work:
         proposal = None
         if ambiguous:
             self.note(0.95, "proposing the next experiment")
-            from gaident.diagnosis.next_experiment import propose
+            from gaident.diagnosis.experiments.next_experiment import propose
 
             elsewhere = self.at_controller.effects
             proposal, notes = propose(ambiguous, self.rivals, self.final, self.driven, self.problem.count, elsewhere)

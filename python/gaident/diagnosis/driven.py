@@ -14,18 +14,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.filtering import filtered, rate_limited
+from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.candidates import CANDIDATES
-from gaident.diagnosis.hygiene import quantisation
 from gaident.diagnosis.layout import Layout
+from gaident.diagnosis.records.hygiene import quantisation
 from gaident.identification.space import torque_of
-from gaident.identification.starts import noise_std, starts_moving
-from gaident.models.controller import PI
-from gaident.models.filtering import filtered, rate_limited
 from gaident.models.model import Model
 from gaident.models.own_effects import OWN
 from gaident.models.roots import quadratic_roots
 from gaident.models.simulate import simulate_values
+from gaident.models.starts import noise_std, starts_moving
 
 __all__ = ["Driven"]
 

@@ -13,15 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.hygiene import quantisation
 from gaident.diagnosis.problem import Fit, Problem
-from gaident.diagnosis.result import Fitness
-from gaident.identification.starts import noise_std, starts_moving
+from gaident.diagnosis.records.hygiene import quantisation
 from gaident.models import simulate
-from gaident.models.controller import PI
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
+from gaident.models.starts import noise_std, starts_moving
+from gaident.results.diagnosis import Fitness
 
 __all__ = ["Gains", "free_run_errors", "measured_gains"]
 

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.filtering import clamped_sum
 from gaident.diagnosis.driven import Driven
 from gaident.diagnosis.line import torque_of_line
 from gaident.diagnosis.noise_filter import WHITE
 from gaident.diagnosis.problem import Fit, Problem, project_out
-from gaident.models.filtering import clamped_sum
 
 __all__ = ["Leftover", "leftover"]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.problem import Fit, Problem
 from gaident.diagnosis.uncertainty import covariance_of
-from gaident.identification.covariance import Estimate
+from gaident.results.estimate import Estimate
 
 __all__ = ["MECHANICS", "mechanics_of", "moved"]
 

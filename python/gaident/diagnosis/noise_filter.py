@@ -23,10 +23,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.filtering import filtered
+from gaident.control.pi import PI
 from gaident.diagnosis.state_space import Discretised, discretised, disturbed, steady_covariances
 from gaident.identification.noise import autocorrelation, autoregression_of, highest_order
-from gaident.models.controller import PI
-from gaident.models.filtering import filtered
 from gaident.models.model import Model
 
 __all__ = ["HIGHEST", "WHITE", "NoiseFilter", "ShaftNoise", "autoregression"]

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.filtering import recursion
+from gaident.control.pi import PI
 from gaident.errors import ModelError
-from gaident.models.controller import PI
-from gaident.models.filtering import recursion
 from gaident.models.model import Model
 
 __all__ = ["Discretised", "discretised", "disturbed", "steady_covariance", "steady_covariances"]

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.candidates import CANDIDATES
 from gaident.diagnosis.problem import Fit, Problem
-from gaident.identification.covariance import Estimate
 from gaident.models.effects import table
+from gaident.results.estimate import Estimate
 
 __all__ = ["covariance_of", "estimates_of"]
 

@@ -14,16 +14,17 @@ import math
 import os
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gaident import _core
+from gaident.checks import real_number
+from gaident.control.pi import PI
 from gaident.errors import ModelError
 from gaident.export.c_effects import HELPERS, Pieces, effect_pieces, indented, number
 from gaident.files import write_whole
-from gaident.models.controller import PI
-
-if TYPE_CHECKING:
-    from gaident.models.model import Model
+from gaident.models.model import Model, require_strictly_proper
+from gaident.models.simulate import checked_substeps
+from gaident.version import version
 
 __all__ = ["c_source", "write_c"]
 
@@ -81,8 +82,6 @@ def c_source(model: Model, dt: float, controller: PI | None, name: str, substeps
 
 
 def _checked(model: Model, dt: float, controller: PI | None, name: str, substeps: int | None) -> None:
-    from gaident.models._checks import real_number
-    from gaident.models.simulate import checked_substeps, require_strictly_proper
 
     if real_number(dt, "dt", ModelError, "give the sample time in s, > 0") <= 0.0:
         raise ModelError(f"dt is {dt:g}: give the sample time in s, > 0")
@@ -143,7 +142,6 @@ def _linear(pieces: Pieces, found: dict[str, Any], controller: PI | None, limits
 
 
 def _file(model: Model, dt: float, controller: PI | None, name: str, pieces: Pieces, substeps: int) -> str:
-    from gaident.version import version
 
     members = [("double velocity", "rad/s, as the sensor shows it"), ("double torque", "N m, as the controller issues it")]
     members += pieces.members

@@ -13,20 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
+from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.identification.notes import record_notes, warnings_of
 from gaident.identification.parts import search_parts
-from gaident.identification.result import Identification, Rival, Structure, TrialOutcome
 from gaident.identification.selection import MARGIN, Candidate
-from gaident.identification.settings import Settings
-from gaident.identification.space import SearchSpace, derive_space
-from gaident.identification.starts import noise_std, starts_moving
-from gaident.models.controller import PI
+from gaident.identification.space import derive_space
 from gaident.models.mechanics import mechanics_from_model
 from gaident.models.model import Model
+from gaident.models.search_space import SearchSpace
+from gaident.models.starts import noise_std, starts_moving
+from gaident.results.adequacy import Adequacy
+from gaident.results.identification import Identification, Rival, Structure, TrialOutcome
+from gaident.results.settings import Settings
 from gaident.version import version
 
 __all__ = ["identify"]
@@ -118,7 +120,7 @@ class _Judged:
     noise: Autoregression
     plain: Vector  # J'J
     coloured: Vector  # J'S J
-    adequacy: adequacy.Adequacy
+    adequacy: Adequacy
 
 
 @dataclass

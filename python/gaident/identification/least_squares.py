@@ -23,10 +23,10 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.identification.plant_of_discrete import plant_of_discrete
-from gaident.models.controller import PI
 from gaident.models.factors import Structure, factor_parameters
 from gaident.models.mechanics import Mechanics, mechanics_from_model
 from gaident.models.model import Discrete, Model
