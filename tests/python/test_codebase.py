@@ -292,6 +292,17 @@ def test_names_that_are_provided_are_there() -> None:
         providers.provided("no such name")
 
 
+def test_what_shows_results_is_typed() -> None:
+    """Text, pictures and the page take results, models and records, whose types stand below them."""
+    assert not [str(f.relative_to(ROOT)) for f in sources(PACKAGE / "show", ".py") if re.search(r"\bAny\b", f.read_text())]
+    higher = {"gaident.identification", "gaident.diagnosis", "gaident.reporting", "gaident.paper", "gaident.cli"}
+    known = modules()
+    wrong = {
+        (n, t) for n in known if n.startswith("gaident.show") for t, _ in imports(n, known) for h in higher if t.startswith(h)
+    }
+    assert not wrong
+
+
 def test_no_folder_of_code_is_crowded() -> None:
     counts = Counter(f.parent for f in sources(PACKAGE, ".py"))
     for folder, count in counts.items():

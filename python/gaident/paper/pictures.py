@@ -1,4 +1,4 @@
-"""The page's pictures as PNG: what they show is worked out here, how it is drawn stands in `gaident.show`."""
+"""The page's pictures as PNG: what they show is worked out here, how it is drawn stands in plots.py."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from gaident.data.record import Record
 from gaident.models.simulate import simulate
 from gaident.paper.facts import STEP
 from gaident.paper.friction import FrictionTest
+from gaident.paper.plots import plot_bias, plot_engines, plot_friction, plot_identified, plot_nominal
 from gaident.paper.reproduction import Reproduction
 from gaident.paper.rig import Friction
 
@@ -38,8 +39,6 @@ CAPTIONS = {
 
 def figures(result: Reproduction) -> dict[str, bytes]:
     """File name without suffix -> PNG, for each of CAPTIONS."""
-    from gaident.show.paper_plots import plot_bias, plot_engines, plot_friction, plot_identified, plot_nominal
-
     tests = [part.step for part in result.parts]
     drawn: dict[str, Figure] = {
         "fig6_nominal": plot_nominal(tests),

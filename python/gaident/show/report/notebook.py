@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from gaident.results.diagnosis import Diagnosis
+from gaident.results.identification import Identification
 from gaident.show.html import Html, Row, joined, number, table, tag, typeset
 from gaident.show.report import diagnosis, identification
-from gaident.show.report.parts import estimate
+from gaident.show.report.parts import Head, estimate
 from gaident.show.summary import meaning_of
 from gaident.show.wording import structure_words
 
@@ -16,7 +16,7 @@ FRAME = "border-left: 4px solid #0072b2; padding: 0.2em 1em; max-width: 60em;"
 UNITS = "rmse in rad/s (m/s on a linear axis)"
 
 
-def diagnosis_html(dia: Any) -> Html:
+def diagnosis_html(dia: Diagnosis) -> Html:
     """Verdict, causes with their parameters and evidence, error before and after."""
     rows: list[Row] = []
     for f in (f for f in dia.findings if not f.is_noise):
@@ -33,10 +33,10 @@ def diagnosis_html(dia: Any) -> Html:
         errors.append(("extended model", number(dia.after.rmse), f"{dia.after.fit_percent:.2f}"))
     errors.append(("noise", number(dia.after.noise_floor), ""))
     where = f"{UNITS}; {dia.held_out}"
-    return _framed(diagnosis, dia, causes, table(("", "rmse", "fit [%]"), [errors], left=(0,)), where, dia.notes)
+    return _framed(diagnosis.head(dia), causes, table(("", "rmse", "fit [%]"), [errors], left=(0,)), where)
 
 
-def identification_html(idn: Any) -> Html:
+def identification_html(idn: Identification) -> Html:
     """Verdict, mechanics or structure, fit."""
     m = idn.mechanics
     parts: Html | str = f"({idn.p},{idn.q}), {structure_words(idn.p, idn.q)}"
@@ -47,16 +47,14 @@ def identification_html(idn: Any) -> Html:
         ]
         parts = table(("", "value", "unit", ""), [rows], left=(0, 2, 3))
     errors: list[Row] = [("model", number(idn.rmse), f"{idn.fit_percent:.2f}"), ("noise", number(idn.adequacy.noise_std), "")]
-    notes = [w for w in idn.warnings if w != idn.adequacy.sentence]
-    return _framed(identification, idn, parts, table(("", "rmse", "fit [%]"), [errors], left=(0,)), f"{UNITS}; in-sample", notes)
+    return _framed(identification.head(idn), parts, table(("", "rmse", "fit [%]"), [errors], left=(0,)), f"{UNITS}; in-sample")
 
 
-def _framed(book: Any, result: Any, parts: str, errors: str, small: str, notes: Any) -> Html:
-    _, sign, word = book.mark(result)
-    listed = tag("ul", *(tag("li", typeset(note)) for note in notes)) if notes else ""
+def _framed(head: Head, parts: str, errors: str, small: str) -> Html:
+    listed = tag("ul", *(tag("li", typeset(note)) for note in head.notes)) if head.notes else ""
     return tag(
         "div",
-        tag("p", tag("b", f"{sign} {word}. "), typeset(book.headline(result))),
+        tag("p", tag("b", f"{head.sign} {head.word}. "), typeset(head.headline)),
         tag("div", parts),
         errors,
         tag("p", tag("small", small)),

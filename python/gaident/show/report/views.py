@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gaident.results.frequency import Responses
 
 __all__ = ["Curve", "Run", "Vector", "View"]
 
@@ -59,7 +60,7 @@ class View:
 
     runs: tuple[Run, ...] = ()
     curve: Curve | None = None
-    response: Any = None
+    response: Responses | None = None
     no_response: str = ""
     axis: str = "rotary"
     made_with: Mapping[str, str] = field(default_factory=dict)

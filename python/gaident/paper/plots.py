@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.show.plots import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, _figure, _line, _tidy
+from gaident.data.record import Record
+from gaident.paper.conventional import Comparison
+from gaident.paper.experiment import StepTest
+from gaident.show.draw import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, line, new_figure, tidy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,13 +30,13 @@ ABOVE: dict[str, Any] = {
 }
 
 
-def plot_nominal(tests: Sequence[Any]) -> Figure:
+def plot_nominal(tests: Sequence[StepTest]) -> Figure:
     """Fig. 6: response of the rig and of the model with the sheet values."""
     curves = [[("nominal model", BLACK, "-", t.nominal_velocity)] for t in tests]
     return _responses(tests, curves, [f"fitness {t.nominal_fitness:.1f}" for t in tests])
 
 
-def plot_identified(tests: Sequence[Any]) -> Figure:
+def plot_identified(tests: Sequence[StepTest]) -> Figure:
     """Fig. 8: response of the rig and of the identified models, the best trial of each engine."""
     curves, notes = [], []
     for t in tests:
@@ -46,8 +49,10 @@ def plot_identified(tests: Sequence[Any]) -> Figure:
     return _responses(tests, curves, notes)
 
 
-def _responses(tests: Sequence[Any], curves: Sequence[Sequence[tuple[str, str, str, Vector]]], notes: Sequence[str]) -> Figure:
-    fig = _figure(9.0, 4.6)
+def _responses(
+    tests: Sequence[StepTest], curves: Sequence[Sequence[tuple[str, str, str, Vector]]], notes: Sequence[str]
+) -> Figure:
+    fig = new_figure(9.0, 4.6)
     grid = fig.subplots(2, len(tests), sharex="col", sharey="row", squeeze=False, height_ratios=(2.4, 1.0))
     for column, (test, mine) in enumerate(zip(tests, curves, strict=True)):
         rec, (top, low) = test.record, grid[:, column]
@@ -63,13 +68,13 @@ def _responses(tests: Sequence[Any], curves: Sequence[Sequence[tuple[str, str, s
         low.margins(x=0.01)
     grid[0, 0].set_ylabel("motor velocity [rad/s]")
     grid[1, 0].set_ylabel("rig - model\n[rad/s]")
-    _tidy(fig)
+    tidy(fig)
     return fig
 
 
-def plot_engines(tests: Sequence[Any]) -> Figure:
+def plot_engines(tests: Sequence[StepTest]) -> Figure:
     """Fig. 7: mean of the trials' best fitness by generation; the dot at the end is what is reported after the local fits."""
-    fig = _figure(9.0, 3.6)
+    fig = new_figure(9.0, 3.6)
     axes = fig.subplots(1, len(tests), sharey=True, squeeze=False)[0]
     for column, (ax, test) in enumerate(zip(axes, tests, strict=True)):
         for key, color, words in (("paper", VERMILION, "paper's GA"), ("default", BLUE, "default engine")):
@@ -87,25 +92,25 @@ def plot_engines(tests: Sequence[Any]) -> Figure:
         ax.set_xlabel(f"generation\n({'ab'[column]}) {test.mechanism.title}")
         ax.legend(fontsize="small")
     axes[0].set_ylabel(f"best fitness (6), mean of {tests[0].engines[0].trials} trials")
-    _tidy(fig)
+    tidy(fig)
     return fig
 
 
-def plot_friction(rec: Any, linear: Vector, extended: Vector, law: tuple[Vector, Vector, Vector]) -> Figure:
+def plot_friction(rec: Record, linear: Vector, extended: Vector, law: tuple[Vector, Vector, Vector]) -> Figure:
     """A record with reversals: rig, both models and their errors [rad/s]; beside it the friction law.
 
     law: velocities [rad/s], dry friction of the rig and as found [N m].
     """
-    fig = _figure(9.0, 4.6)
+    fig = new_figure(9.0, 4.6)
     grid = fig.add_gridspec(2, 2, width_ratios=(2.1, 1.0), height_ratios=(1.5, 1.0))
     top = fig.add_subplot(grid[0, 0])
     low = fig.add_subplot(grid[1, 0], sharex=top)
     side = fig.add_subplot(grid[:, 1])
-    _line(top, rec.time, rec.velocity, color=SKY, linewidth=3.0, label="rig")
-    _line(top, rec.time, linear, color=VERMILION, linewidth=1.0, linestyle="--", label="linear model")
-    _line(top, rec.time, extended, color=BLACK, linewidth=0.8, label="extended model")
-    _line(low, rec.time, rec.velocity - linear, color=VERMILION, linewidth=0.7)
-    _line(low, rec.time, rec.velocity - extended, color=BLACK, linewidth=0.7)
+    line(top, rec.time, rec.velocity, color=SKY, linewidth=3.0, label="rig")
+    line(top, rec.time, linear, color=VERMILION, linewidth=1.0, linestyle="--", label="linear model")
+    line(top, rec.time, extended, color=BLACK, linewidth=0.8, label="extended model")
+    line(low, rec.time, rec.velocity - linear, color=VERMILION, linewidth=0.7)
+    line(low, rec.time, rec.velocity - extended, color=BLACK, linewidth=0.7)
     top.tick_params(labelbottom=False)
     top.legend(ncols=3, **ABOVE)
     top.set_ylabel("motor velocity [rad/s]")
@@ -119,13 +124,13 @@ def plot_friction(rec: Any, linear: Vector, extended: Vector, law: tuple[Vector,
     side.set_xlabel("motor velocity [rad/s]")
     side.set_ylabel("dry friction [N m]")
     side.legend(loc="lower right")
-    _tidy(fig)
+    tidy(fig)
     return fig
 
 
-def plot_bias(comparisons: Sequence[Any], titles: Sequence[str]) -> Figure:
+def plot_bias(comparisons: Sequence[Comparison], titles: Sequence[str]) -> Figure:
     """Deviation of the mechanical parameters from the truth [%], by method: mean over the seeds, bars of two spreads."""
-    fig = _figure(9.0, 3.4)
+    fig = new_figure(9.0, 3.4)
     axes = fig.subplots(1, len(comparisons), sharey=True, squeeze=False)[0]
     styles = (("plain", "plain least squares", "s", GREY), ("refined", "instruments and whitening", "^", ORANGE),
               ("genetic", "genetic", "o", BLUE))  # fmt: skip
@@ -148,5 +153,5 @@ def plot_bias(comparisons: Sequence[Any], titles: Sequence[str]) -> Figure:
         ax.set_xlabel(f"({'abcd'[column]}) {title}")
     axes[0].set_ylabel("deviation from the truth [%]")
     axes[0].legend(ncols=3, **ABOVE)
-    _tidy(fig)
+    tidy(fig)
     return fig

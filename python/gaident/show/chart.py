@@ -1,4 +1,6 @@
-"""A chart as data: panels one above the other with one x axis. Drawn twice, as a live figure and as a picture for print.
+"""A chart as data: panels one above the other with one x axis.
+Two renderers draw it:
+matplotlib (draw.py) and, live in the report, plotly (report/live.py).
 
 Colours are roles ("measured", "linear", ...), so that a page can be light or dark. Texts are plain texts.
 """
@@ -6,12 +8,13 @@ Colours are roles ("measured", "linear", ...), so that a page can be light or da
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BINS", "PALETTES", "Band", "Chart", "Mark", "Panel", "Trace", "Vector", "cloud", "series"]
+__all__ = ["BINS", "PALETTES", "Band", "Chart", "Mark", "Panel", "Trace", "Vector", "bar_width", "cloud", "envelope", "series"]
 
 Vector = NDArray[np.float64]
 
@@ -90,7 +93,10 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """Traces over one y axis; y: its title with the unit, limits: (lowest, highest) or None, height: share of the chart's."""
+    """Traces over one y axis; y: its title with the unit, limits: (lowest, highest) or None, height: share of the chart's.
+
+    note: what stands in the middle of the panel, where there is nothing to draw.
+    """
 
     y: str
     traces: tuple[Trace, ...]
@@ -100,6 +106,7 @@ class Panel:
     limits: tuple[float, float] | None = None
     height: float = 1.0
     ticks: tuple[float, ...] = ()
+    note: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,14 +133,33 @@ class Chart:
         return sum(len(t.x) for p in self.panels for t in p.traces)
 
 
-def series(time: Vector, values: Vector, label: str, role: str, **style: object) -> Trace:
-    """A long signal as the envelope of its samples: no peak is lost, whatever its length."""
-    from gaident.show.plots import envelope
+def envelope(time: Vector, values: Vector, bins: int = BINS) -> tuple[Vector, Vector]:
+    """Least and greatest sample of each of `bins` stretches, in time order; short signals as they are."""
+    n = len(values)
+    if n <= 4 * bins:
+        return time, values
+    edges = np.linspace(0, n, bins + 1).astype(int)
+    chosen = []
+    for a, b in pairwise(edges):
+        chosen += sorted({a + int(np.argmin(values[a:b])), a + int(np.argmax(values[a:b]))})
+    picked = np.array(sorted({0, *chosen, n - 1}))
+    return time[picked], values[picked]
 
-    return Trace(*envelope(time, values, BINS), label, role, **style)  # type: ignore[arg-type]
+
+def series(
+    time: Vector, values: Vector, label: str, role: str, *, width: float = 1.2, dash: Literal["solid", "dash", "dot"] = "solid"
+) -> Trace:
+    """A long signal as the envelope of its samples: no peak is lost, whatever its length."""
+    return Trace(*envelope(time, values, BINS), label, role, width=width, dash=dash)
 
 
 def cloud(x: Vector, y: Vector, role: str, label: str = "") -> Trace:
     """A few of the points of a cloud, evenly over the record; what they say is carried by means of all of them beside it."""
     chosen = np.unique(np.linspace(0, len(x) - 1, min(len(x), CLOUD)).round().astype(int)) if len(x) else np.zeros(0, dtype=int)
     return Trace(x[chosen], y[chosen], label, role, "points", hover=False)
+
+
+def bar_width(t: Trace) -> float:
+    """Width of a bar: nine tenths of the least distance between two, or of 1."""
+    steps = np.diff(np.unique(t.x))
+    return 0.9 * min(float(steps.min(initial=1.0)), 1.0)

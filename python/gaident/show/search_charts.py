@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from gaident.show.plots import roots_of
-from gaident.show.report.chart import Chart, Panel, Trace
+from gaident.results.estimate import Estimate
+from gaident.results.identification import Identification
+from gaident.show.chart import Chart, Panel, Trace
 
-__all__ = ["convergence_chart", "roots_chart", "structures_chart"]
+__all__ = ["convergence_chart", "roots_chart", "roots_of", "structures_chart"]
 
 SHOWN = 12
 
 
-def structures_chart(idn: Any) -> Chart:
+def structures_chart(idn: Identification) -> Chart:
     """BIC of the best structures above the lowest, one bar each, with its name on it."""
     ordered = sorted(idn.structures, key=lambda s: (s.delta_bic, s.p + 2 * s.q))[:SHOWN]
     chosen, rivals = (idn.p, idn.q), {(r.p, r.q) for r in idn.rivals}
@@ -38,7 +40,7 @@ def structures_chart(idn: Any) -> Chart:
     return Chart("structures", "structure (p,q)", (panel,), text, limits=(-0.6, len(ordered) - 0.4), ticks=names, height=320)
 
 
-def convergence_chart(idn: Any) -> Chart:
+def convergence_chart(idn: Identification) -> Chart:
     """Best fitness (6) per generation, one line per trial."""
     best = min(range(len(idn.trials)), key=lambda i: float(idn.trials[i].fitness))
     order = [i for i in range(len(idn.trials)) if i != best] + [best]
@@ -57,19 +59,38 @@ def convergence_chart(idn: Any) -> Chart:
     )
 
 
-def roots_chart(idn: Any) -> Chart:
-    """Poles and zeros in the s-plane with two standard deviations."""
+def roots_chart(idn: Identification, hz: bool = False) -> Chart:
+    """Poles and zeros in the s-plane [rad/s], or divided by 2 pi [Hz], with two standard deviations."""
+    scale, u = (1.0 / math.tau, "Hz") if hz else (1.0, "rad/s")
     traces = []
     for kind, role in (("pole", "linear"), ("zero", "faster")):
         points = roots_of(idn.parameters, kind)
         if not points:
             continue
-        x, y, dx, dy = (np.array(values) for values in zip(*points, strict=True))
+        x, y, dx, dy = (scale * np.array(values) for values in zip(*points, strict=True))
         traces.append(Trace(x, y, f"{kind}s", role, "crosses" if kind == "pole" else "rings", spread=2.0 * dy))
         for xi, yi, d in zip(x.tolist(), y.tolist(), dx.tolist(), strict=True):
             if d > 0.0:
                 traces.append(Trace(np.array([xi - 2.0 * d, xi + 2.0 * d]), np.array([yi, yi]), "", role, width=1.2, hover=False))
-    panel = Panel("imaginary part [rad/s]", tuple(traces))
+    panel = Panel(f"imaginary part [{u}]", tuple(traces))
     return Chart(
-        "roots", "real part [rad/s]", (panel,), "Poles and zeros in the s-plane, bars of 2 standard deviations.", height=380
+        "roots", f"real part [{u}]", (panel,), "Poles and zeros in the s-plane, bars of 2 standard deviations.", height=380
     )
+
+
+def roots_of(parameters: Mapping[str, Estimate], kind: str) -> list[tuple[float, float, float, float]]:
+    """(real, imaginary, their deviations) of every pole or zero; 0 where no deviation is known."""
+    points = []
+    for name, e in parameters.items():
+        if not name.startswith(f"{kind}_"):
+            continue
+        if "_pair_" not in name:
+            points.append((e.value, 0.0, _finite(e.std), 0.0))
+        elif name.endswith("_real"):
+            im = parameters[name.removesuffix("_real") + "_imaginary"]
+            points += [(e.value, sign * im.value, _finite(e.std), _finite(im.std)) for sign in (1.0, -1.0)]
+    return points
+
+
+def _finite(std: float) -> float:
+    return std if math.isfinite(std) else 0.0
