@@ -303,6 +303,18 @@ def test_what_shows_results_is_typed() -> None:
     assert not wrong
 
 
+def test_the_controller_is_an_object() -> None:
+    """Its gains are written as numbers in one file, where the core's signatures need them; no function takes both by position."""
+    bound = re.compile(r"_core\.(Experiment|EffectRecord|simulate|mirrored|discrete|recurrence|held_torque)\(")
+    for file in sources(PACKAGE, ".py"):
+        text = file.read_text()
+        assert file == PACKAGE / "control" / "core.py" or not bound.search(text), file
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.FunctionDef):
+                names = {a.arg for a in (*node.args.posonlyargs, *node.args.args)}
+                assert not {"kp", "ki"} <= names, f"{file.relative_to(ROOT)}:{node.lineno}: give {node.name} a PI"
+
+
 def test_no_folder_of_code_is_crowded() -> None:
     counts = Counter(f.parent for f in sources(PACKAGE, ".py"))
     for folder, count in counts.items():

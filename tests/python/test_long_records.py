@@ -14,7 +14,8 @@ import gaident as ga
 from gaident.identification.adequacy import independence_p
 from gaident.identification.noise import chi2_tail, fit_autoregression, ljung_box
 from gaident.identification.parts import search_parts
-from gaident.identification.space import derive_space, torque_of
+from gaident.identification.space import derive_space
+from gaident.models.drive_torque import torque_of
 from gaident.models.starts import noise_std, stretches
 
 DT = 0.444e-3

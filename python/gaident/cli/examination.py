@@ -126,12 +126,12 @@ def _self_test() -> tuple[str, str, bool]:
     """(instruction set, what was found, whether that is right): the two masses of the demonstration."""
     import numpy as np
 
-    from gaident import _core
     from gaident.cli import demonstration as demo
+    from gaident.control import core
     from gaident.identification.identify import identify
 
     rest = np.zeros(20)
-    chosen = _core.Experiment([(rest, rest, 1e-3, "rest", 0.0)], "open", 0.0, 0.0, np.inf, np.inf).kernels
+    chosen = core.experiment([(rest, rest, 1e-3, "rest", 0.0)], None).kernels
     rec = demo.two_mass_record(0)
     began = time.perf_counter()
     idn = identify(rec, controller=demo.CONTROLLER, seed=0)

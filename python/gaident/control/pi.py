@@ -88,9 +88,3 @@ class PI:
         allowed = ("kp", "ki", "loop", "torque_limit", "integrator_limit")
         values: dict[str, Any] = known_keys(data, "the controller", allowed, ("kp", "ki"), ControllerError)
         return cls(**values)
-
-
-def loop_of(controller: PI | None) -> tuple[str, float, float, float, float]:
-    if controller is None:
-        return "open", 0.0, 0.0, math.inf, math.inf
-    return controller.loop, controller.kp, controller.ki, *controller.limits

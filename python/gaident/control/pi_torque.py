@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident import _core
+from gaident.control import core
 from gaident.control.filtering import clamped_sum
 from gaident.control.pi import PI
 
@@ -61,4 +61,4 @@ def held_torque(
     rectangular one, -0.5 one that lacks the newest error.
     """
     newest, before = ((0.5 + s) * controller.ki * dt for s in (share, -share))
-    return _core.held_torque(command - velocity, controller.kp, newest, before, *controller.limits, rule, initial_integral)
+    return core.held_torque(command - velocity, controller, newest, before, rule, initial_integral)

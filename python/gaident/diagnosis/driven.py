@@ -20,7 +20,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.candidates import CANDIDATES
 from gaident.diagnosis.layout import Layout
 from gaident.diagnosis.records.hygiene import quantisation
-from gaident.identification.space import torque_of
+from gaident.models.drive_torque import torque_of
 from gaident.models.model import Model
 from gaident.models.own_effects import OWN
 from gaident.models.roots import quadratic_roots

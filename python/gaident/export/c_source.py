@@ -16,8 +16,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-from gaident import _core
 from gaident.checks import real_number
+from gaident.control import core
 from gaident.control.pi import PI
 from gaident.errors import ModelError
 from gaident.export.c_effects import HELPERS, Pieces, effect_pieces, indented, number
@@ -54,14 +54,12 @@ def c_source(model: Model, dt: float, controller: PI | None, name: str, substeps
     """The text of the file; `name` begins every name that it declares. Raises ModelError where it cannot be written."""
     _checked(model, dt, controller, name, substeps)
     steps = substeps or (FINEST if any(e.name in TURNING for e in model.effects) else 0)
-    loop, kp, ki, limits = "open", 0.0, 0.0, (math.inf, math.inf)
-    if controller is not None:
-        loop, kp, ki, limits = controller.loop, controller.kp, controller.ki, controller.limits
+    limits = (math.inf, math.inf) if controller is None else controller.limits
     try:
-        found: dict[str, Any] = _core.recurrence(model.core(), dt, loop, kp, ki, *limits, steps, 0.0)
+        found: dict[str, Any] = core.recurrence(model.core(), dt, controller, steps, 0.0)
     except ValueError as reason:
         raise ModelError(str(reason)) from None
-    if found["substeps"] and loop == "continuous":
+    if found["substeps"] and core.loop_name(controller) == "continuous":
         names = ", ".join(e.name for e in model.effects)
         raise ModelError(
             f"with effects ({names}) the continuous loop is the difference of two simulations, which makes no recurrence for a "
@@ -70,8 +68,8 @@ def c_source(model: Model, dt: float, controller: PI | None, name: str, substeps
     clamp = min(limits[1], found.get("effects", {}).get("integrator_clamp", (math.inf,))[0])
     pieces = Pieces()
     if controller is not None:
-        pieces.numbers({"kp": kp}, "proportional gain [N m s/rad]")
-        pieces.numbers({"g": 0.5 * ki * dt}, "integral gain times dt/2 [N m s/rad]")
+        pieces.numbers({"kp": controller.kp}, "proportional gain [N m s/rad]")
+        pieces.numbers({"g": 0.5 * controller.ki * dt}, "integral gain times dt/2 [N m s/rad]")
         bounds = {"torque_limit": limits[0], "integrator_limit": clamp}
         pieces.numbers({key: value for key, value in bounds.items() if value < math.inf}, "N m")
     if found["substeps"]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
+from gaident.control import core
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError, SpaceError
@@ -150,12 +151,10 @@ class _Work:
     def experiment_of(self, parts: Sequence[tuple[Record, bool]]) -> _core.Experiment:
         """The core's view of (record, whether it starts in motion)."""
         c = self.controller
-        loop, kp, ki = ("open", 0.0, 0.0) if c is None else (c.loop, c.kp, c.ki)
-        limits = (np.inf, np.inf) if c is None else c.limits
         rows = [
             (_input(r, c), r.velocity, r.dt, "free" if moving else "rest", float(r.velocity[:3].mean())) for r, moving in parts
         ]
-        return _core.Experiment(records=rows, loop=loop, kp=kp, ki=ki, torque_limit=limits[0], integrator_limit=limits[1])
+        return core.experiment(rows, c)
 
     def search(self, trials: int, seed: int, progress: ProgressCallback | None) -> list[_core.Trial]:
         """The genetic runs."""

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.pi import PI
-from gaident.control.pi_torque import pi_block
 from gaident.data.record import Record
 from gaident.errors import SpaceError
+from gaident.models.drive_torque import torque_blocks
 from gaident.models.search_space import SearchSpace
 
-__all__ = ["derive_space", "torque_of"]
+__all__ = ["derive_space"]
 
 
 def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpace:
@@ -39,7 +39,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
         # Sums of products of x = (int u dt, -int w dt, w) about their means, a block at a time.
         products, sums = np.zeros((3, 3)), np.zeros(3)
         integrals, before = np.zeros(2), np.zeros(2)
-        for first, u, w in _torque_blocks(rec, controller):
+        for first, u, w in torque_blocks(rec, controller):
             x = np.empty((3, len(u)))
             for i, (signal, sign) in enumerate(((u, 1.0), (w, -1.0))):
                 trapezia = 0.5 * rec.dt * sign * (signal + np.concatenate([before[i : i + 1], signal[:-1]]))
@@ -118,27 +118,3 @@ def _check_scales(records: Sequence[Record], controller: PI | None, only_certain
 def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Sum of products, in one thread: a BLAS starts others for a long one, and their number shows in the last digits."""
     return float(np.einsum("i,i", a, b))
-
-
-def torque_of(rec: Record, controller: PI | None) -> NDArray[np.float64]:
-    """The record's torque or, where none was recorded, the controller's answer to command and velocity (limits included)."""
-    if rec.torque is not None:
-        return rec.torque
-    return np.concatenate([u for _, u, _ in _torque_blocks(rec, controller)])
-
-
-def _torque_blocks(
-    rec: Record, controller: PI | None, length: int = 1 << 18
-) -> Iterator[tuple[int, NDArray[np.float64], NDArray[np.float64]]]:
-    """(first sample, torque, velocity) a block at a time: of a long record no copy is made."""
-    integral = last = 0.0
-    for first in range(0, len(rec), length):
-        w = rec.velocity[first : first + length]
-        if rec.torque is not None:
-            yield first, rec.torque[first : first + length], w
-            continue
-        assert controller is not None and rec.command is not None  # checked on entry to identify()
-        e = rec.command[first : first + length] - w
-        torque, integral = pi_block(e, rec.dt, controller, last, integral)
-        last = float(e[-1])
-        yield first, torque, w

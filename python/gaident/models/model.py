@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident import _core
 from gaident.checks import known_keys, real_number
-from gaident.control.pi import PI, loop_of
+from gaident.control import core
+from gaident.control.pi import PI
 from gaident.errors import ModelError
 from gaident.models.effects import Effect, ordered
 from gaident.models.roots import canonical_roots, quadratic_roots
@@ -217,9 +218,8 @@ class Model:
         if sample_time <= 0.0:
             raise ModelError(f"dt is {sample_time:g}: give the sample time in s, > 0")
         require_strictly_proper(self.p, controller)
-        loop, kp, ki, _, _ = loop_of(controller)
         poles, zeros = (np.array(roots, dtype=np.complex128) for roots in (self.poles, self.zeros))
-        alpha, beta = _core.discrete(self.gain, poles, zeros, sample_time, loop, kp, ki)
+        alpha, beta = core.discrete(self.gain, poles, zeros, sample_time, controller)
         return Discrete(alpha, beta)
 
     def to_scipy(self, dt: float | None = None, *, pade: int | None = None) -> Any:

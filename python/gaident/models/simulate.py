@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident import _core
 from gaident.checks import one_of
-from gaident.control.pi import PI, loop_of
+from gaident.control import core
+from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import GaidentError, ModelError, RecordError
 from gaident.models.effects import table as effect_table
@@ -271,10 +272,9 @@ def checked_substeps(substeps: int | None) -> int:
 
 
 def _core_record(rec: Record, source: Signal, controller: PI | None) -> _core.EffectRecord:
-    loop, kp, ki, torque_limit, integrator_limit = loop_of(controller)
     position = np.zeros(0) if rec.position is None else rec.position
     start = 0.0 if rec.position is None else float(rec.position[0])
-    return _core.EffectRecord(rec.dt, source, position, rec.velocity, start, loop, kp, ki, torque_limit, integrator_limit)
+    return core.effect_record(rec.dt, source, position, rec.velocity, start, controller)
 
 
 def _check_start(plant: Model, controller: PI | None, start: Signal, what: str) -> None:
@@ -292,21 +292,7 @@ def _check_start(plant: Model, controller: PI | None, start: Signal, what: str) 
 def _core_simulate(
     plant: Model, dt: float, source: Signal, controller: PI | None, start: Signal, arithmetic: str
 ) -> tuple[Signal, Signal]:
-    loop, kp, ki, torque_limit, integrator_limit = loop_of(controller)
-    return _core.simulate(
-        plant.gain,
-        _roots(plant.poles),
-        _roots(plant.zeros),
-        dt,
-        source,
-        loop,
-        kp,
-        ki,
-        torque_limit,
-        integrator_limit,
-        start,
-        arithmetic,
-    )
+    return core.simulate(plant.gain, _roots(plant.poles), _roots(plant.zeros), dt, source, controller, start, arithmetic)
 
 
 def _roots(roots: tuple[complex, ...]) -> NDArray[np.complex128]:

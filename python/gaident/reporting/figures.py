@@ -1,25 +1,17 @@
-"""The pictures of a result: what they draw is worked out here, how it is drawn stands in `gaident.show`.
-
-The missing torque is that of the linear part of the diagnosed model, its parameters as refitted together with the effects: a
-linear model fitted alone has bent its damping and inertia to swallow part of them, and would show the rest distorted.
-"""
+"""The pictures of a result: what they draw is worked out here and in runs.py, how it is drawn stands in `gaident.show`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.controller.replay import replay
-from gaident.diagnosis.experiments.excitation import position_of
 from gaident.diagnosis.explain.evidence import velocity_curve
-from gaident.diagnosis.explain.missing_torque import missing_torque
-from gaident.diagnosis.gains import free_run_errors
+from gaident.errors import GaidentError
 from gaident.identification.frequency import response_of
 from gaident.models.model import Model
+from gaident.reporting.runs import run_of
 from gaident.results.diagnosis import Diagnosis
 from gaident.show import plots, response_plots
 from gaident.show.diagnosis_plots import plot_evidence
@@ -35,23 +27,19 @@ def plot_diagnosis(dia: Diagnosis, records: Sequence[Record], axis: str = "rotar
     """Six panels of the longest record; axis="linear" for m and N. Raises SettingsError for another axis."""
     unit("N m", axis)
     rec = max(records, key=len)
-    torque = replay(rec, dia.controller).torque
-    missing = missing_torque(dia.model.linear, rec, dia.controller, torque)
-    (before,) = free_run_errors(dia.identification.model, [(rec, 0)], dia.controller)
-    extended = None
-    if dia.model.effects:
-        (after,) = free_run_errors(dia.model, [(rec, 0)], dia.controller)
-        extended = rec.velocity - after
+    run = run_of(dia, rec)
+    if run.dhat is None or run.torque is None:
+        raise GaidentError(f"there is no picture of {rec.name or 'the record'}: {' '.join(run.notes)}")
     return plot_evidence(
-        rec.time,
-        rec.velocity,
-        rec.velocity - before,
-        missing.dhat,
-        position_of(rec),
-        torque,
+        run.time,
+        run.measured,
+        run.linear,
+        run.dhat,
+        run.position,
+        run.torque,
         dia.after.noise_floor,
-        std=float(np.median(missing.std)),
-        extended=extended,
+        std=run.std,
+        extended=run.extended,
         curve=velocity_curve(dia, float(rec.velocity.min()), float(rec.velocity.max())),
         title=_title(dia, rec, records),
         axis=axis,

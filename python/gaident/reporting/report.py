@@ -9,22 +9,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.controller.replay import replay
-from gaident.diagnosis.experiments.excitation import position_of
 from gaident.diagnosis.explain.evidence import velocity_curve
-from gaident.diagnosis.explain.missing_torque import missing_torque
-from gaident.diagnosis.gains import IN_SAMPLE, SHARE, free_run_errors
-from gaident.diagnosis.records.hygiene import cleaned, outliers
 from gaident.errors import GaidentError
 from gaident.files import write_whole
 from gaident.identification.frequency import response_of
-from gaident.models.model import Model
+from gaident.reporting.runs import run_of
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.show.report.page import page
-from gaident.show.report.views import Run, View
+from gaident.show.report.views import View
 from gaident.show.wording import unit
 from gaident.version import version
 
@@ -72,7 +66,7 @@ def view_of(result: Diagnosis | Identification, records: Records, validation: Re
     given = _records(records, result.records, "records")
     held = _records(validation, result.validation_records if isinstance(result, Diagnosis) else (), "validation")
     known = {r.digest for r in given}
-    runs = [_run(result, rec) for rec in (*given, *(r for r in held if r.digest not in known))]
+    runs = [run_of(result, rec) for rec in (*given, *(r for r in held if r.digest not in known))]
     fitted = [rec for rec in given if rec.digest in result.digests] or list(given)
     longest = max(fitted, key=len, default=None)
     curve = response = None
@@ -94,69 +88,6 @@ def _records(given: Records, own: Sequence[Record], name: str) -> tuple[Record, 
     if not isinstance(chosen, Sequence) or not all(isinstance(r, Record) for r in chosen):
         raise GaidentError(f"{name} is {type(given).__name__}: give a gaident.Record or a list of them")
     return tuple(chosen)
-
-
-def _run(result: Diagnosis | Identification, rec: Record) -> Run:
-    """One record and what the models make of it."""
-    controller = result.controller
-    linear: Model = result.model.linear if isinstance(result, Diagnosis) else result.model
-    used = "fitted" if rec.digest in result.digests else "new"
-    notes: list[str] = []
-    extended = held_from = None
-    if isinstance(result, Diagnosis):
-        if rec.digest in result.validation_digests:
-            used, held_from = "held out", 0
-        elif used == "fitted" and not result.validation_digests and result.held_out != IN_SAMPLE:
-            held_from = int(SHARE * len(rec))
-        before = _free_run(result.identification.model, rec, controller, "linear", notes)
-        if result.model.effects:
-            extended = _free_run(result.model, rec, controller, "extended", notes)
-    else:
-        before = _finite(result.simulate(rec), rec, "linear", notes)
-    torque = replay(rec, controller).torque
-    dhat, std = None, 0.0
-    try:
-        hit = outliers(rec.velocity, rec.velocity - before if np.all(np.isfinite(before)) else None)
-        missing = missing_torque(linear, cleaned(rec, hit), controller, torque)
-        dhat, std = missing.dhat, float(np.median(missing.std))
-    except GaidentError as error:
-        notes.append(f"The missing torque cannot be worked out: {error}")
-    return Run(
-        name=rec.name,
-        digest=rec.digest,
-        used=used,
-        time=rec.time,
-        measured=rec.velocity,
-        position=position_of(rec),
-        linear=before,
-        command=rec.command,
-        torque=torque,
-        torque_logged=rec.torque is not None,
-        extended=extended,
-        dhat=dhat,
-        std=std,
-        held_from=held_from,
-        notes=tuple(notes),
-    )
-
-
-def _free_run(model: Model, rec: Record, controller: PI | None, what: str, notes: list[str]) -> Vector:
-    (error,) = free_run_errors(model, [(rec, 0)], controller)
-    return _finite(rec.velocity - error, rec, what, notes)
-
-
-def _finite(velocity: Vector, rec: Record, what: str, notes: list[str]) -> Vector:
-    """Without what would leave every picture: from where a simulation runs away it is a gap."""
-    limit = 1e3 * float(np.abs(rec.velocity).max() or 1.0)
-    with np.errstate(invalid="ignore"):
-        away = ~(np.abs(velocity) <= limit)
-    if not np.any(away):
-        return velocity
-    first = int(np.argmax(away))
-    notes.append(f"The free run of the {what} model runs away at {first * rec.dt:.4g} s; it is drawn up to there.")
-    out = velocity.copy()
-    out[first:] = np.nan
-    return out
 
 
 def _made_with() -> dict[str, str]:

@@ -18,7 +18,6 @@ _OVERLAP = 0.3  # of the shorter signal, at least
 _LONGEST = 1 << 15  # samples of the coarse search
 _CANDIDATES = 4
 _RATES = 31
-_ROUNDS = 30
 
 
 @dataclass(frozen=True)
@@ -122,11 +121,12 @@ def _peaks(strong: Vector) -> NDArray[np.intp]:
 def refine(
     x: Vector, dt: float, y: Vector, their_dt: float, offset: float, rate: float, max_rate: float, free_rate: bool = True
 ) -> Fit | None:
-    """Least squares in offset, rate, scale and zero, from where the correlation led: Gauss-Newton, steps halved.
+    """Least squares in offset, rate, scale and zero, from where the correlation led.
 
     None where the logs do not overlap. The offset stays within the width of the correlation's peak, the rate below max_rate.
     """
     from scipy.interpolate import CubicSpline
+    from scipy.optimize import least_squares
 
     # Noise of x would pass for motion of its own: both are looked at in the band that they share.
     band = _shared_band(x, dt, y, their_dt, offset, rate)
@@ -145,31 +145,34 @@ def refine(
     at, rho = offset + (1.0 + rate) * centre, rate  # the time axis at the centre, which the rate hardly moves
     low, high = at - width, at + width
 
-    def residual(at: float, rho: float) -> tuple[Vector, Vector, float]:
-        t = at + (1.0 + rho) * (s - centre)
-        basis = np.column_stack([spline(t), np.ones(len(t))])
-        linear = np.linalg.lstsq(basis, z, rcond=None)[0]
-        J = np.column_stack([linear[0] * slope(t), linear[0] * slope(t) * (s - centre), basis])
-        return z - basis @ linear, J if free_rate else np.delete(J, 1, axis=1), float(linear[0])
+    def model(p: Vector) -> Vector:
+        moved, scale, zero = p[:-2], p[-2], p[-1]
+        t = moved[0] + (1.0 + (moved[1] if free_rate else rho)) * (s - centre)
+        return np.asarray(scale * spline(t) + zero)
 
-    e, J, gain = residual(at, rho)
-    for _ in range(_ROUNDS):
-        step = np.linalg.lstsq(J / (norms := np.linalg.norm(J, axis=0) + 1e-300), e, rcond=1e-12)[0] / norms
-        size = 1.0
-        while size > 1e-4:
-            new_at = float(np.clip(at + size * step[0], low, high))
-            new_rho = float(np.clip(rho + size * step[1], -max_rate, max_rate)) if free_rate else rho
-            tried = residual(new_at, new_rho)
-            if tried[0] @ tried[0] <= e @ e:
-                break
-            size *= 0.5
-        else:
-            break
-        at, rho = new_at, new_rho
-        gained = 1.0 - (tried[0] @ tried[0]) / max(float(e @ e), 1e-300)
-        e, J, gain = tried
-        if gained < 1e-10:
-            break
+    def slopes(p: Vector) -> Vector:
+        t = p[0] + (1.0 + (p[1] if free_rate else rho)) * (s - centre)
+        along = p[-2] * slope(t)
+        columns = [along, along * (s - centre)] if free_rate else [along]
+        return np.column_stack([*columns, spline(t), np.ones(len(t))])
+
+    basis = np.column_stack([spline(at + (1.0 + rho) * (s - centre)), np.ones(len(s))])
+    scale, zero = np.linalg.lstsq(basis, z, rcond=None)[0].tolist()
+    moved = [(at, low, high), (rho, -max_rate, max_rate)] if free_rate else [(at, low, high)]
+    start, lowest, highest = np.array([*moved, (scale, -np.inf, np.inf), (zero, -np.inf, np.inf)]).T
+    found = least_squares(
+        lambda p: model(p) - z,
+        np.clip(start, lowest, highest),
+        slopes,
+        (lowest, highest),
+        method="dogbox",
+        x_scale="jac",
+        ftol=1e-10,
+        xtol=1e-14,
+    )
+    p = found.x
+    at, rho, gain = float(p[0]), float(p[1]) if free_rate else rho, float(p[-2])
+    e, J = z - model(p), slopes(p)
     cov, independent = _sandwich(J, e)
     rate_std = float(np.sqrt(cov[1, 1])) if free_rate else 0.0
     to_start = np.array([1.0, -centre]) if free_rate else np.array([1.0])

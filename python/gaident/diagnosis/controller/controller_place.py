@@ -76,10 +76,16 @@ def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: P
     if controller is None or any(r.torque is None or r.command is None for r in recorded):
         return tuple(cleaned)
     pairs = [
-        (r, c) if r is c else min((r, c), (c, r), key=lambda pair: replay(pair[0], controller).rms)
+        (r, c) if r is c else min((r, c), (c, r), key=lambda pair: _replay_error(pair[0], controller))
         for r, c in zip(recorded, cleaned, strict=True)
     ]
     return tuple(best for best, _ in pairs)
+
+
+def _replay_error(rec: Record, controller: PI) -> float:
+    """Mean square of logged minus replayed torque [(N m)^2]."""
+    assert rec.command is not None and rec.torque is not None
+    return float(np.mean((rec.torque - pi_torque(rec.command, rec.velocity, rec.dt, controller)) ** 2))
 
 
 def controller_findings(driven: Driven, scales: Scales) -> tuple[list[Finding], AtController, list[str]]:

@@ -47,6 +47,13 @@ class Explanation:
         return (logged - self.torque)[self.edge : len(logged) - self.edge]
 
 
+class _Gains(NamedTuple):
+    """Gains as a fit gives them, of either sign: those of a PI are not negative."""
+
+    kp: float  # N m s/rad
+    ki: float  # N m/rad
+
+
 class _Case(NamedTuple):
     """What every reason is tried on."""
 
@@ -83,20 +90,20 @@ def rounded_command(off: Vector, command: Vector, dt: float, controller: PI) -> 
 
         off(n) - off(n-1) = (kp + h) d(n) - (kp - h) d(n-1)
     """
-    h = 0.5 * controller.ki * dt
-    if controller.kp <= h or controller.limited:
+    if controller.kp <= 0.5 * controller.ki * dt or controller.limited:
         return False
-    d = _error_of(off, controller.kp, h)
+    d = _error_of(off, controller, dt)
     return float(np.abs(d).max()) <= ROUNDED * float(np.abs(command).max())
 
 
-def _error_of(torque: Vector, kp: float, h: float) -> Vector:
+def _error_of(torque: Vector, controller: PI, dt: float) -> Vector:
     """The control error e [rad/s] that makes this torque u [N m], h = ki dt/2:
 
         (kp + h) e(n) = (kp - h) e(n-1) + u(n) - u(n-1)
 
     Both are 0 before the record.
     """
+    kp, h = controller.kp, 0.5 * controller.ki * dt
     rise = np.array([1.0, -1.0]) / (kp + h)
     decay = np.array([1.0, (h - kp) / (kp + h)])
     error: Vector = filtered(rise, decay, torque[None, :], [len(torque)])[0]
@@ -196,10 +203,9 @@ def _rate(case: _Case) -> Iterator[Explanation]:
 
     moves with the slope of the limit where it is not the logged one.
     """
-    kp, h = case.controller.kp, 0.5 * case.controller.ki * case.dt
-    if kp <= h or case.controller.limited:
+    if case.controller.kp <= 0.5 * case.controller.ki * case.dt or case.controller.limited:
         return
-    seen = _error_of(case.logged, kp, h) + case.velocity
+    seen = _error_of(case.logged, case.controller, case.dt) + case.velocity
     behind = np.abs(seen - case.command)[1:] > 1e-3 * float(np.abs(case.command).max())
     slopes = np.abs(np.diff(seen))[behind] / case.dt
     if len(slopes) == 0:
@@ -238,15 +244,13 @@ def _fitted(case: _Case) -> Iterator[Explanation]:
                 continue
             solved = np.linalg.lstsq(table[used] / sizes, case.logged[used], rcond=1e-12)[0] / sizes
             torque = np.clip(table @ solved, -top, top)
-            kp, start = float(solved[0]), float(solved[-1])
-            ki = float(solved[1]) if case.controller.ki else 0.0
-            yield _named(case.controller, kp, ki, case.dt, start, shift, share, torque)
+            gains = _Gains(float(solved[0]), float(solved[1]) if case.controller.ki else 0.0)
+            yield _named(case.controller, gains, case.dt, float(solved[-1]), shift, share, torque)
 
 
-def _named(
-    controller: PI, kp: float, ki: float, dt: float, start: float, shift: int, share: float, torque: Vector
-) -> Explanation:
+def _named(controller: PI, gains: _Gains, dt: float, start: float, shift: int, share: float, torque: Vector) -> Explanation:
     """Says what of a fitted controller differs from the configured one."""
+    kp, ki = gains
     differs, cause, value = [], "", np.nan
     if shift:
         age = "older" if shift > 0 else "newer"

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.experiments.triggers import Motion, not_testable, one_sided
 from gaident.errors import RecordError
+from gaident.models.drive_torque import torque_of
 from gaident.models.model import Model
 from gaident.models.starts import noise_std
 
@@ -119,7 +119,7 @@ def position_of(rec: Record) -> Vector:
 
 def _motion(rec: Record, controller: PI | None, top: float) -> Motion:
     w = rec.velocity
-    u = replay(rec, controller).torque
+    u = torque_of(rec, controller)
     floor = max(6.0 * noise_std(w), 1e-3 * top, 1e-300)
     smooth = _smoothed(w, max(5, len(w) // 400))
     moving = np.abs(smooth) > floor

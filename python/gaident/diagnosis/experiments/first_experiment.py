@@ -13,7 +13,7 @@ is kept free in any case.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 from gaident.checks import real_number
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.experiments.commands import largest_jump
 from gaident.diagnosis.experiments.excitation import position_of
 from gaident.diagnosis.experiments.menu import MENU, Bench, Builder, prbs_moving, reversals, slow_stairs, speed_ladder, steps
 from gaident.errors import SettingsError
+from gaident.models.drive_torque import torque_of
 from gaident.results.experiment import Limits, Proposal, swept
 
-__all__ = ["Limits", "MenuItem", "Proposal", "candidate_commands", "first_experiment", "limits_of", "separation"]
+__all__ = ["Limits", "MenuItem", "Proposal", "candidate_commands", "first_experiment", "limits_of"]
 
 Vector = NDArray[np.float64]
 
@@ -114,23 +114,12 @@ def candidate_commands(dt: float, limits: Limits, inertia: float | None = None, 
     return [MenuItem(name, _within(_filled(build, bench), bench), dt, effects, why) for name, build, effects, why in MENU]
 
 
-def separation(
-    command: Vector, simulate: Callable[[Vector], Vector], refit: Callable[[Vector, Vector], Vector], noise: float
-) -> float:
-    """chi2 that the rival leaves: simulate(command) is what one explanation predicts [rad/s], refit(command, velocity) the
-    other's velocity after it has been fitted to that, base parameters included; noise [rad/s].
-    """
-    velocity = simulate(command)
-    off = (refit(command, velocity) - velocity) / noise
-    return float(off @ off)
-
-
 def limits_of(records: Record | Sequence[Record], controller: PI | None = None) -> Limits:
     """What records show to be allowed, see `Limits.of`."""
     listed = [records] if isinstance(records, Record) else list(records)
     asked = [rec.velocity if rec.command is None else rec.command for rec in listed]
     travel = max((float(np.ptp(position_of(rec))) for rec in listed), default=0.0)
-    torque = max((float(np.abs(replay(rec, controller).torque).max()) for rec in listed), default=0.0)
+    torque = max((float(np.abs(torque_of(rec, controller)).max()) for rec in listed), default=0.0)
     if controller is not None and controller.torque_limit is not None:
         torque = controller.torque_limit
     return Limits(

@@ -23,9 +23,9 @@ from gaident.checks import real_number
 from gaident.control.filtering import recursion
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.state_space import Discretised, discretised, steady_covariance
 from gaident.errors import ModelError, RecordError
+from gaident.models.drive_torque import torque_of
 from gaident.models.model import Model
 
 __all__ = ["MissingTorque", "missing_torque"]
@@ -77,7 +77,7 @@ def missing_torque(
     Raises ModelError for p = 0 outside the continuous loop, for a model that shows no torque at standstill (a zero at 0) and for
     deviations <= 0, RecordError where torque is missing or of another length.
     """
-    u = replay(rec, controller).torque if torque is None else np.asarray(torque, dtype=np.float64)
+    u = torque_of(rec, controller) if torque is None else np.asarray(torque, dtype=np.float64)
     if u.shape != rec.velocity.shape:
         raise RecordError(f"torque has the shape {u.shape}, the record has {len(rec)} samples: give one number per sample")
     for name, value in (("noise", noise), ("walk", walk)):
