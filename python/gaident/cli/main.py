@@ -49,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return code
     except GaidentError as error:
-        return _failed(2, in_options(str(error)))
+        return _failed(2, in_options(error))
     except KeyboardInterrupt:
         return _failed(130, "interrupted")
     except BrokenPipeError:

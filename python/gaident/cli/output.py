@@ -5,11 +5,9 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gaident.cli.remedies import in_options
 from gaident.errors import SettingsError
 from gaident.files import write_whole
 
@@ -117,7 +115,7 @@ def summary_of(idn: Identification, axis: str) -> str:
     """The summary, its remedies as options."""
     from gaident.show.summary import identification_summary
 
-    return identification_summary(replace(idn, warnings=tuple(in_options(w) for w in idn.warnings)), axis)
+    return identification_summary(idn, axis)
 
 
 def draw(idn: Identification, records: Sequence[Record], axis: str, path: Path) -> None:

@@ -7,9 +7,11 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from gaident.arguments import NO_CONTROLLER, arg
 from gaident.checks import known_keys, one_of, real_number
 from gaident.errors import ControllerError
 
+PI_OF_GAINS = arg("controller", "PI(kp=..., ki=...)", python="PI(kp=..., ki=...)")
 LOOPS = ("sampled", "continuous")
 _NOT_GIVEN = float("nan")  # told from a given nan by identity
 
@@ -41,7 +43,7 @@ class PI:
         missing = [name for name in ("kp", "ki") if getattr(self, name) is _NOT_GIVEN]
         if missing:
             raise ControllerError(
-                f"PI lacks {' and '.join(missing)}: give PI(kp=..., ki=...), ki=0 for a proportional controller"
+                f"PI lacks {' and '.join(missing)}: give {PI_OF_GAINS}, {arg('ki', '0')} for a proportional controller"
             )
         for name in ("kp", "ki"):
             gain = real_number(getattr(self, name), name, ControllerError)
@@ -53,7 +55,7 @@ class PI:
             object.__setattr__(self, name, gain)
         if self.kp == 0.0 and self.ki == 0.0:
             raise ControllerError(
-                "kp and ki are both 0: such a controller never gives a torque; for an open loop use controller=None"
+                f"kp and ki are both 0: such a controller never gives a torque; for an open loop use {NO_CONTROLLER}"
             )
         object.__setattr__(self, "loop", one_of(self.loop, "loop", LOOPS, ControllerError))
         for name in ("torque_limit", "integrator_limit"):

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.arguments import arg
 from gaident.data.assemble import assemble
 from gaident.data.formats.binary import read_mat, read_npz
 from gaident.data.formats.delimited import TextOptions, open_text
@@ -191,7 +192,7 @@ def open_log(source: str | os.PathLike[str] | Any, options: TextOptions) -> Iter
 def _only_for_text(shown: str, form: str, options: TextOptions) -> None:
     given = [key for key, value in vars(options).items() if value is not None]
     if given:
-        raise ReadError(f"{given[0]}= is for text tables, but {shown} is {form}; leave {given[0]} out")
+        raise ReadError(f"{arg(given[0])} is for text tables, but {shown} is {form}; leave {given[0]} out")
 
 
 def _file(path: str | os.PathLike[str]) -> tuple[Path, str]:

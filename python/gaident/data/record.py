@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gaident.arguments import arg
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number
 from gaident.data.signals.decimation import decimated, factor_of
 from gaident.errors import RecordError, check_schema
@@ -86,7 +87,7 @@ class Record:
                 f"the channels have unequal lengths ({listed} samples); cut them to the same samples, "
                 "or, where they come from two clocks, bring two records together with align"
             )
-        sample_time = positive_number(dt, "dt", "s", "give the sample time in seconds, for example dt=1e-3")
+        sample_time = positive_number(dt, "dt", "s", f"give the sample time in seconds, for example {arg('dt', '1e-3')}")
         self._fill(sample_time, channels, str(name))
 
     def _fill(self, dt: float, channels: dict[str, NDArray[np.float64] | None], name: str) -> None:

@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from gaident.arguments import arg
 from gaident.data.formats.table import Column, Table
 from gaident.data.formats.units import QUANTITIES, Constants, factor, is_any_unit
 from gaident.data.record import CHANNELS
@@ -36,13 +37,15 @@ class Wanted:
         """Itself, once what can be judged without the file is right; else ReadError or RecordError."""
         for argument, value in (("columns", self.columns), ("units", self.units)):
             if value is not None and not isinstance(value, Mapping):
-                raise ReadError(f"{argument}={value!r} is no mapping; give for example {argument}={{'velocity': ...}}")
+                raise ReadError(
+                    f"{arg(argument, repr(value))} is no mapping; give for example {arg(argument, '...', 'velocity')}"
+                )
             _known(argument, value or ())
         self.constants.check()
         for quantity, unit in self.units.items():
             factor(quantity, unit, self.constants)
         if self.dt is not None:
-            positive_number(self.dt, "dt", "s", "give the sample time in seconds, for example dt=1e-3")
+            positive_number(self.dt, "dt", "s", f"give the sample time in seconds, for example {arg('dt', '1e-3')}")
         factor_of(self.decimate)
         if self.resample is not None:
             positive_number(self.resample, "resample", "s", "give the sample time of the even axis in seconds")
@@ -62,8 +65,9 @@ class Wanted:
         if bool(self.load_side) != (self.gear_ratio is not None):
             given, lacking = ("load_side", "gear_ratio") if self.load_side else ("gear_ratio", "load_side")
             raise ReadError(
-                f"{given} is given without {lacking}: give both or none, gear_ratio=... the turns of the motor per turn of "
-                "the load, load_side=... the channels that were measured behind the gear"
+                f"{given} is given without {lacking}: give both or none, {arg('gear_ratio', '...')} the turns of the motor "
+                "per turn of "
+                f"the load, {arg('load_side', '...')} the channels that were measured behind the gear"
             )
 
 
@@ -78,8 +82,8 @@ def si_factor(table: Table, wanted: Wanted, quantity: str, column: Column) -> fl
     except ReadError as error:
         known = "" if is_any_unit(column.unit) else ", which is not known"
         raise ReadError(
-            f"{table.path}: column {column.key!r} says its unit is {column.unit!r}{known}: {error}; "
-            f"or give units={{{quantity!r}: ...}}, which counts before the file's"
+            f"{table.path}: column {column.key!r} says its unit is {column.unit!r}{known}: {error.marked}; "
+            f"or give {arg('units', '...', quantity)}, which counts before the file's"
         ) from None
 
 

@@ -268,7 +268,7 @@ def read_drive_file(path: str) -> dict[str, dict[str, Any]]:
             try:
                 values[key] = KEYS[name][key](value, key)
             except ReadError as error:
-                raise ReadError(f"{where}{error}") from None
+                raise ReadError(f"{where}{error.marked}") from None
     return sections
 
 

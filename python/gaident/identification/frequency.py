@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.arguments import TORQUE
 from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_torque
 from gaident.data.record import Record
@@ -75,7 +76,7 @@ def measured_response(rec: Record, controller: PI | None = None) -> FrequencyRes
     torque = rec.torque
     if torque is None:
         if controller is None or rec.command is None:
-            raise RecordError("the record has no torque, and no controller to make it from: give Record(torque=...) or PI(...)")
+            raise RecordError(f"the record has no torque, and no controller to make it from: give {TORQUE} or PI(...)")
         torque = pi_torque(rec.command, rec.velocity, rec.dt, controller)
     if _constant(torque):
         raise RecordError("the torque never changes, so that it excites no frequency; use a record whose torque changes")

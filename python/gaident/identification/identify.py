@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
+from gaident.arguments import A_CONTROLLER, COMMAND, CONTINUOUS_LOOP, NO_CONTROLLER, TORQUE, arg
 from gaident.control import core
 from gaident.control.pi import PI
 from gaident.data.record import Record
@@ -99,7 +100,7 @@ def identify(
     best, scored = work.select(found)
     result = work.report(best, scored, found, int(seed))
     if derived and not settings.species:
-        warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give space=SearchSpace(...)."
+        warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
         object.__setattr__(result, "warnings", (*result.warnings, warning))
     overflows = sum(t.overflows for t in found)
     if overflows:
@@ -341,13 +342,13 @@ def _checked_records(rec: Record | Sequence[Record], controller: PI | None) -> l
         where = f"record {i} ({r.name})" if r.name else f"record {i}"
         if controller is not None and r.command is None:
             raise RecordError(
-                f"{where} has no command, which drives the loop with a controller: give Record(command=...), or "
-                "controller=None to identify from torque to velocity"
+                f"{where} has no command, which drives the loop with a controller: give {COMMAND}, or "
+                f"{NO_CONTROLLER} to identify from torque to velocity"
             )
         if controller is None and r.torque is None:
             raise RecordError(
-                f"{where} has no torque, which drives the model in open loop: give Record(torque=...), or "
-                "controller=PI(...) to identify in closed loop"
+                f"{where} has no torque, which drives the model in open loop: give {TORQUE}, or "
+                f"{A_CONTROLLER} to identify in closed loop"
             )
     return records
 
@@ -379,7 +380,7 @@ def _checked_space(space: SearchSpace, controller: PI | None) -> SearchSpace:
         if space.p[1] < 1:
             raise SpaceError(
                 f"p is {space.p!r}: with a held torque the plant needs at least one pole more than zeros; "
-                "use p=(1, 3), or PI(..., loop='continuous')"
+                f"use {arg('p', '(1, 3)')}, or {CONTINUOUS_LOOP}"
             )
         return replace(space, p=(1, space.p[1]))
     return space

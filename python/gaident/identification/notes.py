@@ -72,7 +72,7 @@ def open_loop_notes(records: Sequence[Record], controller: PI | None) -> list[st
         return []
     return [
         "The log has a command, but no gains were given: its torque drives the model, and noise that goes through the loop "
-        "biases the result; give controller=PI(...)."
+        "biases the result; give the gains of the controller."
     ]
 
 

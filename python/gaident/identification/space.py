@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.arguments import arg
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import SpaceError
@@ -61,7 +62,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
         if still:
             raise SpaceError(
                 f"the {what} of the record is constant: nothing can be identified from it; use a record in which the "
-                "drive moves, or give space=SearchSpace(...)"
+                f"drive moves, or give {arg('space', 'SearchSpace(...)')}"
             )
     rigid = float(np.linalg.solve(gram, right)[0]) if np.linalg.cond(gram) < 1e14 else 0.0
     found = [k for k in (rigid, steps / energy) if np.isfinite(k) and k > 0.0]
@@ -73,7 +74,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
     if not found:
         raise SpaceError(
             "the velocity falls when the torque rises: reverse the sign of one of them (for example by a unit of -1), "
-            "or give space=SearchSpace(gain=...)"
+            f"or give {arg('space', 'SearchSpace(gain=...)')}"
         )
     dt = min(rec.dt for rec in records)
     longest = max(rec.duration for rec in records)
@@ -109,9 +110,9 @@ def _check_scales(records: Sequence[Record], controller: PI | None, only_certain
     rpm = next((name for name, rate in (("command", 9.549), ("velocity", 1 / 9.549)) if 0.8 < factor / rate < 1.25), None)
     if 1.0 / 3.0 <= factor <= 3.0 or (only_certain and rpm is None and factor > 3.0):
         return
-    hint = "they are in different units: give units={'command': ...} or units={'velocity': ...}"
+    hint = f"they are in different units: give {arg('units', '...', 'command')} or {arg('units', '...', 'velocity')}"
     if rpm:
-        hint = f"the {rpm} seems to be in rpm, the other in rad/s: give units={{'{rpm}': 'rpm'}}"
+        hint = f"the {rpm} seems to be in rpm, the other in rad/s: give {arg('units', repr('rpm'), rpm)}"
     raise SpaceError(f"the command is {factor:.3g} times the velocity all along: {hint}")
 
 

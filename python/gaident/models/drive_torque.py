@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.arguments import TORQUE
 from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_block
 from gaident.data.record import Record
@@ -30,9 +31,7 @@ def torque_of(rec: Record, controller: PI | None) -> Vector:
 def torque_blocks(rec: Record, controller: PI | None, length: int = 1 << 18) -> Iterator[tuple[int, Vector, Vector]]:
     """(first sample, torque [N m], velocity [rad/s]) a block at a time: of a long record no copy is made."""
     if rec.torque is None and (controller is None or rec.command is None):
-        raise RecordError(
-            "the record has no torque and nothing to make it from: give Record(torque=...), or a command and PI(...)"
-        )
+        raise RecordError(f"the record has no torque and nothing to make it from: give {TORQUE}, or a command and PI(...)")
     integral = last = 0.0
     for first in range(0, len(rec), length):
         w = rec.velocity[first : first + length]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident import _core
+from gaident.arguments import CONTINUOUS_LOOP
 from gaident.checks import known_keys, real_number
 from gaident.control import core
 from gaident.control.pi import PI
@@ -320,7 +321,7 @@ def require_strictly_proper(p: int, controller: PI | None) -> None:
         where = "the sampled loop" if controller is not None else "an open loop"
         raise ModelError(
             f"the model has p = 0 (as many zeros as poles), which does not exist in {where}: "
-            'use a model with more poles than zeros, or PI(..., loop="continuous")'
+            f"use a model with more poles than zeros, or {CONTINUOUS_LOOP}"
         )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident import _core
+from gaident.arguments import A_CONTROLLER, COMMAND, NO_CONTROLLER, TORQUE
 from gaident.checks import one_of
 from gaident.control import core
 from gaident.control.pi import PI
@@ -312,13 +313,13 @@ def _input_for(p: int, rec: Record, controller: PI | None) -> tuple[Signal, str]
         if rec.command is None:
             raise RecordError(
                 "the record has no command, which drives the loop with a controller: give "
-                "Record(command=...), or controller=None to drive the model with the torque"
+                f"{COMMAND}, or {NO_CONTROLLER} to drive the model with the torque"
             )
         return np.ascontiguousarray(rec.command, dtype=np.float64), "command"
     if rec.torque is None:
         raise RecordError(
             "the record has no torque, which drives the model without a controller: give "
-            "Record(torque=...), or controller=PI(...) to drive the loop with the command"
+            f"{TORQUE}, or {A_CONTROLLER} to drive the loop with the command"
         )
     return np.ascontiguousarray(rec.torque, dtype=np.float64), "torque"
 

@@ -48,8 +48,9 @@ def doubtful_start(rec: Record, controller: PI | None) -> str | None:
     name = f"Record {rec.name}" if rec.name else "The record"
     return (
         f"{name} starts at {rec.velocity[0]:.4g} rad/s while its input never changes: taken as a step from rest at its "
-        "first sample. "
-        "If the step came earlier, give the record from before it; if the drive is not a digital one, give loop='continuous'."
+        "first sample. If the step came earlier, give the record from before it; if the drive is not a digital one, "
+        "give its loop "
+        "as continuous."
     )
 
 

@@ -54,7 +54,7 @@ def load(path: str | os.PathLike[str]) -> Saved:
     try:
         return reader(decoded(data))
     except GaidentError as error:
-        raise GaidentError(f"{path}: {error}") from error
+        raise GaidentError(f"{path}: {error.marked}") from error
 
 
 def schema() -> dict[str, Any]:

@@ -9,7 +9,6 @@ from gaident.cli.commands.report import write_report
 from gaident.cli.drive import drive_of, read_all
 from gaident.cli.options import PICTURES
 from gaident.cli.output import apart, naming, print_json, proposal_csv, save_figure, target_of, write
-from gaident.cli.remedies import in_options
 from gaident.diagnosis.diagnose import diagnose
 from gaident.errors import SettingsError
 from gaident.identification.space import derive_space
@@ -67,7 +66,7 @@ def diagnose_command(args: argparse.Namespace) -> None:
     if args.json:
         print_json(dia.to_dict())
         return
-    print(in_options(dia.summary(drive.axis)))
+    print(dia.summary(drive.axis))
     if following is not None and following not in written:
         print(f"\nnot written: {following}, as there is no next experiment to propose")
     if written:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from gaident.cli.drive import drive_of
 from gaident.cli.output import print_json, target_of, write
-from gaident.cli.remedies import in_options
 from gaident.data.record import Record
 from gaident.errors import GaidentError
 from gaident.reporting.report import report_page
@@ -23,11 +21,7 @@ __all__ = ["report_command", "write_report"]
 def write_report(
     result: Diagnosis | Identification, target: Path, records: Sequence[Record], validation: Sequence[Record], axis: str
 ) -> int:
-    """The page, its remedies as options; returns its size [bytes]."""
-    if isinstance(result, Diagnosis):
-        result = replace(result, notes=tuple(map(in_options, result.notes)))
-    else:
-        result = replace(result, warnings=tuple(map(in_options, result.warnings)))
+    """The page; returns its size [bytes]."""
     page = report_page(result, records, validation, axis).encode()
     write(target, page)
     return len(page)

@@ -82,7 +82,7 @@ def _load_model(path: str) -> tuple[AnyModel, PI | None, dict[str, tuple[float, 
     try:
         known = mechanics_from_dict(data) if isinstance(data, dict) and "structure" in data else Model.from_dict(data)
     except GaidentError as error:
-        raise SettingsError(f"{path}: {error}") from None
+        raise SettingsError(f"{path}: {error.marked}") from None
     return known, None, {}
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gaident.arguments import arg
 from gaident.data.formats.cells import ROWS, numbers_of
 from gaident.data.formats.dialect import Dialect, detect
 from gaident.data.formats.exports import END_MARK, refined, scope_layout
@@ -50,14 +51,14 @@ class TextOptions:
             delimiter = _WORDS.get(delimiter, delimiter) if isinstance(delimiter, str) else ""
             if len(delimiter) != 1 or delimiter in '\n\r".+-' or delimiter.isalnum():
                 raise ReadError(
-                    f"delimiter={self.delimiter!r} cannot stand between columns; give ',', ';', 'tab', 'space' or '|'"
+                    f"{arg('delimiter', repr(self.delimiter))} cannot stand between columns; give ',', ';', 'tab', 'space' or '|'"
                 )
         if self.decimal not in (None, ".", ","):
-            raise ReadError(f"decimal={self.decimal!r} is no decimal mark; give '.' or ','")
+            raise ReadError(f"{arg('decimal', repr(self.decimal))} is no decimal mark; give '.' or ','")
         if self.skip is not None and (isinstance(self.skip, bool) or not isinstance(self.skip, int) or self.skip < 0):
-            raise ReadError(f"skip={self.skip!r} is no number of lines; give a whole number from 0")
+            raise ReadError(f"{arg('skip', repr(self.skip))} is no number of lines; give a whole number from 0")
         if self.encoding is not None and not isinstance(self.encoding, str):
-            raise ReadError(f"encoding={self.encoding!r} is no text; give for example 'utf-8' or 'latin-1'")
+            raise ReadError(f"{arg('encoding', repr(self.encoding))} is no text; give for example 'utf-8' or 'latin-1'")
         return TextOptions(delimiter, self.decimal, self.skip, self.encoding)
 
 
@@ -132,7 +133,10 @@ def _layout(path: str, everything: Sequence[str], options: TextOptions) -> tuple
     if comments:
         lines = [line for line in lines if not COMMENT.match(line[1])]
     if not lines:
-        raise ReadError(f"{path}: no line is left after skip={skip} and comments; give a smaller skip=, or a log with data")
+        raise ReadError(
+            f"{path}: no line is left after {arg('skip', repr(skip))} and comments; give a smaller {arg('skip')}, or a "
+            "log with data"
+        )
     scope = scope_layout(lines) if options.delimiter is None and options.decimal is None else None
     if scope is not None:
         dialect, header = scope
@@ -168,7 +172,7 @@ def _blocks(path: str, file: Path, encoding: str, start: int) -> Iterator[tuple[
         except UnicodeError as error:
             raise ReadError(
                 f"{path}, after line {numbers[-1] if numbers else start}: the text is damaged or no {encoding} "
-                f"({first_line(error)}); give its encoding=, for example 'latin-1'"
+                f"({first_line(error)}); give its {arg('encoding')}, for example 'latin-1'"
             ) from None
         if body:
             check_text(path, body, numbers[0])

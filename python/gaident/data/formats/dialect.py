@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from gaident.arguments import arg
 from gaident.data.formats.text import Line
 from gaident.errors import ReadError
 
@@ -90,10 +91,10 @@ def detect(path: str, lines: Sequence[Line], delimiter: str | None, decimal: str
                 best, best_score = candidate, score
     if best is None:
         line, text = half[0]
-        options = f" with delimiter={delimiter!r}, decimal={decimal!r}" if delimiter or decimal else ""
+        options = f" with {arg('delimiter', repr(delimiter))}, {arg('decimal', repr(decimal))}" if delimiter or decimal else ""
         raise ReadError(
             f"{path}, line {line}: no table of numbers was found{options}, this line reads {_short(text)!r}; "
-            f"give delimiter= and decimal= as the log is written, or export it as a plain table"
+            f"give {arg('delimiter')} and {arg('decimal')} as the log is written, or export it as a plain table"
         )
     if best.delimiter == "," and best.decimal == "." and (delimiter is None or decimal is None):
         _refuse_two_meanings(path, lines, half, best)
@@ -152,8 +153,9 @@ def _refuse_two_meanings(path: str, lines: Sequence[Line], half: Sequence[Line],
         f"{path}, line {number}: commas stand between the columns and, it seems, inside the numbers too: "
         f"{_short(text)!r}; export the log with ';' between columns or with decimal points; if these are "
         "whole numbers, "
-        "give delimiter=',' and decimal='.', if it is one column with decimal commas, delimiter=';' and "
-        "decimal=','"
+        f"give {arg('delimiter', repr(','))} and {arg('decimal', repr('.'))}, if it is one column with decimal "
+        f"commas, {arg('delimiter', repr(';'))} and "
+        f"{arg('decimal', repr(','))}"
     )
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.arguments import arg
 from gaident.data.signals.arrays import first_not_finite
 from gaident.errors import ReadError
 
@@ -163,11 +164,12 @@ class Table:
         bad = first_not_finite(values.astype(np.float64, copy=False))
         if column.bad is not None and (bad is None or column.bad[0] <= bad):
             row, text = column.bad
+            apart = f", or, where channels have times of their own, put them on one axis with {arg('resample')} [s]"
             raise ReadError(
                 f"{self.path}, {self.place(row)}: {where} "
                 f"{'is empty' if not text else f'holds {text!r}, not a number'}"
                 f"{_comma_hint(text)}; correct or remove that {'line' if self.lines is not None else 'value'}"
-                f"{'' if text else ', or, where channels have times of their own, put them on one axis with resample= [s]'}"
+                f"{'' if text else apart}"
             )
         if bad is not None:
             raise ReadError(
@@ -230,14 +232,14 @@ class Table:
         return (
             f"{self.path}: there is no column {wanted!r} for {channel}{guess}; the file holds "
             f"{self.listing()}; "
-            f"name one of these in columns={{{channel!r}: ...}}, or give a number such as '#0' (zero based)"
+            f"name one of these in {arg('columns', '...', channel)}, or give a number such as '#0' (zero based)"
         )
 
 
 def _comma_hint(text: str) -> str:
     """What to say about a cell that would be a number with another decimal mark."""
     if re.fullmatch(r"[+-]?\d+,\d+([eE][+-]?\d+)?", text):
-        return " (a decimal comma? then give decimal=',')"
+        return f" (a decimal comma? then give {arg('decimal', repr(','))})"
     if re.fullmatch(r"[+-]?\d+\.\d+", text):
         return " (a point in a log with decimal commas? export it with one decimal mark and none for thousands)"
     if re.fullmatch(r"[+-]?\d{1,3}([.,' ]\d{3})+([.,]\d+)?", text):

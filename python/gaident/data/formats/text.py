@@ -6,6 +6,7 @@ import codecs
 import re
 from collections.abc import Sequence
 
+from gaident.arguments import arg
 from gaident.errors import ReadError
 
 __all__ = ["Line", "check_text", "encoding_of", "lines_of"]
@@ -46,7 +47,7 @@ def check_text(path: str, parts: Sequence[str], first: int = 1) -> None:
             raise ReadError(
                 f"{path}, line {line}: this is no text file (it holds the byte {ord(control[0]):#04x}), nor any other log "
                 "that read knows by its content; export the log as CSV, "
-                "or give encoding= if it is text of another encoding"
+                f"or give {arg('encoding')} if it is text of another encoding"
             )
 
 
@@ -56,7 +57,9 @@ def encoding_of(head: bytes, given: str | None) -> str:
         try:
             return codecs.lookup(given).name
         except LookupError:
-            raise ReadError(f"encoding={given!r} is not known to Python; give for example 'utf-8' or 'latin-1'") from None
+            raise ReadError(
+                f"{arg('encoding', repr(given))} is not known to Python; give for example 'utf-8' or 'latin-1'"
+            ) from None
     guessed = _guess(head)
     if guessed is None:
         try:
@@ -80,11 +83,13 @@ def _decode(path: str, raw: bytes, encoding: str | None) -> str:
     except (UnicodeDecodeError, UnicodeError) as error:
         raise ReadError(
             f"{path}: the text is damaged or no {guessed} ({error.__class__.__name__} at byte "
-            f"{getattr(error, 'start', 0)}); export the log again, or give its encoding=, for example "
+            f"{getattr(error, 'start', 0)}); export the log again, or give its {arg('encoding')}, for example "
             "'latin-1'"
         ) from None
     except LookupError:
-        raise ReadError(f"encoding={encoding!r} is not known to Python; give for example 'utf-8' or 'latin-1'") from None
+        raise ReadError(
+            f"{arg('encoding', repr(encoding))} is not known to Python; give for example 'utf-8' or 'latin-1'"
+        ) from None
 
 
 def _guess(raw: bytes) -> str | None:

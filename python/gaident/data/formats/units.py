@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gaident.arguments import arg
 from gaident.errors import ReadError
 
 __all__ = ["QUANTITIES", "Constants", "factor", "is_any_unit", "is_unit", "known_units", "needed_constant"]
@@ -126,7 +127,7 @@ class Constants:
                 continue
             number = _number(value)
             if number is None or not math.isfinite(number) or number <= 0:
-                raise ReadError(f"{name}={value!r}, but it must be a positive finite number; correct it or leave it out")
+                raise ReadError(f"{arg(name, repr(value))}, but it must be a positive finite number; correct it or leave it out")
 
 
 def known_units(quantity: str) -> tuple[str, ...]:
@@ -170,14 +171,14 @@ def factor(quantity: str, unit: str | float, constants: Constants | None = None)
     if row is None:
         raise ReadError(
             f"units: {unit!r} is no unit of {quantity}{_guess(quantity, unit)}; known are {listed}; "
-            f"or give the factor to SI as a number, units={{{quantity!r}: 0.5}}"
+            f"or give the factor to SI as a number, {arg('units', '0.5', quantity)}"
         )
     if row.constant is None:
         return row.factor
     name, meaning = row.constant
     value: float | None = getattr(constants, name)
     if value is None:
-        raise ReadError(f"units: {quantity} in {unit!r} needs a constant of the drive; give {name}=... {meaning}")
+        raise ReadError(f"units: {quantity} in {unit!r} needs a constant of the drive; give {arg(name, '...')} {meaning}")
     return row.factor / value if row.divide else row.factor * value
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gaident.arguments import arg
 from gaident.errors import RecordError
 
 __all__ = ["MINIMUM_SAMPLES", "channel", "first_not_finite", "positive_number"]
@@ -98,11 +99,11 @@ def positive_number(value: object, argument: str, unit: str, remedy: str) -> flo
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
-        raise RecordError(f"{argument}={value!r} is no number; {remedy}")
+        raise RecordError(f"{arg(argument, repr(value))} is no number; {remedy}")
     try:
         number = float(value)
     except OverflowError:
         number = math.inf
     if not (math.isfinite(number) and number > 0.0):
-        raise RecordError(f"{argument}={value!r} {unit}, but it must be positive and finite; {remedy}")
+        raise RecordError(f"{arg(argument, repr(value))} {unit}, but it must be positive and finite; {remedy}")
     return number

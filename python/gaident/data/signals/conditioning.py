@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gaident.arguments import arg
 from gaident.data.signals.arrays import channel, positive_number
 from gaident.errors import RecordError
 
@@ -32,7 +33,7 @@ def differentiate(position: ArrayLike, dt: float, cutoff_hz: float | None = None
     EMPS", 2019.
     """
     x = channel(position, "position")
-    dt = positive_number(dt, "dt", "s", "give the sample time in seconds, for example dt=1e-3")
+    dt = positive_number(dt, "dt", "s", f"give the sample time in seconds, for example {arg('dt', '1e-3')}")
     if cutoff_hz is not None:
         x = _low_pass(x, dt, cutoff_hz)
     # The edges stay one-sided: a second-order edge formula would amplify encoder noise there by 2.5.

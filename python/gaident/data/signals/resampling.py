@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.arguments import arg
 from gaident.errors import ReadError
 
 __all__ = ["GAP", "resampled"]
@@ -44,15 +45,18 @@ def resampled(
         median = float(np.median(steps))
         if dt > _COARSER * median:
             raise ReadError(
-                f"{path}: resample={dt:g} s is coarser than the log, whose {name} has steps of {median:g} s, and would fold high "
-                f"frequencies down; give resample={median:.4g} and decimate={max(2, round(dt / median))}"
+                f"{path}: {arg('resample', format(dt, 'g'))} s is coarser than the log, whose {name} has steps of {median:g} "
+                "s, and would fold high "
+                f"frequencies down; give {arg('resample', format(median, '.4g'))} and "
+                f"{arg('decimate', repr(max(2, round(dt / median))))}"
             )
         held[name] = (t, x)
         finest = min(finest, median)
     if dt * _FINER < finest:
         raise ReadError(
-            f"{path}: resample={dt:g} s is more than {_FINER:g} times finer than the log, whose steps are {finest:g} s: "
-            f"give seconds, for example resample={finest:.4g}"
+            f"{path}: {arg('resample', format(dt, 'g'))} s is more than {_FINER:g} times finer than the log, whose steps "
+            f"are {finest:g} s: "
+            f"give seconds, for example {arg('resample', format(finest, '.4g'))}"
         )
     start, stop = max(t[0] for t, _ in held.values()), min(t[-1] for t, _ in held.values())
     if stop <= start:

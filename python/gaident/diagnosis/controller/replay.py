@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.arguments import TORQUE
 from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_torque
 from gaident.data.record import Record
@@ -66,9 +67,7 @@ def replay(rec: Record, controller: PI | None) -> Replay:
     logged = rec.torque
     if controller is None or rec.command is None:
         if logged is None:
-            raise RecordError(
-                "the record has no torque and nothing to make it from: give Record(torque=...), or a command and PI(...)"
-            )
+            raise RecordError(f"the record has no torque and nothing to make it from: give {TORQUE}, or a command and PI(...)")
         why = "open loop, there is no controller" if controller is None else "the record has no command"
         return _unchecked(logged, None, f"The logged torque cannot be checked: {why}.")
     replayed = pi_torque(rec.command, rec.velocity, rec.dt, controller)

@@ -125,7 +125,7 @@ def propose(
         return None, notes
     names = tuple(dict.fromkeys(name for effect, rival in pairs for name in (effect, rival.effect)))
     if driven.controller is None or driven.command is None:
-        remedy = "give controller=PI(...), and a log with the velocity command"
+        remedy = "give the controller, and a log with the velocity command"
         return None, [*notes, f"Without a controller no command can be worked out that tells {_listed(names)} apart: {remedy}."]
     bench = _Bench(driven.controller, final.noise, max(final.cost / count, 1e-300), driven.torque_logged, elsewhere)
     items = menu(driven, final)

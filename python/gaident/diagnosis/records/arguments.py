@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from gaident.arguments import NO_CONTROLLER
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
@@ -43,7 +44,7 @@ def checked(
         raise SettingsError(f"identification is {type(idn).__name__}: give what identify() returned, or None")
     for r in (*records, *held):
         if controller is not None and r.command is None:
-            raise RecordError(f"record {r.name or '(without a name)'} has no command: give one, or controller=None for open loop")
+            raise RecordError(f"record {r.name or '(without a name)'} has no command: give one, or {NO_CONTROLLER} for open loop")
         if controller is None and r.torque is None:
             raise RecordError(f"record {r.name or '(without a name)'} has no torque: give one, or the controller that makes it")
     if len({r.dt for r in (*records, *held)}) > 1:
