@@ -63,21 +63,17 @@ def assess(s: Sums) -> Adequacy:
     power = float(s.products[0]) / total
     white_p = ljung_box_of(s.products[: white_lags(s.lengths) + 1], total)
     predictable = 1.0 - s.noise.std**2 / power if power > 0.0 else 0.0
-    p = _independence(s.white, s.unknowns, total - s.noise.order * len(s.lengths))
+    p = independence_p(s.white, s.unknowns, total - s.noise.order * len(s.lengths))
     excess = math.sqrt(power) / s.quiet if s.quiet > 0.0 else (0.0 if power == 0.0 else math.inf)
     falsified = p < LEVEL
     undecided = not falsified and white_p < LEVEL and excess > 2.0
     return Adequacy(white_p, s.noise.order, s.noise.std, max(predictable, 0.0), excess, p, falsified, undecided)
 
 
-def independence_p(v: Vector, own: Vector, extra: Vector, samples: int) -> float:
-    """p-value of the F-test that the rows `extra` explain nothing of v beyond the rows `own`; samples: degrees of freedom."""
-    rows = np.vstack([v, own, extra])
-    return _independence(rows @ rows.T, len(own), samples)
+def independence_p(sums: Vector, own: int, samples: int) -> float:
+    """p-value of the F-test that rows explain nothing of v beyond the rows `own`; samples: degrees of freedom.
 
-
-def _independence(sums: Vector, own: int, samples: int) -> float:
-    """The same from sums of products: of v first, then of `own` columns, then of the others.
+    sums: of products, of v first, then of `own` rows, then of the others.
 
     What `own` explains is taken out of the sums (a Schur complement); what is left of v is regressed on what is left of the
     others.
