@@ -73,9 +73,11 @@ def roots_chart(idn: Identification, hz: bool = False) -> Chart:
             if d > 0.0:
                 traces.append(Trace(np.array([xi - 2.0 * d, xi + 2.0 * d]), np.array([yi, yi]), "", role, width=1.2, hover=False))
     panel = Panel(f"imaginary part [{u}]", tuple(traces))
-    return Chart(
-        "roots", f"real part [{u}]", (panel,), "Poles and zeros in the s-plane, bars of 2 standard deviations.", height=380
-    )
+    ends = np.concatenate([t.x for t in traces]) if traces else np.zeros(1)
+    low, high = float(ends.min()), float(ends.max())
+    room = 0.15 * (high - low) or 1.0
+    text = "Poles and zeros in the s-plane, bars of 2 standard deviations."
+    return Chart("roots", f"real part [{u}]", (panel,), text, limits=(low - room, high + room), height=380)
 
 
 def roots_of(parameters: Mapping[str, Estimate], kind: str) -> list[tuple[float, float, float, float]]:
