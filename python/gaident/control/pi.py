@@ -18,7 +18,7 @@ _NOT_GIVEN = float("nan")  # told from a given nan by identity
 
 @dataclass(frozen=True)
 class PI:
-    """PI velocity controller, C(s) = kp + ki/s (METHOD.md section 1).
+    """PI velocity controller, C(s) = kp + ki/s.
 
     kp                proportional gain [N m s/rad], >= 0
     ki                integral gain [N m/rad], >= 0; kp and ki are not both zero

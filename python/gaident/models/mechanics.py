@@ -1,4 +1,4 @@
-"""One and two masses: from mechanical parameters to the factored model and back (METHOD.md section 2)."""
+"""One and two masses: from mechanical parameters to the factored model and back."""
 
 from __future__ import annotations
 

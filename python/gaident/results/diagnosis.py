@@ -63,7 +63,7 @@ class Fitness:
 
 @dataclass(frozen=True, repr=False)
 class Diagnosis:
-    """What the simulation gets wrong, why, and what the extended model gains. Made by `diagnose`; see API for each attribute.
+    """What the simulation gets wrong, why, and what the extended model gains. Made by `diagnose`.
 
     gain_interval: 95 % interval of the fall of the error from before to after, a fraction. held_out: how the figures of
     `before` and `after` were held out ("in-sample" where they could not be). base_shift: parameter -> (before, after) of the

@@ -69,7 +69,7 @@ class Structure:
 
 @dataclass(frozen=True, repr=False)
 class Identification:
-    """Structure, parameters and what they are worth. Made by `identify`; see API for each attribute.
+    """Structure, parameters and what they are worth. Made by `identify`.
 
     rmse [rad/s] and fit_percent are of the free-run simulation of all records used; `adequacy` says whether the linear model
     holds,

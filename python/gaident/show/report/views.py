@@ -54,7 +54,7 @@ class View:
     """All that a report knows beside the result.
 
     runs: one per record, those that were fitted first. curve: (velocity, torque, label) of named effects. response: of the
-    longest record, see `gaident.identification.frequency.Responses`; without it no_response says why. made_with: what computed
+    longest record, see `gaident.results.frequency.Responses`; without it no_response says why. made_with: what computed
     and drew the page -> version. axis: "rotary" or "linear".
     """
 
