@@ -66,5 +66,5 @@ def test_without_a_controller_there_is_no_command_to_propose() -> None:
     log = rig(truth.plant, truth.command, truth.effects, truth.noise, seed=2 * truth.seed, torque_logged=True)
     dia = ga.diagnose(ga.Record(log.dt, velocity=log.velocity, torque=log.torque))
     assert statistical(dia) and dia.next_experiment is None
-    (note,) = [note for note in dia.notes if "give controller=PI(...)" in note]
+    (note,) = [note for note in dia.notes if "give the controller, and a log" in note]
     assert " and " in note and " apart: " in note and "a log with the velocity command" in note
