@@ -2,6 +2,7 @@ from . import errors
 from .data import Alignment, Record, align, columns, differentiate, read, read_columns
 from .diagnosis import Diagnosis, Finding, Limits, Proposal, diagnose, first_experiment
 from .errors import GaidentError
+from .estimation import InverseDynamics, inverse_dynamics
 from .identification import (
     Estimate,
     Identification,
@@ -43,6 +44,7 @@ __all__ = [
     "Finding",
     "GaidentError",
     "Identification",
+    "InverseDynamics",
     "LeastSquares",
     "Limits",
     "Model",
@@ -63,6 +65,7 @@ __all__ = [
     "first_experiment",
     "identify",
     "initial_state",
+    "inverse_dynamics",
     "least_squares",
     "load",
     "m_sequence",

@@ -68,6 +68,7 @@ ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "models": ({"errors", "data", "_core"}, {"export"}),
     "export": ({"errors", "files", "models", "_core"}, {"version"}),  # called by methods of models and results
     "identification": ({"errors", "version", "files", "data", "models", "_core"}, {"show", "export"}),
+    "estimation": ({"errors", "data", "identification"}, {"show"}),
     "diagnosis": ({"errors", "version", "files", "data", "models", "identification"}, {"show", "export"}),
     "store": ({"errors", "data", "identification", "diagnosis"}, set()),
     "show": ({"errors"}, set()),
