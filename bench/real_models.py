@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 from numpy.typing import NDArray
 from real_fits import smooth, start_velocity
@@ -20,10 +22,17 @@ def open_loop(rec: ga.Record) -> ga.Record:
 
 
 def free_run(model: ga.Model, rec: ga.Record) -> Vector:
-    """The velocity under the logged torque, from the velocity that the record starts with and otherwise at rest."""
+    """The velocity under the logged torque, from the velocity that the record starts with.
+
+    A linear model with more states than that has those with which it follows this record best: to its advantage, or the
+    slow states of a wrong model would be all that is seen. Other states of a model with effects start at rest.
+    """
     state = np.zeros(model.p + model.q)
     state[:1] = start_velocity(rec)
     with np.errstate(all="ignore"):
+        if len(state) > 1 and not model.effects:
+            with contextlib.suppress(ga.errors.ModelError):  # it diverges within the record
+                state = ga.initial_state(model, open_loop(rec))
         return ga.simulate(model, open_loop(rec), None, state)
 
 

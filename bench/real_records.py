@@ -118,12 +118,21 @@ def actuator(motor: int, run: int) -> tuple[list[ga.Record], list[ga.Record]]:
     return [ga.Record(dt, **held, name=f"motor {motor}, run {run}")], []
 
 
+def _cell(text: str) -> float:
+    """A number of an EPOS log; where its authors put another one, "-800,,was -11.1", the one that was logged."""
+    logged = re.search(r"was\s*(-?[\d.]+)", text) or re.match(r"\s*(-?\d+(?:\.\d+)?)", text)
+    if logged is None:
+        raise ValueError(f"{text!r} is no number of an EPOS log")
+    return float(logged[1])
+
+
 def epos(drive: int) -> tuple[list[ga.Record], list[ga.Record]]:
     """The steady speeds of the sample time that most logs have; every third of them is held out."""
     found = []
     for path in sorted((data_folder() / "epos_screws" / "experiments" / f"driveNo{drive}" / "steady_state").rglob("*.csv")):
         lines = [x.replace(",", ".") for x in path.read_text(encoding="latin1").splitlines() if re.match(r"^-?[\d.,]+;", x)]
-        time, speed, torque = np.array([row[:3] for row in csv.reader(lines, delimiter=";")], dtype=float).T
+        cells = [[_cell(cell) for cell in row[:3]] for row in csv.reader(lines, delimiter=";")]
+        time, speed, torque = np.array(cells).T
         dt = round(float(np.median(np.diff(time))) * 1e-3, 6)
         found.append(ga.Record(dt, velocity=speed * RPM, torque=torque / 100.0 * EPOS_TORQUE, name=path.stem))
     (usual, _), *_ = Counter(r.dt for r in found).most_common(1)
