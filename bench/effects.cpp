@@ -1,9 +1,9 @@
 // The loop with effects: ns per sample for one candidate and per candidate in lanes, next to the linear loop. Each row first checks its
 // answer: the lanes against the scalar loop bit for bit, the scalar loop against finer steps.
-#include "../csrc/gaident/effect_batch.hpp"
+#include "../csrc/gaident/nonlinear/effect_batch.hpp"
 
-#include "../csrc/gaident/denormals.hpp"
-#include "../csrc/gaident/roots.hpp"
+#include "../csrc/gaident/numeric/denormals.hpp"
+#include "../csrc/gaident/plant/roots.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -33,9 +33,9 @@ std::vector<EffectModel> drives(bool with_effects) {
         all[i].linear = factors_from_roots(9803.92 * f, poles, zeros);
         if (!with_effects) continue;
         const double lag[] = {1e-3 * f}, friction[] = {0.04 * f, 0.07 * f, 2.0}, cogging[] = {0.03, 12.0, 0.4 * f};
-        all[i].add(Effect::torque_lag, lag);
-        all[i].add(Effect::stribeck_friction, friction);
-        all[i].add(Effect::cogging, cogging);
+        all[i].add(effect<TorqueLag>, lag);
+        all[i].add(effect<StribeckFriction>, friction);
+        all[i].add(effect<Cogging>, cogging);
     }
     return all;
 }

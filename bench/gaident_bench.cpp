@@ -1,11 +1,11 @@
 // Times the core without Python: us per generation beside the bound that the machine sets, ns per candidate and sample, us per candidate;
 // per arithmetic, instruction set, population, record length and loop. Every row first checks its answer against the referee. Times are
 // of this process's own processor time, which on a shared machine is steadier than the clock on the wall. `--quick`: fewer repetitions.
-#include "../csrc/gaident/decode.hpp"
-#include "../csrc/gaident/denormals.hpp"
-#include "../csrc/gaident/breeder.hpp"
+#include "../csrc/gaident/genetic/decode.hpp"
+#include "../csrc/gaident/numeric/denormals.hpp"
+#include "../csrc/gaident/search/breeder.hpp"
 #include "../csrc/gaident/reference/cascade.hpp"
-#include "../csrc/gaident/simulate.hpp"
+#include "../csrc/gaident/simulation/simulate.hpp"
 #include "issue_rate.hpp"
 
 #include <algorithm>

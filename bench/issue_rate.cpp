@@ -1,7 +1,7 @@
 // Compiled once per instruction set: ISSUE_RATE is the function's name, REGISTER_BYTES the width.
 #include "issue_rate.hpp"
 
-#include "../csrc/gaident/lanes.hpp"
+#include "../csrc/gaident/numeric/lanes.hpp"
 
 #include <algorithm>
 #include <ctime>

@@ -1,4 +1,4 @@
-#include "../gaident/effect_batch.hpp"
+#include "../gaident/nonlinear/effect_batch.hpp"
 #include "bindings.hpp"
 
 using namespace gaident;
@@ -22,39 +22,38 @@ py::list table() {
     py::list rows;
     for (const EffectInfo& info : effect_table) {
         py::list parameters;
-        for (int i = 0; i < info.parameters(); ++i) {
-            const EffectParameter& p = info.parameter[i];
+        for (const EffectParameter& p : info.parameters)
             parameters.append(py::make_tuple(p.name, p.unit, p.neutral, p.lowest, p.highest, p.above_lowest));
-        }
         rows.append(py::make_tuple(info.name, name_of(info.place), info.meaning, py::tuple(parameters), info.simulated,
                                    info.needs_two_masses, info.relation));
     }
     return rows;
 }
 
-Effect effect_named(const std::string& name) {
+Effect simulated_effect(const std::string& name) {
     for (int i = 0; i < effect_count; ++i)
         if (name == effect_table[static_cast<std::size_t>(i)].name && effect_table[static_cast<std::size_t>(i)].simulated)
             return static_cast<Effect>(i);
     throw std::invalid_argument("effects: '" + name + "' is no effect that can be simulated");
 }
 
-const EffectInfo& info_of(Effect e) { return effect_table[static_cast<std::size_t>(e)]; }
-
 // The relation that these parameters break, or nothing.
 std::string broken_relation(const std::string& name, const std::vector<double>& values) {
-    const EffectInfo& info = info_of(effect_named(name));
-    if (static_cast<int>(values.size()) != info.parameters()) throw std::invalid_argument("values: wrong number of parameters");
+    const EffectInfo& info = info_of(simulated_effect(name));
+    if (static_cast<int>(values.size()) != info.count()) throw std::invalid_argument("values: wrong number of parameters");
     return info.allowed == nullptr || info.allowed(values.data()) ? "" : info.relation;
 }
 
 void check_structure(Structure s, EffectSet effects) {
     if (effects.bits == 0) return;
     if (s.p < 1) throw std::invalid_argument("poles: a model with effects needs more poles than zeros");
-    if (effects.has_any(Effect::backlash, Effect::hardening_stiffness) && !(s == Structure{1, 2}))
-        throw std::invalid_argument("effects: backlash and hardening_stiffness need two masses, p = 1 and q = 2");
-    if (effects.has_any(Effect::backlash, Effect::hardening_stiffness) && effects.has(Effect::extra_resonance))
-        throw std::invalid_argument("effects: extra_resonance does not go together with backlash or hardening_stiffness");
+    if (!effects.needs_two_masses()) return;
+    for (const EffectInfo& info : effect_table)
+        if (info.needs_two_masses && effects.has(effect_named(info.name)) && !(s == Structure{1, 2}))
+            throw std::invalid_argument(std::string("effects: ") + info.name + " needs two masses, p = 1 and q = 2");
+    if (effects.any([](const EffectInfo& info) { return info.place == Place::plant; }))
+        throw std::invalid_argument(
+            "effects: what changes the mechanism linearly does not go together with a nonlinear coupling");
 }
 
 EffectModel make_model(double gain, const ComplexArray& poles, const ComplexArray& zeros,
@@ -62,8 +61,8 @@ EffectModel make_model(double gain, const ComplexArray& poles, const ComplexArra
     EffectModel m;
     m.linear = make_factors(gain, poles, zeros);
     for (const auto& [name, values] : effects) {
-        const Effect e = effect_named(name);
-        if (static_cast<int>(values.size()) != info_of(e).parameters())
+        const Effect e = simulated_effect(name);
+        if (static_cast<int>(values.size()) != info_of(e).count())
             throw std::invalid_argument("effects: '" + name + "' has another number of parameters");
         m.add(e, values.data());
     }
@@ -249,15 +248,15 @@ py::array simulate_values(const PyRecord& record, const RealArray& values, const
                           const OwnList& own) {
     const auto [real_poles, pole_pairs, real_zeros, zero_pairs] = structure;
     const int poles = real_poles + 2 * pole_pairs, zeros = real_zeros + 2 * zero_pairs;
-    if (std::min({real_poles, pole_pairs, real_zeros, zero_pairs}) < 0 || poles > max_plant_order || zeros > max_plant_order / 2 ||
-        zeros > poles)
+    if (std::min({real_poles, pole_pairs, real_zeros, zero_pairs}) < 0 || poles > max_plant_order ||
+        zeros > max_plant_order / 2 || zeros > poles)
         throw std::invalid_argument("structure: at most 14 poles and 7 zeros, and no more zeros than poles");
     const int factors = 1 + real_poles + 2 * pole_pairs + real_zeros + 2 * zero_pairs;
     std::vector<Effect> chosen;
     int columns = factors;
     for (const std::string& name : effects) {
-        chosen.push_back(effect_named(name));
-        columns += info_of(chosen.back()).parameters();
+        chosen.push_back(simulated_effect(name));
+        columns += info_of(chosen.back()).count();
     }
     if (values.ndim() != 2 || values.shape(1) != columns)
         throw std::invalid_argument("values: rows of " + std::to_string(columns) + " numbers are needed");
@@ -268,7 +267,7 @@ py::array simulate_values(const PyRecord& record, const RealArray& values, const
         x += factors;
         for (const Effect e : chosen) {
             m.add(e, x);
-            x += info_of(e).parameters();
+            x += info_of(e).count();
         }
         check_structure(m.linear.structure, m.effects);
     }

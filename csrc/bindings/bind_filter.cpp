@@ -1,5 +1,5 @@
-#include "../gaident/filter.hpp"
-#include "../gaident/replay.hpp"
+#include "../gaident/numeric/filter.hpp"
+#include "../gaident/control/replay.hpp"
 #include "bindings.hpp"
 
 #include <algorithm>

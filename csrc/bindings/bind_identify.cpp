@@ -1,6 +1,6 @@
-#include "../gaident/decode.hpp"
-#include "../gaident/parallel.hpp"
-#include "../gaident/statistics.hpp"
+#include "../gaident/genetic/decode.hpp"
+#include "../gaident/runtime/parallel.hpp"
+#include "../gaident/estimation/statistics.hpp"
 #include "bindings.hpp"
 
 using namespace gaident;

@@ -1,6 +1,6 @@
 // A model as the numbers of its recurrence, for writing it in another language.
-#include "../gaident/batch.hpp"
-#include "../gaident/effect_prepare.hpp"
+#include "../gaident/simulation/batch.hpp"
+#include "../gaident/nonlinear/effect_prepare.hpp"
 #include "bindings.hpp"
 
 using namespace gaident;
@@ -20,30 +20,16 @@ py::list numbers_of(Value... value) {
     return all;
 }
 
-py::dict effect_numbers(const EffectConstants<double>& c, EffectSet effects) {
-    using enum Effect;
+// Name -> coefficients of each effect there, in the order of its header; of one with a table, its numbers row after row.
+py::dict effect_numbers(const PreparedEffects& made, EffectSet effects) {
     py::dict d;
-    const auto with = [&](Effect e, py::list values) {
-        if (effects.has(e)) d[effect_table[static_cast<std::size_t>(e)].name] = values;
-    };
-    // Those that add up to one law of friction are given as that, under "law".
-    if (effects.has_any(coulomb_friction, asymmetric_friction, quadratic_drag))
-        d["law"] =
-            numbers_of(c.law.level_positive, c.law.level_negative, c.law.viscous_positive, c.law.viscous_negative, c.law.drag);
-    with(stribeck_friction, numbers_of(c.stribeck_torque, c.stribeck_static, c.stribeck_slowness));
-    with(presliding_friction, numbers_of(c.bristle_torque, c.bristle_stiffness, c.bristle_per_break));
-    with(friction_drift, numbers_of(c.drift_torque, c.drift_rate));
-    with(load_torque, numbers_of(c.load));
-    with(unbalance, numbers_of(c.unbalance_amplitude, c.unbalance_phase));
-    with(cogging, numbers_of(c.cogging_amplitude, c.cogging_order, c.cogging_phase));
-    with(torque_saturation, numbers_of(c.saturation));
-    with(torque_dead_band, numbers_of(c.dead_band));
-    with(torque_lag, numbers_of(c.lag_decay, c.lag_mean));
-    with(integrator_clamp, numbers_of(c.integrator_limit));
-    with(command_rate_limit, numbers_of(c.rate_step));
-    with(velocity_filter, numbers_of(c.filter_decay, c.filter_old, c.filter_new));
-    with(velocity_ripple, numbers_of(c.ripple_amplitude, c.ripple_order, c.ripple_phase));
-    with(velocity_quantisation, numbers_of(c.quantum));
+    Effects::each([&]<class E>() {
+        if (!effects.has<E>()) return;
+        const auto& c = made.constants.effects.of<E>();
+        double flat[sizeof c / sizeof(double) + 1];
+        std::memcpy(flat, &c, HasCoefficients<E> ? sizeof c : 0);
+        d[E::info.name] = numbers(flat, HasCoefficients<E> ? static_cast<int>(sizeof c / sizeof(double)) : 0);
+    });
     return d;
 }
 
@@ -72,21 +58,22 @@ py::dict recurrence(const EffectModel& model, double dt, const std::string& loop
     const int n = left.linear.structure.poles();
     if (!std::isfinite(c.x[0])) throw std::invalid_argument("model: it makes no two masses, and cannot carry its effects");
     d["substeps"] = m;
-    d["effects"] = effect_numbers(c, left.effects);
+    d["effects"] = effect_numbers(made, left.effects);
     if (made.two_masses) {
         d["phi"] = numbers(&c.phi[0][0], 9);
         d["motor"] = numbers(c.motor, 3);
         d["coupling"] = numbers(c.coupling, 3);
-        d["shaft"] = numbers_of(c.KG, c.DG, c.per_scale, c.half_gap, c.cubic);
+        d["shaft"] = numbers_of(c.KG, c.DG, c.per_scale);
     } else {
         d["a"] = numbers(c.a, n);
         d["b"] = numbers(c.b, n + 1);
     }
-    if (left.effects.has(Effect::transport_delay)) {
+    if (left.effects.has<TransportDelay>()) {
+        const TransportDelay::Table& table = made.tables.of<TransportDelay>();
         py::list back, share;
         for (int j = 0; j < m; ++j) {
-            back.append(made.delay.back[j]);
-            share.append(made.delay.share[j]);
+            back.append(table.back[j]);
+            share.append(table.share[j]);
         }
         d["delay"] = py::make_tuple(back, share);
     }

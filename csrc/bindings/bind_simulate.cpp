@@ -1,5 +1,5 @@
-#include "../gaident/mirror.hpp"
-#include "../gaident/simulate.hpp"
+#include "../gaident/target/mirror.hpp"
+#include "../gaident/simulation/simulate.hpp"
 #include "bindings.hpp"
 
 using namespace gaident;

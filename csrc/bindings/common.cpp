@@ -1,4 +1,4 @@
-#include "../gaident/roots.hpp"
+#include "../gaident/plant/roots.hpp"
 #include "bindings.hpp"
 
 #include <condition_variable>

@@ -27,14 +27,14 @@ processor = $(word 2,$(subst ., ,$1))
 arithmetic = $(word 3,$(subst ., ,$1))
 program = $(word 1,$(subst ., ,$1))
 
-SOURCES := $(wildcard $(HERE)/*) $(wildcard csrc/gaident/*.hpp) $(OUT)/genes.hpp $(OUT)/record.hpp $(OUT)/record.h
+SOURCES := $(wildcard $(HERE)/*) $(wildcard csrc/gaident/*/*.hpp) $(OUT)/genes.hpp $(OUT)/record.hpp $(OUT)/record.h
 
 .PHONY: all
 .DELETE_ON_ERROR:
 all: $(RUNS:%=$(OUT)/%.checked)
 	@cat $(^:.checked=.report)
 
-$(OUT)/make_tables: $(HERE)/make_tables.cpp $(wildcard csrc/gaident/*.hpp csrc/gaident/reference/*.hpp)
+$(OUT)/make_tables: $(HERE)/make_tables.cpp $(wildcard csrc/gaident/*/*.hpp)
 	@mkdir -p $(OUT)
 	$(CXX) -std=c++20 -O1 -ffp-contract=off $(WARNINGS) -o $@ $<
 $(OUT)/genes.hpp: $(OUT)/make_tables

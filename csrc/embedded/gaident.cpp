@@ -1,7 +1,7 @@
 // gaident.h on the search of paper_search.hpp.
 #include "gaident.h"
 
-#include "../gaident/denormals.hpp"
+#include "../gaident/numeric/denormals.hpp"
 #include "paper_search.hpp"
 
 #include <new>

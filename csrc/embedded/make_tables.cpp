@@ -2,7 +2,7 @@
 //
 //     the values of all codes of a gene (the logarithm of K needs a libm, which a drive has not got)
 //     the paper's two-mass record, Table IV's identified model with 0.3 rad/s of noise
-#include "../gaident/genome.hpp"
+#include "../gaident/genetic/genome.hpp"
 #include "../gaident/reference/drives.hpp"
 
 #include <cstdio>

@@ -1,9 +1,9 @@
 // The paper's search as this program is compiled for it: arithmetic by GAIDENT_ARITHMETIC, sizes and ranges here, its constants in flash.
 #pragma once
 
-#include "../gaident/c30.hpp"
-#include "../gaident/fixed_scaling.hpp"
-#include "../gaident/static_search.hpp"
+#include "../gaident/numeric/c30.hpp"
+#include "../gaident/target/fixed_scaling.hpp"
+#include "../gaident/target/static_search.hpp"
 #include "genes.hpp"  // made by make_tables.cpp
 
 namespace gaident {

@@ -126,6 +126,10 @@ PICTURES: dict[str, Picture] = {
         AGAINST_VELOCITY, shaft_of_velocity, SWING,
     ),
     "presliding_friction": Picture({"torque": 0.05, "stiffness": 1.0}, AGAINST_ANGLE, shaft_of_angle, SLOW, dots=False),
+    "lugre_friction": Picture(
+        {"torque": 0.04, "static_torque": 0.07, "stribeck_velocity": 1.0, "stiffness": 5.0, "damping": 0.01},
+        AGAINST_ANGLE, shaft_of_angle, SLOW, dots=False,
+    ),
     "quadratic_drag": Picture({"coefficient": 3e-4}, AGAINST_VELOCITY, shaft_of_velocity, SWING),
     "load_torque": Picture({"torque": 0.08}, AGAINST_VELOCITY, shaft_of_velocity, SWING),
     "unbalance": Picture({"amplitude": 0.08, "phase": 0.5}, AGAINST_ANGLE, shaft_of_angle, levels(25.0, dwell=0.5)),

@@ -11,8 +11,40 @@ from __future__ import annotations
 
 import lazy_loader
 
+from gaident.providers import provide
+
 # The public names stand in __init__.pyi; a name's module is imported when the name is first used.
 _of_stub, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+# What methods of records, models and results call in rooms above their own, see gaident/providers.py.
+provide(
+    {
+        # Record, Limits
+        "record_html": "gaident.show.record_html:record_html",
+        "limits_of": "gaident.diagnosis.experiments.first_experiment:limits_of",
+        # Model
+        "to_scipy": "gaident.export.lti:to_scipy",
+        "to_control": "gaident.export.lti:to_control",
+        "write_c": "gaident.export.c_source:write_c",
+        # Identification
+        "identification_summary": "gaident.show.summary:identification_summary",
+        "identification_html": "gaident.show.report.notebook:identification_html",
+        "identification_table": "gaident.export.tables:identification_table",
+        "plot_identification": "gaident.show.plots:plot_identification",
+        "plot_poles_zeros": "gaident.show.plots:plot_poles_zeros",
+        "plot_convergence": "gaident.show.plots:plot_convergence",
+        "plot_structures": "gaident.show.plots:plot_structures",
+        # Diagnosis
+        "diagnosis_summary": "gaident.show.diagnosis_summary:diagnosis_summary",
+        "diagnosis_html": "gaident.show.report.notebook:diagnosis_html",
+        "diagnosis_table": "gaident.export.tables:diagnosis_table",
+        "plot_diagnosis": "gaident.reporting.figures:plot_diagnosis",
+        # InverseDynamics
+        "inverse_dynamics_summary": "gaident.show.inverse_dynamics_summary:inverse_dynamics_summary",
+        # both
+        "plot_bode": "gaident.reporting.figures:plot_bode",
+    }
+)
 
 
 def __getattr__(name: str) -> object:

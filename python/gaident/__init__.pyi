@@ -1,24 +1,17 @@
 from . import errors
+from .control import PI
 from .data import Alignment, Record, align, columns, differentiate, read, read_columns
-from .diagnosis import Diagnosis, Finding, Limits, Proposal, diagnose, first_experiment
+from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
-from .identification import (
-    Estimate,
-    Identification,
-    LeastSquares,
-    SearchSpace,
-    Settings,
-    identify,
-    least_squares,
-    m_sequence,
-)
+from .estimation import InverseDynamics, inverse_dynamics
+from .identification import LeastSquares, identify, least_squares, m_sequence
 from .models import (
-    PI,
     Discrete,
     Effect,
     Model,
     OneMass,
     Run,
+    SearchSpace,
     TwoMass,
     effects,
     factor_parameters,
@@ -29,9 +22,9 @@ from .models import (
     simulate,
     simulate_many,
 )
-from .progress_bar import progress
 from .reporting import report
-from .store import load
+from .results import Diagnosis, Estimate, Finding, Identification, Limits, Proposal, Settings, load
+from .show import progress
 
 __all__ = [
     "PI",
@@ -43,6 +36,7 @@ __all__ = [
     "Finding",
     "GaidentError",
     "Identification",
+    "InverseDynamics",
     "LeastSquares",
     "Limits",
     "Model",
@@ -63,6 +57,7 @@ __all__ = [
     "first_experiment",
     "identify",
     "initial_state",
+    "inverse_dynamics",
     "least_squares",
     "load",
     "m_sequence",

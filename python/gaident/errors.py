@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from gaident.arguments import Argument, parts_of
+
 __all__ = [
     "ControllerError",
     "GaidentError",
@@ -21,7 +23,22 @@ __all__ = [
 
 
 class GaidentError(ValueError):
-    """Base of everything gaident raises on wrong use."""
+    """Base of everything gaident raises on wrong use.
+
+    marked: the message with its references to arguments, to be built into another one; parts: texts and `Argument`s.
+    """
+
+    def __init__(self, message: object = "") -> None:
+        self.marked = str(message)
+        super().__init__("".join(map(str, self.parts)))
+
+    @property
+    def parts(self) -> tuple[str | Argument, ...]:
+        """The message as texts and arguments."""
+        return parts_of(self.marked)
+
+    def __reduce__(self) -> tuple[type[GaidentError], tuple[str]]:
+        return type(self), (self.marked,)
 
 
 def check_schema(data: Mapping[str, object], schema: str, version: int) -> None:

@@ -1,7 +1,7 @@
 // The record that tests of the search run on.
 #pragma once
 
-#include "gaident/batch.hpp"
+#include "gaident/simulation/batch.hpp"
 #include "gaident/reference/drives.hpp"
 
 namespace gaident {

@@ -52,6 +52,11 @@ struct Drive {  // SI units, rad; neutral values
     double drift_rate = 0;
     double dahl = 0;  // N m
     double dahl_stiffness = 1;
+    double lugre = 0;  // Tc, N m
+    double lugre_static = 0;
+    double lugre_velocity = 1;
+    double lugre_stiffness = 1;
+    double lugre_damping = 0;
     double drag = 0;  // N m s2/rad2
     double load = 0;  // N m
     double unbalance = 0;
@@ -78,7 +83,7 @@ struct Drive {  // SI units, rad; neutral values
     // end of fields
 };
 
-enum Index { w1, angle, w2, twist, lagged, bristle, filtered, e1, e2, hysteresis, states };
+enum Index { w1, angle, w2, twist, lagged, bristle, bent, filtered, e1, e2, hysteresis, states };
 using State = std::array<double, states>;
 
 double sign(double value) { return static_cast<double>((value > 0) - (value < 0)); }
@@ -132,10 +137,18 @@ private:
         return f;
     }
 
+    // dz/dt of the LuGre bristle
+    double bending(const State& x) const {
+        const double ratio = x[w1] / d.lugre_velocity;
+        const double g = d.lugre + (d.lugre_static - d.lugre) * std::exp(-ratio * ratio);
+        return x[w1] - d.lugre_stiffness * std::abs(x[w1]) * x[bent] / g;
+    }
+
     double smooth(const State& x, double t) const {
         double q = (d.lag > 0 ? x[lagged] : held) + disturbed - d.load;
         if (d.drag != 0) q -= d.drag * x[w1] * std::abs(x[w1]);
         if (d.dahl != 0) q -= d.dahl_stiffness * x[bristle];
+        if (d.lugre != 0) q -= d.lugre_stiffness * x[bent] + d.lugre_damping * bending(x);
         if (d.unbalance != 0) q -= d.unbalance * std::sin(x[angle] + d.unbalance_phase);
         if (d.cogging != 0) q -= d.cogging * std::sin(d.cogging_order * x[angle] + d.cogging_phase);
         if (d.hum != 0) q += d.hum * std::sin(d.hum_frequency * t + d.hum_phase);
@@ -186,6 +199,7 @@ private:
         }
         if (d.lag > 0) dx[lagged] = (held - x[lagged]) / d.lag;
         if (d.dahl != 0) dx[bristle] = x[w1] - d.dahl_stiffness * std::abs(x[w1]) * x[bristle] / d.dahl;
+        if (d.lugre != 0) dx[bent] = bending(x);
         if (d.filter > 0) dx[filtered] = (rippled(x) - x[filtered]) / d.filter;
         if (extra) {
             dx[e1] = x[e2];

@@ -39,6 +39,11 @@ struct Case {  // SI units, rad; neutral values; effect_parameter
     double asymmetric_friction_viscous_negative = 0;
     double presliding_friction_torque = 1;
     double presliding_friction_stiffness = 0;
+    double lugre_friction_torque = 1;
+    double lugre_friction_static_torque = 1;
+    double lugre_friction_stribeck_velocity = 1;
+    double lugre_friction_stiffness = 0;
+    double lugre_friction_damping = 0;
     double quadratic_drag_coefficient = 0;
     double load_torque_torque = 0;
     double unbalance_amplitude = 0;
@@ -130,7 +135,7 @@ private:
     const double delay;  // fine steps
     std::vector<double> ring;
     std::size_t k = 0;
-    double w = 0, wL = 0, twist = 0, z = 0, x1 = 0, x2 = 0, lag = 0, filtered = 0, integral = 0, error = 0, command = 0;
+    double w = 0, wL = 0, twist = 0, z = 0, bend = 0, x1 = 0, x2 = 0, lag = 0, filtered = 0, integral = 0, error = 0, command = 0;
 
     // The torque at the middle of the fine step, `delay` steps ago.
     double late(double v) {
@@ -184,6 +189,14 @@ private:
             const double half = z + 0.5 * h * (w - std::abs(w) * z * per_zc);
             T += s0 * half;
             z += h * (w - std::abs(w) * half * per_zc);
+        }
+        if (const double s0 = c.lugre_friction_stiffness; s0 > 0) {
+            const double ratio = w / c.lugre_friction_stribeck_velocity, Tc = c.lugre_friction_torque;
+            const double g = Tc + (c.lugre_friction_static_torque - Tc) * std::exp(-ratio * ratio);
+            const double half = bend + 0.5 * h * (w - s0 * std::abs(w) * bend / g);
+            const double rate = w - s0 * std::abs(w) * half / g;
+            T += s0 * half + c.lugre_friction_damping * rate;
+            bend += h * rate;
         }
         return T;
     }

@@ -22,8 +22,8 @@
 //     |dF| <= Wf1^2 sum_n ( 2 |e(n)| d(n) + d(n)^2 + 2^-sum_point ) + 4 u F
 #pragma once
 
-#include "gaident/fixed_scaling.hpp"
-#include "gaident/simulate.hpp"
+#include "gaident/target/fixed_scaling.hpp"
+#include "gaident/simulation/simulate.hpp"
 
 namespace gaident {
 

@@ -1,6 +1,6 @@
 #include "check.hpp"
-#include "gaident/parallel.hpp"
-#include "gaident/simulate.hpp"
+#include "gaident/runtime/parallel.hpp"
+#include "gaident/simulation/simulate.hpp"
 #include "gaident/reference/drives.hpp"
 
 using namespace gaident;
@@ -341,7 +341,7 @@ TEST_CASE("batch: a candidate that diverges is the worst, never NaN") {
         std::vector<double> sums(40);
         Batch(setup.experiment, 40, in_float).errors(factors, sums);
         for (std::size_t i = 0; i < 40; ++i) {
-            CHECK(i % 3 == 0 ? sums[i] < 1e12 : sums[i] == worst_fitness);
+            CHECK(i % 3 == 0 ? sums[i] < 1e12 : sums[i] == worst_error_sum);
             CHECK(i % 3 != 0 || sums[i] == sums[0]);
         }
     }

@@ -1,5 +1,5 @@
 #include "check.hpp"
-#include "gaident/bilinear.hpp"
+#include "gaident/plant/bilinear.hpp"
 #include "gaident/reference/drives.hpp"
 
 using namespace gaident;

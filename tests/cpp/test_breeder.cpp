@@ -1,6 +1,6 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
-#include "gaident/breeder.hpp"
+#include "gaident/search/breeder.hpp"
 
 #include <cstdlib>
 #include <new>

@@ -1,5 +1,5 @@
 #include "check.hpp"
-#include "gaident/population.hpp"
+#include "gaident/genetic/population.hpp"
 #include "gaident/reference/bits.hpp"
 
 using namespace gaident;

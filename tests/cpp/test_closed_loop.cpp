@@ -1,7 +1,7 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
-#include "gaident/closed_loop.hpp"
-#include "gaident/float_pair.hpp"
+#include "gaident/control/closed_loop.hpp"
+#include "gaident/numeric/float_pair.hpp"
 
 using namespace gaident;
 
@@ -48,7 +48,7 @@ TEST_CASE("closed_loop: continuous, one difference equation equals the cascade o
 
 TEST_CASE("closed_loop: sampled, one difference equation equals plant and digital controller") { compare(LoopKind::sampled, 52); }
 
-// One line of the paper's Table V as METHOD.md section 3 has it: with one scalar on the loop gain all coefficients
+// One line of the paper's Table V as docs/paper.md has it: with one scalar on the loop gain all coefficients
 // are met.
 TEST_CASE("closed_loop: Table V from Table IV") {
     const auto in_z = [](const Delta<double>& h, std::vector<double>& alpha, std::vector<double>& beta) {

@@ -1,5 +1,5 @@
 #include "check.hpp"
-#include "gaident/controller.hpp"
+#include "gaident/control/controller.hpp"
 
 using namespace gaident;
 

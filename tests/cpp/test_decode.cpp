@@ -1,20 +1,19 @@
 #include "check.hpp"
-#include "gaident/encode.hpp"
+#include "gaident/genetic/encode.hpp"
 #include "gaident/reference/bits.hpp"
 
 using namespace gaident;
 
 namespace {
 
-// The referee's A and B, gathered in pairs in the order of METHOD.md.
+// The referee's A and B, gathered in pairs in the order of genetic/decode.hpp.
 Factors<double> gathered(const reference::Plant& g) {
     Factors<double> f;
     const std::size_t p = g.A1.size(), q = g.A2.size();
     f.structure = {static_cast<int>(p), static_cast<int>(q)};
     f.gain = g.K;
     const auto pair = [](std::complex<double> a, std::complex<double> b) {
-        if (b == std::conj(a) && a.imag() != 0.0)
-            return Pair<double>{2.0 * a.real(), a.real() * a.real() + a.imag() * a.imag()};
+        if (b == std::conj(a) && a.imag() != 0.0) return Pair<double>{2.0 * a.real(), a.real() * a.real() + a.imag() * a.imag()};
         return Pair<double>{a.real() + b.real(), a.real() * b.real()};
     };
     int n = 0;
@@ -70,8 +69,7 @@ TEST_CASE("decode: equals the referee, exactly, over random chromosomes of every
         for (int i = 0; i < 2000; ++i) {
             Word c[Genome::max_words];
             random.words(c, Genome::max_words);
-            const reference::Plant plant =
-                reference::decode(reference::unpack(c, g.bits()), g.fields(), t.code, t.ranges);
+            const reference::Plant plant = reference::decode(reference::unpack(c, g.bits()), g.fields(), t.code, t.ranges);
             const Factors<double> f = decode(c, g);
             CHECK(same(f, gathered(plant)));
             ++seen[f.structure.p][f.structure.q];
@@ -118,8 +116,7 @@ TEST_CASE("decode: genes of inactive modules are latent") {
             for (const Field& row : g.fields()) {
                 const bool active = row.role == Role::p || row.role == Role::q || row.role == Role::gain ||
                                     row.index < (row.role == Role::pole1 ? f.structure.p : f.structure.q);
-                if (!active)
-                    set_field(d, row.first, row.width, static_cast<std::uint32_t>(random.word() >> (64 - row.width)));
+                if (!active) set_field(d, row.first, row.width, static_cast<std::uint32_t>(random.word() >> (64 - row.width)));
             }
             CHECK(same(f, decode(d, g)));
         }

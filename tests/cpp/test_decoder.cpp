@@ -1,6 +1,6 @@
 #include "check.hpp"
-#include "gaident/decoder.hpp"
-#include "gaident/kernels/kernels.hpp"
+#include "gaident/genetic/decoder.hpp"
+#include "gaident/simulation/kernels/kernels.hpp"
 
 using namespace gaident;
 

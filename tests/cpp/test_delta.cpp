@@ -1,5 +1,5 @@
 #include "check.hpp"
-#include "gaident/delta.hpp"
+#include "gaident/plant/delta.hpp"
 
 using namespace gaident;
 

@@ -1,9 +1,9 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
-#include "gaident/engine.hpp"
-#include "gaident/parallel.hpp"
-#include "gaident/simulate.hpp"
-#include "gaident/statistics.hpp"
+#include "gaident/search/engine.hpp"
+#include "gaident/runtime/parallel.hpp"
+#include "gaident/simulation/simulate.hpp"
+#include "gaident/estimation/statistics.hpp"
 
 #include <stdexcept>
 

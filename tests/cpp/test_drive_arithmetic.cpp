@@ -1,9 +1,9 @@
 // The arithmetics of a drive: the DSP's float, fixed point, and the one that counts.
 #include "check.hpp"
-#include "gaident/c30.hpp"
-#include "gaident/candidate.hpp"
-#include "gaident/counting.hpp"
-#include "gaident/fixed_scaling.hpp"
+#include "gaident/numeric/c30.hpp"
+#include "gaident/target/candidate.hpp"
+#include "gaident/numeric/counting.hpp"
+#include "gaident/target/fixed_scaling.hpp"
 #include "gaident/reference/drives.hpp"
 
 using namespace gaident;

@@ -1,7 +1,7 @@
 // The loop with effects: elementary functions, registry, neutral parameters, lanes against scalar, standstill. Accuracy against an
 // independent integrator is tested in tests/python/test_effects.py.
-#include "../../csrc/gaident/effect_batch.hpp"
-#include "../../csrc/gaident/roots.hpp"
+#include "../../csrc/gaident/nonlinear/effect_batch.hpp"
+#include "../../csrc/gaident/plant/roots.hpp"
 
 #include "check.hpp"
 
@@ -31,31 +31,32 @@ Factors<double> table_three(double f = 1.0) {
 // Typical parameters, and ones so small (or large) that the effect does next to nothing without being taken out.
 struct Sizes {
     Effect effect;
-    double typical[4], slight[4];
+    double typical[5], slight[5];
 };
 
 const Sizes sizes[] = {
-    {Effect::coulomb_friction, {0.05}, {1e-14}},
-    {Effect::stribeck_friction, {0.04, 0.07, 2.0}, {1e-14, 2e-14, 2.0}},
-    {Effect::asymmetric_friction, {0.05, 0.035, 1e-4, 4e-4}, {1e-14, 1e-14, 1e-16, 1e-16}},
-    {Effect::presliding_friction, {0.05, 3.0}, {1e-14, 3.0}},
-    {Effect::quadratic_drag, {1.5e-5}, {1e-18}},
-    {Effect::load_torque, {0.03}, {1e-14}},
-    {Effect::unbalance, {0.05, 0.3}, {1e-14, 0.3}},
-    {Effect::cogging, {0.03, 12.0, 0.4}, {1e-14, 12.0, 0.4}},
-    {Effect::friction_drift, {0.05, -0.2}, {1e-14, -0.2}},
-    {Effect::backlash, {0.01}, {1e-15}},
-    {Effect::hardening_stiffness, {1e3}, {1e-10}},
-    {Effect::torque_saturation, {0.5}, {1e14}},
-    {Effect::torque_dead_band, {0.03}, {1e-14}},
-    {Effect::transport_delay, {0.73e-3}, {1e-16}},
-    {Effect::torque_lag, {1e-3}, {1e-16}},
-    {Effect::integrator_clamp, {0.05}, {1e14}},
-    {Effect::command_rate_limit, {3000.0}, {1e14}},
-    {Effect::velocity_filter, {1e-3}, {1e-16}},
-    {Effect::velocity_ripple, {0.005, 2.0, 0.2}, {1e-14, 2.0, 0.2}},
-    {Effect::velocity_quantisation, {0.6}, {1e-13}},
-    {Effect::extra_resonance, {900.0, 0.02, 800.0, 0.02}, {900.0, 0.02, 900.0 + 1e-10, 0.02}},
+    {effect<CoulombFriction>, {0.05}, {1e-14}},
+    {effect<StribeckFriction>, {0.04, 0.07, 2.0}, {1e-14, 2e-14, 2.0}},
+    {effect<AsymmetricFriction>, {0.05, 0.035, 1e-4, 4e-4}, {1e-14, 1e-14, 1e-16, 1e-16}},
+    {effect<PreslidingFriction>, {0.05, 3.0}, {1e-14, 3.0}},
+    {effect<LugreFriction>, {0.04, 0.07, 2.0, 10.0, 0.005}, {1e-14, 2e-14, 2.0, 10.0, 1e-16}},
+    {effect<QuadraticDrag>, {1.5e-5}, {1e-18}},
+    {effect<LoadTorque>, {0.03}, {1e-14}},
+    {effect<Unbalance>, {0.05, 0.3}, {1e-14, 0.3}},
+    {effect<Cogging>, {0.03, 12.0, 0.4}, {1e-14, 12.0, 0.4}},
+    {effect<FrictionDrift>, {0.05, -0.2}, {1e-14, -0.2}},
+    {effect<Backlash>, {0.01}, {1e-15}},
+    {effect<HardeningStiffness>, {1e3}, {1e-10}},
+    {effect<TorqueSaturation>, {0.5}, {1e14}},
+    {effect<TorqueDeadBand>, {0.03}, {1e-14}},
+    {effect<TransportDelay>, {0.73e-3}, {1e-16}},
+    {effect<TorqueLag>, {1e-3}, {1e-16}},
+    {effect<IntegratorClamp>, {0.05}, {1e14}},
+    {effect<CommandRateLimit>, {3000.0}, {1e14}},
+    {effect<VelocityFilter>, {1e-3}, {1e-16}},
+    {effect<VelocityRipple>, {0.005, 2.0, 0.2}, {1e-14, 2.0, 0.2}},
+    {effect<VelocityQuantisation>, {0.6}, {1e-13}},
+    {effect<ExtraResonance>, {900.0, 0.02, 800.0, 0.02}, {900.0, 0.02, 900.0 + 1e-10, 0.02}},
 };
 
 std::vector<double> staircase(std::size_t n) {
@@ -107,20 +108,20 @@ TEST_CASE("the registry: names are unique, the enumeration has the table's order
     std::set<std::string> names;
     for (const EffectInfo& info : effect_table) {
         CHECK(names.insert(info.name).second);
-        CHECK(info.parameters() >= 1);
+        CHECK(info.count() >= 1);
     }
-    CHECK(std::string(effect_table[static_cast<std::size_t>(Effect::backlash)].name) == "backlash");
-    CHECK(std::string(effect_table[static_cast<std::size_t>(Effect::velocity_filter)].name) == "velocity_filter");
-    CHECK(static_cast<int>(Effect::outliers) + 1 == effect_count);
+    CHECK(std::string(effect_table[static_cast<std::size_t>(effect<Backlash>)].name) == "backlash");
+    CHECK(std::string(effect_table[static_cast<std::size_t>(effect<VelocityFilter>)].name) == "velocity_filter");
+    CHECK(static_cast<int>(effect<Outliers>) + 1 == effect_count);
     std::size_t simulated = 0;
     for (const EffectInfo& info : effect_table) simulated += info.simulated;
     CHECK(simulated == std::size(sizes));
     for (const Sizes& s : sizes) {
         const EffectInfo& info = effect_table[static_cast<std::size_t>(s.effect)];
         CHECK(!info.neutral(s.typical));
-        double neutral[4];
-        for (int i = 0; i < info.parameters(); ++i) {
-            const double value = info.parameter[i].neutral;
+        double neutral[5];
+        for (int i = 0; i < info.count(); ++i) {
+            const double value = info.parameters[static_cast<std::size_t>(i)].neutral;
             neutral[i] = value == value ? value : 1.0;
         }
         CHECK(info.neutral(neutral));
@@ -138,12 +139,12 @@ TEST_CASE("neutral parameters are the identity, and their neighbourhood is next 
         for (const Sizes& s : sizes) {
             const EffectInfo& info = effect_table[static_cast<std::size_t>(s.effect)];
             EffectModel neutral{table_three(), {}}, slight = neutral;
-            double values[4];
-            for (int i = 0; i < info.parameters(); ++i) {
-                const double value = info.parameter[i].neutral;
+            double values[5];
+            for (int i = 0; i < info.count(); ++i) {
+                const double value = info.parameters[static_cast<std::size_t>(i)].neutral;
                 values[i] = value == value ? value : s.slight[i];
             }
-            if (s.effect == Effect::extra_resonance) values[2] = values[0];
+            if (s.effect == effect<ExtraResonance>) values[2] = values[0];
             neutral.add(s.effect, values);
             slight.add(s.effect, s.slight);
             CHECK(velocity_of(job, neutral) == linear);
@@ -160,7 +161,7 @@ TEST_CASE("lanes equal the scalar loop bit for bit, with every effect, loop and 
     std::vector<EffectModel> models;
     for (const Sizes& s : sizes)
         for (int i = 0; i < 3; ++i) {
-            double values[4];
+            double values[5];
             for (int k = 0; k < 4; ++k) values[k] = s.typical[k] * (1.0 + 0.03 * i);
             EffectModel m{table_three(1.0 + 0.01 * i), {}};
             m.add(s.effect, values);
@@ -169,7 +170,7 @@ TEST_CASE("lanes equal the scalar loop bit for bit, with every effect, loop and 
     for (int i = 0; i < 11; ++i) {  // several at once, more than one group of lanes
         EffectModel m{one_mass(5e-4 * (1.0 + 0.02 * i)), {}};
         for (const Sizes& s : sizes)
-            if (s.effect != Effect::backlash && s.effect != Effect::hardening_stiffness && s.effect != Effect::extra_resonance)
+            if (s.effect != effect<Backlash> && s.effect != effect<HardeningStiffness> && s.effect != effect<ExtraResonance>)
                 m.add(s.effect, s.typical);
         models.push_back(m);
     }
@@ -205,15 +206,15 @@ TEST_CASE("friction holds exactly: no creep, no ringing, and lets go above its l
     const EffectJob job = job_of(torque, LoopKind::open);
     for (const Factors<double>& g : {one_mass(), table_three()}) {
         const std::vector<double> w =
-            velocity_of(job, model_with(g, Effect::coulomb_friction, {g.structure.q == 0 ? 0.05 : 0.0501}));
+            velocity_of(job, model_with(g, effect<CoulombFriction>, {g.structure.q == 0 ? 0.05 : 0.0501}));
         CHECK(*std::max_element(w.begin(), w.end()) > 5.0);
         // Two masses: the load has to swing out first.
         for (std::size_t k = g.structure.q == 0 ? 250 : release - 50; k <= release; ++k) CHECK(w[k] == 0.0);
         CHECK(w[release + 1] > 0.0);
     }
     // With a static level the stop holds although the sliding level lies below the torque; once it moves there is less friction.
-    const std::vector<double> w = velocity_of(job, model_with(one_mass(), Effect::coulomb_friction, {0.05}));
-    const std::vector<double> s = velocity_of(job, model_with(one_mass(), Effect::stribeck_friction, {0.03, 0.0505, 0.02}));
+    const std::vector<double> w = velocity_of(job, model_with(one_mass(), effect<CoulombFriction>, {0.05}));
+    const std::vector<double> s = velocity_of(job, model_with(one_mass(), effect<StribeckFriction>, {0.03, 0.0505, 0.02}));
     for (std::size_t k = 250; k <= release; ++k) CHECK(s[k] == 0.0);
     CHECK(s[n - 1] > w[n - 1]);
 }
@@ -223,12 +224,32 @@ TEST_CASE("a stiff bristle does not ring, even in one step per sample") {
     std::fill(torque.begin(), torque.begin() + 20, 0.08);
     EffectJob job = job_of(torque, LoopKind::open);
     job.substeps = 1;
-    const std::vector<double> w = velocity_of(job, model_with(one_mass(1e-4, 0.001), Effect::presliding_friction, {0.05, 500.0}));
+    const std::vector<double> w = velocity_of(job, model_with(one_mass(1e-4, 0.001), effect<PreslidingFriction>, {0.05, 500.0}));
     CHECK(w[20] > 1.0);
     for (std::size_t k = 200; k < w.size(); ++k) CHECK(std::abs(w[k]) < 1e-9);
     int turns = 0;
     for (std::size_t k = 21; k < w.size(); ++k) turns += w[k] * w[k - 1] < 0.0 && std::abs(w[k]) > 0.02;
     CHECK(turns <= 2);
+}
+
+TEST_CASE("a stiff LuGre bristle is stable at any step, holds below its static level and slides at the level of motion") {
+    constexpr std::size_t n = 600;
+    for (const double damping : {0.1, 1.0})
+        for (const double stiffness : {100.0, 1e3, 1e6}) {
+            std::vector<double> torque(n, 0.065);  // below Ts
+            std::fill(torque.begin() + 200, torque.begin() + 400, 0.09);
+            std::fill(torque.begin() + 400, torque.end(), 0.0);
+            EffectJob job = job_of(torque, LoopKind::open);
+            job.substeps = 1;
+            const EffectModel model = model_with(one_mass(), effect<LugreFriction>, {0.04, 0.07, 2.0, stiffness, damping});
+            const std::vector<double> w = velocity_of(job, model);
+            for (std::size_t k = 150; k < 200; ++k) CHECK(std::abs(w[k]) < 1e-3);
+            // Sliding: T = g(w) + D w + J dw/dt, D = 0.005, J = 5e-4
+            const double v = w[399], g = 0.04 + 0.03 * std::exp(-(v / 2.0) * (v / 2.0));
+            CHECK(v > 5.0);
+            CHECK_NEAR(g + 0.005 * v + 5e-4 * (v - w[398]) / Ts, 0.09, 2e-4);
+            for (std::size_t k = 560; k < n; ++k) CHECK(std::abs(w[k]) < 1e-3);
+        }
 }
 
 TEST_CASE("two masses are recovered from the factors, with shaft damping") {
@@ -271,25 +292,25 @@ TEST_CASE("what is no drive gives undefined numbers and no crash") {
     Factors<double> backwards = one_mass();
     backwards.gain = -backwards.gain;
     const auto undefined = [&](const EffectModel& m) { return !std::isfinite(velocity_of(job, m).back()); };
-    CHECK(undefined(model_with(backwards, Effect::coulomb_friction, {0.05})));
+    CHECK(undefined(model_with(backwards, effect<CoulombFriction>, {0.05})));
     Factors<double> impossible = table_three();
     impossible.zero_pair[0] = {1.0, 0.0};  // no stiffness
-    CHECK(undefined(model_with(impossible, Effect::backlash, {0.01})));
-    CHECK(undefined(model_with(one_mass(), Effect::transport_delay, {std::nan("")})));
-    CHECK(undefined(model_with(one_mass(), Effect::transport_delay, {5.0})));
-    CHECK(undefined(model_with(one_mass(), Effect::load_torque, {std::nan("")})));
-    EffectModel all = model_with(one_mass(), Effect::presliding_friction, {-1.0, -2.0});
+    CHECK(undefined(model_with(impossible, effect<Backlash>, {0.01})));
+    CHECK(undefined(model_with(one_mass(), effect<TransportDelay>, {std::nan("")})));
+    CHECK(undefined(model_with(one_mass(), effect<TransportDelay>, {5.0})));
+    CHECK(undefined(model_with(one_mass(), effect<LoadTorque>, {std::nan("")})));
+    EffectModel all = model_with(one_mass(), effect<PreslidingFriction>, {-1.0, -2.0});
     for (const Sizes& s : sizes)
-        if (s.effect != Effect::backlash && s.effect != Effect::hardening_stiffness) {
-            double wild[4];
-            for (int i = 0; i < 4; ++i) wild[i] = -1e3 * s.typical[i];
+        if (s.effect != effect<Backlash> && s.effect != effect<HardeningStiffness>) {
+            double wild[5];
+            for (int i = 0; i < 5; ++i) wild[i] = -1e3 * s.typical[i];
             all.add(s.effect, wild);
         }
     velocity_of(job, all);
     const EffectModel p0{factors_from_roots(1.0, {}, {}), {}};
     EffectModel with_load = p0;
     const double load[] = {0.1};
-    with_load.add(Effect::load_torque, load);
+    with_load.add(effect<LoadTorque>, load);
     CHECK_THROWS(velocity_of(job, with_load), std::invalid_argument);
 }
 
@@ -303,7 +324,7 @@ TEST_CASE("a record that starts in motion continues the linear loop's own state"
         const EffectModel plain{table_three(), {}};
         simulate_effects(job, {&plain, 1}, {&start, 1}, {linear.data()});
         for (const EffectModel& m :
-             {model_with(table_three(), Effect::load_torque, {1e-14}), model_with(table_three(), Effect::backlash, {1e-15})}) {
+             {model_with(table_three(), effect<LoadTorque>, {1e-14}), model_with(table_three(), effect<Backlash>, {1e-15})}) {
             simulate_effects(job, {&m, 1}, {&start, 1}, {w.data()});
             const double scale = kind == LoopKind::open ? 1e3 : 1e2;  // the torque of the open loop is the staircase itself
             for (std::size_t k = 0; k < w.size(); ++k) CHECK_NEAR(w[k], linear[k], 1e-10 * scale);
@@ -355,7 +376,7 @@ TEST_CASE("effects that the core does not know: as its own, in lanes as alone") 
             own.level.push_back(Tc);
             asked[i].linear = one_mass();
             known[i].linear = kind == LoopKind::continuous ? one_mass() : one_mass(5e-4, 0.005 + d);
-            if (Tc > 0.0) known[i].add(Effect::coulomb_friction, &Tc);
+            if (Tc > 0.0) known[i].add(effect<CoulombFriction>, &Tc);
             if (kind == LoopKind::continuous) own.d[i] = 0.0;
         }
         const auto run = [&](const std::vector<EffectModel>& models, OwnEffects* effects, bool lanes) {

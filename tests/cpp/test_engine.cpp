@@ -1,8 +1,8 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
-#include "gaident/decode.hpp"
-#include "gaident/engine.hpp"
-#include "gaident/parameters.hpp"
+#include "gaident/genetic/decode.hpp"
+#include "gaident/search/engine.hpp"
+#include "gaident/estimation/parameters.hpp"
 
 #include <algorithm>
 #include <chrono>

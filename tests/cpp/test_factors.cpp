@@ -12,8 +12,8 @@ namespace {
 double distance(std::vector<Complex> a, std::vector<Complex> b) {
     double worst = 0.0, size = 1e-300;
     for (const Complex x : a) {
-        const auto nearest = std::min_element(b.begin(), b.end(),
-                                              [&](Complex u, Complex v) { return std::abs(u - x) < std::abs(v - x); });
+        const auto nearest =
+            std::min_element(b.begin(), b.end(), [&](Complex u, Complex v) { return std::abs(u - x) < std::abs(v - x); });
         worst = std::max(worst, std::abs(*nearest - x));
         size = std::max(size, std::abs(x));
         b.erase(nearest);
@@ -61,8 +61,7 @@ TEST_CASE("factors: roots into factors and back") {
     double worst = 0.0;
     for (int repeat = 0; repeat < 3000; ++repeat) {
         const std::size_t p = random.below(8), q = random.below(8);
-        const reference::Plant g =
-            reference::random_plant(random, p, q, reference::families[repeat % 2 == 0 ? 0 : 3], 1e-3, 250);
+        const reference::Plant g = reference::random_plant(random, p, q, reference::families[repeat % 2 == 0 ? 0 : 3], 1e-3, 250);
         const Factors<double> f = reference::factors_of(g);
         CHECK(f.structure == Structure{static_cast<int>(p), static_cast<int>(q)});
         std::vector<Complex> poles, zeros;

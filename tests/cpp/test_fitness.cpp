@@ -1,5 +1,5 @@
 #include "check.hpp"
-#include "gaident/fitness.hpp"
+#include "gaident/genetic/fitness.hpp"
 
 using namespace gaident;
 

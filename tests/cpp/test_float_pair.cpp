@@ -1,6 +1,6 @@
 #include "check.hpp"
-#include "gaident/float_pair.hpp"
-#include "gaident/rng.hpp"
+#include "gaident/numeric/float_pair.hpp"
+#include "gaident/numeric/rng.hpp"
 
 using namespace gaident;
 

@@ -73,8 +73,7 @@ TEST_CASE("genome: Gray code and back, neighbours one bit apart") {
         CHECK(reference::from_gray(gray, 16) == x);
         CHECK(x == 0 || std::popcount(gray ^ Genome::to_gray(x - 1)) == 1);
     }
-    for (const std::uint32_t x : {0xFFFFFFFFU, 0x80000000U, 0xDEADBEEFU})
-        CHECK(Genome::from_gray(Genome::to_gray(x)) == x);
+    for (const std::uint32_t x : {0xFFFFFFFFU, 0x80000000U, 0xDEADBEEFU}) CHECK(Genome::from_gray(Genome::to_gray(x)) == x);
 }
 
 TEST_CASE("genome: value and set_value, every code of every field, both codes and scales") {

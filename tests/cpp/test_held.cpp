@@ -1,7 +1,7 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
-#include "gaident/closed_loop.hpp"
-#include "gaident/held.hpp"
+#include "gaident/control/closed_loop.hpp"
+#include "gaident/plant/held.hpp"
 
 using namespace gaident;
 

@@ -1,6 +1,7 @@
 #include "check.hpp"
-#include "gaident/batch.hpp"
-#include "gaident/decode.hpp"
+#include "gaident/genetic/population.hpp"
+#include "gaident/simulation/batch.hpp"
+#include "gaident/genetic/decode.hpp"
 #include "gaident/reference/drives.hpp"
 
 #include <cstring>

@@ -1,6 +1,6 @@
 #include "check.hpp"
-#include "gaident/lanes.hpp"
-#include "gaident/rng.hpp"
+#include "gaident/numeric/lanes.hpp"
+#include "gaident/numeric/rng.hpp"
 
 using namespace gaident;
 

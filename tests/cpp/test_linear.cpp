@@ -1,6 +1,6 @@
 #include "check.hpp"
-#include "gaident/linear.hpp"
-#include "gaident/rng.hpp"
+#include "gaident/numeric/linear.hpp"
+#include "gaident/numeric/rng.hpp"
 
 using namespace gaident;
 

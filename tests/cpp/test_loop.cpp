@@ -1,6 +1,6 @@
 #include "check.hpp"
-#include "gaident/batch.hpp"
-#include "gaident/float_pair.hpp"
+#include "gaident/simulation/batch.hpp"
+#include "gaident/numeric/float_pair.hpp"
 #include "gaident/reference/drives.hpp"
 
 using namespace gaident;

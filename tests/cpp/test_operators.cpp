@@ -1,5 +1,5 @@
 #include "check.hpp"
-#include "gaident/operators.hpp"
+#include "gaident/genetic/operators.hpp"
 #include "gaident/reference/bits.hpp"
 
 using namespace gaident;

@@ -1,6 +1,6 @@
 #include "check.hpp"
-#include "gaident/batch.hpp"
-#include "gaident/parallel.hpp"
+#include "gaident/simulation/batch.hpp"
+#include "gaident/runtime/parallel.hpp"
 
 #include <stdexcept>
 

@@ -1,5 +1,5 @@
 #include "check.hpp"
-#include "gaident/parameters.hpp"
+#include "gaident/estimation/parameters.hpp"
 #include "gaident/reference/drives.hpp"
 
 using namespace gaident;
@@ -15,9 +15,9 @@ SearchRanges ranges() {
 }
 
 Factors<double> random_factors(Random& random, Structure s, double size) {
-    reference::Plant g = reference::random_plant(
-        random, static_cast<std::size_t>(s.p), static_cast<std::size_t>(s.q),
-        random.below(2) == 0 ? reference::Family::ordinary : reference::Family::unstable, size, 250);
+    reference::Plant g =
+        reference::random_plant(random, static_cast<std::size_t>(s.p), static_cast<std::size_t>(s.q),
+                                random.below(2) == 0 ? reference::Family::ordinary : reference::Family::unstable, size, 250);
     g.K = reference::log_uniform(random, 10.0, 1e6);
     return reference::factors_of(g);
 }

@@ -1,6 +1,6 @@
 #include "check.hpp"
-#include "gaident/kernels/kernels.hpp"
-#include "gaident/rng.hpp"
+#include "gaident/simulation/kernels/kernels.hpp"
+#include "gaident/numeric/rng.hpp"
 
 using namespace gaident;
 

@@ -1,8 +1,8 @@
 #include "check.hpp"
-#include "gaident/parameters.hpp"
+#include "gaident/estimation/parameters.hpp"
 #include "gaident/reference/drives.hpp"
-#include "gaident/refine.hpp"
-#include "gaident/simulate.hpp"
+#include "gaident/estimation/refine.hpp"
+#include "gaident/simulation/simulate.hpp"
 
 using namespace gaident;
 
@@ -136,8 +136,7 @@ TEST_CASE("refine: recovers every structure") {
     Random random(132);
     for (std::size_t p = 0; p <= 3; ++p)
         for (std::size_t q = 0; q <= 3; ++q) {
-            const auto d =
-                reference::random_drive(random, LoopKind::continuous, p, q, reference::Family::ordinary, 400, 3.0);
+            const auto d = reference::random_drive(random, LoopKind::continuous, p, q, reference::Family::ordinary, 400, 3.0);
             const Bench bench(d, {command(LoopKind::continuous, 400, 3)});
             RefineOptions o;
             o.bounded = false;
@@ -195,10 +194,10 @@ TEST_CASE("refine: stays inside its bounds and says where it stands at one") {
 
 TEST_CASE("refine: whitening equals the error filtered explicitly, over chunks and records") {
     const std::vector<double> phi{0.6, -0.25, 0.1};
-    const Bench bench(paper(LoopKind::continuous),
-                      {command(LoopKind::continuous, 1300, 5), command(LoopKind::continuous, 2, 6),
-                       command(LoopKind::continuous, 512, 7)},
-                      0.5);
+    const Bench bench(
+        paper(LoopKind::continuous),
+        {command(LoopKind::continuous, 1300, 5), command(LoopKind::continuous, 2, 6), command(LoopKind::continuous, 512, 7)},
+        0.5);
     RefineOptions o = wide();
     o.whitening = phi;
     const Refiner refiner(bench.experiment, o);
@@ -220,8 +219,7 @@ TEST_CASE("refine: whitening equals the error filtered explicitly, over chunks a
                 double v = 0.0;
                 if (i >= phi.size()) {
                     v = bench.outputs[r][i] - w[i];
-                    for (std::size_t j = 0; j < phi.size(); ++j)
-                        v -= phi[j] * (bench.outputs[r][i - 1 - j] - w[i - 1 - j]);
+                    for (std::size_t j = 0; j < phi.size(); ++j) v -= phi[j] * (bench.outputs[r][i - 1 - j] - w[i - 1 - j]);
                 }
                 filtered.push_back(v);
             }
@@ -273,8 +271,7 @@ TEST_CASE("refine: estimates the unknown state of records that start in motion")
         CHECK(fit.starts.size() == states.size());
         double size = 0.0, worst = 0.0;
         for (const double x : states) size = std::max(size, std::abs(x));
-        for (std::size_t i = 0; i < states.size(); ++i)
-            worst = std::max(worst, std::abs(fit.starts[i] - states[i]) / size);
+        for (std::size_t i = 0; i < states.size(); ++i) worst = std::max(worst, std::abs(fit.starts[i] - states[i]) / size);
         std::printf("loop %d: largest deviation of a start state %.2g of the largest, cost %.2g of the signal\n",
                     static_cast<int>(kind), worst, fit.cost / bench.scale());
         CHECK(worst < 1e-4);
@@ -306,15 +303,14 @@ TEST_CASE("refine: derivatives by forward differences equal the referee's centra
                 for (const int side : {0, 1}) {
                     std::vector<long double> moved = exact;
                     moved[j] += side == 0 ? h : -h;
-                    w[side] = reference::run(system_of(moved, std::exp(moved[0]), g.structure), bench.inputs[0],
-                                             d.sample_time, d.loop)
-                                  .velocity;
+                    w[side] =
+                        reference::run(system_of(moved, std::exp(moved[0]), g.structure), bench.inputs[0], d.sample_time, d.loop)
+                            .velocity;
                 }
                 std::vector<double> column(columns.begin() + static_cast<std::ptrdiff_t>(300 * j),
                                            columns.begin() + static_cast<std::ptrdiff_t>(300 * (j + 1)));
                 std::vector<long double> central;
-                for (std::size_t i = 0; i < 300; ++i)
-                    central.push_back((w[1][i] - w[0][i]) / (2.0L * h));  // of the error
+                for (std::size_t i = 0; i < 300; ++i) central.push_back((w[1][i] - w[0][i]) / (2.0L * h));  // of the error
                 worst = std::max(worst, reference::deviation(column, central));
             }
         }
@@ -330,7 +326,7 @@ TEST_CASE("refine: a start that diverges comes back as the worst, untouched") {
     const Factors<double> wild =
         factors_from_roots(1e4, std::vector<std::complex<double>>{2000.0, {900.0, 700.0}, {900.0, -700.0}}, {});
     const Refined fit = Refiner(bench.experiment, o).fit(wild, {}, 20);
-    CHECK(fit.cost == worst_fitness);
+    CHECK(fit.cost == worst_error_sum);
     CHECK(!fit.converged);
     CHECK(fit.factors.structure == wild.structure);
 }

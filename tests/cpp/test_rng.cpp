@@ -1,5 +1,5 @@
 #include "check.hpp"
-#include "gaident/rng.hpp"
+#include "gaident/numeric/rng.hpp"
 
 #include <array>
 

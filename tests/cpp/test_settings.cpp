@@ -1,6 +1,6 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
-#include "gaident/engine.hpp"
+#include "gaident/search/engine.hpp"
 
 using namespace gaident;
 

@@ -1,6 +1,6 @@
 #include "check.hpp"
 #include "gaident/reference/drives.hpp"
-#include "gaident/simulate.hpp"
+#include "gaident/simulation/simulate.hpp"
 
 using namespace gaident;
 

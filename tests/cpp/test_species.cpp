@@ -1,9 +1,9 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
-#include "gaident/decode.hpp"
-#include "gaident/engine.hpp"
-#include "gaident/parameters.hpp"
-#include "gaident/species.hpp"
+#include "gaident/genetic/decode.hpp"
+#include "gaident/search/engine.hpp"
+#include "gaident/estimation/parameters.hpp"
+#include "gaident/search/species.hpp"
 
 using namespace gaident;
 

@@ -2,11 +2,12 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
 #include "fixed_bound.hpp"
-#include "gaident/c30.hpp"
-#include "gaident/denormals.hpp"
-#include "gaident/engine.hpp"
-#include "gaident/fixed_scaling.hpp"
-#include "gaident/static_search.hpp"
+#include "gaident/numeric/c30.hpp"
+#include "gaident/numeric/denormals.hpp"
+#include "gaident/search/chromosomes.hpp"
+#include "gaident/search/engine.hpp"
+#include "gaident/target/fixed_scaling.hpp"
+#include "gaident/target/static_search.hpp"
 
 #include <array>
 #include <functional>
@@ -166,7 +167,7 @@ TEST_CASE("mirror: two records, and records that begin in motion, cost what doub
     for (std::size_t i = 0; i < all.size(); ++i)
         for (int w = 0; w < all.words(); ++w) all[i][w] = random.word();
     std::vector<double> exact(all.size()), found(all.size());
-    Batch(bench.experiment, all.size(), false).errors(all, decoder, exact);
+    Batch(bench.experiment, all.size(), false).errors(Chromosomes(all, decoder), exact);
     for (std::size_t i = 0; i < all.size(); ++i) exact[i] = fitness(exact[i], decoder.structure(all[i]), {});
     double peak = 0.0;
     for (const auto* signal : {&bench.measured.input, &bench.measured.output})

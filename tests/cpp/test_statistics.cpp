@@ -1,7 +1,7 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
-#include "gaident/refine.hpp"
-#include "gaident/statistics.hpp"
+#include "gaident/estimation/refine.hpp"
+#include "gaident/estimation/statistics.hpp"
 
 using namespace gaident;
 

@@ -20,7 +20,7 @@ NAMES = ("--columns", "command=w_ref,velocity=w", "--columns", "torque=u,time=t"
 TRUTH = ga.TwoMass(JM=1.02e-4, DM=0.003, JL=5.815e-4, DL=0.008, KG=2.59)
 LONG = """
 import signal, sys
-from gaident.cli import COMMANDS, _command, main
+from gaident.cli.main import COMMANDS, _command, main
 _command(COMMANDS[sys.argv[1]])  # imported: what is interrupted is the work
 signal.signal(signal.SIGINT, signal.default_int_handler)  # some shells start jobs with it ignored
 print("ready", flush=True)

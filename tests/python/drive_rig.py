@@ -76,6 +76,13 @@ NOISES = {
 # Library effect -> parameter -> field of the drive; friction adds to fields that several effects share.
 FIELDS: dict[str, dict[str, str]] = {
     "presliding_friction": {"torque": "dahl", "stiffness": "dahl_stiffness"},
+    "lugre_friction": {
+        "torque": "lugre",
+        "static_torque": "lugre_static",
+        "stribeck_velocity": "lugre_velocity",
+        "stiffness": "lugre_stiffness",
+        "damping": "lugre_damping",
+    },
     "quadratic_drag": {"coefficient": "drag"},
     "load_torque": {"torque": "load"},
     "unbalance": {"amplitude": "unbalance", "phase": "unbalance_phase"},
@@ -169,6 +176,7 @@ def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:
 def substeps_for(values: Mapping[str, float], dt: float, least: int) -> int:
     """So many substeps that the fastest state stays well inside the step's stability and accuracy: bristle, lag or filter."""
     rates = [values["dahl_stiffness"] * 150 / values["dahl"] if values["dahl"] else 0.0]
+    rates += [values["lugre_stiffness"] * 150 / values["lugre"] if values["lugre"] else 0.0]
     rates += [1 / values[name] for name in ("lag", "filter") if values[name] > 0]
     fastest = max(rates)
     needed = int(np.ceil(dt * fastest / 0.5))

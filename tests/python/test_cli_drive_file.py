@@ -12,7 +12,7 @@ from cli_cases import LOOP, NAMES, refusal
 from gaident.cli import COMMANDS
 from gaident.cli.drive import drive_of
 from gaident.cli.options import parser_of
-from gaident.drive_file import read_drive_file
+from gaident.drive.drive_file import read_drive_file
 
 ROOT = Path(__file__).resolve().parents[2]
 

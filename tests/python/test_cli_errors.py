@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 from pathlib import Path
 
 import pytest
 
 from cli_cases import LOOP, NAMES, command, refusal
+from gaident.arguments import CONTINUOUS_LOOP, NO_TIME, arg
 from gaident.cli import main
 from gaident.cli.remedies import in_options
+from gaident.errors import ReadError, SettingsError
 
 
 def test_messages_speak_of_options(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -20,22 +23,44 @@ def test_messages_speak_of_options(here: Path, capsys: pytest.CaptureFixture[str
     assert "argument --kp: '0,0232' is no number: write a decimal point, 0.0232" in err
     err = refusal(["identify", "step.csv", *NAMES, "--kp", "lots", "--ki", "1.367"], capsys)
     assert "'lots' is no number; see" in err
-    for text, options in (
-        ("set columns={'time': None} to trust dt", "set --columns time= to trust dt"),
-        ("give units={'time': 'ms'}; give dt= [s] then", "give --units time=ms; give --dt [s] then"),
+    for text, python, options in (
         (
+            f"set {NO_TIME} to trust dt",
+            "set columns={'time': None} to trust dt",
+            "set --columns time= to trust dt",
+        ),
+        (
+            f"give {arg('units', repr('ms'), 'time')}; give {arg('dt')} [s] then",
+            "give units={'time': 'ms'}; give dt= [s] then",
+            "give --units time=ms; give --dt [s] then",
+        ),
+        (
+            f"{arg('counts_per_turn', '0.0')} is no number; give {arg('velocity_cutoff_hz')}",
             "counts_per_turn=0.0 is no number; give velocity_cutoff_hz=",
             "--counts-per-turn 0.0 is no number; give --velocity-cutoff",
         ),
-        ("use p=(1, 3), or PI(..., loop='continuous')", "use --p 1..3, or --loop continuous"),
-        ("give delimiter=',' and decimal='.' as in my--run_1.csv", "give --delimiter ',' and --decimal '.' as in my--run_1.csv"),
         (
-            "if the drive is not a digital one, give loop='continuous'.",
-            "if the drive is not a digital one, give --loop continuous.",
+            f"use {arg('p', '(1, 3)')}, or {CONTINUOUS_LOOP}",
+            "use p=(1, 3), or PI(..., loop='continuous')",
+            "use --p 1..3, or --loop continuous",
         ),
-        ("reverse one, or give space=SearchSpace(gain=...)", "reverse one, or give --gain LOW HIGH"),
+        (
+            f"give {arg('delimiter', repr(','))} and {arg('decimal', repr('.'))} as in my--run_1.csv, dt=1 says",
+            "give delimiter=',' and decimal='.' as in my--run_1.csv, dt=1 says",
+            "give --delimiter ',' and --decimal '.' as in my--run_1.csv, dt=1 says",
+        ),
+        (
+            f"reverse one, or give {arg('space', 'SearchSpace(gain=...)')}",
+            "reverse one, or give space=SearchSpace(gain=...)",
+            "reverse one, or give --gain LOW HIGH",
+        ),
+        (f"leave {arg('pade', '3')} out", "leave pade=3 out", "leave pade=3 out"),
     ):
-        assert " ".join(in_options(text).split()) == options
+        error = ReadError(text)
+        assert str(error) == python and in_options(error) == options
+        again = pickle.loads(pickle.dumps(error))
+        assert type(again) is ReadError and in_options(again) == options
+        assert in_options(SettingsError(f"run.csv: {error.marked}")) == f"run.csv: {options}"
 
 
 def test_a_forgotten_unit_is_named_and_not_taken_for_a_sign(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -115,6 +140,6 @@ def test_a_bug_is_1_and_no_traceback(here: Path, capsys: pytest.CaptureFixture[s
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("one\nover zero")
 
-    monkeypatch.setattr("gaident.cli.identify.identify", broken)
+    monkeypatch.setattr("gaident.cli.commands.identify.identify", broken)
     assert main(["identify", "step.csv", *NAMES, *LOOP]) == 1
     assert capsys.readouterr().err == ("gaident: internal error, please report it: ZeroDivisionError: one over zero\n")

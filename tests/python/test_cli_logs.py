@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident import doctor
+from gaident.cli import examination as doctor
 from gaident.cli import main
 from gaident.data.guess import guess_channels, unit_from_position, unit_from_velocity
 from gaident.data.listing import columns
-from gaident.drive_file import read_drive_file
-from gaident.progress_bar import Progress
+from gaident.drive.drive_file import read_drive_file
+from gaident.show.progress_bar import Progress
 
 SAMPLES = Path(__file__).parent / "samples"
 TRUTH = ga.TwoMass(JM=1.02e-4, DM=0.003, JL=5.815e-4, DL=0.008, KG=2.59)
@@ -64,7 +64,7 @@ def test_names_of_a_file_do_nothing_to_the_terminal(here: Path, capsys: pytest.C
     assert sections["columns"]["torque"] == 'torque "\n[controller]\nkp = 1' and sections["controller"] == {}
     call = ["identify", "evil.npz", "--drive", "drive.toml", "--quiet"]
     assert main(call) == 2
-    assert "line 18: velocity and torque of [units], marked FILL IN, are not filled in" in capsys.readouterr().err
+    assert "line 19: velocity and torque of [units], marked FILL IN, are not filled in" in capsys.readouterr().err
     assert main([*call, "--units", "velocity=rad/s,torque=N m"]) == 0
 
 
@@ -135,7 +135,7 @@ def test_init_writes_a_drive_file_that_identify_takes(here: Path, capsys: pytest
     assert Path("drive.toml").read_bytes() == before
     assert main(["init", "step.csv", "--force", "--json"]) == 0
     marked = json.loads(capsys.readouterr().out)["fill_in"]
-    assert [line.split(":")[0] for line in marked] == ["controller.kp", "controller.ki"]
+    assert [line.split(":")[0] for line in marked] == ["torque_is", "controller.kp", "controller.ki"]
     # The line to go on with is one that a shell takes.
     Path("my step.csv").write_bytes(Path("step.csv").read_bytes())
     assert main(["init", "my step.csv", "--out", "my.toml"]) == 0
@@ -197,6 +197,7 @@ def test_the_unit_of_a_velocity_by_its_position() -> None:
 @pytest.mark.parametrize(
     ("text", "what", "remedy"),
     [
+        ("torque_is = 'actual'", "torque_is is 'actual'", "must be one of commanded, measured"),
         ("gear_ratio = -3", "gear_ratio is -3", "give a number > 0"),
         ('load_side = ["angle"]', "load_side is 'angle'", "position"),
         ("decimate = 2.5", "decimate is 2.5", "whole number"),
@@ -315,7 +316,7 @@ def test_progress_is_drawn_on_a_terminal_and_nowhere_else(monkeypatch: pytest.Mo
         stream = Terminal()
         with Progress(stream) as show:
             assert show is not None
-            monkeypatch.setattr("gaident.progress_bar._QUIET", 0.0)
+            monkeypatch.setattr("gaident.show.progress_bar._QUIET", 0.0)
             show(0.25, "generation 120, best fitness 0.01, species (1, 2) of [bold]10")
         drawn = stream.getvalue()
         assert "25%" in drawn and "species (1, 2) of [bold]10" in drawn and "left" in drawn
@@ -353,7 +354,7 @@ def test_progress_in_a_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
     display.display = lambda page, raw, display_id: Handle()  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "IPython", kernel)
     monkeypatch.setitem(sys.modules, "IPython.display", display)
-    monkeypatch.setattr("gaident.progress_bar._QUIET", 0.0)
+    monkeypatch.setattr("gaident.show.progress_bar._QUIET", 0.0)
     with Progress(io.StringIO()) as show:
         assert show is not None  # although the stream is no terminal
         show(0.5, "generation 10 <b>")

@@ -55,7 +55,7 @@ def test_emps_axis_falsifies_the_linear_model(here: Path, data_dir: Path, capsys
 
 
 def test_hsm150_runs_together_falsify_the_linear_model(here: Path, data_dir: Path, capsys: Any) -> None:
-    logs = sorted(str(path) for path in (data_dir / "hsm150").glob("*.mat"))
+    logs = sorted(str(path) for path in (data_dir / "hsm150").glob("idf_pos_*.mat"))
     assert len(logs) == 6
     columns = ("--columns", "velocity=data[:,3],torque=data[:,4]", "--columns", "time=data[:,0]")
     assert main(["identify", *logs, *columns, "--out", "hsm.json"]) == 0

@@ -17,7 +17,8 @@ from gaident.cli import main
 # The bar without its 0.3 s of waiting, so that a short run shows it; what is drawn takes some 0.2 s of search.
 AT_ONCE = """
 import sys
-from gaident import cli, progress_bar
+from gaident import cli
+from gaident.show import progress_bar
 progress_bar._QUIET = 0.0
 sys.exit(cli.main(sys.argv[1:]))
 """
@@ -51,9 +52,18 @@ def test_a_command_imports_what_it_needs(here: Path) -> None:
     assert done.returncode == 0, done.stderr
     imported = done.stderr.splitlines()[-1].split()
     assert "gaident.identification.identify" in imported
-    assert not {"scipy", "matplotlib", "gaident.store", "gaident.demo"} & {*imported}
+    assert not {"scipy", "matplotlib", "gaident.results.store", "gaident.cli.demonstration"} & {*imported}
     # The controller is run again on the log; nothing else of the diagnosis is needed.
-    replay = {"gaident.diagnosis", *(f"gaident.diagnosis.{name}" for name in ("replay", "replay_causes", "lattice"))}
+    needed = (
+        "controller",
+        "controller.replay",
+        "controller.replay_causes",
+        "library",
+        "library.names",
+        "records",
+        "records.lattice",
+    )
+    replay = {"gaident.diagnosis", *(f"gaident.diagnosis.{name}" for name in needed)}
     assert {name for name in imported if name.startswith("gaident.diagnosis")} == replay
 
 
@@ -90,7 +100,7 @@ def test_progress_bar_on_a_terminal_only(here: Path, capfd: pytest.CaptureFixtur
     assert bars and bars == sorted(bars, key=int)
     assert re.search(rb"\d+ s left gen(eration|\.) \d+, best (fitness )?[\d.e-]+", text)
     assert text.split(b"\r")[-1].strip() == b""  # nothing of it stays
-    monkeypatch.setattr("gaident.progress_bar._QUIET", 0.0)
+    monkeypatch.setattr("gaident.show.progress_bar._QUIET", 0.0)
     assert main(["identify", "step.csv", *NAMES, *LOOP, "--paper", "--workers", "1"]) == 0
     assert capfd.readouterr().err == ""
 

@@ -3,101 +3,58 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import importlib
 import re
 import shutil
 import subprocess
 import sys
 import types
-from collections.abc import Iterator
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
 import gaident
 from clock import fastest
-from gaident import cli
+from gaident import providers
+from gaident.cli.main import COMMANDS, _command
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = ROOT / "csrc" / "gaident"
 PACKAGE = ROOT / "python" / "gaident"
 
-# The core, lowest first: a file includes only what stands above it. Files of one folder share its place.
-CORE_ORDER = [
-    *(
-        "wrong_use",
-        "rng",
-        "arithmetic",
-        "float_pair",
-        "lanes",
-        "c30",
-        "fixed",
-        "counting",
-        "denormals",
-        "chromosome",
-        "population",
-    ),
-    *("genome", "factors", "roots", "decode", "encode", "decoder", "parameters", "neighbours", "delta", "bilinear", "held"),
-    *("controller", "closed_loop", "loop", "record", "fitness", "candidate", "fixed_scaling", "operators", "static_search"),
-    *("kernels/", "elementary", "effects/", "filter", "replay", "friction", "two_mass", "effect_constants", "effect_plant"),
-    *(
-        "own_effects",
-        "effect_loop",
-        "effect_kernels/",
-        "advance",
-        "parallel",
-        "batch",
-        "simulate",
-        "mirror",
-        "linear",
-        "sweep",
-        "refine",
-        "statistics",
-    ),
-    *("settings", "breeder", "island", "species", "engine", "reference/", "effect_prepare", "effect_batch"),
+# The rooms of the core, lowest first: a file includes its own room and rooms before it. Folders inside a room belong to it.
+CORE_ROOMS = [
+    *("numeric", "runtime", "plant", "control", "simulation", "effects", "nonlinear"),
+    *("estimation", "genetic", "target", "search", "reference"),
 ]
+MOST_FILES = 20  # of code in one folder
 
-# Python: what each room may import of gaident, beside itself, and what inside a function only. A room is a
-# module or a folder of the package. Nothing but python -m gaident imports cli.
-DESK = {"errors", "data", "models", "identification"}
-ROOMS: dict[str, tuple[set[str], set[str]]] = {
-    "errors": (set(), set()),
-    "version": (set(), set()),
-    "files": (set(), set()),
-    "data": ({"errors", "files"}, {"version"}),
-    "models": ({"errors", "data", "_core"}, {"export"}),
-    "export": ({"errors", "files", "models", "_core"}, {"version"}),  # called by methods of models and results
-    "identification": ({"errors", "version", "files", "data", "models", "_core"}, {"show", "export"}),
-    "diagnosis": ({"errors", "version", "files", "data", "models", "identification"}, {"show", "export"}),
-    "store": ({"errors", "data", "identification", "diagnosis"}, set()),
-    "show": ({"errors"}, set()),
-    "drive_file": (DESK | {"diagnosis", "show"}, set()),
-    "drive_init": ({"errors", "data"}, set()),
-    "doctor": ({"version"}, {"_core", "demo", "identification"}),
-    "progress_bar": (set(), set()),
-    "paper": (DESK | {"diagnosis", "version", "show"}, set()),
-    "reporting": (DESK | {"diagnosis", "files", "version", "show"}, set()),
-    "demo": (DESK | {"diagnosis"}, {"show"}),
-    "cli": (
-        DESK
-        | {
-            "diagnosis",
-            "store",
-            "show",
-            "drive_file",
-            "drive_init",
-            "doctor",
-            "demo",
-            "files",
-            "paper",
-            "progress_bar",
-            "reporting",
-        },
-        {"version"},
+# Python: the rooms of gaident, lowest first. A module imports its own room and rooms that stand above its line here, inside
+# functions and for type checks too. A room is a folder, without the folders in it that have a line of their own, or one module.
+ROOMS = [
+    *("arguments", "errors", "version", "files", "checks", "providers", "_core"),
+    *("data/signals", "data/formats", "control", "data", "models", "results"),
+    *("show", "show/report", "export", "identification"),
+    *("estimation/regression", "estimation"),
+    *(
+        "diagnosis/policy",
+        "diagnosis/records",
+        "diagnosis/library",
+        "diagnosis/selection",
+        "diagnosis",
+        "diagnosis/controller",
+        "diagnosis/experiments",
+        "diagnosis/explain",
+        "diagnosis/diagnose",
     ),
-    "__main__": ({"cli"}, set()),
-    "__init__": (set(), {"version"}),  # the rest is imported by name when it is used
-}
+    *("reporting", "paper", "drive", "cli", "cli/commands", "__init__", "__main__"),
+]
+MOST_FILES = 20  # of code in a folder
+# What is still to be cut: files of a folder over the limit, and modules that import each other.
+TOO_FULL: dict[str, int] = {}
+CIRCLES: list[set[str]] = []
 
 
 def repository_files() -> list[Path]:
@@ -115,12 +72,11 @@ def sources(folder: Path, *suffixes: str) -> list[Path]:
     return sorted(f for f in folder.rglob("*") if f.suffix in suffixes)
 
 
-def place(file: Path) -> int:
-    """Return the place of a core file in CORE_ORDER."""
-    relative = file.relative_to(CORE)
-    name = f"{relative.parts[0]}/" if len(relative.parts) > 1 else relative.stem
-    assert name in CORE_ORDER, f"{file.relative_to(ROOT)}: give it a place in CORE_ORDER ({Path(__file__).name})"
-    return CORE_ORDER.index(name)
+def core_room(file: Path) -> int:
+    """Return the place of a core file's room in CORE_ROOMS."""
+    room = file.relative_to(CORE).parts[0]
+    assert room in CORE_ROOMS, f"{file.relative_to(ROOT)}: a file stands in one of the rooms {', '.join(CORE_ROOMS)}"
+    return CORE_ROOMS.index(room)
 
 
 def includes(file: Path) -> list[tuple[str, bool]]:
@@ -137,22 +93,44 @@ def resolved(file: Path, name: str) -> Path:
     raise AssertionError(f'{file.relative_to(ROOT)}: #include "{name}" names no file of the core')
 
 
-def test_core_includes_only_what_stands_above() -> None:
+def test_core_rooms_include_only_lower_rooms() -> None:
     wrong = []
     for file in sources(CORE, ".hpp", ".cpp"):
-        own_place = place(file)
         for name, in_brackets in includes(file):
             if in_brackets:
                 # Headers of the standard library have no suffix; intrinsics are the compiler's own.
                 if "." in name and name not in {"immintrin.h", "xmmintrin.h", "emmintrin.h"}:
                     wrong.append(f"{file.relative_to(ROOT)}: <{name}> is not the standard library")
-                continue
-            target = resolved(file, name)
-            own_header = target.with_suffix("") == file.with_suffix("")
-            same_folder = target.parent == file.parent != CORE
-            if not (own_header or same_folder or place(target) < own_place):
-                wrong.append(f"{file.relative_to(ROOT)}: {name} does not stand above it")
+            elif core_room(resolved(file, name)) > core_room(file):
+                wrong.append(f"{file.relative_to(ROOT)}: {name} stands in a higher room")
     assert not wrong, "\n".join(wrong)
+
+
+def test_core_includes_in_no_circle() -> None:
+    above: dict[Path, list[Path]] = {
+        file: [resolved(file, name) for name, in_brackets in includes(file) if not in_brackets]
+        for file in sources(CORE, ".hpp", ".cpp")
+    }
+    done: set[Path] = set()
+
+    def visit(file: Path, way: list[Path]) -> None:
+        circle = [f.relative_to(CORE) for f in way[way.index(file) :]] if file in way else []
+        assert not circle, " includes ".join(map(str, [*circle, file.relative_to(CORE)]))
+        if file not in done:
+            for included in above[file]:
+                visit(included, [*way, file])
+            done.add(file)
+
+    for file in above:
+        visit(file, [])
+
+
+def test_folders_of_the_core_stay_small() -> None:
+    folders = {f.parent for f in sources(ROOT / "csrc", ".hpp", ".cpp", ".h", ".c")}
+    many = {
+        str(d.relative_to(ROOT)): n for d in folders if (n := sum(f.parent == d for f in sources(d, ".hpp", ".cpp"))) > MOST_FILES
+    }
+    assert not many, f"more than {MOST_FILES} files: {many}"
 
 
 def test_only_the_bindings_name_pybind11_and_python() -> None:
@@ -210,46 +188,137 @@ def test_check_hpp_fails_when_a_check_fails(tmp_path: Path) -> None:
     assert exit_code("--list") == 0
 
 
-def statements(node: ast.AST, inside: bool = False) -> Iterator[tuple[ast.AST, bool]]:
-    """Yield every statement below, with whether it stands in a function."""
-    inside = inside or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, (ast.stmt, ast.excepthandler, ast.match_case)):
-            yield child, inside
-            yield from statements(child, inside)
+def modules() -> dict[str, Path]:
+    """Return the modules of the package: name -> file; a folder's __init__ has the folder's name."""
+    files = {".".join(["gaident", *f.relative_to(PACKAGE).with_suffix("").parts]): f for f in sources(PACKAGE, ".py")}
+    files["gaident._core"] = PACKAGE / "_core.pyi"
+    return {name.removesuffix(".__init__"): file for name, file in files.items()}
 
 
-def imports(tree: ast.Module, package: str) -> list[tuple[str, bool, int]]:
-    """Return (absolute module, whether inside a function, line) of every import of a module of `package`."""
-    found = []
-    for node, inside in statements(tree):
+def lazy_names(file: Path) -> dict[str, str]:
+    """Return the names that a folder gives out when they are used, as its stub says: name -> module that has it."""
+    stub = file.with_suffix(".pyi")
+    if file.stem != "__init__" or not stub.is_file():
+        return {}
+    folder = ".".join(["gaident", *file.parent.relative_to(PACKAGE).parts])
+    found = [node for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom)]
+    return {
+        a.asname or a.name: ".".join(p for p in (folder, n.module, None if n.module else a.name) if p)
+        for n in found
+        for a in n.names
+    }
+
+
+def imports(name: str, known: dict[str, Path]) -> set[tuple[str, int]]:
+    """Return (module, line) of every import of gaident in a module, wherever it stands; names that a folder gives out lazily
+    count as the module that has them."""
+    found = set()
+
+    def add(base: str, attribute: str | None, line: int) -> None:
+        if attribute is not None and f"{base}.{attribute}" in known:
+            found.add((f"{base}.{attribute}", line))
+        elif attribute is not None and attribute in (lazy := lazy_names(known[base])):
+            target = lazy[attribute]
+            # A stub may name a folder's name again.
+            add(target, attribute if known[target].stem == "__init__" else None, line)
+        elif base != "gaident" or attribute != "__version__":
+            found.add((base, line))
+
+    for node in ast.walk(ast.parse(known[name].read_text())):
         if isinstance(node, ast.Import):
-            found += [(alias.name, inside, node.lineno) for alias in node.names]
+            for alias in node.names:
+                if alias.name.split(".")[0] == "gaident":
+                    add(alias.name, None, node.lineno)
         elif isinstance(node, ast.ImportFrom):
-            up = package.split(".")[: len(package.split(".")) - node.level + 1]
-            base = ".".join([*up, *([node.module] if node.module else [])]) if node.level else str(node.module)
-            # `from gaident import x` reaches the module x
-            names = [f"{base}.{a.name}" for a in node.names] if base == "gaident" else [base]
-            found += [(name, inside, node.lineno) for name in names]
-    return found
+            assert node.level == 0, f"{known[name].relative_to(ROOT)}:{node.lineno}: give the module's full name"
+            if (node.module or "").split(".")[0] == "gaident":
+                for alias in node.names:
+                    add(str(node.module), alias.name, node.lineno)
+    return found - {(name, line) for _, line in found}
+
+
+def room_of(file: Path) -> str:
+    """Return the room of a file: the line of ROOMS that fits it most closely."""
+    path = file.relative_to(PACKAGE).with_suffix("").as_posix()
+    fitting = [room for room in ROOMS if path == room or path.startswith(f"{room}/")]
+    assert fitting, f"{file.relative_to(ROOT)}: give its room a place in ROOMS ({Path(__file__).name})"
+    return max(fitting, key=len)
 
 
 def test_python_imports_follow_the_rooms() -> None:
+    known = modules()
     wrong = []
-    for file in sources(PACKAGE, ".py"):
-        relative = file.relative_to(PACKAGE)
-        room = relative.parts[0].removesuffix(".py")
-        assert room in ROOMS, f"{file.relative_to(ROOT)}: give the room {room!r} its line in ROOMS ({Path(__file__).name})"
-        always, later = ROOMS[room]
-        package = ".".join(["gaident", *relative.parts[:-1]])
-        for module, in_function, line in imports(ast.parse(file.read_text()), package):
-            parts = module.split(".")
-            if parts[0] != "gaident" or (in_function and module == "gaident.__version__"):
-                continue
-            target = parts[1] if len(parts) > 1 else "__init__"
-            if target != room and target not in always and not (in_function and target in later):
-                wrong.append(f"{file.relative_to(ROOT)}:{line}: {room} may not import {module} here")
+    for name, file in known.items():
+        if file.suffix == ".pyi":
+            continue
+        room = room_of(file)
+        for target, line in sorted(imports(name, known)):
+            above = room_of(known[target])
+            if ROOMS.index(above) > ROOMS.index(room):
+                wrong.append(f"{file.relative_to(ROOT)}:{line}: {room} may not import {target}, which stands in {above}")
     assert not wrong, "\n".join(wrong)
+
+
+def test_python_modules_import_in_no_circle() -> None:
+    """Imports inside functions and for type checks included."""
+    known = modules()
+    for circle in CIRCLES:
+        first, second = sorted(circle)
+        assert first in {t for t, _ in imports(second, known)}, f"{circle} is no circle any more: take it out of CIRCLES"
+    graph = {name: {t for t, _ in imports(name, known) if {name, t} not in CIRCLES} for name in known}
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def test_folders_give_out_names_lazily() -> None:
+    """Who imports a module runs the __init__ of its folders: these import nothing of the package."""
+    known = modules()
+    eager = {n: i for n, f in known.items() if f.stem == "__init__" and (i := imports(n, known)) and n != "gaident"}
+    assert not eager
+    assert {t for t, _ in imports("gaident", known)} == {"gaident.providers", "gaident.version"}
+
+
+def test_names_that_are_provided_are_there() -> None:
+    for name in providers._PLACES:
+        assert callable(providers.provided(name)), name
+    used = re.findall(r'\bprovided\("(\w+)"\)', "".join(f.read_text() for f in sources(PACKAGE, ".py") if f.stem != "providers"))
+    assert set(used) == set(providers._PLACES)
+    with pytest.raises(LookupError, match="no such name"):
+        providers.provided("no such name")
+
+
+def test_what_shows_results_is_typed() -> None:
+    """Text, pictures and the page take results, models and records, whose types stand below them."""
+    assert not [str(f.relative_to(ROOT)) for f in sources(PACKAGE / "show", ".py") if re.search(r"\bAny\b", f.read_text())]
+    higher = {"gaident.identification", "gaident.diagnosis", "gaident.reporting", "gaident.paper", "gaident.cli"}
+    known = modules()
+    wrong = {
+        (n, t) for n in known if n.startswith("gaident.show") for t, _ in imports(n, known) for h in higher if t.startswith(h)
+    }
+    assert not wrong
+
+
+def test_the_controller_is_an_object() -> None:
+    """Its gains are written as numbers in one file, where the core's signatures need them; no function takes both by position."""
+    bound = re.compile(r"_core\.(Experiment|EffectRecord|simulate|mirrored|discrete|recurrence|held_torque)\(")
+    for file in sources(PACKAGE, ".py"):
+        text = file.read_text()
+        assert file == PACKAGE / "control" / "core.py" or not bound.search(text), file
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.FunctionDef):
+                names = {a.arg for a in (*node.args.posonlyargs, *node.args.args)}
+                assert not {"kp", "ki"} <= names, f"{file.relative_to(ROOT)}:{node.lineno}: give {node.name} a PI"
+
+
+def test_no_folder_of_code_is_crowded() -> None:
+    counts = Counter(f.parent for f in sources(PACKAGE, ".py"))
+    for folder, count in counts.items():
+        name = folder.relative_to(PACKAGE).as_posix()
+        assert count <= TOO_FULL.get(name, MOST_FILES), f"{folder.relative_to(ROOT)} holds {count} files: cut it into rooms"
+    for name in TOO_FULL:
+        assert counts[PACKAGE / name] > MOST_FILES, f"{name} is crowded no more: take it out of TOO_FULL"
 
 
 def test_importing_gaident_is_light() -> None:
@@ -272,11 +341,78 @@ def test_files_stay_readable() -> None:
     assert not long, f"over 400 lines: {long}"
 
 
+# Rooms and modules that may name an effect: the library of the diagnosis, the models with the effects themselves, what writes
+# them in another language; and the drive that the demonstration hides one in.
+NAMES_EFFECTS = ("diagnosis/library/", "models/", "export/", "cli/demonstration.py")
+
+
+def effects_named(text: str, effects: set[str]) -> list[tuple[int, str]]:
+    """(line, effect) of each string of a module that is an effect's name; docstrings and __all__ do not count."""
+    tree = ast.parse(text)
+    skipped: set[ast.AST] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            skipped.add(node.value)
+        elif isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == "__all__" for t in node.targets):
+            skipped.update(ast.walk(node))
+    strings = [n for n in ast.walk(tree) if isinstance(n, ast.Constant) and n not in skipped]
+    return sorted((n.lineno, n.value) for n in strings if isinstance(n.value, str) and n.value in effects)
+
+
+def test_only_the_library_names_effects() -> None:
+    """What another room has to know of an effect is data of its term, or a constant of the library."""
+    effects = {row.name for row in gaident.effects.table()}
+    assert effects_named('"""cogging"""\n__all__ = ["cogging"]\nx = "cogging" + f"{x}backlash"', effects) == [
+        (3, "backlash"),
+        (3, "cogging"),
+    ]
+    found = []
+    for file in sources(PACKAGE, ".py"):
+        name = file.relative_to(PACKAGE).as_posix()
+        if not name.startswith(NAMES_EFFECTS):
+            found += [f"{name}:{line}: {effect}" for line, effect in effects_named(file.read_text(), effects)]
+    assert not found, "\n".join(found)
+
+
+def test_the_estimation_knows_no_effect_and_no_diagnosis() -> None:
+    effects = {row.name for row in gaident.effects.table()}
+    known = modules()
+    for name, file in known.items():
+        if name.startswith("gaident.estimation"):
+            assert not effects_named(file.read_text(), effects), name
+            assert not [t for t, _ in imports(name, known) if t.startswith("gaident.diagnosis")], name
+
+
+def test_pages_that_are_cited_are_there() -> None:
+    """A page's name with its folder, or that of a page at the top or beside the file; no page that only its author has."""
+    page = re.compile(r"(?<![\w/.*-])((?:[\w.-]+/)*[\w-]+\.md)\b")
+    # Written in two parts, so that this file does not find itself.
+    private = re.compile(r"\b(?:METH" + r"OD|DIAGN" + r"OSIS table|ARCHI" + r"TECTURE|see AP" + r"I)\b")
+    suffixes = {".py", ".pyi", ".hpp", ".cpp", ".h", ".c", ".md", ".txt", ".toml", ".mk", ".sh", ".yml", ".m"}
+    wrong = []
+    for file in repository_files():
+        if file.suffix not in suffixes and file.name not in {"Makefile", "run"}:
+            continue
+        if "samples" in file.parts:
+            continue  # logs, in every encoding
+        written = (
+            ROOT / "docs" in file.parents or file == ROOT / "mkdocs.yml"
+        )  # docs/tools writes pages, and names them as these do
+        docs = [ROOT / "docs", ROOT / "docs" / "theory"] if written else []
+        for i, line in enumerate(file.read_text().splitlines(), 1):
+            if private.search(line):
+                wrong.append(f"{file.relative_to(ROOT)}:{i}: {line.strip()}")
+            for name in page.findall(line):
+                if not any((folder / name).is_file() for folder in (ROOT, file.parent, *docs)):
+                    wrong.append(f"{file.relative_to(ROOT)}:{i}: no page {name}")
+    assert not wrong, "\n".join(wrong)
+
+
 def test_library_code_prints_nothing() -> None:
     printing = []
     for file in sources(PACKAGE, ".py"):
         text = file.read_text()
-        if file.parent == PACKAGE / "cli" or "print" not in text:
+        if PACKAGE / "cli" in file.parents or "print" not in text:
             continue
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print":
@@ -326,5 +462,5 @@ def test_names_of_the_rooms_are_there() -> None:
 
 
 def test_every_command_has_a_function() -> None:
-    for where in cli.COMMANDS.values():
-        assert callable(cli._command(where)), where
+    for where in COMMANDS.values():
+        assert callable(_command(where)), where

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gaident import _core
+from gaident.control.pi import PI
 from gaident.errors import ControllerError
-from gaident.models.controller import PI
 
 
 def test_defaults_are_a_digital_controller_without_limits() -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.diagnosis.hygiene import outliers
-from gaident.diagnosis.replay import replay
-from gaident.models.pi_torque import held_torque
+from gaident.control.pi_torque import held_torque
+from gaident.diagnosis.controller.replay import replay
+from gaident.diagnosis.records.hygiene import outliers
 from test_diagnosis_result import CONTROLLER, DRIVE, DT, drive_record
 
 J, D = 5e-4, 2e-3

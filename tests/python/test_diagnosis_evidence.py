@@ -12,14 +12,13 @@ import pytest
 from scipy import signal
 
 import gaident as ga
-from gaident.diagnosis.excitation import excitation
-from gaident.diagnosis.lattice import lattice_step, rounding_step
-from gaident.diagnosis.missing_torque import missing_torque
-from gaident.diagnosis.offset import Offset
-from gaident.diagnosis.replay import replay
-from gaident.diagnosis.residual_tests import residual_tests
-from gaident.diagnosis.state_space import discretised, disturbed
+from gaident.diagnosis.controller.replay import replay
+from gaident.diagnosis.experiments.excitation import excitation
+from gaident.diagnosis.explain.missing_torque import missing_torque
+from gaident.diagnosis.records.lattice import lattice_step, rounding_step
+from gaident.diagnosis.selection.offset import Offset
 from gaident.errors import ModelError, RecordError
+from gaident.estimation.state_space import discretised, disturbed
 from gaident.show.wording import sentence
 
 DT = 1e-3
@@ -346,59 +345,6 @@ def fitted(rec: ga.Record) -> ga.Model:
         gain=(100.0, 1e5), real=(-1.0, 200.0), imaginary=(0.0, 1e3), p=(1, 1), q=(0, 0)), workers=1).model  # fmt: skip
 
 
-def test_a_sound_model_raises_no_alarm() -> None:
-    for seed in range(4):
-        rng = np.random.default_rng(seed)
-        still = ga.Record(DT, np.repeat(rng.permutation(LEVELS), 75), np.zeros(1500))
-        done = ga.run(ONE_MASS, still, CONTROLLER)
-        rec = changed(still, done.velocity + 0.1 * rng.standard_normal(1500), done.torque)
-        found = residual_tests(ONE_MASS.model(), rec, CONTROLLER)
-        assert found.alarms == () and found.white > 1e-3, (seed, found)
-        assert "Nothing is left" in found.sentence
-
-
-def test_coloured_noise_inside_the_loop_raises_no_alarm_either() -> None:
-    """A torque disturbance of its own colour: the residual is far from white, but depends on nothing outside."""
-    from scipy.signal import lfilter
-
-    rng = np.random.default_rng(2)
-    plant = disturbed(discretised(ONE_MASS.model(), DT), CONTROLLER, DT)
-    still = ga.Record(DT, np.repeat(LEVELS, 100), np.zeros(2000))
-    disturbance = 0.005 * math.sqrt(1 - 0.98**2) * lfilter([1.0], [1.0, -0.98], rng.standard_normal(2000))
-    velocity = ga.simulate(ONE_MASS, still, CONTROLLER) + plant.response(disturbance) + 0.05 * rng.standard_normal(2000)
-    found = residual_tests(ONE_MASS.model(), changed(still, velocity), CONTROLLER)
-    assert found.alarms == () and found.noise.order > 2, found
-
-
-def test_friction_is_nonlinear_and_shows_in_its_own_direction() -> None:
-    rec = drive(Tc=0.03)
-    found = residual_tests(fitted(rec), rec, CONTROLLER)
-    assert found.alarms and found.nonlinear_share > max(0.2, found.linear_share)
-    assert min(found.directed, key=found.directed.__getitem__) in ("sign of velocity", "slow motion", "time")
-    assert found.directed["sign of velocity"] < 1e-20 < 1e-3 < found.directed["twice per turn"]
-    assert "nonlinear" in found.sentence and found.power_share > 0.5
-    load = residual_tests(ONE_MASS.model(), drive(load=0.03), CONTROLLER)
-    assert load.directed["constant"] == min(load.directed.values()) < 1e-6
-
-
-def test_missing_dynamics_are_linear() -> None:
-    rng = np.random.default_rng(1)
-    still = ga.Record(DT, np.repeat(LEVELS, 100), np.zeros(2000))
-    done = ga.run(TWO_MASS, still, CONTROLLER)
-    rec = changed(still, done.velocity + 0.1 * rng.standard_normal(2000), done.torque)
-    found = residual_tests(fitted(rec), rec, CONTROLLER)
-    assert "command" in found.alarms and found.linear_share > found.nonlinear_share
-    assert "linear" in found.sentence
-
-
-def test_a_noise_that_grows_is_not_stationary() -> None:
-    rng = np.random.default_rng(4)
-    still = ga.Record(DT, np.repeat(LEVELS, 100), np.zeros(2000))
-    noise = np.linspace(0.05, 0.3, 2000) * rng.standard_normal(2000)
-    found = residual_tests(ONE_MASS.model(), changed(still, ga.simulate(ONE_MASS, still, CONTROLLER) + noise), CONTROLLER)
-    assert found.stationary < 1e-7 and found.command > 1e-4
-
-
 def test_the_disturbed_loop_is_the_simulated_one() -> None:
     """From a torque step beside the controller's to the velocity, against the loop simulated sample by sample."""
     for model, loop in ((ONE_MASS, "sampled"), (TWO_MASS, "sampled"), (ONE_MASS, "continuous")):
@@ -413,8 +359,3 @@ def test_the_disturbed_loop_is_the_simulated_one() -> None:
             x = plant.A @ x + plant.B * (integral - CONTROLLER.kp * w[n] + f[n])
             w_old = w[n]
         np.testing.assert_allclose(disturbed(plant, CONTROLLER, DT).response(f), w, atol=1e-12)
-
-
-def test_residual_tests_refuse_nothing_to_test() -> None:
-    with pytest.raises(RecordError, match="at least one"):
-        residual_tests(ONE_MASS.model(), [], CONTROLLER)

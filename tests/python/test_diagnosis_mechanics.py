@@ -4,22 +4,27 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.diagnosis.candidates import Scales
-from gaident.diagnosis.layout import Layout, evenly_damped
 from gaident.diagnosis.mechanics import MECHANICS, moved
-from gaident.diagnosis.noise_filter import WHITE
-from gaident.diagnosis.problem import Fit
+from gaident.diagnosis.selection.mechanisms import evenly_damped
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.noise_model import WHITE
+from gaident.estimation.objective import Fit, Hypothesis
+from gaident.estimation.parameterisation import Parameterisation
+from gaident.estimation.prediction import OpenLoop
+from gaident.estimation.term import Scales
 
 NAN = math.nan
 SCALES = Scales(1e-3, 1.0, 50.0, 1.0, 1e3, 10.0, 0.02, NAN, NAN, True, 1.0)
+DATA = DataSet.of([ga.Record(1e-3, velocity=np.zeros(20), torque=np.zeros(20))], None)
 
 
 def fit(model: ga.Model) -> Fit:
-    layout = Layout.of(model, SCALES, [False])
-    return Fit(layout, layout.base_vector(model), WHITE, 0.0, 0.0)
+    parameters = Parameterisation.of(model, SCALES, [False])
+    return Fit(Hypothesis(parameters, OpenLoop(DATA)), parameters.base_vector(model), WHITE, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("DG", [0.0, 0.02])
@@ -51,9 +56,9 @@ def test_one_mass_and_pairs_that_do_not_swing() -> None:
 def test_even_damping_leaves_a_drive_of_even_bearings_alone_and_mends_one_that_is_driven() -> None:
     """D_M/J_M = D_L/J_L = a: f1 = a + (e1 - a) f0/e0 is what the shaft's damping makes of the zeros."""
     model = ga.TwoMass(JM=2e-4, DM=1e-3, JL=3e-4, DL=1.5e-3, KG=60.0, DG=2e-3).model()
-    layout = Layout.of(model, SCALES, [False])
-    x = layout.base_vector(model)
-    assert evenly_damped(layout, x) == pytest.approx(x, rel=1e-4)
+    parameters = Parameterisation.of(model, SCALES, [False])
+    x = parameters.base_vector(model)
+    assert evenly_damped(parameters, x) == pytest.approx(x, rel=1e-4)
     spoiled = x.copy()
     spoiled[4] *= 3.0
-    assert evenly_damped(layout, spoiled) == pytest.approx(x, rel=1e-4)
+    assert evenly_damped(parameters, spoiled) == pytest.approx(x, rel=1e-4)

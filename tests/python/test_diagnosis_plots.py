@@ -108,7 +108,7 @@ def test_torque_against_velocity_draws_both_branches_and_the_named_curve() -> No
     (ax,) = figure.axes
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
     assert ax.get_legend().get_window_extent().y0 >= ax.get_window_extent().y1  # no point is covered
-    assert sorted(labels) == sorted(["±2 std", "accelerating", "decelerating", "Coulomb friction", "mean ± sd"])
+    assert sorted(labels) == sorted(["±2 std of the estimate", "accelerating", "decelerating", "Coulomb friction", "mean ± sd"])
     assert ax.get_ylabel() == "missing torque [N m]" and ax.get_xlabel() == "velocity [rad/s]"
     rendered(figure)
     linear = plot_torque_velocity(VELOCITY, FRICTION, DT, axis="linear").axes[0]
@@ -130,7 +130,7 @@ def test_orders_reversals_and_residual_render() -> None:
     assert not any(len(ax.get_xticks()) or len(ax.get_yticks()) for ax in none.axes)
     rendered(none)
     residual = plot_residual(TIME, 0.3 * NOISE, 0.3, after=0.1 * NOISE)
-    floor = [line for line in residual.axes[1].lines if line.get_label() == "white noise floor"]
+    floor = [line for line in residual.axes[1].lines if line.get_label() == "white noise of the sensor"]
     assert floor[0].get_ydata()[0] == pytest.approx(0.3 * math.sqrt(2.0 * DT))
     rendered(residual)
 

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.diagnosis.evidence import velocity_curve
-from gaident.diagnosis.result import Finding, Fitness
-from gaident.diagnosis.wording import evidence_of
+from gaident.diagnosis.explain.evidence import velocity_curve
+from gaident.diagnosis.explain.wording import evidence_of
 from gaident.errors import GaidentError, RecordError, SettingsError
+from gaident.results.diagnosis import Finding, Fitness
 from gaident.show.wording import certainty, sentence
 
 GOLDEN = Path(__file__).parent / "golden" / "diagnosis.txt"

@@ -21,7 +21,7 @@ from test_simulate import core
 LOOPS = ("continuous", "sampled", "open")
 STRUCTURES = [(p, q) for p in range(4) for q in range(4) if p + q > 0]
 
-# Table IV, identified; factor of the loop gain; equation (7) in METHOD.md section 3 and in Table V.
+# Table IV, identified; factor of the loop gain; equation (7) from these (docs/paper.md, loop gain) and as Table V prints it.
 Coefficients = tuple[list[float], list[float]]
 Table = tuple[ga.Model, float, Coefficients, Coefficients]
 ONE_MASS: Table = (
@@ -86,7 +86,7 @@ def test_the_recurrence_is_the_simulation(loop: str, family: str) -> None:
 
 @pytest.mark.parametrize("table", [ONE_MASS, TWO_MASS], ids=["one mass", "two masses"])
 def test_table_5_from_table_4(table: Table) -> None:
-    """One factor on the loop gain gives all of Table V: METHOD.md's figures to 1e-5, the paper's to 1e-4."""
+    """One factor on the loop gain gives all of Table V: the computed figures to 1e-5, the paper's to 1e-4."""
     model, factor, method, paper = table
     found = model.discrete(0.444e-3, controller=ga.PI(0.0232 * factor, 1.367 * factor, loop="continuous"))
     largest = max(np.max(np.abs(found.alpha)), np.max(np.abs(found.beta)))

@@ -12,7 +12,7 @@ import pytest
 
 import gaident as ga
 from gaident.errors import ModelError, SettingsError
-from gaident.identification.settings import ARITHMETICS, DRIVE_ARITHMETICS
+from gaident.results.settings import ARITHMETICS, DRIVE_ARITHMETICS
 
 ROOT = Path(__file__).resolve().parents[2]
 EMBEDDED = ROOT / "csrc" / "embedded"
@@ -94,9 +94,9 @@ def test_the_drives_headers_need_no_library(tmp_path: Path) -> None:
     if compiler is None or nm is None:
         pytest.skip("no g++ or nm on the path")
     text = """
-        #include "gaident/c30.hpp"
-        #include "gaident/fixed_scaling.hpp"
-        #include "gaident/static_search.hpp"
+        #include "gaident/numeric/c30.hpp"
+        #include "gaident/target/fixed_scaling.hpp"
+        #include "gaident/target/static_search.hpp"
         template class gaident::StaticSearch<gaident::Plain<float>, 50, 250>;
         template class gaident::StaticSearch<gaident::FixedPoint<2>, 50, 250>;
         template class gaident::StaticSearch<gaident::Plain<gaident::C30Word, gaident::C30>, 50, 250>;

@@ -21,7 +21,7 @@ from gaident import _core
 from gaident.cli import main
 from gaident.models import Structure, factor_parameters, initial_state, simulate_values
 
-# Typical sizes (docs: DIAGNOSIS table of typical magnitudes).
+# Typical sizes of each effect on a small servo drive.
 SIZES: dict[str, dict[str, float]] = {
     "coulomb_friction": {"torque": 0.05},
     "stribeck_friction": {"torque": 0.04, "static_torque": 0.07, "stribeck_velocity": 2.0},
@@ -32,6 +32,13 @@ SIZES: dict[str, dict[str, float]] = {
         "viscous_negative": 4e-4,
     },
     "presliding_friction": {"torque": 0.05, "stiffness": 3.0},
+    "lugre_friction": {
+        "torque": 0.04,
+        "static_torque": 0.07,
+        "stribeck_velocity": 2.0,
+        "stiffness": 10.0,
+        "damping": 0.005,
+    },
     "quadratic_drag": {"coefficient": 1.5e-5},
     "load_torque": {"torque": 0.03},
     "unbalance": {"amplitude": 0.05, "phase": 0.3},

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.diagnosis.excitation import excitation
-from gaident.diagnosis.experiments import Limits, candidate_commands, first_experiment, separation
+from gaident.diagnosis.experiments.excitation import excitation
+from gaident.diagnosis.experiments.first_experiment import candidate_commands, first_experiment
 from gaident.errors import SettingsError
+from gaident.results.experiment import Limits
 
 DT = 1e-3
 MASS = ga.OneMass(J=2e-4, D=3e-3)
@@ -26,7 +27,7 @@ EFFECTS = {
     *("coulomb_friction", "stribeck_friction", "asymmetric_friction", "presliding_friction", "quadratic_drag", "load_torque"),
     *("unbalance", "cogging", "friction_drift", "backlash", "hardening_stiffness", "torque_saturation", "torque_dead_band"),
     *("transport_delay", "torque_lag", "integrator_clamp", "command_rate_limit", "velocity_filter", "velocity_ripple"),
-    "extra_resonance",
+    *("extra_resonance", "lugre_friction"),
 }
 
 
@@ -107,13 +108,6 @@ def test_menu_items_say_what_they_are_for() -> None:
     assert asked.margin == 87.0 and asked.separates == ("stribeck_friction", "presliding_friction")
     again = candidate_commands(DT, Limits(100.0, 1.5, 50.0, 4.0))
     assert all(np.array_equal(a.command, b.command) for a, b in zip(items, again, strict=True))
-
-
-def test_separation_counts_what_a_rival_leaves() -> None:
-    command = np.linspace(0.0, 10.0, 50)
-    left = separation(command, lambda r: 2.0 * r, lambda r, w: np.full_like(r, w.mean()), noise=0.5)
-    assert left == pytest.approx(50 * np.var(2.0 * command) / 0.25)
-    assert separation(command, lambda r: r, lambda r, w: w, noise=0.5) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,14 @@ import pytest
 from scipy.signal import lfilter
 
 import gaident as ga
-from gaident.diagnosis.noise_filter import WHITE, NoiseFilter, ShaftNoise, autoregression
-from gaident.diagnosis.problem import Problem, _damped_steps
-from gaident.diagnosis.state_space import _inverses, steady_covariance, steady_covariances
+from gaident.control.filtering import clamped_sum, filtered, recursion
 from gaident.errors import ModelError
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.least_squares import damped_steps
+from gaident.estimation.noise_model import WHITE, NoiseFilter, ShaftNoise, autoregression
+from gaident.estimation.objective import Objective
+from gaident.estimation.state_space import _inverses, steady_covariance, steady_covariances
 from gaident.identification.noise import autocorrelation
-from gaident.models.filtering import clamped_sum, filtered, recursion
 
 RNG = np.random.default_rng(5)
 
@@ -110,21 +112,22 @@ def test_a_clamped_sum() -> None:
 def test_rows_that_overflow_are_whitened_without_a_warning_and_the_callers_rows_stay() -> None:
     weight = np.ones(100)
     weight[40:50] = 0.0
+    data = DataSet.of([ga.Record(1e-3, velocity=np.zeros(100), torque=np.zeros(100))], None)
     for w in (np.ones(100), weight):
-        problem = Problem(lambda _, X: X, np.zeros(100), (100,), w)
+        objective = Objective(data, w)
         E = RNG.standard_normal((2, 100))
         E[0, 5] = np.inf
         before = E.copy()
         for noise in (WHITE, NoiseFilter(np.array([1.0, -0.5]), np.ones(1), 1)):
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
-                V = problem.whitened(E, noise)
+                V = objective.whitened(E, noise)
             assert not np.isfinite(V[0]).all() and np.isfinite(V[1]).all()
-            np.testing.assert_array_equal(V[1, problem.counted == 0.0], 0.0)
+            np.testing.assert_array_equal(V[1, objective.counted == 0.0], 0.0)
             np.testing.assert_array_equal(E, before)
 
 
 def test_a_damped_step_that_has_no_solution_is_none() -> None:
-    steps = _damped_steps(np.ones((2, 2)), np.array([1.0, 2.0]), np.array([[0.0, 0.0], [1.0, 1.0]]))
+    steps = damped_steps(np.ones((2, 2)), np.array([1.0, 2.0]), np.array([[0.0, 0.0], [1.0, 1.0]]))
     np.testing.assert_array_equal(steps[0], 0.0)
     np.testing.assert_allclose((np.ones((2, 2)) + np.eye(2)) @ steps[1], [1.0, 2.0])

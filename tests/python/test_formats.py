@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.data import delimited, read, read_columns
-from gaident.data import stored as stored_module
-from gaident.data.resampling import resampled
+from gaident.data import read, read_columns
+from gaident.data.formats import delimited
+from gaident.data.formats import stored as stored_module
+from gaident.data.signals.resampling import resampled
 from gaident.errors import ReadError, RecordError
 from samples.dialects import sample_log
 
@@ -366,7 +367,7 @@ def test_flaws_of_a_long_log_bear_their_line(long_log: Path, tmp_path: Path, mon
 @pytest.mark.parametrize("factor", [1, 2, 7])
 @pytest.mark.parametrize("n", [140, 1000])
 def test_decimation_does_not_depend_on_the_blocks(factor: int, n: int) -> None:
-    from gaident.data.decimation import Decimator, decimated
+    from gaident.data.signals.decimation import Decimator, decimated
 
     rng = np.random.default_rng(n + factor)
     x = rng.standard_normal(n).cumsum()
@@ -381,7 +382,7 @@ def test_decimation_does_not_depend_on_the_blocks(factor: int, n: int) -> None:
 
 
 def test_decimation_keeps_slow_signals_and_stops_what_would_fold() -> None:
-    from gaident.data.decimation import Decimator
+    from gaident.data.signals.decimation import Decimator
 
     decimator = Decimator(10)
     j = np.arange(-decimator.half, decimator.half + 1)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import gaident as ga
-from gaident.data.record_html import sparkline
+from gaident.show.record_html import sparkline
 
 
 class _Tags(html.parser.HTMLParser):

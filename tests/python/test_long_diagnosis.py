@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.diagnosis.coarse import blocks_of, coarsened
-from gaident.diagnosis.driven import Driven
-from gaident.diagnosis.folded import folded
-from gaident.diagnosis.noise_filter import ShaftNoise, autoregression
+from gaident.diagnosis.records.folded import folded
+from gaident.diagnosis.selection.decimated import blocks_of, decimated_record
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.noise_model import ShaftNoise, autoregression
 
 DT = 1e-3
 
@@ -38,7 +38,7 @@ def test_a_coarse_grid_leaves_a_mass_what_it_is() -> None:
     """W(m+1) - W(m) = k dt/J U(m), to the last digit."""
     u = np.random.default_rng(0).standard_normal(2003)
     w = np.concatenate([[0.0], np.cumsum(u)[:-1]]) * DT / 0.3
-    coarse = coarsened(ga.Record(DT, velocity=w, torque=u, position=np.cumsum(w) * DT), 7)
+    coarse = decimated_record(ga.Record(DT, velocity=w, torque=u, position=np.cumsum(w) * DT), 7)
     assert len(coarse) == 2003 // 7 and coarse.dt == pytest.approx(7 * DT)
     assert coarse.torque is not None
     np.testing.assert_allclose(np.diff(coarse.velocity), coarse.torque[:-1] * 7 * DT / 0.3, rtol=0.0, atol=1e-14)
@@ -48,12 +48,12 @@ def test_the_grid_is_as_coarse_as_what_is_wrong_allows() -> None:
     n = 28_000
     t = np.arange(n) * DT
     rec = ga.Record(DT, velocity=np.sin(t), torque=np.cos(t))
-    driven = Driven.of([rec], None)
-    assert blocks_of(driven, 0.1 * np.sin(2.0 * t)) == 8, "3500 samples are left"
-    assert 1 < blocks_of(driven, 0.1 * np.sin(2.0 * np.pi * 20.0 * t)) < 8
-    assert blocks_of(driven, 0.1 * np.sin(2.0 * np.pi * 400.0 * t)) == 1
+    data = DataSet.of([rec], None)
+    assert blocks_of(data, 0.1 * np.sin(2.0 * t)) == 8, "3500 samples are left"
+    assert 1 < blocks_of(data, 0.1 * np.sin(2.0 * np.pi * 20.0 * t)) < 8
+    assert blocks_of(data, 0.1 * np.sin(2.0 * np.pi * 400.0 * t)) == 1
     looped = ga.Record(DT, command=np.sin(t), velocity=np.sin(t))
-    assert blocks_of(Driven.of([looped], ga.PI(1.0, 1.0)), 0.1 * np.sin(2.0 * t)) == 1, "a controller samples as it does"
+    assert blocks_of(DataSet.of([looped], ga.PI(1.0, 1.0)), 0.1 * np.sin(2.0 * t)) == 1, "a controller samples as it does"
 
 
 def test_a_floor_bounds_what_a_filter_makes_of_a_smooth_error() -> None:

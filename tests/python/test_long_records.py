@@ -12,10 +12,11 @@ import pytest
 
 import gaident as ga
 from gaident.identification.adequacy import independence_p
-from gaident.identification.noise import chi2_tail, fit_autoregression, ljung_box
+from gaident.identification.noise import autocorrelation, autoregression_of, chi2_tail, ljung_box
 from gaident.identification.parts import search_parts
-from gaident.identification.space import derive_space, torque_of
-from gaident.identification.starts import noise_std, stretches
+from gaident.identification.space import derive_space
+from gaident.models.drive_torque import torque_of
+from gaident.models.starts import noise_std, stretches
 
 DT = 0.444e-3
 CTL = ga.PI(0.116, 6.8)
@@ -163,7 +164,7 @@ def test_autoregression_and_whiteness_of_known_noise() -> None:
     e = white.copy()
     for n in range(2, len(e)):
         e[n] += 0.8 * e[n - 1] - 0.3 * e[n - 2]
-    noise = fit_autoregression([e[:12_000], e[12_000:]])
+    noise = autoregression_of(autocorrelation(e[:12_000], 30) + autocorrelation(e[12_000:], 30), len(e))
     assert noise.order >= 2 and noise.phi[:2] == pytest.approx([0.8, -0.3], abs=0.04)
     assert noise.std == pytest.approx(1.0, rel=0.02)
     assert ljung_box([white], 20) > 1e-3 and ljung_box([e], 20) < 1e-10
@@ -175,11 +176,12 @@ def test_independence_test_equals_the_projection_of_whole_arrays() -> None:
     extra = np.vstack([rng.standard_normal((3, 300)), own[0] + own[1], np.zeros(300)])  # two that say nothing new
     for strength in (0.0, 0.3):
         v = rng.standard_normal(300) + strength * extra[0] + own[2] * 1e4
+        rows = np.vstack([v, own, extra])
         basis = np.linalg.qr(own.T)[0]
         rest, more = v - basis @ (basis.T @ v), extra[:3] - (extra[:3] @ basis) @ basis.T
         directions = np.linalg.qr(more.T)[0]
         explained = float(np.sum((directions.T @ rest) ** 2))
         left = float(rest @ rest) - explained
         expected = chi2_tail((300 - 4 - 3 + 1.5) * float(np.log1p(explained / left)), 3)
-        assert independence_p(v, own, extra, 300) == pytest.approx(expected, rel=1e-6)
+        assert independence_p(rows @ rows.T, len(own), 300) == pytest.approx(expected, rel=1e-6)
         assert (expected < 1e-3) == (strength > 0.0)

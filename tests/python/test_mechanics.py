@@ -1,4 +1,4 @@
-"""Mechanics to model and back, against the paper's tables (METHOD.md section 2)."""
+"""Mechanics to model and back, against the paper's tables (docs/paper.md)."""
 
 from __future__ import annotations
 

@@ -10,8 +10,8 @@ import pytest
 import gaident as ga
 from drive_cases import Truth, random_case
 from drive_rig import library, rig
-from gaident.diagnosis.candidates import TWINS
-from gaident.diagnosis.next_experiment import BEYOND, CLEAR
+from gaident.diagnosis.experiments.next_experiment import CLEAR
+from gaident.diagnosis.library.terms import EQUIVALENT
 
 try:
     library()
@@ -23,7 +23,7 @@ AMBIGUOUS_SEEDS = (1, 3, 0, 5, 8)  # one step each; the first that leaves a choi
 
 def statistical(dia: ga.Diagnosis) -> bool:
     """Whether a finding has a rival that is no structural twin."""
-    return any(not any({f.effect, a} <= t for t in TWINS) for f in dia.causes for a in f.alternatives)
+    return any(not any({f.effect, a} <= t for t in EQUIVALENT) for f in dia.causes for a in f.alternatives)
 
 
 @lru_cache
@@ -57,7 +57,9 @@ def test_twins_get_the_missing_signal_instead_of_a_command() -> None:
     assert {dia.causes[0].effect, *dia.causes[0].alternatives} == {"torque_lag", "velocity_filter"}
     assert dia.next_experiment is None
     assert any("motor current" in note and "encoder angle" in note for note in dia.notes)
-    assert set(BEYOND) == set(TWINS)
+    assert all("log" in text or "repeat" in text for text in EQUIVALENT.values()), (
+        "each class says what would tell its effects apart"
+    )
 
 
 def test_without_a_controller_there_is_no_command_to_propose() -> None:
@@ -66,5 +68,5 @@ def test_without_a_controller_there_is_no_command_to_propose() -> None:
     log = rig(truth.plant, truth.command, truth.effects, truth.noise, seed=2 * truth.seed, torque_logged=True)
     dia = ga.diagnose(ga.Record(log.dt, velocity=log.velocity, torque=log.torque))
     assert statistical(dia) and dia.next_experiment is None
-    (note,) = [note for note in dia.notes if "give controller=PI(...)" in note]
+    (note,) = [note for note in dia.notes if "give the controller, and a log" in note]
     assert " and " in note and " apart: " in note and "a log with the velocity command" in note

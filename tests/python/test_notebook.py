@@ -16,7 +16,8 @@ pytest.importorskip("ipykernel", reason="no Jupyter kernel: pip install ipykerne
 
 PREPARED = """\
 import gaident as ga
-from gaident import demo, progress_bar
+from gaident.cli import demonstration as demo
+from gaident.show import progress_bar
 progress_bar._QUIET = 0.0
 rec, ctl = demo.two_mass_record(0), demo.CONTROLLER
 """

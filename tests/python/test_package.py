@@ -74,7 +74,7 @@ def test_sdist_holds_the_sources(sdist: Path) -> None:
     def files(root: Path) -> set[str]:
         parts = ("csrc", "python", "tests", "bench")
         found = (f for part in parts for f in (root / part).rglob("*"))
-        kinds = {".hpp", ".cpp", ".py", ".pyi", ".typed", ".txt", ".css", ".js"}
+        kinds = {".hpp", ".cpp", ".py", ".pyi", ".typed", ".txt", ".css", ".js", ".c", ".h"}
         return {str(f.relative_to(root)) for f in found if f.suffix in kinds or f.name == "py.typed"}
 
     assert files(sdist) == files(ROOT)
@@ -87,8 +87,8 @@ def test_sdist_holds_the_sources(sdist: Path) -> None:
 @pytest.mark.alone  # it builds in build/checked, as the same fixture of another worker would
 def test_wheel_holds_the_package_and_nothing_else(wheel: Path) -> None:
     python = ROOT / "python"
-    sources = [f for f in (python / "gaident").rglob("*") if f.suffix in (".py", ".pyi", ".css", ".js")]
-    expected = {f.relative_to(python).as_posix() for f in sources} | {"gaident/py.typed", "gaident/results.schema.json"}
+    sources = [f for f in (python / "gaident").rglob("*") if f.suffix in (".py", ".pyi", ".css", ".js", ".c", ".h")]
+    expected = {f.relative_to(python).as_posix() for f in sources} | {"gaident/py.typed", "gaident/results/results.schema.json"}
     info = f"gaident-{pyproject_version()}.dist-info"
     expected |= {f"{info}/{n}" for n in ("METADATA", "WHEEL", "RECORD", "entry_points.txt", "licenses/LICENSE")}
 

@@ -168,7 +168,7 @@ def test_the_rig_shares_nothing_with_the_package_s_simulation() -> None:
     found = {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
     assert {m for m in found if m and m.startswith("gaident")} == {
         "gaident.data.record",
-        "gaident.models.controller",
+        "gaident.control.pi",
         "gaident.models.mechanics",
     }
 

@@ -14,7 +14,7 @@ import pytest
 
 import gaident as ga
 from gaident.show import plot_bode, plot_convergence, plot_identification, plot_poles_zeros, plot_structures
-from gaident.show.plots import envelope
+from gaident.show.chart import envelope
 
 TRUTH = ga.OneMass(J=2e-4, D=0.004)
 CONTROLLER = ga.PI(kp=0.02, ki=0.5)

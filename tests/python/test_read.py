@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from scipy.io import loadmat, savemat
 
 from gaident.data import Record, read, read_columns
-from gaident.data.mat import variables
+from gaident.data.formats.mat import variables
 from gaident.errors import GaidentError, ReadError, RecordError
 from samples.dialects import SAMPLE_CALLS, sample_log, tables
 from samples.logs import GARBAGE, log_bytes, mat, rows, write

@@ -86,8 +86,8 @@ def test_emps_dry_and_direction_dependent_friction_are_the_cause(emps: ga.Diagno
 
 
 def test_emps_a_remainder_is_said_and_does_not_take_the_name_away(emps: ga.Diagnosis) -> None:
-    assert emps.verdict == "partly explained" and emps.driver == "velocity"
-    assert "What is left depends on the velocity" in " ".join(emps.summary("linear").split())
+    assert emps.verdict == "partly explained" and emps.driver == "position"
+    assert "What is left depends on the position" in " ".join(emps.summary("linear").split())
 
 
 def test_emps_the_published_offset_is_mostly_the_asymmetry(emps: ga.Diagnosis) -> None:
@@ -145,8 +145,8 @@ def test_hsm150_inertia_dry_friction_and_the_encoder(data_dir: Path) -> None:
     dia = ga.diagnose(records)
     friction = dia.causes[0]
     assert friction.effect == "coulomb_friction" and "load_torque" in friction.alternatives
-    assert 0.03 < friction.parameters["torque"].value < 0.05
-    assert 0.9e-4 < 1.0 / dia.model.gain < 1.3e-4
+    assert 0.025 < friction.parameters["torque"].value < 0.05  # of 0.06 N m that keep it turning, damping takes the rest
+    assert 1.1e-4 < 1.0 / dia.model.gain < 1.3e-4  # catalogue 1.2e-4 kg m^2; the linear fit has 2.6e-4
     (step,) = [f for f in dia.findings if f.effect == "velocity_quantisation"]
     assert step.is_noise and step.parameters["step"].value == pytest.approx(2.0 * np.pi / 10_000 / 1e-3, rel=1e-3)
     assert "asymmetric_friction" in dia.not_testable

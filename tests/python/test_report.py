@@ -19,14 +19,15 @@ import gaident as ga
 from gaident.cli import main
 from gaident.cli.output import csv_text
 from gaident.errors import GaidentError, SettingsError
-from gaident.reporting import report_page, view_of
+from gaident.reporting.report import report_page, view_of
+from gaident.show.chart import BINS, PALETTES, Band, Chart, Mark, Panel, Trace, cloud, series
+from gaident.show.diagnosis_charts import residual_spectrum
+from gaident.show.draw import picture
 from gaident.show.html import Html, tag, typeset
 from gaident.show.report import parts
-from gaident.show.report.chart import BINS, PALETTES, Band, Chart, Mark, Panel, Trace, cloud, series
-from gaident.show.report.charts import held_out_chart, residual_spectrum, run_chart
+from gaident.show.report.charts import held_out_chart, run_chart
 from gaident.show.report.command import proposal_csv
 from gaident.show.report.live import figure, script_json
-from gaident.show.report.still import picture
 from report_cases import HOSTILE, ambiguous, diagnosed, hostile
 from test_diagnosis_result import CONTROLLER, drive_record
 
@@ -189,7 +190,10 @@ def test_a_run_that_runs_away_is_drawn_up_to_there(dia: ga.Diagnosis) -> None:
     wild = replace(dia, model=model, identification=replace(dia.identification, model=model), validation_records=())
     (run,) = view_of(wild, None, (), "rotary").runs
     assert "runs away" in run.notes[0] and np.isnan(run.linear[-1]) and np.all(np.isfinite(run.linear[:10]))
-    for chart in (run_chart(run, 0.05, "run", "rotary"), residual_spectrum(run, 0.05, "rotary")):
+    for chart in (
+        run_chart(run, 0.05, "run", "rotary"),
+        residual_spectrum(run.measured - run.linear, None, run.dt, 0.05, "rotary"),
+    ):
         assert picture(chart).startswith(b"\x89PNG")
         assert any(y is not None for y in figure(chart)["data"][-1]["y"])
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.identification.result import json_text
-from gaident.store import schema
+from gaident.results.json_text import json_text
+from gaident.results.store import schema
 
 GOLDEN = Path(__file__).parent / "golden" / "diagnosis_schema_1.json"
 

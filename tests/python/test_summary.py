@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import gaident as ga
-from gaident.identification import Estimate
+from gaident.results.estimate import Estimate
 from gaident.show import identification_summary, mechanics_comparison
 from gaident.show.wording import number, structure_words, table, unit, with_std
 

@@ -28,6 +28,13 @@ EFFECTS: dict[str, dict[str, float]] = {
         "torque_positive": 0.05, "torque_negative": 0.03, "viscous_positive": 1e-3, "viscous_negative": 0.0,
     },
     "presliding_friction": {"torque": 0.05, "stiffness": 30.0},
+    "lugre_friction": {
+        "torque": 0.04,
+        "static_torque": 0.07,
+        "stribeck_velocity": 2.0,
+        "stiffness": 10.0,
+        "damping": 0.005,
+    },
     "quadratic_drag": {"coefficient": 2e-5},
     "load_torque": {"torque": 0.03},
     "unbalance": {"amplitude": 0.05, "phase": 0.4},

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gaident.data import read
-from gaident.data.units import QUANTITIES, Constants, factor, is_unit, known_units
+from gaident.data.formats.units import QUANTITIES, Constants, factor, is_unit, known_units
 from gaident.errors import ReadError
 from samples.logs import rows, write
 

@@ -1,8 +1,39 @@
-// What an effect is: a name, a place in the loop, up to four parameters with units, and one line of meaning. Neutral parameters make it
-// the identity. Its formula stands in its own header; effects do not know one another, the loop asks each at its place.
+// What an effect is. Its header holds everything about it:
+//
+//     static constexpr EffectInfo info             its row in the table: name, place, meaning, parameters with units and ranges
+//     template <class R> struct Coefficients       what the sample loop needs of the parameters: members of type R only; absent: none
+//     template <class R> struct State              its memory, all zero where the record begins; absent: none
+//     static void prepare(p, Timing, c)            parameters -> coefficients
+//     static constexpr Pace pace                   how fine the substeps must be; absent: one a sample is enough
+//     static double substeps(p, Circumstances)     how many a sample it asks for beyond that
+//
+// and a hook, the place in the loop where it acts. R is double or lanes of doubles; on R there are selections and no branches.
+//
+//     command            r' = command(c, s, r)                        what the controller is asked to follow [rad/s]
+//     controller         controller(c, pi)                            once: its limits
+//     actuator           u' = actuator(c, u)                          the torque issued, once a control step [N m]
+//     actuator_dynamics  T = actuator_dynamics(c, s, past, T)         its mean over the substep [N m]
+//     torque             T' = T - torque(c, theta)                    a torque that brakes, at the angle theta [rad]
+//     law                law(c, friction)                             once: its part of the friction law with constant coefficients
+//     level              level(c, t)                                  dry friction known by the time t [s] alone [N m]
+//     friction           friction(c, s, step)                         what its friction changes in the substep's equation
+//                        after_friction(c, s, step, w_next)           and once its velocity is known; may be absent
+//     coupling           coupling, mean_coupling, loaded_twist        a nonlinear coupling of two masses (mechanism.hpp)
+//     sensor             w' = sensor(c, theta, w)                     the velocity as it is measured [rad/s]
+//     sensor_dynamics    y = sensor_dynamics(c, s, w)                 the same filtered, once a substep, its output kept as s.output
+//     reading            y' = reading(c, y)                           the number read from it, once a sample
+//     plant              plant(p, linear)                             the mechanism changed, linearly
+//
+// An effect may also have `begin(c, s, Beginning)`, its state where the record begins in motion; `possible(p)`, false where there is no such
+// drive; a `Table` made by tabulate(p, Timing, table), for what is not a number per lane, with reach(table, steps), how many torques back
+// it looks. Neutral parameters make it the identity. Effects do not know one another.
 #pragma once
 
+#include "../control/closed_loop.hpp"
+#include "../numeric/elementary.hpp"
+
 #include <limits>
+#include <span>
 
 namespace gaident {
 
@@ -19,44 +50,73 @@ struct EffectParameter {
     bool above_lowest = false;  // the lowest value itself is excluded
 };
 
-inline constexpr int max_effect_parameters = 4;
-
 struct EffectInfo {
     const char* name;
     Place place;
     const char* meaning;
-    EffectParameter parameter[max_effect_parameters];
+    std::span<const EffectParameter> parameters;
     bool simulated = true;
     bool needs_two_masses = false;
+    bool turns = false;                         // depends on the shaft's angle
     bool (*identity)(const double*) = nullptr;  // where being neutral is a relation between parameters
     bool (*allowed)(const double*) = nullptr;   // a relation that parameters have to meet,
     const char* relation = "";                  // in words
 
-    constexpr int parameters() const {
-        int n = 0;
-        while (n < max_effect_parameters && parameter[n].name != nullptr) ++n;
-        return n;
-    }
+    constexpr int count() const { return static_cast<int>(parameters.size()); }
 
     constexpr bool neutral(const double* p) const {
         if (identity != nullptr) return identity(p);
-        for (int i = 0; i < parameters(); ++i) {
-            const double value = parameter[i].neutral;
+        for (std::size_t i = 0; i < parameters.size(); ++i) {
+            const double value = parameters[i].neutral;
             if (value == value && p[i] != value) return false;
         }
         return true;
     }
 };
 
-// What friction-like effects add up to, as torques against the motion:
-//
-//     w > 0:  level_positive + viscous_positive w + drag w^2,   w < 0: level_negative + viscous_negative abs(w) + drag w^2
+// Substeps per sample at most.
+inline constexpr int max_substeps = 64;
+
+// The times that coefficients are made for.
+struct Timing {
+    double step;  // of the mechanism [s]
+    double hold;  // how long a torque is held [s]
+    int steps;    // while a torque is held
+};
+
+enum class Pace {
+    sample,  // the effect is exact at any step
+    fine,    // it acts between samples
+    finer,   // it is part of a resonance, or drives one
+};
+
+// What an effect may look at to say how many substeps it needs.
+struct Circumstances {
+    const Factors<double>& plant;
+    const Loop& loop;
+    double sample_time, top_speed;  // [s], [rad/s]
+
+    // Substeps in which a shaft at the top speed turns little of one period.
+    double for_turns(double order) const { return order * top_speed * sample_time / 0.3; }
+};
+
+// How things stood where the record began.
 template <class R>
-struct FrictionLaw {
-    R level_positive = R(0.0), level_negative = R(0.0);      // N m
-    R viscous_positive = R(0.0), viscous_negative = R(0.0);  // N m s/rad
-    R drag = R(0.0);                                         // N m s^2/rad^2
-    R more_at_rest = R(0.0);                                 // what the levels at w = 0 have more, N m
+struct Beginning {
+    R velocity, torque, command;  // rad/s, N m, rad/s
+};
+
+// e^-x and (1 - e^-x)/x for x >= 0 or infinite.
+struct Decay {
+    double power, mean;
+
+    explicit Decay(double x) : power(exp_of_minus(x)), mean(x < 0.5 ? series(x) : (1.0 - power) / x) {}
+
+    static double series(double x) {
+        double sum = 0.0;
+        for (int k = 14; k >= 1; --k) sum = (1.0 - x * sum) / k;
+        return sum;
+    }
 };
 
 }  // namespace gaident

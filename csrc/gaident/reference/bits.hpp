@@ -4,8 +4,8 @@
 // definition, which random word is drawn when; operators.hpp, decode.hpp and chromosome.hpp must come to the same bits.
 #pragma once
 
-#include "../genome.hpp"
-#include "../rng.hpp"
+#include "../genetic/genome.hpp"
+#include "../numeric/rng.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -60,8 +60,7 @@ inline std::uint32_t from_gray(std::uint32_t gray, int width) {
 // ------------------------------------------------------------------------------------------------ operators
 
 // Of `size` contestants drawn with replacement from `count`, the one of lowest cost; on a tie the one drawn first.
-inline std::size_t tournament(Random& random, const std::vector<double>& cost, std::size_t first, std::size_t count,
-                              int size) {
+inline std::size_t tournament(Random& random, const std::vector<double>& cost, std::size_t first, std::size_t count, int size) {
     std::vector<std::size_t> drawn;
     for (int k = 0; k < size; ++k) {
         const std::uint64_t high = random.word() >> 32;
@@ -75,8 +74,7 @@ inline std::size_t tournament(Random& random, const std::vector<double>& cost, s
 
 // Multi-point crossover, field by field. Two words are drawn when the walk enters a new word of 64 bits: a bit of the
 // first word says "cut here" where a field begins, and elsewhere where the second word says so too.
-inline void crossover(Random& random, std::span<const Field> fields, const Bits& a, const Bits& b, Bits& child_a,
-                      Bits& child_b) {
+inline void crossover(Random& random, std::span<const Field> fields, const Bits& a, const Bits& b, Bits& child_a, Bits& child_b) {
     child_a = a;
     child_b = b;
     std::uint64_t r1 = 0, r2 = 0;
@@ -161,7 +159,7 @@ inline double value(const Bits& c, const Field& f, Code code) {
                                     : f.range.lo * std::exp(t * std::log(f.range.hi / f.range.lo));
 }
 
-// METHOD.md section 1: pairs within a group first, (A11,A12), (A21,A22), (B21,B22); where both pole groups have a
+// As docs/paper.md has it: pairs within a group first, (A11,A12), (A21,A22), (B21,B22); where both pole groups have a
 // member left over, those two; what is still left is real. The top bit of the second member's imaginary gene says
 // whether a pair is a conjugate pair, from the first member's genes, or two real numbers.
 inline Plant decode(const Bits& c, std::span<const Field> fields, Code code, const SearchRanges& ranges) {

@@ -7,7 +7,7 @@
 // rounding matters.
 #pragma once
 
-#include "../controller.hpp"
+#include "../control/controller.hpp"
 #include "bits.hpp"
 
 #include <array>
@@ -115,11 +115,7 @@ struct Regulator {
     R I = R(0), e = R(0);
 
     Regulator(const Loop& loop, double Ts)
-        : kp(loop.kp),
-          ki(loop.ki),
-          sample_time(Ts),
-          torque_limit(loop.torque_limit),
-          integrator_limit(loop.integrator_limit) {}
+        : kp(loop.kp), ki(loop.ki), sample_time(Ts), torque_limit(loop.torque_limit), integrator_limit(loop.integrator_limit) {}
 
     R integral(R error) const { return limited<R>(I + R(ki) * R(sample_time) / R(2) * (error + e), integrator_limit); }
     R torque(R error) const { return limited<R>(R(kp) * error + integral(error), torque_limit); }
@@ -142,8 +138,7 @@ struct Regulator {
             }
         };
         if (integrator_limit < std::numeric_limits<double>::infinity())
-            for (const double at : {integrator_limit, -integrator_limit})
-                attempt((R(kp) * free + R(at)) / (R(1) + G * R(kp)));
+            for (const double at : {integrator_limit, -integrator_limit}) attempt((R(kp) * free + R(at)) / (R(1) + G * R(kp)));
         if (torque_limit < std::numeric_limits<double>::infinity())
             for (const double at : {torque_limit, -torque_limit}) attempt(R(at));
         return best;

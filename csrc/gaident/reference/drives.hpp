@@ -1,8 +1,8 @@
 // Drives for the tests: random ones of every kind, and the paper's.
 #pragma once
 
-#include "../record.hpp"
-#include "../roots.hpp"
+#include "../simulation/record.hpp"
+#include "../plant/roots.hpp"
 #include "cascade.hpp"
 
 namespace gaident::reference {
@@ -71,8 +71,7 @@ inline std::vector<double> random_signal(Random& random, std::size_t samples) {
 enum class Family { ordinary, slow, fast, unstable };
 inline constexpr Family families[] = {Family::ordinary, Family::slow, Family::fast, Family::unstable};
 
-inline Plant random_plant(Random& random, std::size_t p, std::size_t q, Family family, double sample_time,
-                          std::size_t samples) {
+inline Plant random_plant(Random& random, std::size_t p, std::size_t q, Family family, double sample_time, std::size_t samples) {
     const double nyquist = 3.141592653589793 / sample_time, base = log_uniform(random, 0.2, 5.0);
     double lo = 2.0, hi = 0.3 * nyquist;
     if (family == Family::slow) {
@@ -114,8 +113,8 @@ inline Plant random_plant(Random& random, std::size_t p, std::size_t q, Family f
 }
 
 // A random drive whose response stays below `growth` times its command; its algebraic loop is not next to unsolvable.
-inline Drive random_drive(Random& random, LoopKind kind, std::size_t p, std::size_t q, Family family,
-                          std::size_t samples, double growth = 1e4) {
+inline Drive random_drive(Random& random, LoopKind kind, std::size_t p, std::size_t q, Family family, std::size_t samples,
+                          double growth = 1e4) {
     for (;;) {
         Drive d;
         d.sample_time = log_uniform(random, 1e-4, 2e-3);
@@ -131,10 +130,8 @@ inline Drive random_drive(Random& random, LoopKind kind, std::size_t p, std::siz
         d.plant.K = 1.0 / (d.loop.kp * std::abs(shape));
         for (int attempt = 0; attempt < 30; ++attempt, d.loop.kp /= 1.5, d.loop.ki /= 2.0) {
             double G = d.plant.K;  // what a torque does within its own sample
-            for (const auto& m : factor_modules<double>(d.plant).modules)
-                G *= DifferenceEquation<double>(m, d.sample_time).g();
-            if (kind == LoopKind::continuous && std::abs(1.0 + G * (d.loop.kp + 0.5 * d.loop.ki * d.sample_time)) < 0.2)
-                continue;
+            for (const auto& m : factor_modules<double>(d.plant).modules) G *= DifferenceEquation<double>(m, d.sample_time).g();
+            if (kind == LoopKind::continuous && std::abs(1.0 + G * (d.loop.kp + 0.5 * d.loop.ki * d.sample_time)) < 0.2) continue;
             const std::vector<double> zero(samples, 0.0), velocity = d.respond<double>().velocity;
             double largest = 0.0;
             for (const double r : d.input) largest = std::max(largest, std::abs(r));
@@ -149,8 +146,8 @@ inline Drive random_drive(Random& random, LoopKind kind, std::size_t p, std::siz
     }
 }
 
-// What the paper identified (Table IV), with the controller of Table III scaled as its Table V needs it (METHOD.md
-// section 3).
+// What the paper identified (Table IV), with the controller of Table III scaled as its Table V needs it (docs/paper.md,
+// loop gain).
 inline Drive paper_drive(bool two_mass) {
     Drive d;
     d.sample_time = 0.444e-3;

@@ -7,13 +7,14 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+from gaident.checks import one_of
+from gaident.control.pi import LOOPS, PI
 from gaident.data.record import Record
-from gaident.drive_file import COLUMNS, KEYS, Drive, read_drive_file, unfilled_of
+from gaident.data.torque_kind import MEASURED
+from gaident.drive.drive_file import COLUMNS, KEYS, Drive, read_drive_file, unfilled_of
 from gaident.errors import ControllerError, SettingsError
-from gaident.models._checks import one_of
-from gaident.models.controller import LOOPS, PI
 
-__all__ = ["drive_of", "read_all"]
+__all__ = ["drive_of", "read_all", "reading_notes"]
 
 
 def drive_of(args: argparse.Namespace) -> Drive:
@@ -59,6 +60,24 @@ def read_all(drive: Drive, logs: Sequence[str], controller: PI | None, measured:
                 "(--columns torque=...), or give the controller (--kp, --ki)"
             )
     return records
+
+
+def reading_notes(drive: Drive, records: Sequence[Record]) -> list[str]:
+    """What to keep in mind about how the logs were read, in plain sentences."""
+    notes = []
+    guessed = [rec.name for rec in records if rec.torque_is == MEASURED and "torque_is" not in drive.general]
+    if guessed:
+        notes.append(
+            f"The torque of {', '.join(guessed)} is taken as measured, as the name of its column says; where it is the "
+            "controller's command, say so with --torque-is commanded."
+        )
+    cutoff = drive.general.get("velocity_cutoff_hz")
+    if cutoff is not None:
+        notes.append(
+            f"The velocity alone went through a low-pass of {cutoff:g} Hz, and what drives the model did not: that biases the "
+            "inertia of a fast axis. Leave velocity_cutoff_hz out; the velocity is then the plain difference of the position."
+        )
+    return notes
 
 
 def _assignments(texts: Sequence[str], option: str) -> dict[str, str]:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
+from gaident.data.torque_kind import TORQUE_KINDS
 from gaident.show.wording import AXES
 
 __all__ = ["SHELLS", "add_log_commands", "add_log_options", "number"]
@@ -92,7 +93,8 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
         type=number,
         metavar="HZ",
         dest="velocity_cutoff_hz",
-        help="a log without velocity gets it from position, low-passed at this corner [Hz]",
+        help="a log without velocity gets it from position, low-passed at this corner [Hz] (default: not at all; the velocity "
+        "filtered alone biases the inertia)",
     )
     g.add_argument(
         "--decimate", type=int, metavar="N", help="keep every N-th sample behind a linear-phase low-pass, as the log is read"
@@ -105,6 +107,8 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
     )
     g.add_argument("--gear-ratio", type=number, metavar="X", help="turns of the motor per turn of the load, with --load-side")
     g.add_argument("--load-side", nargs="+", metavar="CH", help="channels that were measured behind the gear")
+    kinds = "commanded: by the controller; measured: a current times a constant (default: as its column's name says)"
+    g.add_argument("--torque-is", choices=TORQUE_KINDS, help=f"what the torque is: {kinds}")
     for name, text in CONSTANT_HELP.items():
         g.add_argument(f"--{name.replace('_', '-')}", type=number, metavar="X", help=text)
     _add_text_options(g)

@@ -10,9 +10,9 @@ from typing import Any, NoReturn
 
 from gaident.cli.log_options import add_log_commands, add_log_options, number
 from gaident.cli.report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
+from gaident.control.pi import LOOPS
 from gaident.errors import SettingsError
-from gaident.identification.settings import INITIAL_STATES
-from gaident.models.controller import LOOPS
+from gaident.results.settings import INITIAL_STATES
 
 __all__ = ["PICTURES", "parser_of"]
 
@@ -34,7 +34,7 @@ examples:
     gaident identify run*.csv --drive drive.toml
   open loop, velocity from a position, force from the drive's voltage:
     gaident identify DATA_EMPS.mat --columns torque=vir,position=qm,time=t --unit torque=35.15 \\
-        --velocity-cutoff 100 --axis linear
+        --axis linear
   as in the paper (Table II), in the paper's ranges:
     gaident identify step.csv --kp 0.0232 --ki 1.367 --loop continuous --paper \\
         --gain 1e3 2e4 --real 0 60 --imaginary 0 250 --trials 20
@@ -42,8 +42,8 @@ examples:
 drive.toml, every part optional:
   axis = "rotary"                 # or "linear"
   dt = 0.444e-3                   # s; also velocity_cutoff_hz, counts_per_turn, torque_constant,
-                                  # rated_torque, torque_per_volt, gear_ratio, load_side, decimate,
-                                  # resample, delimiter, decimal, skip, encoding
+                                  # rated_torque, torque_per_volt, gear_ratio, load_side, torque_is,
+                                  # decimate, resample, delimiter, decimal, skip, encoding
   [columns]
   command = "w_ref"
   velocity = "w"

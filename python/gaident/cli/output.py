@@ -5,11 +5,9 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gaident.cli.remedies import in_options
 from gaident.errors import SettingsError
 from gaident.files import write_whole
 
@@ -17,9 +15,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gaident.data.record import Record
-    from gaident.diagnosis.experiments import Proposal
-    from gaident.identification.result import Identification
     from gaident.models.simulate import Run
+    from gaident.results.experiment import Proposal
+    from gaident.results.identification import Identification
 
 __all__ = [
     "apart",
@@ -117,7 +115,7 @@ def summary_of(idn: Identification, axis: str) -> str:
     """The summary, its remedies as options."""
     from gaident.show.summary import identification_summary
 
-    return identification_summary(replace(idn, warnings=tuple(in_options(w) for w in idn.warnings)), axis)
+    return identification_summary(idn, axis)
 
 
 def draw(idn: Identification, records: Sequence[Record], axis: str, path: Path) -> None:
@@ -136,6 +134,6 @@ def save_figure(figure: Figure, path: Path) -> None:
 
 def print_json(data: dict[str, Any]) -> None:
     """A result for programs."""
-    from gaident.identification.result import json_text
+    from gaident.results.json_text import json_text
 
     print(json_text(data))

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gaident.data.arrays import MINIMUM_SAMPLES, channel, positive_number
-from gaident.data.decimation import low_passed
-from gaident.data.lags import Fit, coarse_lags, refine
 from gaident.data.record import CHANNELS, Record
+from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number
+from gaident.data.signals.decimation import low_passed
+from gaident.data.signals.lags import Fit, coarse_lags, refine
 from gaident.errors import RecordError
 
 __all__ = ["Alignment", "align"]
@@ -115,7 +115,7 @@ def align(
     if not seen:
         equal = refine(x, rec.dt, y, their_dt, fit.offset + fit.rate * fit.centre, 0.0, limit, free_rate=False)
         fit = (equal or fit).with_rate_std(fit.std[1])
-    return _result(rec, theirs, their_dt, take, fit, seen)
+    return _result(rec, other, theirs, their_dt, take, fit, seen)
 
 
 def _channels(other: object, dt: float | None) -> tuple[dict[str, NDArray[np.float64]], float]:
@@ -185,7 +185,13 @@ def _best(
 
 
 def _result(
-    rec: Record, theirs: dict[str, NDArray[np.float64]], their_dt: float, take: Sequence[str] | None, fit: Fit, seen: bool
+    rec: Record,
+    other: object,
+    theirs: dict[str, NDArray[np.float64]],
+    their_dt: float,
+    take: Sequence[str] | None,
+    fit: Fit,
+    seen: bool,
 ) -> Alignment:
     from scipy.interpolate import PchipInterpolator
 
@@ -203,7 +209,8 @@ def _result(
     axis = their_dt * np.arange(len(next(iter(theirs.values()))))
     ratio = rec.dt / (their_dt * (1.0 + fit.rate))
     new = {name: PchipInterpolator(axis, low_passed(theirs[name], ratio))(inner[start:stop]) for name in taken}
-    record = Record(rec.dt, name=rec.name, **{**{name: values[start:stop] for name, values in mine.items()}, **new})
+    kind = other.torque_is if "torque" in taken and isinstance(other, Record) else None
+    record = rec.with_channels(torque_is=kind, **{**{name: values[start:stop] for name, values in mine.items()}, **new})
     far = max(abs(inner[start] - fit.centre), abs(inner[stop - 1] - fit.centre))
     uncertainty = 2.0 * float(np.hypot(fit.centre_std, far * fit.std[1]))
     return Alignment(record, fit.offset, fit.std[0], fit.rate, fit.std[1], seen, fit.gain, fit.correlation, uncertainty)

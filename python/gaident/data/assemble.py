@@ -7,14 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.arrays import MINIMUM_SAMPLES
+from gaident.arguments import NO_TIME, arg
 from gaident.data.clock import axis_of, clock_of, common_clock, part_of, second_of
-from gaident.data.conditioning import differentiate
-from gaident.data.decimation import Decimator, decimated, factor_of
+from gaident.data.formats.table import Column, Table
 from gaident.data.record import CHANNELS, Record
-from gaident.data.resampling import resampled
-from gaident.data.table import Column, Table
+from gaident.data.signals.arrays import MINIMUM_SAMPLES
+from gaident.data.signals.conditioning import differentiate
+from gaident.data.signals.decimation import Decimator, decimated, factor_of
+from gaident.data.signals.resampling import resampled
 from gaident.data.timeaxis import TimeAxis
+from gaident.data.torque_kind import COMMANDED, kind_of_torque
 from gaident.data.wanted import Wanted, si_factor
 from gaident.errors import ReadError, RecordError
 
@@ -31,7 +33,7 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
         if quantity not in named and quantity != "time":
             raise ReadError(
                 f"{table.path}: units names {quantity!r}, but no such column is read; "
-                f"add it to columns={{{quantity!r}: ...}}, or leave its unit out"
+                f"add it to {arg('columns', '...', quantity)}, or leave its unit out"
             )
     for channel in wanted.load_side:
         if channel not in named:
@@ -47,9 +49,22 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
         elif "velocity" not in values:
             values["velocity"] = differentiate(values["position"], dt, wanted.velocity_cutoff_hz)
         name = stem if wanted.name is None else wanted.name
-        return Record(dt, name=name, **{channel: values.get(channel) for channel in CHANNELS})
+        kind = _torque_kind(table, wanted, named.get("torque"))
+        return Record(dt, name=name, torque_is=kind, **{channel: values.get(channel) for channel in CHANNELS})
     except RecordError as error:
-        raise RecordError(f"{table.path}: {error}") from None
+        raise RecordError(f"{table.path}: {error.marked}") from None
+
+
+def _torque_kind(table: Table, wanted: Wanted, column: Column | None) -> str:
+    """What the torque is: as the user says, else as its column's name does."""
+    if wanted.torque_is is None:
+        return COMMANDED if column is None else kind_of_torque((column.key, *column.names)) or COMMANDED
+    if column is None:
+        raise ReadError(
+            f"{table.path}: {arg('torque_is', repr(wanted.torque_is))} speaks of the torque, but no such column is read; name it "
+            f"with {arg('columns', '...', 'torque')}, or leave torque_is out"
+        )
+    return wanted.torque_is
 
 
 _Values = dict[str, NDArray[np.float64]]
@@ -68,7 +83,7 @@ def _block_by_block(table: Table, wanted: Wanted, named: dict[str, Column], scal
             listed = ", ".join(f"{channel} {length}" for channel, length in lengths.items())
             raise ReadError(
                 f"{table.path}: the columns have unequal lengths ({listed}); name columns of one run, or, where they "
-                "were logged at several rates, put them on one axis with resample= [s]"
+                f"were logged at several rates, put them on one axis with {arg('resample')} [s]"
             )
     factor = factor_of(wanted.decimate)
     decimators = {channel: Decimator(factor) for channel in named}
@@ -95,7 +110,7 @@ def _stated(table: Table, named: Mapping[str, Column]) -> float:
     """The sample time that the file states for these columns [s]."""
     periods = [column.period for column in named.values() if column.period is not None]
     if not periods:
-        raise ReadError(f"{table.path}: columns={{'time': None}} ignores the time column; give dt= [s] then")
+        raise ReadError(f"{table.path}: {NO_TIME} ignores the time column; give {arg('dt')} [s] then")
     return periods[0]
 
 
@@ -126,10 +141,10 @@ def _on_even_axis(table: Table, wanted: Wanted, named: dict[str, Column], scales
 def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
     """Channel -> column, complete enough for a Record; time is not among them."""
     if len(table.columns) == 1 and wanted.measured:
+        hint = "" if table.form == "DataFrame" else f"; if other columns were not recognised, give {arg('delimiter')}"
         raise ReadError(
             f"{table.path}: the log holds one column only, {table.columns[0].key!r}, but a record needs "
-            "the velocity and a command or torque"
-            f"{'' if table.form == 'DataFrame' else '; if other columns were not recognised, give delimiter='}"
+            f"the velocity and a command or torque{hint}"
         )
     if wanted.columns is None:
         found = {channel: column for channel in CHANNELS if (column := table.own(channel)) is not None}
@@ -145,7 +160,7 @@ def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
         raise ReadError(_say_missing(table, wanted, "torque", "the command or the torque"))
     if "velocity" in found and wanted.velocity_cutoff_hz is not None:
         raise ReadError(
-            f"velocity_cutoff_hz={wanted.velocity_cutoff_hz!r} is for a velocity derived from position, "
+            f"{arg('velocity_cutoff_hz', repr(wanted.velocity_cutoff_hz))} is for a velocity derived from position, "
             "but the velocity "
             f"is read from {found['velocity'].key!r}; leave one of them out"
         )
@@ -156,7 +171,7 @@ def _say_missing(table: Table, wanted: Wanted, channel: str, what: str) -> str:
     guess = ", or let gaident init write down what the log shows" if wanted.columns is None and table.form != "DataFrame" else ""
     return (
         f"{table.path}: no column is named for {what}; the file holds {table.listing()}; "
-        f"say which it is with columns={{{channel!r}: ...}}{guess}"
+        f"say which it is with {arg('columns', '...', channel)}{guess}"
     )
 
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gaident.data.table import Column, Table
+from gaident.arguments import arg
+from gaident.data.formats.table import Column, Table
 from gaident.data.timeaxis import TimeAxis, stamp_unit, time_column
 from gaident.data.wanted import Wanted, si_factor
 from gaident.errors import ReadError
@@ -26,7 +27,9 @@ def clock_of(table: Table, wanted: Wanted, column: Column) -> Column | None:
         return None
     found = time_column(table)
     if found is None:
-        raise ReadError(f"{table.path}: resample needs time stamps; give columns={{'time': ...}} with one of {table.listing()}")
+        raise ReadError(
+            f"{table.path}: resample needs time stamps; give {arg('columns', '...', 'time')} with one of {table.listing()}"
+        )
     return found
 
 
@@ -48,14 +51,14 @@ def common_clock(table: Table, wanted: Wanted, named: Mapping[str, Column]) -> C
             listed = ", ".join(f"{channel} {column.period:g} s" for channel, column in named.items())
             raise ReadError(
                 f"{table.path}: the channels were logged at several rates ({listed}); name columns of one rate, or put them on "
-                "one axis with resample= [s]"
+                f"one axis with {arg('resample')} [s]"
             )
         return None
     column = time_column(table)
     if column is None and wanted.dt is None:
         raise ReadError(
-            f"{table.path}: dt is not given and no column is called time or t; give dt= [s], or "
-            f"columns={{'time': ...}} with one of {table.listing()}"
+            f"{table.path}: dt is not given and no column is called time or t; give {arg('dt')} [s], or "
+            f"{arg('columns', '...', 'time')} with one of {table.listing()}"
         )
     return column
 
@@ -68,8 +71,8 @@ def _refuse_two_clocks(table: Table, clocks: list[Column]) -> None:
             return
     raise ReadError(
         f"{table.path}: the channels have time columns of their own ({', '.join(repr(clock.key) for clock in clocks)}), which "
-        "differ; name columns of one rate, put them on one axis with resample= [s], or say which counts with "
-        f"columns={{'time': {clocks[0].key!r}}}"
+        f"differ; name columns of one rate, put them on one axis with {arg('resample')} [s], or say which counts with "
+        f"{arg('columns', repr(clocks[0].key), 'time')}"
     )
 
 

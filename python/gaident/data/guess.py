@@ -9,50 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.data.column_words import COMMAND_WORDS, FOREIGN_WORDS, MEASURED_WORDS, QUANTITY_WORDS, words_of
+from gaident.data.formats.units import Constants, factor
 from gaident.data.listing import ColumnInfo, Listing
 from gaident.data.record import CHANNELS
-from gaident.data.units import Constants, factor
 from gaident.errors import ReadError
 
 __all__ = ["Guess", "guess_channels", "position_and_velocity", "unit_from_position", "unit_from_velocity"]
 
-# Words in the names of drive logs, English and German; a name is cut at capitals, digits and signs.
-_COMMAND = {
-    "r",
-    "ref",
-    "reference",
-    "cmd",
-    "command",
-    "soll",
-    "sollwert",
-    "set",
-    "setpoint",
-    "sp",
-    "target",
-    "desired",
-    "demand",
-    "des",
-}
-_MEASURED = {"act", "actual", "ist", "istwert", "meas", "measured", "fb", "feedback", "real", "motor", "servo"}
-_WORDS: dict[str, dict[str, int]] = {
-    "velocity": {
-        **dict.fromkeys(("velocity", "vel", "speed", "spd", "omega", "drehzahl", "geschwindigkeit", "rpm"), 4),
-        **dict.fromkeys(("w", "wm", "n", "v", "dq", "qd"), 2),
-    },
-    "torque": {
-        **dict.fromkeys(("torque", "trq", "moment", "drehmoment", "tau", "force", "kraft", "effort"), 4),
-        **dict.fromkeys(("current", "strom", "iq", "thrust"), 3),
-        **dict.fromkeys(("u", "m", "i"), 2),
-    },
-    "position": {
-        **dict.fromkeys(("position", "pos", "angle", "theta", "phi", "lage", "winkel", "encoder"), 4),
-        **dict.fromkeys(("q", "qm", "enc", "weg", "x"), 2),
-    },
-}
-_NEVER = {
-    *("error", "err", "deviation", "droop", "following", "limit", "max", "min", "load", "ratio", "temp", "temperature", "status"),
-    *("state", "seq", "id", "acc", "acceleration", "jerk", "counter", "digital", "selected", "power"),
-}
 _LEAST = 2
 
 
@@ -102,27 +66,22 @@ def _numbered(one: ColumnInfo, other: ColumnInfo) -> bool:
     return one.name != other.name and bare[0] == bare[1] and "#" in bare[0]
 
 
-def _words(name: str) -> list[str]:
-    spaced = re.sub(r"([a-z])([A-Z])", r"\1 \2", re.sub(r"[\[(<{].*", "", name))
-    return [word.casefold() for word in re.findall(r"[^\W\d_]+", spaced)]
-
-
 def _score(column: ColumnInfo, channel: str) -> tuple[int, str]:
     """How much speaks for it: words of the name, the unit."""
     quantity = "velocity" if channel == "command" else channel
-    words = [word for name in (column.name, *column.names) for word in _words(name)]
-    if _NEVER & set(words):
+    words = [word for name in (column.name, *column.names) for word in words_of(name)]
+    if FOREIGN_WORDS & set(words):
         return 0, ""
-    by_name = max((_WORDS[quantity].get(word, 0) for word in words), default=0)
+    by_name = max((QUANTITY_WORDS[quantity].get(word, 0) for word in words), default=0)
     fits = _is_unit_of(column.unit, quantity)
     if column.unit is not None and not fits and not _converts(column.unit, quantity):
         return 0, ""
-    commanded, measured = bool(_COMMAND & set(words)), bool(_MEASURED & set(words))
+    commanded, measured = bool(COMMAND_WORDS & set(words)), bool(MEASURED_WORDS & set(words))
     score = by_name + (3 if fits else 0)
     if channel == "command":
         score = score + 3 if commanded else 0
     elif channel in ("velocity", "position"):
-        score += -4 if commanded else 1 if measured else 0
+        score = 0 if commanded else score + (1 if measured else 0)  # a command is no measurement, whatever its unit
     else:
         score += 1 if commanded else 0  # what the controller issued rather than what was measured
     why = [f"its name says {quantity}" if by_name else "", f"its unit is one of {quantity}" if fits else ""]

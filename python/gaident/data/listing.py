@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.delimited import TextOptions
+from gaident.data.formats.delimited import TextOptions
+from gaident.data.formats.table import Column, Table
+from gaident.data.formats.units import factor
 from gaident.data.readers import open_log
-from gaident.data.table import Column, Table
 from gaident.data.timeaxis import TimeAxis, stamp_unit, time_column
-from gaident.data.units import factor
+from gaident.data.torque_kind import kind_of_column
 from gaident.errors import ReadError
 
 __all__ = ["ColumnInfo", "Listing", "columns", "printable"]
@@ -30,6 +31,7 @@ class ColumnInfo:
     sample_time  [s], None where nothing tells it or the time stamps are irregular
     is_time      whether it is taken for the time of the others; rises_evenly: whether it could be
     note         what stands in the way of its use, "" if nothing does
+    torque_is    "commanded" or "measured" where its name speaks of a torque or current and says which, else None
     """
 
     name: str
@@ -42,6 +44,7 @@ class ColumnInfo:
     is_time: bool
     rises_evenly: bool
     note: str
+    torque_is: str | None = None
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,8 @@ class Listing:
         for c in self.columns:
             step = "" if c.sample_time is None else f"{1e3 * c.sample_time:.6g}"
             remark = "rises evenly: a time?" if c.rises_evenly and not timed else ""
-            remark = "; ".join(filter(None, ["time" if c.is_time else "", c.note, remark]))
+            kind = f"{c.torque_is} torque" if c.torque_is else ""
+            remark = "; ".join(filter(None, ["time" if c.is_time else "", c.note, remark, kind]))
             rows.append(
                 (printable(c.name), printable(c.unit or "-"), str(c.samples), _number(c.lowest), _number(c.highest), step, remark)
             )
@@ -176,5 +180,5 @@ class _Gathered:
         return ColumnInfo(
             column.key, column.names, column.unit, self.samples, self.lowest if held else None, self.highest if held else None,
             column.period if step is None and column.clock is None else step, self.is_time,
-            self.even and self.samples > 2, ", ".join(filter(None, notes)),
+            self.even and self.samples > 2, ", ".join(filter(None, notes)), kind_of_column((column.key, *column.names)),
         )  # fmt: skip

@@ -13,15 +13,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.arguments import arg
 from gaident.data.assemble import assemble
-from gaident.data.binary import read_mat, read_npz
-from gaident.data.delimited import TextOptions, open_text
-from gaident.data.frames import frame_table, is_frame, open_parquet
-from gaident.data.hdf import open_hdf
-from gaident.data.instruments import open_mdf, open_tdms
+from gaident.data.formats.binary import read_mat, read_npz
+from gaident.data.formats.delimited import TextOptions, open_text
+from gaident.data.formats.frames import frame_table, is_frame, open_parquet
+from gaident.data.formats.hdf import open_hdf
+from gaident.data.formats.instruments import open_mdf, open_tdms
+from gaident.data.formats.table import Table
+from gaident.data.formats.units import Constants
 from gaident.data.record import Record
-from gaident.data.table import Table
-from gaident.data.units import Constants
 from gaident.data.wanted import Wanted
 from gaident.errors import ReadError
 
@@ -88,6 +89,7 @@ def read(
     gear_ratio: float | None = None,
     load_side: str | Sequence[str] = (),
     measured: bool = True,
+    torque_is: str | None = None,
     delimiter: str | None = None,
     decimal: str | None = None,
     skip: int | None = None,
@@ -112,7 +114,8 @@ def read(
     counts_per_turn, torque_constant [N m/A], rated_torque [N m], torque_per_volt [N m/V]
              constants of the drive, for the units counts, A, %, V
     velocity_cutoff_hz
-             a log with a position and no velocity gets differentiate(position, dt, velocity_cutoff_hz)
+             a log with a position and no velocity gets differentiate(position, dt, velocity_cutoff_hz). None, the plain
+             difference, suits identification: a velocity that is filtered alone biases the inertia of a fast axis
     decimate 10: every tenth sample behind a linear-phase low-pass whose delay is compensated, see
              Record.decimate; the log is decimated as it is read, whatever its length
     resample [s] put channels with irregular time stamps, or of several rates, on one even axis, by linear
@@ -122,6 +125,9 @@ def read(
              motion is multiplied by it, their torque divided
     measured False: a log without velocity and position will do, as a proposed command that is to be simulated; its velocity
              is 0 then
+    torque_is "commanded": the torque is the controller's command; "measured": a measured current times a constant, behind the
+             actuator and with the sensor's noise. None: measured where the column's name says so (`Actual current`, `I_q`,
+             `M_ist`, `torque feedback`), else commanded; the record's repr shows which it is
     delimiter, decimal, skip, encoding
              of a text table, where they cannot be found out: what separates columns (a character, "tab" or
              "space"), decimal mark ("." or ","), lines to leave out at the top, encoding as Python calls it
@@ -140,6 +146,7 @@ def read(
         gear_ratio=gear_ratio,
         load_side=(load_side,) if isinstance(load_side, str) else tuple(load_side),
         measured=measured,
+        torque_is=torque_is,
     ).check()
     with open_log(path, TextOptions(delimiter, decimal, skip, encoding)) as table:
         return assemble(table, wanted, "" if is_frame(path) else Path(path).stem)
@@ -191,7 +198,7 @@ def open_log(source: str | os.PathLike[str] | Any, options: TextOptions) -> Iter
 def _only_for_text(shown: str, form: str, options: TextOptions) -> None:
     given = [key for key, value in vars(options).items() if value is not None]
     if given:
-        raise ReadError(f"{given[0]}= is for text tables, but {shown} is {form}; leave {given[0]} out")
+        raise ReadError(f"{arg(given[0])} is for text tables, but {shown} is {form}; leave {given[0]} out")
 
 
 def _file(path: str | os.PathLike[str]) -> tuple[Path, str]:

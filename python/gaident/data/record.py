@@ -13,9 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gaident.data.arrays import MINIMUM_SAMPLES, channel, positive_number
+from gaident.arguments import arg
+from gaident.checks import one_of
+from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number
+from gaident.data.signals.decimation import decimated, factor_of
+from gaident.data.torque_kind import COMMANDED, MEASURED, TORQUE_KINDS
 from gaident.errors import RecordError, check_schema
 from gaident.files import write_whole
+from gaident.providers import provided
+from gaident.version import version
 
 __all__ = ["CHANNELS", "Record"]
 
@@ -37,16 +43,29 @@ class Record:
     dt        sample time [s]
     command   velocity command r [rad/s], shape (n,), or None
     velocity  measured motor velocity w [rad/s], shape (n,): the output that models are judged on
-    torque    motor torque command u as the controller issued it [N m], shape (n,), or None
+    torque    motor torque u [N m], shape (n,), or None
     position  measured motor angle theta [rad], shape (n,), or None
     name      what reports call it
+    torque_is what the torque is: "commanded", as the controller issued it, before the actuator's limits, dead band, delay and
+              lag; or "measured", a measured current times a constant: behind the actuator, with the sensor's noise on it
 
     At least one of command and torque is given, and n >= 20. A linear axis has m, m/s, N in the same places.
     The arrays are copied once to read-only float64; yours are never changed. `rec[a:b]` and `rec.between`
     share memory with the record they were cut from; their time starts at 0 again.
 
-    Raises RecordError for NaN, infinities, unequal lengths, fewer than 20 samples, dt <= 0, and for arrays
-    that are not one-dimensional real numbers.
+    Raises RecordError for NaN, infinities, unequal lengths, fewer than 20 samples, dt <= 0, for arrays
+    that are not one-dimensional real numbers, and for a torque_is that is none of the two, or "measured" without a torque.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> n = np.arange(100)
+    >>> rec = ga.Record(1e-3, velocity=np.sin(0.1 * n), torque=np.cos(0.1 * n), torque_is="measured", name="run 1")
+    >>> rec
+    Record('run 1', 100 samples, dt=0.001 s, 0.1 s; velocity -0.9999..0.9996, torque -0.9997..1 (measured))
+    >>> rec.with_channels(velocity=rec.velocity + 1.0).torque_is
+    'measured'
     """
 
     dt: float
@@ -55,6 +74,7 @@ class Record:
     torque: NDArray[np.float64] | None
     position: NDArray[np.float64] | None
     name: str
+    torque_is: str
 
     def __init__(
         self,
@@ -64,6 +84,8 @@ class Record:
         torque: ArrayLike | None = None,
         position: ArrayLike | None = None,
         name: str = "",
+        *,
+        torque_is: str = COMMANDED,
     ) -> None:
         if velocity is None:
             raise RecordError(
@@ -76,20 +98,39 @@ class Record:
             raise RecordError(f"name={name!r} is no text; give a str")
         given = {"command": command, "velocity": velocity, "torque": torque, "position": position}
         channels = {key: None if values is None else channel(values, key) for key, values in given.items()}
-        lengths = {key: len(values) for key, values in channels.items() if values is not None}
-        if len(set(lengths.values())) > 1:
-            listed = ", ".join(f"{key} {length}" for key, length in lengths.items())
-            raise RecordError(
-                f"the channels have unequal lengths ({listed} samples); cut them to the same samples, "
-                "or, where they come from two clocks, bring two records together with align"
-            )
-        sample_time = positive_number(dt, "dt", "s", "give the sample time in seconds, for example dt=1e-3")
-        self._fill(sample_time, channels, str(name))
+        kind = _torque_kind(torque_is, channels["torque"])
+        self._fill(_sample_time(dt), _equally_long(channels), str(name), kind)
 
-    def _fill(self, dt: float, channels: dict[str, NDArray[np.float64] | None], name: str) -> None:
+    def _fill(self, dt: float, channels: Mapping[str, NDArray[np.float64] | None], name: str, torque_is: str) -> None:
         """Set the fields of this frozen object, unchecked."""
-        for key, value in {"dt": dt, **channels, "name": name}.items():
+        for key, value in {"dt": dt, **channels, "name": name, "torque_is": torque_is}.items():
             object.__setattr__(self, key, value)
+
+    def with_channels(self, *, dt: float | None = None, torque_is: str | None = None, **changed: ArrayLike | None) -> Record:
+        """The record with other channels and all else as it is: `rec.with_channels(velocity=w)`.
+
+        changed  channel -> values, shape (n,), or None to leave the channel out; where the length changes, give all channels
+        dt       another sample time [s]; None: as it is. torque_is: what another torque is; None: as it is
+
+        Channels that are not named share memory with this record. A record that has lost its torque is "commanded", as one
+        that never had any. Raises RecordError as the constructor does, and for what is no channel.
+        """
+        for key in changed:
+            one_of(key, "with_channels: the channel", CHANNELS, RecordError)
+        held = {key: getattr(self, key) for key in CHANNELS}
+        channels = held | {key: None if values is None else channel(values, key) for key, values in changed.items()}
+        if channels["velocity"] is None or (channels["command"] is None and channels["torque"] is None):
+            listed = ", ".join(f"{key}=None" for key, values in changed.items() if values is None)
+            raise RecordError(
+                f"with_channels({listed}) leaves a record without its velocity, or without command and torque; keep what "
+                "the motor did and what drove it"
+            )
+        made = object.__new__(type(self))
+        sample_time = self.dt if dt is None else _sample_time(dt)
+        kept = COMMANDED if channels["torque"] is None else self.torque_is
+        kind = kept if torque_is is None else _torque_kind(torque_is, channels["torque"])
+        made._fill(sample_time, _equally_long(channels), self.name, kind)
+        return made
 
     def channels(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
         """The channels that are there, as (name, array (n,)), in the order of the arguments."""
@@ -116,7 +157,7 @@ class Record:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the sample time and the channels, hexadecimal; the name does not count.
+        """SHA-256 of the sample time, the channels and a torque that is measured, hexadecimal; the name does not count.
 
         Equal data give equal digests on every machine: a canonical order for records, a fingerprint for
         reports.
@@ -128,6 +169,8 @@ class Record:
                 # + 0.0 makes -0.0 the 0.0 that it equals
                 block = values[start : start + _HASH_BLOCK] + 0.0
                 sha.update(block.astype("<f8", copy=False).tobytes())
+        if self.torque_is != COMMANDED:
+            sha.update(f" torque is {self.torque_is}".encode())
         return sha.hexdigest()
 
     def __getitem__(self, samples: slice) -> Record:
@@ -166,14 +209,12 @@ class Record:
         longer in the record: identify a decimated record in open loop, or with a continuous controller. At least 20
         samples remain. Raises RecordError.
         """
-        from gaident.data.decimation import decimated, factor_of
-
         factor = factor_of(factor, "decimate", "({!r})")
         count = -(-len(self) // factor)
         if count < MINIMUM_SAMPLES:
             raise RecordError(f"decimate({factor}) leaves {count} samples, but at least {MINIMUM_SAMPLES} are needed")
-        thinned = {key: decimated(values, factor) for key, values in self.channels()}
-        return Record(self.dt * factor, name=self.name, **thinned)
+        thinned: Mapping[str, Any] = {key: decimated(values, factor) for key, values in self.channels()}
+        return self.with_channels(dt=self.dt * factor, **thinned)
 
     def _sample_at(self, time: float) -> int:
         """First sample not before `time` [s], within 0..n."""
@@ -188,13 +229,14 @@ class Record:
             )
         part = object.__new__(type(self))
         cut = {key: None if (v := getattr(self, key)) is None else v[start:stop] for key in CHANNELS}
-        part._fill(self.dt, cut, self.name)
+        part._fill(self.dt, cut, self.name, self.torque_is)
         return part
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON: dt, name and the channels as lists, None for those that are not there."""
+        """Plain data for JSON: dt, name, torque_is, and the channels as lists, None for those that are not there."""
         held = {key: None if (v := getattr(self, key)) is None else v.tolist() for key in CHANNELS}
-        return {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, "name": self.name, "dt": self.dt, **held}
+        about = {"name": self.name, "dt": self.dt, "torque_is": self.torque_is}
+        return {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **about, **held}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Record:
@@ -204,19 +246,18 @@ class Record:
         if missing:
             raise RecordError(f"the saved record lacks {', '.join(missing)}; save it again")
         command, velocity, torque, position = (data[key] for key in CHANNELS)
-        return cls(data["dt"], command, velocity, torque, position, data["name"])
+        kind = data.get("torque_is", COMMANDED)  # which early files do not hold
+        return cls(data["dt"], command, velocity, torque, position, data["name"], torque_is=kind)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes JSON, all digits, for `gaident.load`; the file appears whole or not at all."""
-        from gaident.version import version
-
         write_whole(path, json.dumps({**self.to_dict(), "gaident_version": version()}).encode())
 
     def __eq__(self, other: object) -> bool:
-        """Same sample time, same name, same channels, same values."""
+        """Same sample time, same name, same channels, same values, a torque of the same kind."""
         if not isinstance(other, Record):
             return NotImplemented
-        if (self.dt, self.name, len(self)) != (other.dt, other.name, len(other)):
+        if (self.dt, self.name, self.torque_is, len(self)) != (other.dt, other.name, other.torque_is, len(other)):
             return False
         mine, yours = dict(self.channels()), dict(other.channels())
         return mine.keys() == yours.keys() and all(np.array_equal(mine[key], yours[key]) for key in mine)
@@ -226,17 +267,45 @@ class Record:
 
     def __repr__(self) -> str:
         label = f"{self.name!r}, " if self.name else ""
-        held = ", ".join(f"{key} {values.min() + 0.0:.4g}..{values.max() + 0.0:.4g}" for key, values in self.channels())
+        kind = {"torque": " (measured)"} if self.torque_is == MEASURED else {}
+        held = ", ".join(f"{key} {v.min() + 0.0:.4g}..{v.max() + 0.0:.4g}{kind.get(key, '')}" for key, v in self.channels())
         return f"Record({label}{len(self)} samples, dt={self.dt:.6g} s, {self.duration:.4g} s; {held})"
 
     def _repr_html_(self) -> str:
-        from gaident.data.record_html import record_html
+        html: str = provided("record_html")(self)
+        return html
 
-        return record_html(self)
-
-    def __reduce__(self) -> tuple[type[Record], tuple[Any, ...]]:
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
         # Arrays come out of a pickle writable; through the constructor they are checked and locked again.
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+        return _rebuilt, (type(self), {field.name: getattr(self, field.name) for field in fields(self)})
+
+
+def _rebuilt(kind: type[Record], held: dict[str, Any]) -> Record:
+    return kind(**held)
+
+
+def _sample_time(dt: object) -> float:
+    return positive_number(dt, "dt", "s", f"give the sample time in seconds, for example {arg('dt', '1e-3')}")
+
+
+def _torque_kind(torque_is: object, torque: NDArray[np.float64] | None) -> str:
+    """What the torque is, once it is one of the two and there is a torque. Raises RecordError."""
+    kind = one_of(torque_is, "torque_is", TORQUE_KINDS, RecordError)
+    if kind != COMMANDED and torque is None:
+        raise RecordError(f"torque_is={kind!r}, but the record has no torque; give torque=, or leave torque_is out")
+    return kind
+
+
+def _equally_long(channels: dict[str, NDArray[np.float64] | None]) -> dict[str, NDArray[np.float64] | None]:
+    """The channels, once they are. Raises RecordError."""
+    lengths = {key: len(values) for key, values in channels.items() if values is not None}
+    if len(set(lengths.values())) > 1:
+        listed = ", ".join(f"{key} {length}" for key, length in lengths.items())
+        raise RecordError(
+            f"the channels have unequal lengths ({listed} samples); cut them to the same samples, "
+            "or, where they come from two clocks, bring two records together with align"
+        )
+    return channels
 
 
 def _bound(value: object) -> str:

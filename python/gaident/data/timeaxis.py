@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.resampling import GAP
-from gaident.data.table import Column, Table
+from gaident.arguments import NO_TIME, arg
+from gaident.data.formats.table import Column, Table
+from gaident.data.signals.resampling import GAP
 from gaident.errors import ReadError
 
 __all__ = ["TimeAxis", "stamp_unit", "time_column"]
@@ -75,7 +76,7 @@ class TimeAxis:
             raise ReadError(
                 f"{table.path}, {table.place(row - shift)}: time column {self.column.key!r} does not increase "
                 f"({t[row - 1]:.12g}, then {t[row]:.12g}); sort the log, "
-                f"or give dt= and set columns={{'time': None}}"
+                f"or give {arg('dt')} and set {NO_TIME}"
             )
         usual = self.step or median  # of the first block
         deviation = np.abs(steps - usual)
@@ -103,10 +104,10 @@ def _check_given(table: Table, column: Column, found: float, second: float, dt: 
         (name for name, size in (("ms", 1e-3), ("us", 1e-6), ("min", 60.0)) if abs(found * size / dt - 1) < 0.01),
         None,
     )
-    hint = f"; if it is in {unit}, give units={{'time': {unit!r}}}" if unit and second == 1.0 else ""
+    hint = f"; if it is in {unit}, give {arg('units', repr(unit), 'time')}" if unit and second == 1.0 else ""
     raise ReadError(
-        f"{table.path}: dt={dt:g} s, but time column {column.key!r} has steps of {found:g} s{hint}; "
-        f"leave dt out, or set columns={{'time': None}} to trust dt"
+        f"{table.path}: {arg('dt', format(dt, 'g'))} s, but time column {column.key!r} has steps of {found:g} s{hint}; "
+        f"leave dt out, or set {NO_TIME} to trust dt"
     )
 
 
@@ -152,20 +153,24 @@ def _bare(name: str) -> str:
 def _too_coarse(table: Table, column: Column, printed: float) -> None:
     raise ReadError(
         f"{table.path}: time column {column.key!r} is printed in steps of {printed:g}, too coarse to "
-        f"tell the sample time; export more digits, or give dt= [s] and set columns={{'time': None}}"
+        f"tell the sample time; export more digits, or give {arg('dt')} [s] and set {NO_TIME}"
     )
 
 
 def _refuse(table: Table, column: Column, t: NDArray[np.float64], step: int, dt: float, shift: int) -> None:
     usual = float(np.median(np.diff(t)))
     bridged = t[step + 1] - t[step] <= GAP * usual
-    even = f"cut the log there, or put it on an even axis with resample={dt:.6g}" if bridged else "split the log there into two"
+    even = (
+        f"cut the log there, or put it on an even axis with {arg('resample', format(dt, '.6g'))}"
+        if bridged
+        else "split the log there into two"
+    )
     raise ReadError(
         f"{table.path}, {table.place(step + 1 - shift)}: time column {column.key!r} is irregular: from "
         f"{t[step]:.12g} to "
         f"{t[step + 1]:.12g} it jumps by {t[step + 1] - t[step]:.6g}, elsewhere by "
         f"{usual:.6g}; {even}; if the samples are in truth evenly spaced, "
-        f"give dt={dt:.6g} and set columns={{'time': None}}"
+        f"give {arg('dt', format(dt, '.6g'))} and set {NO_TIME}"
     )
 
 

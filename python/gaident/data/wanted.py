@@ -6,11 +6,14 @@ import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from gaident.data.arrays import positive_number
-from gaident.data.decimation import factor_of
+from gaident.arguments import arg
+from gaident.checks import one_of
+from gaident.data.formats.table import Column, Table
+from gaident.data.formats.units import QUANTITIES, Constants, factor, is_any_unit
 from gaident.data.record import CHANNELS
-from gaident.data.table import Column, Table
-from gaident.data.units import QUANTITIES, Constants, factor, is_any_unit
+from gaident.data.signals.arrays import positive_number
+from gaident.data.signals.decimation import factor_of
+from gaident.data.torque_kind import TORQUE_KINDS
 from gaident.errors import ReadError
 
 __all__ = ["Wanted", "si_factor"]
@@ -31,24 +34,29 @@ class Wanted:
     gear_ratio: float | None = None
     load_side: tuple[str, ...] = ()
     measured: bool = True
+    torque_is: str | None = None
 
     def check(self) -> Wanted:
         """Itself, once what can be judged without the file is right; else ReadError or RecordError."""
         for argument, value in (("columns", self.columns), ("units", self.units)):
             if value is not None and not isinstance(value, Mapping):
-                raise ReadError(f"{argument}={value!r} is no mapping; give for example {argument}={{'velocity': ...}}")
+                raise ReadError(
+                    f"{arg(argument, repr(value))} is no mapping; give for example {arg(argument, '...', 'velocity')}"
+                )
             _known(argument, value or ())
         self.constants.check()
         for quantity, unit in self.units.items():
             factor(quantity, unit, self.constants)
         if self.dt is not None:
-            positive_number(self.dt, "dt", "s", "give the sample time in seconds, for example dt=1e-3")
+            positive_number(self.dt, "dt", "s", f"give the sample time in seconds, for example {arg('dt', '1e-3')}")
         factor_of(self.decimate)
         if self.resample is not None:
             positive_number(self.resample, "resample", "s", "give the sample time of the even axis in seconds")
             if self.dt is not None:
                 raise ReadError("dt and resample are both given; resample takes the log's time stamps, leave dt out")
         self._check_gear()
+        if self.torque_is is not None:
+            one_of(self.torque_is, "torque_is", TORQUE_KINDS, ReadError)
         if self.name is not None and not isinstance(self.name, str):
             raise ReadError(f"name={self.name!r} is no text; give a str")
         return self
@@ -62,8 +70,9 @@ class Wanted:
         if bool(self.load_side) != (self.gear_ratio is not None):
             given, lacking = ("load_side", "gear_ratio") if self.load_side else ("gear_ratio", "load_side")
             raise ReadError(
-                f"{given} is given without {lacking}: give both or none, gear_ratio=... the turns of the motor per turn of "
-                "the load, load_side=... the channels that were measured behind the gear"
+                f"{given} is given without {lacking}: give both or none, {arg('gear_ratio', '...')} the turns of the motor "
+                "per turn of "
+                f"the load, {arg('load_side', '...')} the channels that were measured behind the gear"
             )
 
 
@@ -78,8 +87,8 @@ def si_factor(table: Table, wanted: Wanted, quantity: str, column: Column) -> fl
     except ReadError as error:
         known = "" if is_any_unit(column.unit) else ", which is not known"
         raise ReadError(
-            f"{table.path}: column {column.key!r} says its unit is {column.unit!r}{known}: {error}; "
-            f"or give units={{{quantity!r}: ...}}, which counts before the file's"
+            f"{table.path}: column {column.key!r} says its unit is {column.unit!r}{known}: {error.marked}; "
+            f"or give {arg('units', '...', quantity)}, which counts before the file's"
         ) from None
 
 

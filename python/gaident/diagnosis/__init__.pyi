@@ -1,5 +1,4 @@
-from .diagnose import diagnose
-from .experiments import Limits, Proposal, first_experiment
-from .result import Diagnosis, Finding
+from .diagnose import Diagnosis, Finding, diagnose
+from .experiments.first_experiment import Limits, Proposal, first_experiment
 
 __all__ = ["Diagnosis", "Finding", "Limits", "Proposal", "diagnose", "first_experiment"]

@@ -3,44 +3,45 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.arguments import ProgressCallback, checked, noise_std_of, records_of
-from gaident.diagnosis.candidates import CANDIDATES, TWINS, Scales, conditional_twins
-from gaident.diagnosis.controller_place import as_logged, as_read, controller_findings
-from gaident.diagnosis.driven import AT_CONTROLLER, Driven
-from gaident.diagnosis.excitation import excitation
-from gaident.diagnosis.extension import Extension, extended
-from gaident.diagnosis.folded import ADVICE, FOLDED, folded
+from gaident.diagnosis.controller.controller_place import as_logged, as_read, controller_findings
+from gaident.diagnosis.experiments.excitation import excitation
+from gaident.diagnosis.explain.wording import evidence_of
 from gaident.diagnosis.gains import Gains, measured_gains
-from gaident.diagnosis.hygiene import cleaned, outliers, quantisation
-from gaident.diagnosis.leftover import leftover
+from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
+from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, TWO_LEVELS, conditional_classes
 from gaident.diagnosis.mechanics import mechanics_of, moved
-from gaident.diagnosis.offset import offset_of
-from gaident.diagnosis.problem import Problem
-from gaident.diagnosis.result import Diagnosis, Finding
-from gaident.diagnosis.rivals import Rival
-from gaident.diagnosis.standing import only_describes, simplified
-from gaident.diagnosis.uncertainty import estimates_of
-from gaident.diagnosis.wording import evidence_of
-from gaident.identification.covariance import Estimate
+from gaident.diagnosis.policy import POLICY
+from gaident.diagnosis.records.arguments import ProgressCallback, checked, noise_std_of, records_of
+from gaident.diagnosis.records.folded import ADVICE, FOLDED, folded
+from gaident.diagnosis.records.hygiene import cleaned, outliers, quantisation
+from gaident.diagnosis.selection.attribution import only_describes, simplified
+from gaident.diagnosis.selection.dependence import dependence
+from gaident.diagnosis.selection.offset import offset_of
+from gaident.diagnosis.selection.rivals import Rival
+from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.objective import Fit, Objective
+from gaident.estimation.term import Scales
+from gaident.estimation.uncertainty import estimates_of
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
-from gaident.identification.result import Identification
-from gaident.models.controller import PI
 from gaident.models.simulate import simulate
+from gaident.results.diagnosis import Diagnosis, Finding
+from gaident.results.estimate import Estimate
+from gaident.results.identification import Identification
 from gaident.version import version
 
-__all__ = ["diagnose"]
+__all__ = ["Diagnosis", "Finding", "diagnose"]
 
 Vector = NDArray[np.float64]
-FREE_RUN = 5.0  # times the noise of the measured velocity: what the free run of an explained record may miss
-GATE = 1.5  # times the noise of the measured velocity: what an explained record may leave, whitened
 
 
 def diagnose(
@@ -62,9 +63,10 @@ def diagnose(
     bootstrap: simulated records without any effect to calibrate the p-value of the first finding; 0: none.
     progress: called now and then with (fraction done, message).
 
-    The method: stepwise extension by the effects of `gaident.effects.table()`, base and effects refitted together on whitened
-    errors of a torque-driven simulation, decided by BIC; rivals within 10 units and structural
-    twins make a finding ambiguous; what no effect explains is reported by its driver and not named. See docs/diagnosis.md.
+    The method: a beam search over mechanisms with effects of `gaident.effects.table()`, all refitted together on whitened errors
+    of a torque-driven simulation, or on plain ones where these are no stationary noise, decided by BIC; rivals within 10 units
+    and equivalent effects make a finding ambiguous; what no effect explains is reported by its driver and not named.
+    See docs/diagnosis.md.
 
     Raises GaidentError (a ValueError) that names the argument, its value and the remedy.
     """
@@ -87,10 +89,10 @@ def diagnose(
         work.search()
         result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap)
         if bootstrap:
-            from gaident.diagnosis.bootstrap import with_p_value
+            from gaident.diagnosis.selection.bootstrap import with_p_value
 
-            search = work.found.search
-            result = with_p_value(result, search, work.base, work.final, bootstrap, seed, lambda message: note(None, message))
+            space = work.found.space
+            result = with_p_value(result, space, work.base, work.final, bootstrap, seed, lambda message: note(None, message))
     object.__setattr__(result, "seconds", time.perf_counter() - began)
     return result
 
@@ -125,24 +127,28 @@ class _Work:
         hit = [self._spikes(r) for r in self.records]
         clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
         self.clean = tuple(clean)
-        driven = Driven.of(clean, self.controller, any(len(h) for h in hit), as_read(self.records, clean, self.controller))
-        self.scales = _scales(driven)
-        self.controller_steps, self.at_controller, notes = controller_findings(driven, self.scales)
+        self.step = quantisation(self.records)
+        read = as_read(self.records, clean, self.controller)
+        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step)
+        self.scales = _scales(data)
+        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales)
         self.notes += notes
         # Limits that the log shows act in every loop that is closed for a fit.
-        self.driven = replace(driven, controller=self.at_controller.controller or self.controller)
-        rate = self.at_controller.effects.get("command_rate_limit")
-        if rate is not None:
-            self.driven = self.driven.commanded(rate["rate"])
-        weight = np.ones(sum(self.driven.lengths))
+        known = {t: np.array(list(self.at_controller.effects[t.name].values())) for t in IN_CONTROLLER if self._shown(t.name)}
+        shown = self.at_controller.controller or self.controller
+        data = replace(data, controller=shown, loop_follows=self.at_controller.follows)
+        self.data = data if self.at_controller.controller is not None else data.with_effects(known)
+        weight = np.ones(sum(self.data.lengths))
         at = 0
-        for h, n in zip(hit, self.driven.lengths, strict=True):
+        for h, n in zip(hit, self.data.lengths, strict=True):
             weight[at + h] = 0.0
             at += n
-        self.problem = Problem(self.driven.predict, self.driven.measured, self.driven.lengths, weight)
-        self.step = quantisation(self.records)
+        self.objective = Objective(self.data, weight)
         self.spoiled = int(sum(len(h) for h in hit))
         self.excited = excitation(self.clean, self.controller)
+
+    def _shown(self, effect: str) -> bool:
+        return effect in self.at_controller.effects
 
     def _spikes(self, rec: Record) -> NDArray[np.intp]:
         """Samples that stand out of the velocity, or out of the linear model's error: a slope of the velocity may hide them."""
@@ -153,61 +159,69 @@ class _Work:
         return outliers(rec.velocity)
 
     def search(self) -> None:
-        """Base, stepwise extension, rivals, what is left."""
+        """The selected model, its rivals, what is left."""
         not_testable = dict(self.excited.not_testable)
         if any(folded(r) for r in self.records):
-            not_testable = dict.fromkeys(CANDIDATES, FOLDED)
+            not_testable = dict.fromkeys(LIBRARY, FOLDED)
             self.notes.append(ADVICE)
-        allowed = [e for e in CANDIDATES if e not in not_testable and e not in self.at_controller.decided]
-        if self.controller is None:
-            allowed = [e for e in allowed if e not in AT_CONTROLLER]
+        if self.data.torque_measured:
+            behind = "the torque was measured behind the actuator, which it does not show"
+            not_testable |= {t.name: behind for t in LIBRARY.values() if t.place == "actuator"}
+        out = {*not_testable, *self.at_controller.decided}
+        allowed = [t for t in LIBRARY.values() if t.name not in out and (self.controller is not None or not t.in_controller)]
         self.not_testable = not_testable
-        self.found = extended(
-            self.problem,
-            self.driven,
-            self.scales,
-            self.idn.model,
-            allowed,
-            self._twins_here,
-            lambda message: self.note(None, message),
-        )
-        self.problem, self.driven = self.found.search.problem, self.found.search.driven
+        found = selected(self.objective, self.scales, self.idn.model, allowed, self._equivalent_here, self._say)
         self.note(0.85, "looking for what is left")
-        self.take(self.found)
-        simpler = simplified(self.found.search, self.found.decided, self.left)
-        if simpler is not self.found.decided:
-            self.found = self.found.instead(simpler, self._twins_here, lambda message: self.note(None, message))
-            self.take(self.found)
+        self.take(found)
+        simpler = simplified(found.space, found.final, self.left)
+        if simpler is not found.final:
+            self.take(compared(found, simpler, self._equivalent_here, self._say))
 
-    def take(self, found: Extension) -> None:
+    def _say(self, message: str) -> None:
+        self.note(None, message)
+
+    def take(self, found: Selection) -> None:
         """The result of a search, and what it leaves."""
-        self.base, self.final, self.rivals = found.base, found.final, found.rivals
-        self.adequate = found.search.fitter.only_noise(self.final, GATE)
-        self.left = leftover(self.problem, self.driven, self.final)
+        self.found, self.base, self.rivals = found, found.base, found.rivals
+        self.data, self.objective = found.space.data, found.space.objective
+        self._settle(found.final)
+
+    def _settle(self, final: Fit) -> None:
+        self.final = final
+        self.adequate = self.found.space.is_noise(final)
+        self.left = dependence(self.objective, final)
 
     def report(self, seed: int) -> Diagnosis:
         """Everything the user sees."""
         self.note(0.9, "measuring the gain")
+        said = list(self.notes)
         gains = self._accepted_gains()
         driver = self.left.driver if self.adequate else self.left.strongest
         after = gains.after
-        if driver is None and after.rmse > FREE_RUN * after.noise_floor:
-            # A filter of coloured noise swallows a slow misfit whole; the free run does not.
-            strongest = self.left.strongest
-            driver = strongest if strongest is not None and self.left.gains[strongest] > 0.0 else "time"
+        if driver is None and after.rmse > POLICY.free_run_ratio * after.noise_floor:
+            # A noise filter takes a slow misfit whole; the free run does not.
+            driver = self.left.strongest or "time"
+            times = f"The free run misses the velocity by {after.rmse / after.noise_floor:.0f} times its noise. "
             self.notes.append(
-                f"The free run misses the velocity by {after.rmse / after.noise_floor:.0f} times its noise. In these data that "
-                "passes for a torque disturbance, but is far too large for noise: a controller or a limit that is not the one "
-                "given here, or a load that changes in time."
+                times
+                + "In these data that passes for a torque disturbance, but is far too large for noise: a controller or a limit "
+                "that is not the one given here, or a load that changes in time."
             )
-        search = self.found.search
+        space = self.found.space
         causes = []
         for e in self.final.effects:
-            of_class = bool(self._twins_here(e))
-            if not only_describes(search, self.final, e, self.rivals[e][0], driver, self.left, of_class):
+            of_class = bool(self._equivalent_here(e))
+            if not only_describes(space, self.final, e, self.rivals[e][0], driver, self.left, of_class):
                 causes.append(e)
-        offset = offset_of(search, self.found.decided)
-        estimates = estimates_of(self.problem, self.final)
+        offset = offset_of(space, self.final)
+        estimates = estimates_of(self.objective, self.final)
+        causes = [e for e in causes if self._determined(e, estimates[e])]
+        if self.final.effects and not causes:
+            instead = by_whitened_errors(self.found, self._equivalent_here, self._say)
+            if instead is not None:
+                self.notes = said
+                self.take(instead)
+                return self.report(seed)
         findings = [*self._noise_findings(), *(replace(f, gain=gains.of(f.effect)) for f in self.controller_steps)]
         for effect in causes:
             gain, rivals = self.rivals[effect]
@@ -222,7 +236,7 @@ class _Work:
                     evidence=evidence_of(effect, gain, alternatives, offset),
                 )
             )
-        model = self.final.layout.model(self.final.x)
+        model = self.final.parameters.model(self.final.x)
         for name, values in self.at_controller.effects.items():
             model = model.with_effect(name, **values)
         real = [f for f in findings if not f.is_noise]
@@ -240,10 +254,10 @@ class _Work:
         proposal = None
         if ambiguous:
             self.note(0.95, "proposing the next experiment")
-            from gaident.diagnosis.next_experiment import propose
+            from gaident.diagnosis.experiments.next_experiment import propose
 
             elsewhere = self.at_controller.effects
-            proposal, notes = propose(ambiguous, self.rivals, self.final, self.driven, self.problem.count, elsewhere)
+            proposal, notes = propose(ambiguous, self.rivals, self.final, self.data, self.objective.count, elsewhere)
             self.notes += notes
         return Diagnosis(
             verdict=verdict,
@@ -259,17 +273,17 @@ class _Work:
             base_shift=self._base_shift(),
             left=self.left.gains,
             line=self.left.line if driver == "time" else None,
-            mechanics=mechanics_of(self.problem, self.final),
+            mechanics=mechanics_of(self.objective, self.final),
             notes=tuple(self.notes),
             identification=self.idn,
             controller=self.controller,
             seed=seed,
             seconds=0.0,
-            simulations=self.problem.simulations,
-            samples=sum(self.driven.lengths),
+            simulations=self.objective.counter.simulations,
+            samples=sum(self.data.lengths),
             digests=tuple(r.digest for r in self.records),
             validation_digests=tuple(r.digest for r in self.held),
-            torque_logged=self.driven.torque_logged,
+            torque_logged=self.data.torque_logged,
             loop_follows=self.at_controller.follows,
             version=version(),
             records=self.records,
@@ -285,7 +299,7 @@ class _Work:
                 self.controller,
                 self.idn.model,
                 self.final,
-                self.problem,
+                self.objective,
                 self.noise,
                 self.at_controller.effects,
             )
@@ -296,34 +310,34 @@ class _Work:
                 f"{effect.replace('_', ' ').capitalize()} would come closer to these records, but makes the held-out data worse: "
                 "it is not accepted."
             )
-            self.final = self.found.search.without(self.final, effect)
-            self.left = leftover(self.problem, self.driven, self.final)
-            self.adequate = self.found.search.fitter.only_noise(self.final, GATE)
+            self._settle(self.found.space.without(self.final, effect))
 
     def _alternatives(self, effect: str, rivals: Sequence[Rival], even: bool) -> tuple[str, ...]:
-        """Statistical rivals and structural twins; even: friction of two levels has one viscous part, and is a load as well."""
+        """Statistical rivals and equivalent effects; even: friction of two levels has one viscous part, and is a load as well."""
         names = [r.effect for r in rivals]
-        names += sorted(self._twins_here(effect))
-        for twins in TWINS:
-            if effect in twins and (even or effect != "asymmetric_friction"):
-                names += [t for t in sorted(twins) if t != effect]
+        names += sorted(self._equivalent_here(effect))
+        for names_of_class in EQUIVALENT:
+            if effect in names_of_class and (even or effect != TWO_LEVELS.name):
+                names += [t for t in sorted(names_of_class) if t != effect]
         return tuple(dict.fromkeys(names))
 
-    def _twins_here(self, effect: str) -> set[str]:
+    def _equivalent_here(self, effect: str) -> set[str]:
         """What these records cannot tell from an effect, whatever their noise, for lack of reversals or of sizes of steps."""
         e = self.excited
-        classes = conditional_twins(e.reversals, len(e.steps), self.driven.torque_logged)
+        # Speeds held in either direction, in whichever record, split what a reversal splits.
+        turns = max(e.reversals, int(min(e.speeds, default=0.0) < 0.0 < max(e.speeds, default=0.0)))
+        classes = conditional_classes(turns, len(e.steps), self.data.torque_logged)
         return set().union(*(c for c in classes if effect in c)) - {effect} - set(self.not_testable)
 
     def _noise_findings(self) -> list[Finding]:
         found = []
-        total = sum(self.driven.lengths)
+        total = sum(len(r) for r in self.records)
         if self.spoiled:
             fraction = self.spoiled / total
             text = f"{self.spoiled} of {total} samples leave the signal and come back; they are left out of every fit."
             found.append(
                 Finding(
-                    "outliers",
+                    OUTLIERS,
                     {"fraction": Estimate(fraction, float(np.sqrt(self.spoiled) / total), "1")},
                     evidence=text,
                     is_noise=True,
@@ -331,32 +345,39 @@ class _Work:
             )
         if self.step > 0.0:
             text = f"All velocities lie on a lattice of {self.step:.4g} rad/s: the resolution of the encoder or of the log."
-            found.append(
-                Finding("velocity_quantisation", {"step": Estimate(self.step, 0.0, "rad/s")}, evidence=text, is_noise=True)
-            )
+            found.append(Finding(QUANTISATION, {"step": Estimate(self.step, 0.0, "rad/s")}, evidence=text, is_noise=True))
         return found
+
+    def _determined(self, effect: str, parameters: Mapping[str, Estimate]) -> bool:
+        """Whether the records say how large an effect is; else its name would rest on nothing, and a note says so."""
+        if any(e.identifiable and not e.at_bound for e in parameters.values()):
+            return True
+        self.notes.append(
+            f"{effect.replace('_', ' ').capitalize()} comes closer to these records, but they do not determine one of its "
+            "parameters: it is not named."
+        )
+        return False
 
     def _base_shift(self) -> dict[str, tuple[float, float]]:
         """Base parameters before (the linear fit) and after (with the effects)."""
-        if self.base.layout.masses != self.final.layout.masses:
+        if self.base.parameters.masses != self.final.parameters.masses:
             return {}
         names = ("gain", "pole", "pole_pair_e1", "pole_pair_e0", "zero_pair_e1", "zero_pair_e0")
-        before = self.base.layout.base_values(self.base.x[None, :])[0]
-        after = self.final.layout.base_values(self.final.x[None, :])[0]
+        before = self.base.parameters.base_values(self.base.x[None, :])[0]
+        after = self.final.parameters.base_values(self.final.x[None, :])[0]
         coefficients = {n: (float(b), float(a)) for n, b, a in zip(names, before, after, strict=False)}
         return coefficients | moved(self.base, self.final)
 
 
-def _scales(driven: Driven) -> Scales:
-    w, u, angle = driven.measured, driven.torque, driven.angle
-    command = driven.command
-    dt = min(r.dt for r in driven.records)
+def _scales(data: DataSet) -> Scales:
+    w, u, angle = data.velocity, data.torque, data.angle
+    command, dt = data.command, data.dt
     steps = 0.0 if command is None else float(np.abs(np.diff(command, prepend=0.0)).max()) / dt
     integral = float(np.abs(u).max())
     torque = max(float(np.abs(u).max()), 1e-300)
     return Scales(
         dt=dt,
-        duration=max(r.duration for r in driven.records),
+        duration=max(r.duration for r in data.records),
         speed=max(float(np.abs(w).max()), 1e-300),
         torque=torque,
         acceleration=steps or float("inf"),

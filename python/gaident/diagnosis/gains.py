@@ -8,20 +8,22 @@ so.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.hygiene import quantisation
-from gaident.diagnosis.problem import Fit, Problem
-from gaident.diagnosis.result import Fitness
-from gaident.identification.starts import noise_std, starts_moving
+from gaident.diagnosis.policy import POLICY
+from gaident.diagnosis.records.hygiene import quantisation
+from gaident.estimation.least_squares import fit
+from gaident.estimation.objective import Fit, Objective
 from gaident.models import simulate
-from gaident.models.controller import PI
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
+from gaident.models.starts import noise_std, starts_moving
+from gaident.results.diagnosis import Fitness
 
 __all__ = ["Gains", "free_run_errors", "measured_gains"]
 
@@ -30,7 +32,6 @@ Vector = NDArray[np.float64]
 SHARE = 0.7  # of a record that parameters are fitted to
 LEAST = 600  # samples of a record from which a part is held out
 BLOCKS = 200  # bootstrap draws
-HARM = 0.02  # of the held-out error, that an effect has to add to it before it is refused
 IN_SAMPLE = "in-sample"
 
 
@@ -59,7 +60,7 @@ def measured_gains(
     controller: PI | None,
     linear: Model,
     final: Fit,
-    problem: Problem,
+    objective: Objective,
     noise: float | None,
     at_controller: dict[str, dict[str, float]],
 ) -> Gains:
@@ -71,26 +72,27 @@ def measured_gains(
         words, part = "the last 30 % of the record, parameters fitted to the first 70 %", SHARE
     else:
         judged, words, part = [(r, 0) for r in records], IN_SAMPLE, None
-    stages = _stages(final, problem, part)
+    stages = _stages(final, objective, part)
     chain = [linear]
     if at_controller:
-        chain.append(_with(stages[0].layout.model(stages[0].x), at_controller))
-    chain += [_with(f.layout.model(f.x), at_controller) for f in stages[1:]]
+        chain.append(_with(stages[0].parameters.model(stages[0].x), at_controller))
+    chain += [_with(f.parameters.model(f.x), at_controller) for f in stages[1:]]
     errors = [free_run_errors(m, judged, controller) for m in chain]
     levels = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in errors]
-    base = free_run_errors(stages[0].layout.model(stages[0].x), judged, controller)
+    base = free_run_errors(stages[0].parameters.model(stages[0].x), judged, controller)
     level0 = float(np.sqrt(np.mean(np.concatenate(base) ** 2)))
     # The linear mechanism, refitted, may be better than the identified model already.
     previous = min(levels[0], level0) if np.isfinite(level0) else levels[0]
     steps = {}
-    for effect, level in zip([*at_controller, *final.layout.effects], levels[1:], strict=True):
+    for effect, level in zip([*at_controller, *final.effects], levels[1:], strict=True):
         steps[effect] = 1.0 - level / previous if previous > 0.0 else 0.0
         previous = level
     if len(errors) == 1:
         errors.append(errors[0])
     spread = np.concatenate([r.velocity[first:] for r, first in judged])
-    floor = noise if noise is not None else float(np.mean([noise_std(r.velocity) for r, _ in judged]))
-    floor = max(floor, quantisation(tuple(r for r, _ in judged)) / float(np.sqrt(12.0)))
+    step = quantisation(tuple(r for r, _ in judged))
+    floor = float(np.mean([noise_std(r.velocity, step) for r, _ in judged])) if noise is None else noise
+    floor = max(floor, step / float(np.sqrt(12.0)))
     size = float(np.sqrt(np.mean((spread - spread.mean()) ** 2)))
 
     def fitness(parts: list[Vector]) -> Fitness:
@@ -99,28 +101,28 @@ def measured_gains(
 
     harmful = []
     for effect in final.effects if words != IN_SAMPLE else ():
-        less = stages[0] if len(final.effects) == 1 else _without(stages[-1], effect, _part(problem, part))
-        spared = free_run_errors(_with(less.layout.model(less.x), at_controller), judged, controller)
+        less = stages[0] if len(final.effects) == 1 else _without(stages[-1], effect, _part(objective, part))
+        spared = free_run_errors(_with(less.parameters.model(less.x), at_controller), judged, controller)
         level = float(np.sqrt(np.mean(np.concatenate(spared) ** 2)))
-        if level < (1.0 - HARM) * levels[-1] and _interval(spared, errors[-1])[1] < 0.0:
+        if level < (1.0 - POLICY.harm) * levels[-1] and _interval(spared, errors[-1])[1] < 0.0:
             harmful.append(effect)
     return Gains(fitness(errors[0]), fitness(errors[-1]), _interval(errors[0], errors[-1]), words, steps, tuple(harmful))
 
 
-def _without(fit: Fit, effect: str, problem: Problem) -> Fit:
-    return problem.fit(fit.layout.without(effect), fit.layout.removed(fit.x, effect), fit.noise, 10)
+def _without(found: Fit, effect: str, objective: Objective) -> Fit:
+    return fit(objective, found.hypothesis.without(effect), found.parameters.removed(found.x, effect), found.noise, 10)
 
 
-def _part(problem: Problem, part: float | None) -> Problem:
-    """The problem with the last of each record left out."""
+def _part(objective: Objective, part: float | None) -> Objective:
+    """The objective with the last of each record left out."""
     if part is None:
-        return problem
-    weight = problem.weight.copy()
+        return objective
+    weight = objective.weight.copy()
     at = 0
-    for n in problem.lengths:
+    for n in objective.lengths:
         weight[at + int(part * n) : at + n] = 0.0
         at += n
-    return replace(problem, weight=weight)
+    return objective.weighted(weight)
 
 
 def _with(model: Model, effects: dict[str, dict[str, float]]) -> Model:
@@ -129,15 +131,16 @@ def _with(model: Model, effects: dict[str, dict[str, float]]) -> Model:
     return model
 
 
-def _stages(final: Fit, problem: Problem, part: float | None) -> list[Fit]:
+def _stages(final: Fit, objective: Objective, part: float | None) -> list[Fit]:
     """The final model without its effects, with the first, the first two, ...; each refitted to the part that is not held out."""
-    problem = _part(problem, part)
+    objective = _part(objective, part)
     fits = []
-    layout, x = final.layout, final.x
-    for e in reversed(final.layout.effects):
-        fits.append(problem.fit(layout, x, final.noise, 10) if part is not None or layout is not final.layout else final)
-        x, layout = layout.removed(x, e), layout.without(e)
-    fits.append(problem.fit(layout, x, final.noise, 10))
+    hypothesis, x = final.hypothesis, final.x
+    for e in reversed(final.effects):
+        whole = part is None and hypothesis is final.hypothesis
+        fits.append(final if whole else fit(objective, hypothesis, x, final.noise, 10))
+        x, hypothesis = hypothesis.parameters.removed(x, e), hypothesis.without(e)
+    fits.append(fit(objective, hypothesis, x, final.noise, 10))
     return fits[::-1]
 
 

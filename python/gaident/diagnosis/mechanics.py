@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.diagnosis.problem import Fit, Problem
-from gaident.diagnosis.uncertainty import covariance_of
-from gaident.identification.covariance import Estimate
+from gaident.estimation.objective import Fit, Objective
+from gaident.estimation.uncertainty import covariance_of
+from gaident.results.estimate import Estimate
 
 __all__ = ["MECHANICS", "mechanics_of", "moved"]
 
@@ -36,19 +36,19 @@ MECHANICS = {
 WHOLE = 2  # of these, what every axis has
 
 
-def mechanics_of(problem: Problem, fit: Fit) -> dict[str, Estimate]:
+def mechanics_of(objective: Objective, fit: Fit) -> dict[str, Estimate]:
     """Name -> Estimate, fitted together with the effects; deviations to first order.
 
     Of a pair of poles or zeros that does not swing (damping ratio 1 or more), or where a mass or the stiffness would be
     negative, only inertia and viscous friction of the whole are given.
     """
-    layout = fit.layout
-    cov = covariance_of(problem, fit)[: layout.base, : layout.base]
-    found = _numbers(layout.base_values(fit.x[None, :])[0])
-    h = 1e-6 * np.maximum(np.abs(fit.x[: layout.base]), 1.0)
+    parameters = fit.parameters
+    cov = covariance_of(objective, fit)[: parameters.base, : parameters.base]
+    found = _numbers(parameters.base_values(fit.x[None, :])[0])
+    h = 1e-6 * np.maximum(np.abs(fit.x[: parameters.base]), 1.0)
     X = np.repeat(fit.x[None, :], len(h), axis=0)
     X[np.arange(len(h)), np.arange(len(h))] += h
-    slopes = np.array([(_numbers(row) - found) / step for row, step in zip(layout.base_values(X), h, strict=True)])
+    slopes = np.array([(_numbers(row) - found) / step for row, step in zip(parameters.base_values(X), h, strict=True)])
     known = np.isfinite(np.diag(cov))
     variances = np.einsum("ij,ik,kj->j", slopes, np.where(known[:, None] & known[None, :], cov, 0.0), slopes)
     lost = np.any((np.abs(slopes) > 0.0) & ~known[:, None], axis=0)
@@ -62,7 +62,7 @@ def mechanics_of(problem: Problem, fit: Fit) -> dict[str, Estimate]:
 
 def moved(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:
     """Name -> (before, after) of what both have."""
-    pair = [_numbers(fit.layout.base_values(fit.x[None, :])[0]) for fit in (before, after)]
+    pair = [_numbers(fit.parameters.base_values(fit.x[None, :])[0]) for fit in (before, after)]
     return {name: (float(b), float(a)) for name, b, a in zip(MECHANICS, *pair, strict=False) if np.isfinite(b) and np.isfinite(a)}
 
 

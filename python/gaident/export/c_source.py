@@ -4,8 +4,9 @@ Linear, behind a hold or bilinear as the controller's loop says, in delta = z - 
 
     y = x[0] + b[0] u,   x[i] += x[i+1] + b[i+1] u - a[i] y
 
-With a controller the torque u of the sample solves the loop through b[0] and the controller's limits (csrc/gaident/loop.hpp);
-with effects the sample is divided into substeps (c_effects.py).
+With a controller the torque u of the sample solves the loop through b[0] and the controller's limits
+(csrc/gaident/control/loop.hpp); with effects the sample is divided into substeps (csrc/gaident/nonlinear/effect_loop.hpp).
+The code is written by hand, once (runtime.h, runtime.c); this module writes the table of coefficients that it steps through.
 """
 
 from __future__ import annotations
@@ -13,27 +14,24 @@ from __future__ import annotations
 import math
 import os
 import re
+from collections.abc import Sequence
+from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from gaident import _core
+from gaident.checks import real_number
+from gaident.control import core
+from gaident.control.pi import PI
 from gaident.errors import ModelError
-from gaident.export.c_effects import HELPERS, Pieces, effect_pieces, indented, number
 from gaident.files import write_whole
-from gaident.models.controller import PI
-
-if TYPE_CHECKING:
-    from gaident.models.model import Model
+from gaident.models.model import Model, require_strictly_proper
+from gaident.models.simulate import checked_substeps
+from gaident.version import version
 
 __all__ = ["c_source", "write_c"]
 
 TURNING = ("unbalance", "cogging", "velocity_ripple")
 FINEST = 16  # substeps that the core takes at most by itself
-
-LINEAR_MOVE = """
-for (i = 0; i + 1 < ORDER; ++i) s->x[i] += s->x[i + 1] + b[i + 1] * u - a[i] * y;
-if (ORDER > 0) s->x[ORDER - 1] += b[ORDER] * u - a[ORDER - 1] * y;
-"""
 
 
 def write_c(
@@ -53,36 +51,20 @@ def c_source(model: Model, dt: float, controller: PI | None, name: str, substeps
     """The text of the file; `name` begins every name that it declares. Raises ModelError where it cannot be written."""
     _checked(model, dt, controller, name, substeps)
     steps = substeps or (FINEST if any(e.name in TURNING for e in model.effects) else 0)
-    loop, kp, ki, limits = "open", 0.0, 0.0, (math.inf, math.inf)
-    if controller is not None:
-        loop, kp, ki, limits = controller.loop, controller.kp, controller.ki, controller.limits
     try:
-        found: dict[str, Any] = _core.recurrence(model.core(), dt, loop, kp, ki, *limits, steps, 0.0)
+        found: dict[str, Any] = core.recurrence(model.core(), dt, controller, steps, 0.0)
     except ValueError as reason:
         raise ModelError(str(reason)) from None
-    if found["substeps"] and loop == "continuous":
+    if found["substeps"] and core.loop_name(controller) == "continuous":
         names = ", ".join(e.name for e in model.effects)
         raise ModelError(
             f"with effects ({names}) the continuous loop is the difference of two simulations, which makes no recurrence for a "
             'controller: use PI(..., loop="sampled"), or controller=None for the drive alone'
         )
-    clamp = min(limits[1], found.get("effects", {}).get("integrator_clamp", (math.inf,))[0])
-    pieces = Pieces()
-    if controller is not None:
-        pieces.numbers({"kp": kp}, "proportional gain [N m s/rad]")
-        pieces.numbers({"g": 0.5 * ki * dt}, "integral gain times dt/2 [N m s/rad]")
-        bounds = {"torque_limit": limits[0], "integrator_limit": clamp}
-        pieces.numbers({key: value for key, value in bounds.items() if value < math.inf}, "N m")
-    if found["substeps"]:
-        effect_pieces(pieces, found, dt, None if controller is None else _sampled_pi(limits[0], clamp))
-    else:
-        _linear(pieces, found, controller, limits)
-    return _file(model, dt, controller, name, pieces, found["substeps"])
+    return _file(model, dt, controller, name, found)
 
 
 def _checked(model: Model, dt: float, controller: PI | None, name: str, substeps: int | None) -> None:
-    from gaident.models._checks import real_number
-    from gaident.models.simulate import checked_substeps, require_strictly_proper
 
     if real_number(dt, "dt", ModelError, "give the sample time in s, > 0") <= 0.0:
         raise ModelError(f"dt is {dt:g}: give the sample time in s, > 0")
@@ -100,67 +82,69 @@ def _checked(model: Model, dt: float, controller: PI | None, name: str, substeps
     require_strictly_proper(model.p, controller)
 
 
-def _limited(expression: str, name: str, limit: float) -> str:
-    """The expression, clipped where the limit exists."""
-    return f"clip({expression}, {name})" if limit < math.inf else expression
+def _number(value: float) -> str:
+    """A double as C writes it, all digits."""
+    value = float(value)
+    return repr(value) if math.isfinite(value) else "INFINITY"
 
 
-def _sampled_pi(torque_limit: float, clamp: float) -> list[str]:
-    """The digital controller: velocity y read, torque u issued."""
-    return [
-        "const double e = r - y;",
-        f"const double I = {_limited('s->stored + g * e', 'integrator_limit', clamp)};",
-        "s->stored = I + g * e;",
-        f"double u = {_limited('kp * e + I', 'torque_limit', torque_limit)};",
-    ]
+def _array(values: Sequence[float]) -> str:
+    return "{" + ", ".join(_number(v) for v in values or [0.0]) + "}"
 
 
-def _linear(pieces: Pieces, found: dict[str, Any], controller: PI | None, limits: tuple[float, float]) -> None:
-    a, b = found["a"], found["b"]
-    pieces.constants.append(f"enum {{ ORDER = {len(a)} }};")
-    pieces.array("a", a or [0.0], "denominator in delta = z - 1")
-    pieces.array("b", b, "numerator")
-    pieces.members.append((f"double x[{max(len(a), 1)}]", "the mechanism"))
-    step = pieces.step
-    step.append("int i;")
-    if controller is None:
-        step.append("const double u = input, y = s->x[0] + b[0] * u;")
+def _table(dt: float, controller: PI | None, name: str, found: dict[str, Any]) -> tuple[list[str], int]:
+    """The drive's coefficients, and how many torques are on their way at most."""
+    rows: list[tuple[str, str]] = []
+    before, length = [], 1
+    if controller is not None:
+        limits = controller.limits
+        rows += [("closed", "1"), ("kp", _number(controller.kp)), ("g", _number(0.5 * controller.ki * dt))]
+        rows += [("torque_limit", _number(limits[0])), ("integrator_limit", _number(limits[1]))]
+    if "phi" in found:
+        rows += [("two_masses", "1"), ("order", "3"), *((key, _array(found[key])) for key in ("phi", "motor", "coupling"))]
+        rows += [(key, _number(v)) for key, v in zip(("stiffness", "damping", "per_scale"), found["shaft"], strict=True)]
     else:
-        pieces.members.append(("double stored", "N m, of the controller"))
-        pieces.reset.append("s->stored = 0.0;")
-        torque = _limited("kp * (lead - b[0] * I) / (1.0 + b[0] * kp) + I", "torque_limit", limits[0])
-        # The velocity answers within the sample where b[0] is not 0: the loop is solved, then limited.
-        step += [
-            "const double lead = input - s->x[0];",
-            "const double free = (lead - b[0] * s->stored) / (1.0 + b[0] * (kp + g));",
-            f"const double I = {_limited('s->stored + g * free', 'integrator_limit', limits[1])};",
-            f"const double u = {torque};",
-            "const double y = s->x[0] + b[0] * u, e = input - y;",
-            f"s->stored = {_limited('s->stored + g * e', 'integrator_limit', limits[1])} + g * e;",
-        ]
-    step += LINEAR_MOVE.strip("\n").split("\n")
-    step += ["s->velocity = y;", "s->torque = u;", "return y;"]
+        rows += [("order", str(len(found["a"]))), ("a", _array(found["a"])), ("b", _array(found["b"]))]
+    effects: dict[str, Sequence[float]] = found.get("effects", {})
+    if found["substeps"]:
+        rows += [("substeps", str(found["substeps"])), ("h", _number(dt / found["substeps"]))]
+        rows.append(("effects", " | ".join(f"GAIDENT_{effect.upper()}" for effect in effects) or "0"))
+    for effect, values in effects.items():
+        if effect == "transport_delay":
+            back, share = found["delay"]
+            length = max(back) + 1
+            before.append(f"static const int {name}_back[] = {{{', '.join(str(b) for b in back)}}};")
+            before.append(f"static const double {name}_share[] = {_array(share)};")
+            rows.append((effect, f"{{{length}, {name}_back, {name}_share}}"))
+        else:
+            rows.append((effect, _array(values)))
+    table = [f"static const gaident_drive {name}_drive = {{", *(f"    .{key} = {value}," for key, value in rows), "};"]
+    return [*before, *table], length
 
 
-def _file(model: Model, dt: float, controller: PI | None, name: str, pieces: Pieces, substeps: int) -> str:
-    from gaident.version import version
+def _runtime(file: str) -> str:
+    return files("gaident.export").joinpath(file).read_text(encoding="utf-8").strip("\n")
 
-    members = [("double velocity", "rad/s, as the sensor shows it"), ("double torque", "N m, as the controller issues it")]
-    members += pieces.members
-    width = max(len(m) for m, _ in members) + 1
-    state = [f"    {m + ';':{width}} /* {what} */" if what else f"    {m};" for m, what in members]
-    reset = [*pieces.reset, "for (i = 0; i < ORDER; ++i) s->x[i] = 0.0;", "s->velocity = s->torque = 0.0;"]
-    if substeps:
-        reset.append("s->angle = 0.0;")
+
+def _file(model: Model, dt: float, controller: PI | None, name: str, found: dict[str, Any]) -> str:
+
+    table, length = _table(dt, controller, name, found)
+    angle = ["    double angle; /* rad, of the motor, from 0 */"] if found["substeps"] else []
     drive = "command [rad/s]" if controller is not None else "torque [N m]"
-    text = "\n".join(
+    return "\n".join(
         [
             *_head(model, dt, controller, name, version(), drive),
             f"#ifndef {name.upper()}_DECLARED",
             f"#define {name.upper()}_DECLARED",
             "",
+            _runtime("runtime.h"),
+            "",
             "typedef struct {",
-            *state,
+            "    double velocity; /* rad/s, as the sensor shows it */",
+            "    double torque; /* N m, as the controller issues it */",
+            *angle,
+            "    gaident_memory memory;",
+            f"    double issued[{length}]; /* N m, torques on their way */",
             f"}} {name}_state;",
             "",
             f"void {name}_reset({name}_state *s);",
@@ -169,36 +153,36 @@ def _file(model: Model, dt: float, controller: PI | None, name: str, pieces: Pie
             "#endif",
             f"#ifndef {name.upper()}_DECLARATIONS_ONLY",
             "",
-            "#include <math.h>",
+            _runtime("runtime.c"),
             "",
-            "@HELPERS@",
-            *pieces.constants,
+            *table,
             "",
             f"void {name}_reset({name}_state *s) {{",
-            "    int i;",
-            *(f"    {line}" for line in reset),
+            f"    static const {name}_state at_rest;",
+            "    *s = at_rest;",
             "}",
             "",
             f"double {name}_step({name}_state *s, double input) {{",
-            indented("\n".join(pieces.step), 4),
+            f"    s->velocity = gaident_step(&{name}_drive, &s->memory, s->issued, input, &s->torque);",
+            *(["    s->angle = s->memory.angle;"] if found["substeps"] else []),
+            "    return s->velocity;",
             "}",
             "",
             "#endif",
             "",
         ]
     )
-    return text.replace("@HELPERS@\n", HELPERS.lstrip() if "clip(" in text else "")
 
 
 def _head(model: Model, dt: float, controller: PI | None, name: str, version: str, drive: str) -> list[str]:
     loop = "the drive alone" if controller is None else f"{controller.loop} loop, kp {controller.kp:g}, ki {controller.ki:g}"
     lines = [
-        f"/* {name}: {drive} to motor velocity [rad/s], every {number(dt)} s ({loop}).",
+        f"/* {name}: {drive} to motor velocity [rad/s], every {_number(dt)} s ({loop}).",
         " *",
         " * SI units of a rotary axis; a linear axis reads m for rad and N for N m.",
         f" * Written by gaident {version}. C99, standard library only.",
         " *",
-        f" *   gain  {number(model.gain)}",
+        f" *   gain  {_number(model.gain)}",
         *(f" *   {kind}  {root.real:.10g}" + (f" {root.imag:+.10g}j" if root.imag else "") + " rad/s"
           for kind, roots in (("pole", model.poles), ("zero", model.zeros)) for root in roots),
         *(f" *   {effect.name}: " + ", ".join(f"{k} {v:.10g}" for k, v in effect.parameters.items()) for effect in model.effects),

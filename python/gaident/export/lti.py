@@ -15,15 +15,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.checks import real_number
 from gaident.errors import ModelError
-
-if TYPE_CHECKING:
-    from gaident.models.model import Model
+from gaident.models.model import Model
+from gaident.models.roots import canonical_roots
 
 __all__ = ["LINEAR", "to_control", "to_scipy"]
 
@@ -90,7 +90,6 @@ def _chain(model: Model) -> Chain:
 
 
 def _checked_step(model: Model, dt: float, pade: int | None) -> float:
-    from gaident.models._checks import real_number
 
     step = real_number(dt, "dt", ModelError, "give the sample time in s, > 0")
     if step <= 0.0:
@@ -163,7 +162,6 @@ def _cascade(chain: Chain, dt: float) -> tuple[Matrix, NDArray[np.float64], NDAr
 
     Each takes the output v of those before it:  x1' = x2, x2' = -e0 x1 - e1 x2 + v, y = n2 x2' + n1 x2 + n0 x1.
     """
-    from gaident.models.roots import canonical_roots
 
     poles, zeros = (_sections(canonical_roots(roots, "roots"), dt) for roots in (chain.poles, chain.zeros))
     n = sum(len(section) for section in poles)

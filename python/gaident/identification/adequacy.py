@@ -17,63 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.identification.noise import Autoregression, chi2_tail, ljung_box_of
+from gaident.results.adequacy import LEVEL, Adequacy
 
-__all__ = ["Adequacy", "Sums", "assess", "independence_p", "regressor_lags", "white_lags"]
+__all__ = ["Sums", "assess", "independence_p", "regressor_lags", "white_lags"]
 
 Vector = NDArray[np.float64]
 
 LAGS = (0, 1, 2, 4, 8, 16, 32)
-LEVEL = 1e-4  # p-value below which the linear model counts as falsified
-
-
-@dataclass(frozen=True)
-class Adequacy:
-    """What the residual says about the model.
-
-    white_p: Ljung-Box p-value of the residual; ar_order: order of the noise model; noise_std: standard deviation of the whitened
-    residual [rad/s]; predictable: share of the residual's power that its own past predicts (0: white); excess: rms of the
-    residual over
-    the noise as the measured velocity's own third differences show it;
-    independence_p: p-value of the test that the residual no longer depends on input and motion; falsified: it does;
-    undecided: it does not, but the residual is coloured and more than twice the noise, so that dynamics may be missing.
-    """
-
-    white_p: float
-    ar_order: int
-    noise_std: float
-    predictable: float
-    excess: float
-    independence_p: float
-    falsified: bool
-    undecided: bool
-
-    @property
-    def sentence(self) -> str:
-        """The verdict in words."""
-        if self.falsified:
-            return (
-                "The linear model is falsified: the residual still depends on the input or the motion "
-                f"(p = {self.independence_p:.1g}), and its own past predicts {100 * self.predictable:.0f} % of its power. "
-                "Do not trust the mechanical parameters; an effect that is not in the model bends them."
-            )
-        if self.undecided:
-            if not math.isfinite(self.excess):
-                return (
-                    "Undecided: the residual is coloured, and the measured velocity shows no noise at all. Is it a measurement, "
-                    "or a command or a simulation? Missing dynamics cannot be told from coloured noise here."
-                )
-            return (
-                f"Undecided: the residual is coloured and {self.excess:.1f} times the noise on the measured velocity. "
-                "Coloured noise "
-                "or missing dynamics; this record cannot tell which, and parameters and standard deviations hold only "
-                "if it is noise."
-            )
-        if self.white_p < LEVEL:
-            return (
-                "The residual is not white but does not depend on input or motion: coloured noise. The linear model stands; "
-                "the standard deviations take the colour into account."
-            )
-        return "The residual is white: nothing left that this linear model could be blamed for."
 
 
 @dataclass(frozen=True)
@@ -113,21 +63,17 @@ def assess(s: Sums) -> Adequacy:
     power = float(s.products[0]) / total
     white_p = ljung_box_of(s.products[: white_lags(s.lengths) + 1], total)
     predictable = 1.0 - s.noise.std**2 / power if power > 0.0 else 0.0
-    p = _independence(s.white, s.unknowns, total - s.noise.order * len(s.lengths))
+    p = independence_p(s.white, s.unknowns, total - s.noise.order * len(s.lengths))
     excess = math.sqrt(power) / s.quiet if s.quiet > 0.0 else (0.0 if power == 0.0 else math.inf)
     falsified = p < LEVEL
     undecided = not falsified and white_p < LEVEL and excess > 2.0
     return Adequacy(white_p, s.noise.order, s.noise.std, max(predictable, 0.0), excess, p, falsified, undecided)
 
 
-def independence_p(v: Vector, own: Vector, extra: Vector, samples: int) -> float:
-    """p-value of the F-test that the rows `extra` explain nothing of v beyond the rows `own`; samples: degrees of freedom."""
-    rows = np.vstack([v, own, extra])
-    return _independence(rows @ rows.T, len(own), samples)
+def independence_p(sums: Vector, own: int, samples: int) -> float:
+    """p-value of the F-test that rows explain nothing of v beyond the rows `own`; samples: degrees of freedom.
 
-
-def _independence(sums: Vector, own: int, samples: int) -> float:
-    """The same from sums of products: of v first, then of `own` columns, then of the others.
+    sums: of products, of v first, then of `own` rows, then of the others.
 
     What `own` explains is taken out of the sums (a Schur complement); what is left of v is regressed on what is left of the
     others.

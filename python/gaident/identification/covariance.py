@@ -12,32 +12,17 @@ sums its products.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.models.factors import factor_parameters, gain_unit
 from gaident.models.model import Model
+from gaident.results.estimate import Estimate
 
-__all__ = ["Estimate", "covariance_of_factors", "estimates"]
+__all__ = ["covariance_of_factors", "estimates"]
 
 Matrix = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """One parameter: value and standard deviation in `unit`.
-
-    std is nan for a parameter at a bound of its search range (`at_bound`), inf where the record says nothing about it.
-    identifiable: the record determines it to better than its own size.
-    """
-
-    value: float
-    std: float
-    unit: str
-    at_bound: bool = False
-    identifiable: bool = True
 
 
 def core_layout(model: Model) -> tuple[Matrix, list[int]]:

@@ -16,19 +16,19 @@ may be compared where the bare curve of the model may not.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.arguments import TORQUE
+from gaident.control.pi import PI
+from gaident.control.pi_torque import pi_torque
 from gaident.data.record import Record
 from gaident.errors import RecordError
-from gaident.models.controller import PI
 from gaident.models.model import Model
-from gaident.models.pi_torque import pi_torque
 from gaident.models.simulate import Run, run
+from gaident.results.frequency import FrequencyResponse, Responses
 
-__all__ = ["FrequencyResponse", "Responses", "measured_response", "response_of", "sampled_response", "simulated_response"]
+__all__ = ["measured_response", "response_of", "sampled_response", "simulated_response"]
 
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -41,46 +41,6 @@ CHANCE = 0.05  # of a coherence above `threshold` where there is none
 SAME = np.array([1.0, 4.0 / 9.0, 1.0 / 36.0])
 NEXT = np.array([1.0 / 36.0, (4.0 / (9.0 * np.pi)) ** 2, 1.0 / 144.0, (4.0 / (45.0 * np.pi)) ** 2])
 """|rho|^2 of white noise behind Hann windows, 0, 1, 2, ... frequencies apart: in one window, and in the next one."""
-
-
-@dataclass(frozen=True, eq=False)
-class FrequencyResponse:
-    """An estimate over frequency [Hz], arrays (n,): value [rad/s/(N m)] complex, its standard deviation, coherence 0..1.
-
-    std (n,): root of the mean |error|^2 of the complex value; magnitude, and phase times magnitude, deviate by std/sqrt(2) each.
-    threshold (n,): the coherence that unrelated signals pass once in twenty. instrument: whether the command was used (joint
-    input-output); False: torque to velocity directly (H1). windows: how many; resolution [Hz].
-    """
-
-    frequency: Vector
-    value: Complex
-    std: Vector
-    coherence: Vector
-    threshold: Vector
-    instrument: bool
-    windows: int
-    resolution: float
-
-    @property
-    def sentence(self) -> str:
-        """How it was estimated and what to doubt."""
-        how = f"{self.windows} half-overlapping windows, resolution {self.resolution:.2g} Hz"
-        if self.instrument:
-            return f"Joint input-output estimate: cross spectra with the command, free of the loop's bias by noise; {how}."
-        return (
-            f"H1 estimate from torque to velocity; {how}. If a controller made this torque out of the noisy velocity, the "
-            "estimate is biased towards minus the inverse of the controller where the coherence is low."
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Responses:
-    """A record's response, that of a model simulated on it, and the linear part's own over `fine` [Hz], (m,)."""
-
-    measured: FrequencyResponse
-    simulated: FrequencyResponse | None
-    fine: Vector
-    model: Complex
 
 
 def response_of(rec: Record, model: Model, controller: PI | None = None) -> Responses:
@@ -116,7 +76,7 @@ def measured_response(rec: Record, controller: PI | None = None) -> FrequencyRes
     torque = rec.torque
     if torque is None:
         if controller is None or rec.command is None:
-            raise RecordError("the record has no torque, and no controller to make it from: give Record(torque=...) or PI(...)")
+            raise RecordError(f"the record has no torque, and no controller to make it from: give {TORQUE} or PI(...)")
         torque = pi_torque(rec.command, rec.velocity, rec.dt, controller)
     if _constant(torque):
         raise RecordError("the torque never changes, so that it excites no frequency; use a record whose torque changes")

@@ -13,20 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
+from gaident.arguments import A_CONTROLLER, COMMAND, CONTINUOUS_LOOP, NO_CONTROLLER, TORQUE, arg
+from gaident.control import core
+from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.identification.notes import record_notes, warnings_of
 from gaident.identification.parts import search_parts
-from gaident.identification.result import Identification, Rival, Structure, TrialOutcome
 from gaident.identification.selection import MARGIN, Candidate
-from gaident.identification.settings import Settings
-from gaident.identification.space import SearchSpace, derive_space
-from gaident.identification.starts import noise_std, starts_moving
-from gaident.models.controller import PI
+from gaident.identification.space import derive_space
 from gaident.models.mechanics import mechanics_from_model
 from gaident.models.model import Model
+from gaident.models.search_space import SearchSpace
+from gaident.models.starts import noise_std, starts_moving
+from gaident.results.adequacy import Adequacy
+from gaident.results.identification import Identification, Rival, Structure, TrialOutcome
+from gaident.results.settings import Settings
 from gaident.version import version
 
 __all__ = ["identify"]
@@ -96,7 +100,7 @@ def identify(
     best, scored = work.select(found)
     result = work.report(best, scored, found, int(seed))
     if derived and not settings.species:
-        warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give space=SearchSpace(...)."
+        warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
         object.__setattr__(result, "warnings", (*result.warnings, warning))
     overflows = sum(t.overflows for t in found)
     if overflows:
@@ -118,7 +122,7 @@ class _Judged:
     noise: Autoregression
     plain: Vector  # J'J
     coloured: Vector  # J'S J
-    adequacy: adequacy.Adequacy
+    adequacy: Adequacy
 
 
 @dataclass
@@ -148,12 +152,10 @@ class _Work:
     def experiment_of(self, parts: Sequence[tuple[Record, bool]]) -> _core.Experiment:
         """The core's view of (record, whether it starts in motion)."""
         c = self.controller
-        loop, kp, ki = ("open", 0.0, 0.0) if c is None else (c.loop, c.kp, c.ki)
-        limits = (np.inf, np.inf) if c is None else c.limits
         rows = [
             (_input(r, c), r.velocity, r.dt, "free" if moving else "rest", float(r.velocity[:3].mean())) for r, moving in parts
         ]
-        return _core.Experiment(records=rows, loop=loop, kp=kp, ki=ki, torque_limit=limits[0], integrator_limit=limits[1])
+        return core.experiment(rows, c)
 
     def search(self, trials: int, seed: int, progress: ProgressCallback | None) -> list[_core.Trial]:
         """The genetic runs."""
@@ -340,13 +342,13 @@ def _checked_records(rec: Record | Sequence[Record], controller: PI | None) -> l
         where = f"record {i} ({r.name})" if r.name else f"record {i}"
         if controller is not None and r.command is None:
             raise RecordError(
-                f"{where} has no command, which drives the loop with a controller: give Record(command=...), or "
-                "controller=None to identify from torque to velocity"
+                f"{where} has no command, which drives the loop with a controller: give {COMMAND}, or "
+                f"{NO_CONTROLLER} to identify from torque to velocity"
             )
         if controller is None and r.torque is None:
             raise RecordError(
-                f"{where} has no torque, which drives the model in open loop: give Record(torque=...), or "
-                "controller=PI(...) to identify in closed loop"
+                f"{where} has no torque, which drives the model in open loop: give {TORQUE}, or "
+                f"{A_CONTROLLER} to identify in closed loop"
             )
     return records
 
@@ -378,7 +380,7 @@ def _checked_space(space: SearchSpace, controller: PI | None) -> SearchSpace:
         if space.p[1] < 1:
             raise SpaceError(
                 f"p is {space.p!r}: with a held torque the plant needs at least one pole more than zeros; "
-                "use p=(1, 3), or PI(..., loop='continuous')"
+                f"use {arg('p', '(1, 3)')}, or {CONTINUOUS_LOOP}"
             )
         return replace(space, p=(1, space.p[1]))
     return space

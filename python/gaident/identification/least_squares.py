@@ -23,10 +23,11 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.arguments import A_CONTROLLER, NO_CONTROLLER
+from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.identification.plant_of_discrete import plant_of_discrete
-from gaident.models.controller import PI
 from gaident.models.factors import Structure, factor_parameters
 from gaident.models.mechanics import Mechanics, mechanics_from_model
 from gaident.models.model import Discrete, Model
@@ -204,6 +205,6 @@ def _model_covariance(model: Model, theta: Vector, covariance: Vector, dt: float
 def _source(rec: Record, controller: PI | None) -> Vector:
     source, name = (rec.torque, "torque") if controller is None else (rec.command, "command")
     if source is None:
-        other = "controller=PI(...) to use the command" if controller is None else "controller=None to use the torque"
+        other = f"{A_CONTROLLER} to use the command" if controller is None else f"{NO_CONTROLLER} to use the torque"
         raise RecordError(f"the record has no {name}, the input of the regression: give Record({name}=...), or {other}")
     return source

@@ -7,8 +7,8 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.checks import real_number
 from gaident.errors import SettingsError
-from gaident.models._checks import real_number
 
 __all__ = ["m_sequence"]
 

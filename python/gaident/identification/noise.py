@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gaident import _core
 
-__all__ = ["Autoregression", "autoregression_of", "fit_autoregression", "highest_order", "ljung_box", "ljung_box_of", "whiten"]
+__all__ = ["Autoregression", "autocorrelation", "autoregression_of", "chi2_tail", "highest_order", "ljung_box", "ljung_box_of"]
 
 Vector = NDArray[np.float64]
 
@@ -35,24 +35,16 @@ class Autoregression(NamedTuple):
         return len(self.phi)
 
 
-def fit_autoregression(residuals: Sequence[Vector], max_order: int = MAX_ORDER) -> Autoregression:
-    """Order by BIC, coefficients by Levinson-Durbin on the autocovariance pooled over records.
-
-    residuals: one array per record, not centred (a mean is an error too). The order is at most a twentieth of the samples.
-    """
-    lengths = [len(e) for e in residuals]
-    top = highest_order(lengths, max_order)
-    products: Vector = np.sum([autocorrelation(e, top) for e in residuals], axis=0)
-    return autoregression_of(products, sum(lengths))
-
-
 def highest_order(lengths: Sequence[int], max_order: int = MAX_ORDER) -> int:
     """The largest order that so many samples are asked for."""
     return max(0, min(max_order, sum(lengths) // 20, min(lengths) - 1))
 
 
 def autoregression_of(products: Vector, total: int) -> Autoregression:
-    """The same from sums of products e(n) e(n+k), k = 0..top, over `total` samples."""
+    """Order by BIC, coefficients by Levinson-Durbin, from sums of products e(n) e(n+k), k = 0..top, over `total` samples.
+
+    e is not centred: a mean is an error too.
+    """
     cov = (products / total).tolist()
     if not cov[0] > 0.0:
         return Autoregression(np.zeros(0), 0.0)
@@ -69,15 +61,6 @@ def autoregression_of(products: Vector, total: int) -> Autoregression:
         if score < best_score:
             best, best_std, best_score = phi, math.sqrt(variance), score
     return Autoregression(np.array(best, dtype=np.float64), best_std)
-
-
-def whiten(x: Vector, phi: Vector) -> Vector:
-    """v of x; the first len(phi) samples, whose past is missing, are 0."""
-    v = x.copy()
-    for i, f in enumerate(phi, start=1):
-        v[i:] -= f * x[:-i]
-    v[: len(phi)] = 0.0
-    return v
 
 
 def ljung_box(residuals: Sequence[Vector], lags: int) -> float:

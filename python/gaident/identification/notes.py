@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.identification.adequacy import Adequacy
-from gaident.identification.covariance import Estimate
-from gaident.identification.result import Rival
 from gaident.identification.selection import MARGIN
-from gaident.identification.starts import doubtful_start
-from gaident.models.controller import PI
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Model
+from gaident.models.starts import doubtful_start
+from gaident.results.adequacy import Adequacy
+from gaident.results.estimate import Estimate
+from gaident.results.identification import Rival
 
 __all__ = ["open_loop_notes", "record_notes", "warnings_of"]
 
@@ -72,7 +72,7 @@ def open_loop_notes(records: Sequence[Record], controller: PI | None) -> list[st
         return []
     return [
         "The log has a command, but no gains were given: its torque drives the model, and noise that goes through the loop "
-        "biases the result; give controller=PI(...)."
+        "biases the result; give the gains of the controller."
     ]
 
 

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.models.controller import PI
 
 __all__ = ["search_parts"]
 

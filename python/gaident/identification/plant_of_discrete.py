@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.pi import PI
 from gaident.errors import ModelError
-from gaident.models.controller import PI
 from gaident.models.model import Model
 
 __all__ = ["Plant", "plant_of_discrete"]

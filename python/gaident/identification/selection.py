@@ -4,8 +4,8 @@
 
 RSS_w is the least sum of squares of the whitened simulation error. One filter serves all structures, estimated on the residual of
 the one that fits best, so that no structure is whitened with its own mistakes. The *smallest* structure within 10 units of the
-best wins
-(METHOD.md section 3). A pole and a zero closer than 2 % to each other fit noise and are charged 10 units.
+best wins.
+A pole and a zero closer than 2 % to each other fit noise and are charged 10 units.
 """
 
 from __future__ import annotations

@@ -1,151 +1,21 @@
-"""Search space: where gain, poles and zeros are looked for."""
+"""The search space that records suggest."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field, fields
-from numbers import Real
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.arguments import arg
+from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import SpaceError
-from gaident.models.controller import PI
-from gaident.models.pi_torque import pi_block
+from gaident.models.drive_torque import torque_blocks
+from gaident.models.search_space import SearchSpace
 
-if TYPE_CHECKING:
-    from gaident import _core
-
-__all__ = ["SearchSpace", "derive_space"]
-
-Range = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class SearchSpace:
-    """Search ranges; a pole or zero is -(real part) +- i (imaginary part).
-
-    gain: range of K at p = 1, 1/J [rad/s^2 per N m], both ends positive.
-    real: negated real parts, rad/s (negative lower end: unstable roots are allowed). imaginary: rad/s.
-    p, q: ranges of the structural numbers, 0..7. bits: per number, 2..16.
-    gain_scale: K counts in units of gain_scale^(p-1) at other p, rad/s; None: sqrt(real[1]*imaginary[1])/10, and 1 (the same
-    range
-    for every p, as in the paper) with Settings.paper().
-    source: where the ranges come from, shown in the summary.
-
-    Raises SpaceError naming the range and the remedy.
-    """
-
-    gain: Range = (1e3, 2e4)
-    real: Range = (0.0, 60.0)
-    imaginary: Range = (0.0, 250.0)
-    p: tuple[int, int] = (0, 3)
-    q: tuple[int, int] = (0, 3)
-    bits: int = 10
-    gain_scale: float | None = None
-    source: str = field(default="given", compare=False)
-
-    def __post_init__(self) -> None:
-        for name in ("gain", "real", "imaginary", "p", "q"):
-            value = getattr(self, name)
-            if isinstance(value, str) or not isinstance(value, (Sequence, np.ndarray)) or len(value) != 2:
-                raise SpaceError(f"{name} is {value!r}: give a pair (lowest, highest)")
-            try:
-                lo, hi = (float(v) for v in value)
-            except (TypeError, ValueError):
-                raise SpaceError(f"{name} is {value!r}: both ends must be numbers") from None
-            if not (math.isfinite(lo) and math.isfinite(hi)):
-                raise SpaceError(f"{name} is {value!r}: both ends must be finite")
-            if name in ("p", "q"):
-                if lo != int(lo) or hi != int(hi) or not 0 <= lo <= hi <= 7:
-                    raise SpaceError(f"{name} is {value!r}: give whole numbers with 0 <= lowest <= highest <= 7")
-                object.__setattr__(self, name, (int(lo), int(hi)))
-                continue
-            if not lo < hi:
-                raise SpaceError(f"{name} is {value!r}: the lowest must be below the highest")
-            object.__setattr__(self, name, (lo, hi))
-        if self.gain[0] <= 0.0:
-            raise SpaceError(
-                f"gain is {self.gain!r}: both ends must be positive, the gain is searched on a logarithmic scale; "
-                "if velocity falls when torque rises, reverse the sign of one of them"
-            )
-        if self.imaginary[0] < 0.0:
-            raise SpaceError(f"imaginary is {self.imaginary!r}: give the positive half, pairs are conjugate by themselves")
-        if isinstance(self.bits, bool) or not isinstance(self.bits, int) or not 2 <= self.bits <= 16:
-            raise SpaceError(f"bits is {self.bits!r}: it must be a whole number from 2 to 16")
-        if self.gain_scale is not None and not (isinstance(self.gain_scale, Real) and 0.0 < self.gain_scale < math.inf):
-            raise SpaceError(f"gain_scale is {self.gain_scale!r}: give a frequency in rad/s, above 0, or None")
-
-    @classmethod
-    def from_mechanics(
-        cls,
-        inertia: Range,
-        resonance_hz: Range,
-        damping: Range | None = None,
-        *,
-        p: tuple[int, int] = (0, 3),
-        q: tuple[int, int] = (0, 3),
-        bits: int = 10,
-    ) -> SearchSpace:
-        """Ranges as an engineer knows them.
-
-        inertia: total inertia at the motor shaft [kg m^2] (or mass [kg]); the motor's own may be down to a tenth of it.
-        resonance_hz: lowest and highest frequency at which the mechanism may resonate, Hz; antiresonances are looked for
-            from half the lowest on.
-        damping: total viscous damping [N m s/rad]; None: up to where a pole is as fast as the highest resonance.
-        """
-        inertia = _pair("inertia", inertia, above_zero=True)
-        resonance_hz = _pair("resonance_hz", resonance_hz, above_zero=True)
-        damping = None if damping is None else _pair("damping", damping, above_zero=False)
-        top = 2.0 * math.pi * resonance_hz[1]
-        real = top if damping is None else max(damping[1] / inertia[0], 0.3 * top)
-        return cls(
-            gain=(1.0 / inertia[1], 10.0 / inertia[0]),
-            real=(0.0, real),
-            imaginary=(math.pi * resonance_hz[0], top),
-            p=p,
-            q=q,
-            bits=bits,
-            source="from mechanics",
-        )
-
-    def ranges(self, paper: bool = False) -> _core.SearchRanges:
-        """The same for the core."""
-        from gaident import _core
-
-        scale = self.gain_scale
-        if scale is None:
-            scale = 1.0 if paper else 0.1 * math.sqrt(max(self.real[1], 1e-9) * self.imaginary[1])
-        return _core.SearchRanges(
-            gain=self.gain, real=self.real, imaginary=self.imaginary, p=self.p, q=self.q, bits=self.bits, gain_scale=scale
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> SearchSpace:
-        """The inverse of to_dict. Raises SpaceError for unknown keys."""
-        unknown = set(data) - {f.name for f in fields(cls)}
-        if unknown:
-            raise SpaceError(f"space holds unknown keys: {', '.join(sorted(unknown))}")
-        return cls(**data)
-
-
-def _pair(name: str, value: object, above_zero: bool) -> Range:
-    """(lowest, highest) as floats, or SpaceError."""
-    try:
-        lo, hi = (float(v) for v in value)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        raise SpaceError(f"{name} is {value!r}: give a pair of numbers (lowest, highest)") from None
-    if not ((lo > 0.0 or (lo == 0.0 and not above_zero)) and lo < hi < math.inf):
-        least = "0 <" if above_zero else "0 <="
-        raise SpaceError(f"{name} is {value!r}: give (lowest, highest) with {least} lowest < highest")
-    return lo, hi
+__all__ = ["derive_space"]
 
 
 def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpace:
@@ -170,7 +40,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
         # Sums of products of x = (int u dt, -int w dt, w) about their means, a block at a time.
         products, sums = np.zeros((3, 3)), np.zeros(3)
         integrals, before = np.zeros(2), np.zeros(2)
-        for first, u, w in _torque_blocks(rec, controller):
+        for first, u, w in torque_blocks(rec, controller):
             x = np.empty((3, len(u)))
             for i, (signal, sign) in enumerate(((u, 1.0), (w, -1.0))):
                 trapezia = 0.5 * rec.dt * sign * (signal + np.concatenate([before[i : i + 1], signal[:-1]]))
@@ -192,7 +62,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
         if still:
             raise SpaceError(
                 f"the {what} of the record is constant: nothing can be identified from it; use a record in which the "
-                "drive moves, or give space=SearchSpace(...)"
+                f"drive moves, or give {arg('space', 'SearchSpace(...)')}"
             )
     rigid = float(np.linalg.solve(gram, right)[0]) if np.linalg.cond(gram) < 1e14 else 0.0
     found = [k for k in (rigid, steps / energy) if np.isfinite(k) and k > 0.0]
@@ -204,7 +74,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
     if not found:
         raise SpaceError(
             "the velocity falls when the torque rises: reverse the sign of one of them (for example by a unit of -1), "
-            "or give space=SearchSpace(gain=...)"
+            f"or give {arg('space', 'SearchSpace(gain=...)')}"
         )
     dt = min(rec.dt for rec in records)
     longest = max(rec.duration for rec in records)
@@ -240,36 +110,12 @@ def _check_scales(records: Sequence[Record], controller: PI | None, only_certain
     rpm = next((name for name, rate in (("command", 9.549), ("velocity", 1 / 9.549)) if 0.8 < factor / rate < 1.25), None)
     if 1.0 / 3.0 <= factor <= 3.0 or (only_certain and rpm is None and factor > 3.0):
         return
-    hint = "they are in different units: give units={'command': ...} or units={'velocity': ...}"
+    hint = f"they are in different units: give {arg('units', '...', 'command')} or {arg('units', '...', 'velocity')}"
     if rpm:
-        hint = f"the {rpm} seems to be in rpm, the other in rad/s: give units={{'{rpm}': 'rpm'}}"
+        hint = f"the {rpm} seems to be in rpm, the other in rad/s: give {arg('units', repr('rpm'), rpm)}"
     raise SpaceError(f"the command is {factor:.3g} times the velocity all along: {hint}")
 
 
 def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Sum of products, in one thread: a BLAS starts others for a long one, and their number shows in the last digits."""
     return float(np.einsum("i,i", a, b))
-
-
-def torque_of(rec: Record, controller: PI | None) -> NDArray[np.float64]:
-    """The record's torque or, where none was recorded, the controller's answer to command and velocity (limits included)."""
-    if rec.torque is not None:
-        return rec.torque
-    return np.concatenate([u for _, u, _ in _torque_blocks(rec, controller)])
-
-
-def _torque_blocks(
-    rec: Record, controller: PI | None, length: int = 1 << 18
-) -> Iterator[tuple[int, NDArray[np.float64], NDArray[np.float64]]]:
-    """(first sample, torque, velocity) a block at a time: of a long record no copy is made."""
-    integral = last = 0.0
-    for first in range(0, len(rec), length):
-        w = rec.velocity[first : first + length]
-        if rec.torque is not None:
-            yield first, rec.torque[first : first + length], w
-            continue
-        assert controller is not None and rec.command is not None  # checked on entry to identify()
-        e = rec.command[first : first + length] - w
-        torque, integral = pi_block(e, rec.dt, controller, last, integral)
-        last = float(e[-1])
-        yield first, torque, w

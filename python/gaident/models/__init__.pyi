@@ -1,9 +1,9 @@
 from . import effects
-from .controller import PI
 from .effects import Effect
 from .factors import Structure, factor_parameters, model_from_factor_parameters
 from .mechanics import Mechanics, OneMass, TwoMass, mechanics_from_dict, mechanics_from_model
 from .model import Discrete, Mode, Model
+from .search_space import SearchSpace
 from .simulate import AnyModel, Run, initial_state, run, simulate, simulate_many, simulate_values
 
 __all__ = [
@@ -14,8 +14,8 @@ __all__ = [
     "Mode",
     "Model",
     "OneMass",
-    "PI",
     "Run",
+    "SearchSpace",
     "Structure",
     "TwoMass",
     "effects",

@@ -15,8 +15,8 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from gaident import _core
+from gaident.checks import known_keys, one_of, real_number
 from gaident.errors import ModelError
-from gaident.models._checks import known_keys, one_of, real_number
 from gaident.models.own_effects import OWN, PLACES, Function, Own, Parameter, Signals, checked
 
 __all__ = ["Effect", "Parameter", "Row", "Signals", "Table", "register", "table", "unregister"]

@@ -1,4 +1,4 @@
-"""One and two masses: from mechanical parameters to the factored model and back (METHOD.md section 2)."""
+"""One and two masses: from mechanical parameters to the factored model and back."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gaident.checks import known_keys, one_of, real_number
 from gaident.errors import ModelError
 from gaident.models import two_mass
-from gaident.models._checks import known_keys, one_of, real_number
 from gaident.models.factors import Structure
 from gaident.models.model import Model
 from gaident.models.roots import polynomial_roots

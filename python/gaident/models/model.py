@@ -12,11 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident import _core
+from gaident.arguments import CONTINUOUS_LOOP
+from gaident.checks import known_keys, real_number
+from gaident.control import core
+from gaident.control.pi import PI
 from gaident.errors import ModelError
-from gaident.models._checks import known_keys, real_number
-from gaident.models.controller import PI
 from gaident.models.effects import Effect, ordered
 from gaident.models.roots import canonical_roots, quadratic_roots
+from gaident.providers import provided
 
 Roots = Sequence[complex] | NDArray[np.complex128] | NDArray[np.float64]
 
@@ -212,9 +215,13 @@ class Model:
         loop; a model with effects).
         """
         self._require_linear("discrete")
-        from gaident.models.simulate import discrete
-
-        return discrete(self, dt, controller)
+        sample_time = real_number(dt, "dt", ModelError, "give the sample time in s, > 0")
+        if sample_time <= 0.0:
+            raise ModelError(f"dt is {sample_time:g}: give the sample time in s, > 0")
+        require_strictly_proper(self.p, controller)
+        poles, zeros = (np.array(roots, dtype=np.complex128) for roots in (self.poles, self.zeros))
+        alpha, beta = core.discrete(self.gain, poles, zeros, sample_time, controller)
+        return Discrete(alpha, beta)
 
     def to_scipy(self, dt: float | None = None, *, pade: int | None = None) -> Any:
         """The same as a linear system of scipy.signal, torque [N m] to velocity [rad/s].
@@ -226,18 +233,14 @@ class Model:
         The linear effects (extra_resonance, transport_delay, torque_lag, velocity_filter) are part of it. Raises ModelError
         for other effects, for a delay with neither dt nor pade, and for p = 0 with dt.
         """
-        from gaident.export.lti import to_scipy
-
-        return to_scipy(self, dt, pade)
+        return provided("to_scipy")(self, dt, pade)
 
     def to_control(self, dt: float | None = None, *, pade: int | None = None) -> Any:
         """The same as a system of python-control: control.TransferFunction, with a sample time dt [s] control.StateSpace.
 
         As `to_scipy`. Raises ImportError with the way to get python-control, and ModelError.
         """
-        from gaident.export.lti import to_control
-
-        return to_control(self, dt, pade)
+        return provided("to_control")(self, dt, pade)
 
     def to_c(
         self,
@@ -261,9 +264,8 @@ class Model:
         library included. Raises ModelError for effects of one's own, for effects in the continuous loop, for p = 0 outside
         it, and for a dt, name or substeps that are none.
         """
-        from gaident.export.c_source import write_c
-
-        return write_c(self, path, dt, controller, name, substeps)
+        text: str = provided("write_c")(self, path, dt, controller, name, substeps)
+        return text
 
     def to_dict(self) -> dict[str, Any]:
         """The model for JSON: {"gain": K, "poles": [[re, im], ...], "zeros": [[re, im], ...], "effects": [...]}.
@@ -311,6 +313,16 @@ class Model:
             made = _core.EffectModel(self.gain, poles, zeros, built_in)
             object.__setattr__(self, "_core_model", made)
         return made
+
+
+def require_strictly_proper(p: int, controller: PI | None) -> None:
+    """Raises ModelError for p = 0 outside the continuous loop."""
+    if p == 0 and (controller is None or controller.loop != "continuous"):
+        where = "the sampled loop" if controller is not None else "an open loop"
+        raise ModelError(
+            f"the model has p = 0 (as many zeros as poles), which does not exist in {where}: "
+            f"use a model with more poles than zeros, or {CONTINUOUS_LOOP}"
+        )
 
 
 def _list(roots: tuple[complex, ...]) -> str:

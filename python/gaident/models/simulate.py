@@ -11,14 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident import _core
+from gaident.arguments import A_CONTROLLER, COMMAND, NO_CONTROLLER, TORQUE
+from gaident.checks import one_of
+from gaident.control import core
+from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import GaidentError, ModelError, RecordError
-from gaident.models._checks import one_of, real_number
-from gaident.models.controller import PI
 from gaident.models.effects import table as effect_table
 from gaident.models.factors import Structure
 from gaident.models.mechanics import OneMass, TwoMass
-from gaident.models.model import Discrete, Model
+from gaident.models.model import Model, require_strictly_proper
 from gaident.models.own_effects import OWN
 
 Signal = NDArray[np.float64]
@@ -116,18 +118,6 @@ def initial_state(model: AnyModel, rec: Record, controller: PI | None = None) ->
     solution = np.linalg.lstsq(columns / lengths, missing, rcond=1e-12)[0]
     state: Signal = solution / lengths
     return state
-
-
-def discrete(model: AnyModel, dt: float, controller: PI | None = None) -> Discrete:
-    """Equation (7) of the model in the controller's loop, or torque to velocity; see `Model.discrete`."""
-    plant = _as_model(model)
-    sample_time = real_number(dt, "dt", ModelError, "give the sample time in s, > 0")
-    if sample_time <= 0.0:
-        raise ModelError(f"dt is {sample_time:g}: give the sample time in s, > 0")
-    require_strictly_proper(plant.p, controller)
-    loop, kp, ki, _, _ = _loop(controller)
-    alpha, beta = _core.discrete(plant.gain, _roots(plant.poles), _roots(plant.zeros), sample_time, loop, kp, ki)
-    return Discrete(alpha, beta)
 
 
 def simulate_many(
@@ -283,16 +273,9 @@ def checked_substeps(substeps: int | None) -> int:
 
 
 def _core_record(rec: Record, source: Signal, controller: PI | None) -> _core.EffectRecord:
-    loop, kp, ki, torque_limit, integrator_limit = _loop(controller)
     position = np.zeros(0) if rec.position is None else rec.position
     start = 0.0 if rec.position is None else float(rec.position[0])
-    return _core.EffectRecord(rec.dt, source, position, rec.velocity, start, loop, kp, ki, torque_limit, integrator_limit)
-
-
-def _loop(controller: PI | None) -> tuple[str, float, float, float, float]:
-    if controller is None:
-        return "open", 0.0, 0.0, math.inf, math.inf
-    return controller.loop, controller.kp, controller.ki, *controller.limits
+    return core.effect_record(rec.dt, source, position, rec.velocity, start, controller)
 
 
 def _check_start(plant: Model, controller: PI | None, start: Signal, what: str) -> None:
@@ -310,21 +293,7 @@ def _check_start(plant: Model, controller: PI | None, start: Signal, what: str) 
 def _core_simulate(
     plant: Model, dt: float, source: Signal, controller: PI | None, start: Signal, arithmetic: str
 ) -> tuple[Signal, Signal]:
-    loop, kp, ki, torque_limit, integrator_limit = _loop(controller)
-    return _core.simulate(
-        plant.gain,
-        _roots(plant.poles),
-        _roots(plant.zeros),
-        dt,
-        source,
-        loop,
-        kp,
-        ki,
-        torque_limit,
-        integrator_limit,
-        start,
-        arithmetic,
-    )
+    return core.simulate(plant.gain, _roots(plant.poles), _roots(plant.zeros), dt, source, controller, start, arithmetic)
 
 
 def _roots(roots: tuple[complex, ...]) -> NDArray[np.complex128]:
@@ -344,25 +313,15 @@ def _input_for(p: int, rec: Record, controller: PI | None) -> tuple[Signal, str]
         if rec.command is None:
             raise RecordError(
                 "the record has no command, which drives the loop with a controller: give "
-                "Record(command=...), or controller=None to drive the model with the torque"
+                f"{COMMAND}, or {NO_CONTROLLER} to drive the model with the torque"
             )
         return np.ascontiguousarray(rec.command, dtype=np.float64), "command"
     if rec.torque is None:
         raise RecordError(
             "the record has no torque, which drives the model without a controller: give "
-            "Record(torque=...), or controller=PI(...) to drive the loop with the command"
+            f"{TORQUE}, or {A_CONTROLLER} to drive the loop with the command"
         )
     return np.ascontiguousarray(rec.torque, dtype=np.float64), "torque"
-
-
-def require_strictly_proper(p: int, controller: PI | None) -> None:
-    """Raises ModelError for p = 0 outside the continuous loop."""
-    if p == 0 and (controller is None or controller.loop != "continuous"):
-        where = "the sampled loop" if controller is not None else "an open loop"
-        raise ModelError(
-            f"the model has p = 0 (as many zeros as poles), which does not exist in {where}: "
-            'use a model with more poles than zeros, or PI(..., loop="continuous")'
-        )
 
 
 def _as_model(model: AnyModel) -> Model:

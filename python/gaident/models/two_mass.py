@@ -1,4 +1,4 @@
-"""The equations between a two-mass drive and its transfer function (METHOD.md section 2), on plain numbers.
+"""The equations between a two-mass drive and its transfer function, on plain numbers.
 
     c = (K, sum A, pairwise A, prod A, sum B, prod B): G(s) = K (s^2 + c4 s + c5)/(s^3 + c1 s^2 + c2 s + c3)
 

@@ -1,7 +1,8 @@
 """The paper, reproduced and checked: its tables against one another, its experiment on a simulated rig, and what lies behind."""
 
-from gaident.paper.page import page, summary
-from gaident.paper.pictures import figures
-from gaident.paper.reproduction import Reproduction, reproduce
+from __future__ import annotations
 
-__all__ = ["Reproduction", "figures", "page", "reproduce", "summary"]
+import lazy_loader
+
+# The names stand in __init__.pyi; a name's module is imported when the name is first used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -61,7 +61,7 @@ class IdentifiedMechanics:
 
 
 def identified_mechanics(mechanism: Mechanism) -> IdentifiedMechanics:
-    """METHOD: the six numbers K, A, B over-determine five mechanical parameters at D_G = 0."""
+    """The six numbers K, A, B over-determine five mechanical parameters at D_G = 0."""
     model = mechanism.identified
     found = mechanics_from_model(model)
     if not isinstance(found, TwoMass):

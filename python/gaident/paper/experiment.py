@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.identification.identify import identify
-from gaident.identification.result import Identification
-from gaident.identification.settings import Settings
-from gaident.identification.space import SearchSpace
+from gaident.models.search_space import SearchSpace
 from gaident.models.simulate import simulate
 from gaident.paper.facts import DT, ERROR_WEIGHT, ORDER_WEIGHT, SAMPLES, STEP, Mechanism
 from gaident.paper.rig import Friction, Rig, Run, side_by_side
+from gaident.results.identification import Identification
+from gaident.results.settings import Settings
 
 __all__ = ["FRICTION", "NOISE", "Engine", "StepTest", "rig_of", "step_test"]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gaident.models.controller import PI
+from gaident.control.pi import PI
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Model
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from gaident.data.record import Record
 from gaident.diagnosis.diagnose import diagnose
-from gaident.diagnosis.result import Diagnosis
 from gaident.models.mechanics import Mechanics, mechanics_from_model
 from gaident.paper.experiment import rig_of
 from gaident.paper.facts import SAMPLES, STEP, Mechanism
 from gaident.paper.rig import Friction, Run, side_by_side
+from gaident.results.diagnosis import Diagnosis
 
 __all__ = ["FrictionTest", "friction_test"]
 

@@ -1,4 +1,4 @@
-"""The page's pictures as PNG: what they show is worked out here, how it is drawn stands in `gaident.show`."""
+"""The page's pictures as PNG: what they show is worked out here, how it is drawn stands in plots.py."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.models.simulate import simulate
 from gaident.paper.facts import STEP
 from gaident.paper.friction import FrictionTest
+from gaident.paper.plots import plot_bias, plot_engines, plot_friction, plot_identified, plot_nominal
 from gaident.paper.reproduction import Reproduction
-from gaident.paper.rig import Friction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,8 +39,6 @@ CAPTIONS = {
 
 def figures(result: Reproduction) -> dict[str, bytes]:
     """File name without suffix -> PNG, for each of CAPTIONS."""
-    from gaident.show.paper_plots import plot_bias, plot_engines, plot_friction, plot_identified, plot_nominal
-
     tests = [part.step for part in result.parts]
     drawn: dict[str, Figure] = {
         "fig6_nominal": plot_nominal(tests),
@@ -57,11 +56,9 @@ def _friction_curves(f: FrictionTest) -> tuple[Record, Vector, Vector, tuple[Vec
     w = np.linspace(0.0, 50.0, 501)
     found = np.zeros_like(w)
     for finding in f.diagnosis.findings:
-        values = {name: e.value for name, e in finding.parameters.items()}
-        if finding.effect == "coulomb_friction":
-            found = found + values["torque"]
-        elif finding.effect == "stribeck_friction":
-            found = found + Friction(values["torque"], values["static_torque"], values["stribeck_velocity"]).level(w)
+        term = LIBRARY.get(finding.effect)
+        if term is not None and term.curve is not None:
+            found = found - term.curve(np.maximum(w, 1e-9), {name: e.value for name, e in finding.parameters.items()})
     extended = simulate(f.diagnosis.model, f.reversals, f.diagnosis.controller)
     return f.reversals, f.diagnosis.identification.simulate(f.reversals), extended, (w, f.truth.level(w), found)
 

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.models.controller import PI
 from gaident.models.mechanics import OneMass, TwoMass
 
 __all__ = ["Friction", "Rig", "Run", "integrate", "side_by_side"]

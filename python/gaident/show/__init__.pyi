@@ -12,6 +12,7 @@ from .plots import (
     plot_poles_zeros,
     plot_structures,
 )
+from .progress_bar import progress
 from .response_plots import plot_response
 from .summary import identification_summary, mechanics_comparison
 
@@ -29,4 +30,5 @@ __all__ = [
     "plot_reversals",
     "plot_structures",
     "plot_torque_velocity",
+    "progress",
 ]

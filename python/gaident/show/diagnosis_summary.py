@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import textwrap
-from typing import Any
 
+from gaident.results.diagnosis import Diagnosis, Finding
+from gaident.results.estimate import Estimate
+from gaident.results.experiment import Proposal
 from gaident.show.wording import certainty, number, sentence, table, unit, velocity_unit, with_std
 
 __all__ = [
@@ -33,7 +35,7 @@ DRIVERS = {
 }
 
 
-def diagnosis_summary(dia: Any, axis: str = "rotary") -> str:
+def diagnosis_summary(dia: Diagnosis, axis: str = "rotary") -> str:
     """What is wrong, why, the gain, what could not be tested, what to measure next; no line break at the end.
 
     dia: a Diagnosis, or anything with its attributes. axis: "rotary", or "linear" for units of m and N.
@@ -62,13 +64,13 @@ def _wrapped(text: str, indent: str = "", hanging: str = "") -> list[str]:
     return lines or [""]
 
 
-def either(finding: Any) -> str:
+def either(finding: Finding) -> str:
     """ "a, b or c" of a finding and what these data cannot tell from it."""
     names = [words(name) for name in (finding.effect, *finding.alternatives)]
     return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
-def _verdict(dia: Any, axis: str) -> list[str]:
+def _verdict(dia: Diagnosis, axis: str) -> list[str]:
     head = " ".join(filter(None, (verdict_words(dia), left_words(dia, axis))))
     lines = [f"Verdict: {dia.verdict}", *_wrapped(head)]
     for note in dia.notes:
@@ -76,7 +78,7 @@ def _verdict(dia: Any, axis: str) -> list[str]:
     return lines
 
 
-def left_words(dia: Any, axis: str) -> str:
+def left_words(dia: Diagnosis, axis: str) -> str:
     """What the error that is left depends on; empty where nothing significant is left."""
     if dia.driver is None:
         return ""
@@ -88,7 +90,7 @@ def left_words(dia: Any, axis: str) -> str:
     return f"{text}."
 
 
-def verdict_words(dia: Any) -> str:
+def verdict_words(dia: Diagnosis) -> str:
     """The verdict in words, with the names."""
     if dia.verdict == "adequate":
         return "The linear model is adequate: nothing significant is left that could be blamed on the drive."
@@ -109,7 +111,7 @@ def verdict_words(dia: Any) -> str:
     return " ".join([f"The model was wrong, {found} nothing significant is left.", *parts])
 
 
-def _causes(dia: Any, axis: str) -> list[str]:
+def _causes(dia: Diagnosis, axis: str) -> list[str]:
     lines: list[str] = []
     for f in dia.findings:
         if f.is_noise:
@@ -122,13 +124,15 @@ def _causes(dia: Any, axis: str) -> list[str]:
     return ["What was found", *(line if line.startswith(" ") else f"  {line}" for line in lines)] if lines else []
 
 
-def chance_words(finding: Any, bootstrap: int) -> str:
+def chance_words(finding: Finding, bootstrap: int) -> str:
     """The p-value of the bootstrap in words."""
+    if finding.p_value is None:
+        return ""
     most = "at most " if finding.p_value * (bootstrap + 1) <= 1.0 + 1e-9 else ""  # none of the draws came as far
     return f"Chance of such a finding where there is no effect at all (bootstrap): {most}{finding.p_value:.2g}."
 
 
-def parameter_row(name: str, e: Any, axis: str) -> tuple[str, str, str, str]:
+def parameter_row(name: str, e: Estimate, axis: str) -> tuple[str, str, str, str]:
     """Name, value with its standard deviation, unit, remark."""
     value, std, u = e.value, e.std, e.unit
     if axis == "linear" and u == "1/turn":  # a turn is 2 pi m
@@ -139,7 +143,7 @@ def parameter_row(name: str, e: Any, axis: str) -> tuple[str, str, str, str]:
     return words(name), with_std(value, std), "" if u == "1" else u, remark
 
 
-def _gain(dia: Any, axis: str) -> list[str]:
+def _gain(dia: Diagnosis, axis: str) -> list[str]:
     v = velocity_unit(axis)
     extended = bool(dia.model.effects)
     rows = [
@@ -162,7 +166,7 @@ def _gain(dia: Any, axis: str) -> list[str]:
     return lines
 
 
-def fall_words(dia: Any) -> str:
+def fall_words(dia: Diagnosis) -> str:
     """By how much the error falls, in words."""
     fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)
     low, high = (100.0 * x for x in dia.gain_interval)
@@ -187,7 +191,7 @@ def fall_words(dia: Any) -> str:
     return f"The error falls by {fall:.0f} %{interval}."
 
 
-def _mechanics(dia: Any, axis: str) -> list[str]:
+def _mechanics(dia: Diagnosis, axis: str) -> list[str]:
     """The linear part of the reported model as a mechanic calls it."""
     if not dia.mechanics:
         return []
@@ -208,7 +212,7 @@ def mechanical_name(name: str, axis: str) -> str:
     return "  its damping ratio" if name.endswith("_damping") else sentence(words(name), axis)
 
 
-def _base(dia: Any, axis: str) -> list[str]:
+def _base(dia: Diagnosis, axis: str) -> list[str]:
     rows = [("", "linear fit", "with the effects", "moved", "")]
     for name, e in dia.mechanics.items():
         if name in dia.base_shift:
@@ -219,7 +223,7 @@ def _base(dia: Any, axis: str) -> list[str]:
     return ["How far the effects had bent the linear model", *table(rows)] if len(rows) > 1 and dia.model.effects else []
 
 
-def _record(dia: Any, axis: str) -> list[str]:
+def _record(dia: Diagnosis, axis: str) -> list[str]:
     lines = []
     for f in dia.findings:
         if f.is_noise:
@@ -227,31 +231,30 @@ def _record(dia: Any, axis: str) -> list[str]:
     return ["About the record", *lines] if lines else []
 
 
-def _untested(dia: Any, axis: str) -> list[str]:
+def _untested(dia: Diagnosis, axis: str) -> list[str]:
     lines = []
     for effect, reason in dia.not_testable.items():
         lines += _wrapped(f"{words(effect)}: {sentence(reason, axis)}", "  ", "  ")
     return ["Not testable with this record", *lines] if lines else []
 
 
-def _next(dia: Any, axis: str) -> list[str]:
+def _next(dia: Diagnosis, axis: str) -> list[str]:
     p = dia.next_experiment
     if p is None:
         return []
     size = f"The command: {len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s."
-    return ["Next experiment", *_wrapped(sentence(next_words(dia), axis), "  "), f"  {size}"]
+    return ["Next experiment", *_wrapped(sentence(next_words(dia, p), axis), "  "), f"  {size}"]
 
 
-def next_words(dia: Any) -> str:
-    """Why the next experiment, what it tells apart and how surely."""
-    p = dia.next_experiment
+def next_words(dia: Diagnosis, p: Proposal) -> str:
+    """Why the experiment p comes next, what it tells apart and how surely."""
     margin = f", {certainty(p.margin)} ({p.margin:.0f} BIC units, 10 are enough)" if math.isfinite(p.margin) else ""
     text = f"{p.reason} It tells {' from '.join(map(words, p.separates))}{margin}."
     rest = dict.fromkeys(a for f in dia.findings for a in f.alternatives if a not in p.separates)
     return f"{text} It was not chosen for {' or '.join(map(words, rest))}." if rest else text
 
 
-def _how(dia: Any) -> list[str]:
+def _how(dia: Diagnosis) -> list[str]:
     data = ", ".join(digest[:12] for digest in dia.digests)
     version = dia.version or "of unknown version"
     work = f"{dia.samples} samples, {dia.simulations} simulations, {dia.seconds:.2f} s"

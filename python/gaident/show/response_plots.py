@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.show.plots import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, _figure, _locator, _tidy
+from gaident.results.frequency import Responses
+from gaident.show.chart import Chart, Panel, Trace
+from gaident.show.draw import chart_figure
 from gaident.show.wording import unit, velocity_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["phase_line", "plot_response"]
+__all__ = ["phase_line", "plot_response", "response_chart"]
 
 
 def phase_line(response: NDArray[np.complex128]) -> NDArray[np.float64]:
@@ -24,50 +26,41 @@ def phase_line(response: NDArray[np.complex128]) -> NDArray[np.float64]:
     return phase
 
 
-def plot_response(responses: Any, hz: bool = False, axis: str = "rotary", title: str = "") -> Figure:
-    """Magnitude, phase and coherence from torque to velocity.
+def plot_response(responses: Responses, hz: bool = False, axis: str = "rotary", title: str = "") -> Figure:
+    """Magnitude, phase and coherence from torque to velocity as a Figure, see `response_chart`."""
+    way = "joint input-output, by the command" if responses.measured.instrument else "H1: biased where a loop's noise is large"
+    head = title or f"{'Torque' if axis == 'rotary' else 'Force'} to velocity ({way})"
+    return chart_figure(response_chart(responses, axis, hz), 7.5, 6.6, [head])
 
-    responses: measured and simulated (or None), estimates with frequency [Hz], value, std, coherence, threshold; fine [Hz] and
-    model: the linear part as the loop samples it. Points whose coherence chance could give are left out; bars are 2 standard
-    deviations of the magnitude and of the phase, 1/sqrt(2) of the complex value's each. hz: frequencies in Hz instead of rad/s.
+
+def response_chart(r: Responses, axis: str, hz: bool = True) -> Chart:
+    """Bode diagram of the model against what the record shows by itself, with coherence; over Hz, or rad/s for hz=False.
+
+    Points whose coherence chance could give are left out. Bars are 2 standard deviations of the magnitude and of the phase,
+    1/sqrt(2) of the complex value's each.
     """
-    scale = 1.0 if hz else math.tau
-    m, s = responses.measured, responses.simulated
+    m, s, scale = r.measured, r.simulated, 1.0 if hz else math.tau
     sure = m.coherence > m.threshold
-    fig = _figure(7.5, 6.6)
-    top, middle, low = fig.subplots(3, 1, sharex=True, height_ratios=(1.6, 1.0, 0.7))
     f, g, spread = scale * m.frequency[sure], m.value[sure], math.sqrt(2.0) * m.std[sure]
-    size = np.abs(g)
-    style: dict[str, Any] = {"fmt": "o", "color": SKY, "markersize": 3.5, "elinewidth": 1.0, "zorder": 1}
-    # A bar that would reach 0 ends at a hundredth of the value: the axis is logarithmic.
-    top.errorbar(f, size, [np.minimum(spread, 0.99 * size), spread], label="record, ±2 std", **style)
-    if not len(f):
-        text = "the record shows nothing here: its coherence is nowhere above chance"
-        middle.text(0.5, 0.5, text, transform=middle.transAxes, ha="center", va="center", color=GREY, fontsize="small")
-    middle.errorbar(f, np.degrees(np.angle(g)), np.degrees(np.minimum(spread / size, math.pi)), **style)
+    angle = np.degrees(spread / np.abs(g)).clip(0.0, 180.0)
+    size = [Trace(f, np.abs(g), "record, ±2 std", "measured", "means", 0.0, spread=spread)]
+    phase = [Trace(f, np.degrees(np.angle(g)), "", "measured", "means", 0.0, spread=angle)]
     if s is not None:
-        top.plot(scale * s.frequency, np.abs(s.value), color=BLACK, linewidth=1.2, label="model, estimated the same way")
-        middle.plot(scale * s.frequency, phase_line(s.value), color=BLACK, linewidth=1.2)
-    dashes: dict[str, Any] = {"color": VERMILION, "linewidth": 1.0, "linestyle": (0, (4, 2))}
-    top.plot(scale * responses.fine, np.abs(responses.model), label="its linear part, exact", **dashes)
-    middle.plot(scale * responses.fine, phase_line(responses.model), **dashes)
-    low.plot(scale * m.frequency, m.coherence, color=BLUE, linewidth=1.2)
-    low.plot(scale * m.frequency, m.threshold, color=ORANGE, linewidth=1.2, linestyle="--", label="reached by chance, 1 of 20")
-    top.set_xscale("log")
-    top.set_yscale("log")
-    middle.yaxis.set_major_locator(_locator(90.0))
-    middle.set_ylim(-200.0, 200.0)
-    low.set_ylim(0.0, 1.05)
-    u = unit("N m", axis)
-    top.set_ylabel(f"magnitude [{velocity_unit(axis)}/{'(N m)' if u == 'N m' else u}]")
-    middle.set_ylabel("phase [deg]")
-    low.set_ylabel("coherence")
-    low.set_xlabel("frequency [Hz]" if hz else "frequency [rad/s]")
-    way = "joint input-output, by the command" if m.instrument else "H1: biased where a loop's noise is large"
-    top.set_title(
-        title or f"{'Torque' if axis == 'rotary' else 'Force'} to velocity ({way})", fontsize="medium", loc="left", pad=20.0
+        size.append(Trace(scale * s.frequency, np.abs(s.value), "model, estimated the same way", "extended", width=1.5))
+        phase.append(Trace(scale * s.frequency, phase_line(s.value), "", "extended", width=1.5))
+    size.append(Trace(scale * r.fine, np.abs(r.model), "its linear part, exact", "linear", width=1.0, dash="dash"))
+    phase.append(Trace(scale * r.fine, phase_line(r.model), "", "linear", width=1.0, dash="dash"))
+    chance = Trace(scale * m.frequency, m.threshold, "reached by chance, 1 of 20", "noise", dash="dash")
+    per = unit("N m", axis)
+    none = "" if len(f) else "the record shows nothing here: its coherence is nowhere above chance"
+    panels = (
+        Panel(f"magnitude [{velocity_unit(axis)}/{'(N m)' if ' ' in per else per}]", tuple(size), log=True, height=1.6),
+        Panel("phase [deg]", tuple(phase), limits=(-200.0, 200.0), ticks=(-180.0, -90.0, 0.0, 90.0, 180.0), note=none),
+        Panel("coherence", (Trace(scale * m.frequency, m.coherence, "", "faster"), chance), limits=(0.0, 1.05), height=0.7),
     )
-    for ax, columns in ((top, 3), (low, 1)):
-        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, frameon=False, fontsize="small", borderaxespad=0.2)
-    _tidy(fig)
-    return fig
+    hidden = int(np.sum(~sure))
+    text = f"{m.sentence} Bars: 2 standard deviations."
+    if hidden:
+        text += f" {hidden} of {len(sure)} points are not drawn, as their coherence is what chance gives (dashed)."
+    text += " Friction and other nonlinear effects bend the record's response; the model estimated the same way has them too."
+    return Chart("response", "frequency [Hz]" if hz else "frequency [rad/s]", panels, text, log=True, height=600)

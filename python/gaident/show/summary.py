@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 import textwrap
-from typing import Any
+from collections.abc import Mapping
 
+from gaident.control.pi import PI
+from gaident.models.mechanics import Mechanics, TwoMass
+from gaident.results.estimate import Estimate
+from gaident.results.identification import Identification
 from gaident.show.wording import number, structure_words, table, unit, velocity_unit, with_std
 
 __all__ = [
@@ -21,7 +25,7 @@ WIDTH = 100
 SHOWN_STRUCTURES = 5
 
 
-def identification_summary(idn: Any, axis: str = "rotary") -> str:
+def identification_summary(idn: Identification, axis: str = "rotary") -> str:
     """What was found and what it is worth; plain text, verdict first, no line break at the end.
 
     idn: an Identification, or anything with its attributes. axis: "rotary", or "linear" for units of m and N.
@@ -37,7 +41,7 @@ def identification_summary(idn: Any, axis: str = "rotary") -> str:
     return "\n\n".join("\n".join(lines) for lines in sections if lines)
 
 
-def mechanics_comparison(found: Any, truth: Any, axis: str = "rotary") -> str:
+def mechanics_comparison(found: Mechanics, truth: Mechanics, axis: str = "rotary") -> str:
     """A table of identified against true mechanics; both OneMass or both TwoMass."""
     rows = [("", "true", "identified", "deviation", "")]
     for name in (n for n in found.UNITS if hasattr(truth, n)):
@@ -50,7 +54,7 @@ def mechanics_comparison(found: Any, truth: Any, axis: str = "rotary") -> str:
     return "\n".join(table(rows))
 
 
-def _verdict(idn: Any, axis: str) -> list[str]:
+def _verdict(idn: Identification, axis: str) -> list[str]:
     stands = "the linear model stands"
     if idn.falsified:
         stands = "the linear model is FALSIFIED"
@@ -70,7 +74,7 @@ def _verdict(idn: Any, axis: str) -> list[str]:
     ]
 
 
-def _loop(controller: Any, axis: str) -> str:
+def _loop(controller: PI | None, axis: str) -> str:
     torque = unit("N m", axis)
     if controller is None:
         driven = "torque" if axis == "rotary" else "force"
@@ -86,7 +90,7 @@ def _loop(controller: Any, axis: str) -> str:
     return ", ".join(parts)
 
 
-def _model(idn: Any, axis: str) -> list[str]:
+def _model(idn: Identification, axis: str) -> list[str]:
     gain = idn.parameters["gain"]
     rows: list[tuple[str, ...]] = [("", "real part [rad/s]", "imaginary part [rad/s]", "frequency [Hz]", "damping", "")]
     stems = dict.fromkeys(stem_of(name) for name in idn.parameters if name != "gain")
@@ -100,24 +104,24 @@ def stem_of(name: str) -> str:
     return name.rsplit("_", 1)[0] if "_pair_" in name else name
 
 
-def _root(parameters: Any, stem: str) -> tuple[str, ...]:
+def _root(parameters: Mapping[str, Estimate], stem: str) -> tuple[str, ...]:
     """One real root or one pair as a row."""
     name = stem.replace("_", " ")
     if stem in parameters:
         e = parameters[stem]
-        frequency = with_std(abs(e.value) / math.tau, e.std / math.tau) if e.value else ""
-        return (name, _estimate(e), "", frequency, "", flags_of([e], e.value))
-    parts = [parameters[f"{stem}_{what}"] for what in ("real", "imaginary", "frequency", "damping")]
-    real, imaginary, frequency, damping = parts
+        shown = with_std(abs(e.value) / math.tau, e.std / math.tau) if e.value else ""
+        return (name, _estimate(e), "", shown, "", flags_of([e], e.value))
+    estimates = [parameters[f"{stem}_{what}"] for what in ("real", "imaginary", "frequency", "damping")]
+    real, imaginary, frequency, damping = estimates
     in_hz = with_std(frequency.value / math.tau, frequency.std / math.tau)
-    return name, _estimate(real), _estimate(imaginary), in_hz, _estimate(damping), flags_of(parts, real.value)
+    return name, _estimate(real), _estimate(imaginary), in_hz, _estimate(damping), flags_of(estimates, real.value)
 
 
-def _estimate(e: Any) -> str:
+def _estimate(e: Estimate) -> str:
     return with_std(e.value, e.std)
 
 
-def flags_of(estimates: list[Any], real_part: float = -1.0) -> str:
+def flags_of(estimates: list[Estimate], real_part: float = -1.0) -> str:
     """What to doubt in a root or a parameter."""
     flags = []
     if any(e.at_bound for e in estimates):
@@ -129,7 +133,7 @@ def flags_of(estimates: list[Any], real_part: float = -1.0) -> str:
     return ", ".join(flags)
 
 
-def _mechanics(idn: Any, axis: str) -> list[str]:
+def _mechanics(idn: Identification, axis: str) -> list[str]:
     m = idn.mechanics
     if m is None:
         if (idn.p, idn.q) in ((1, 0), (1, 2)):
@@ -140,15 +144,15 @@ def _mechanics(idn: Any, axis: str) -> list[str]:
         head += ", NOT TO BE TRUSTED (the linear model is falsified)"
     elif idn.adequacy.undecided:
         head += ", with reserve (the linear model is undecided)"
-    damped = getattr(m, "with_shaft_damping", None)
+    damped = m.with_shaft_damping if isinstance(m, TwoMass) else None
     rows = [("", "no shaft damping", "with shaft damping", "", "")] if damped is not None else []
     for name, rotary in m.UNITS.items():
         value = getattr(m, name)
         cell = "0 (set)" if name == "DG" and value == 0.0 else with_std(value, m.std.get(name))
         beside = "" if damped is None else with_std(getattr(damped, name), damped.std.get(name))
-        rows.append((name, cell, beside, unit(rotary, axis), meaning_of(name, hasattr(m, "KG"), axis)))
+        rows.append((name, cell, beside, unit(rotary, axis), meaning_of(name, isinstance(m, TwoMass), axis)))
     lines = [head, *table(rows)]
-    if hasattr(m, "resonance"):
+    if isinstance(m, TwoMass):
         lines.append(
             f"  resonance {number(m.resonance / math.tau)} Hz, antiresonance {number(m.antiresonance / math.tau)} Hz (undamped)"
         )
@@ -174,7 +178,7 @@ def meaning_of(name: str, two_masses: bool, axis: str) -> str:
     return words.get(name, "")
 
 
-def inconsistency_words(m: Any) -> str:
+def inconsistency_words(m: Mechanics) -> str:
     """How far the two equations of a stiffness without shaft damping are apart."""
     if m.inconsistency is None:
         return ""
@@ -187,7 +191,7 @@ def inconsistency_words(m: Any) -> str:
     return f"{text}: significant; a hint at shaft damping, or at an effect that the model lacks"
 
 
-def _structures(idn: Any) -> list[str]:
+def _structures(idn: Identification) -> list[str]:
     if not idn.structures:
         return []
     rivals = {(r.p, r.q) for r in idn.rivals}
@@ -200,7 +204,7 @@ def _structures(idn: Any) -> list[str]:
     return [f"Structures, the best {len(shown)} of {len(ordered)}", *table(rows)]
 
 
-def _search(idn: Any, axis: str) -> list[str]:
+def _search(idn: Identification, axis: str) -> list[str]:
     space, s = idn.space, idn.settings
     generations = sum(t.generations for t in idn.trials)
     evaluations = sum(t.evaluations for t in idn.trials)
@@ -223,7 +227,7 @@ def _span(low: float, high: float) -> str:
     return f"{number(low)}..{number(high)}"
 
 
-def _warnings(idn: Any) -> list[str]:
+def _warnings(idn: Identification) -> list[str]:
     # What falsifies the model stands at the top already.
     notes = [w for w in idn.warnings if w != idn.adequacy.sentence]
     lines = []

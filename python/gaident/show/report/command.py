@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from gaident.results.experiment import Proposal
 from gaident.show.wording import velocity_unit
 
 __all__ = ["proposal_csv"]
 
 
-def proposal_csv(proposal: Any, axis: str = "rotary") -> str:
+def proposal_csv(proposal: Proposal, axis: str = "rotary") -> str:
     """CSV of time [s] and command [rad/s or m/s]; proposal: what has `command` (n,) and `dt`."""
     rows = (f"{n * proposal.dt:.9g},{r:.9g}" for n, r in enumerate(proposal.command.tolist()))
     return "\n".join([f"time [s],command [{velocity_unit(axis)}]", *rows, ""])

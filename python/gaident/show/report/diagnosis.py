@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import base64
 import math
-from typing import Any
+from collections.abc import Callable
 
+from gaident.results.diagnosis import Diagnosis
+from gaident.results.estimate import Estimate
 from gaident.show.diagnosis_summary import (
     DRIVERS,
     chance_words,
@@ -22,6 +24,7 @@ from gaident.show.report import charts
 from gaident.show.report.command import proposal_csv
 from gaident.show.report.parts import (
     Charts,
+    Head,
     Section,
     box,
     controller_words,
@@ -50,7 +53,12 @@ GOOD, HALF, BAD = ("good", "✓"), ("half", "◐"), ("bad", "✗")
 MARKS = {"adequate": GOOD, "explained": GOOD, "partly explained": HALF, "unexplained": BAD}
 
 
-def headline(dia: Any) -> str:
+def head(dia: Diagnosis) -> Head:
+    """What stands at the top of the page."""
+    return Head("Diagnosis", *mark(dia), headline(dia), dia.notes)
+
+
+def headline(dia: Diagnosis) -> str:
     """The verdict in one sentence."""
     if dia.verdict == "adequate":
         return "The linear model is adequate: nothing significant is left that could be blamed on the drive."
@@ -67,12 +75,12 @@ def headline(dia: Any) -> str:
     return f"{text}; with {'it' if len(causes) == 1 else 'them'} nothing significant is left."
 
 
-def mark(dia: Any) -> tuple[str, str, str]:
+def mark(dia: Diagnosis) -> tuple[str, str, str]:
     """(class, sign, word) of the verdict."""
     return (*MARKS.get(dia.verdict, HALF), dia.verdict)
 
 
-def tiles(dia: Any, view: View) -> Html:
+def tiles(dia: Diagnosis, view: View) -> Html:
     """The figures seen first."""
     v = velocity_unit(view.axis)
     where = "in-sample" if dia.held_out == "in-sample" else "held-out data"
@@ -94,7 +102,7 @@ def percent(share: float) -> str:
     return f"{round(100.0 * share) + 0:d}"
 
 
-def chapters(dia: Any, view: View, drawn: Charts) -> list[Section]:
+def chapters(dia: Diagnosis, view: View, drawn: Charts) -> list[Section]:
     """All of them."""
     noise = dia.after.noise_floor
     left = typeset(sentence(left_words(dia, view.axis), view.axis))
@@ -110,7 +118,7 @@ def chapters(dia: Any, view: View, drawn: Charts) -> list[Section]:
     ]
 
 
-def _causes(dia: Any, view: View) -> Section:
+def _causes(dia: Diagnosis, view: View) -> Section:
     axis = view.axis
     parts: list[str] = []
     causes = [f for f in dia.findings if not f.is_noise]
@@ -148,11 +156,11 @@ def _causes(dia: Any, view: View) -> Section:
     return Section("cause", "Cause and evidence", *parts)
 
 
-def _row(axis: str) -> Any:
+def _row(axis: str) -> Callable[[tuple[str, Estimate]], tuple[str, str, str, str]]:
     return lambda item: parameter_row(item[0], item[1], axis)
 
 
-def _parameters(dia: Any, view: View, drawn: Charts) -> Section:
+def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     axis = view.axis
     parts: list[str] = []
     rows: list[Row] = []
@@ -189,7 +197,7 @@ def _gain_unit(p: int) -> str:
     return "rad/s^2/(N m)" if p == 1 else f"rad/s^{1 + p}/(N m)" if p else "rad/s/(N m)"
 
 
-def _gain(dia: Any, view: View, drawn: Charts) -> Section:
+def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     axis = view.axis
     v = velocity_unit(axis)
     extended = bool(dia.model.effects)
@@ -231,7 +239,7 @@ def _gain(dia: Any, view: View, drawn: Charts) -> Section:
     return Section("gain", "Before and after", *parts)
 
 
-def _untested(dia: Any, view: View) -> Section:
+def _untested(dia: Diagnosis, view: View) -> Section:
     if not dia.not_testable:
         text = "Every effect of the library could have shown itself in this record."
         return Section("untested", "What could not be tested", tag("p", text))
@@ -242,7 +250,7 @@ def _untested(dia: Any, view: View) -> Section:
     )
 
 
-def _next(dia: Any, view: View, drawn: Charts) -> Section:
+def _next(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     title = "Next experiment"
     p = dia.next_experiment
     axis = view.axis
@@ -268,7 +276,7 @@ def _next(dia: Any, view: View, drawn: Charts) -> Section:
     return Section(
         "next",
         title,
-        tag("p", typeset(sentence(next_words(dia), axis))),
+        tag("p", typeset(sentence(next_words(dia, p), axis))),
         facts(size),
         tag("p", link),
         tag("p", tag("small", "Check speed and travel against the axis' limits before it runs.")),
@@ -276,7 +284,7 @@ def _next(dia: Any, view: View, drawn: Charts) -> Section:
     )
 
 
-def _how(dia: Any, view: View) -> Section:
+def _how(dia: Diagnosis, view: View) -> Section:
     idn = dia.identification
     rows: dict[str, str | None] = {
         "controller": typeset(controller_words(dia.controller, view.axis)),

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Mapping
 
+from gaident.models.mechanics import TwoMass
+from gaident.results.estimate import Estimate
+from gaident.results.identification import Identification
 from gaident.show.html import Html, Row, joined, number, table, tag, typeset
 from gaident.show.report.parts import (
     Charts,
+    Head,
     Section,
     box,
     controller_words,
@@ -19,8 +23,8 @@ from gaident.show.report.parts import (
     response_part,
     tile,
 )
-from gaident.show.report.search_charts import convergence_chart, roots_chart, structures_chart
 from gaident.show.report.views import View
+from gaident.show.search_charts import convergence_chart, roots_chart, structures_chart
 from gaident.show.summary import flags_of, inconsistency_words, meaning_of, stem_of
 from gaident.show.wording import number as plain_number
 from gaident.show.wording import structure_words, unit, velocity_unit
@@ -28,7 +32,12 @@ from gaident.show.wording import structure_words, unit, velocity_unit
 __all__ = ["chapters", "headline", "mark", "tiles"]
 
 
-def headline(idn: Any) -> str:
+def head(idn: Identification) -> Head:
+    """What stands at the top of the page."""
+    return Head("Identification", *mark(idn), headline(idn), tuple(w for w in idn.warnings if w != idn.adequacy.sentence))
+
+
+def headline(idn: Identification) -> str:
     """The verdict in one sentence."""
     what = f"{structure_words(idn.p, idn.q)}, (p,q) = ({idn.p},{idn.q})"
     if idn.falsified:
@@ -38,14 +47,14 @@ def headline(idn: Any) -> str:
     return f"A linear model explains the record: {what}."
 
 
-def mark(idn: Any) -> tuple[str, str, str]:
+def mark(idn: Identification) -> tuple[str, str, str]:
     """(class, sign, word) of the verdict."""
     if idn.falsified:
         return "bad", "✗", "falsified"
     return ("half", "◐", "undecided") if idn.adequacy.undecided else ("good", "✓", "linear model stands")
 
 
-def tiles(idn: Any, view: View) -> Html:
+def tiles(idn: Identification, view: View) -> Html:
     """The figures seen first."""
     v = velocity_unit(view.axis)
     return joined((
@@ -55,7 +64,7 @@ def tiles(idn: Any, view: View) -> Html:
     ))  # fmt: skip
 
 
-def chapters(idn: Any, view: View, drawn: Charts) -> list[Section]:
+def chapters(idn: Identification, view: View, drawn: Charts) -> list[Section]:
     """All of them."""
     noise = idn.adequacy.noise_std
     return [
@@ -68,7 +77,7 @@ def chapters(idn: Any, view: View, drawn: Charts) -> list[Section]:
     ]
 
 
-def _cause(idn: Any) -> Section:
+def _cause(idn: Identification) -> Section:
     said = "The linear model is contradicted." if idn.falsified else "An identification fits linear models only."
     text = (
         f"{said} Causes beyond it (friction, backlash, saturation, delay, cogging, ...), the gain on held-out data, what could "
@@ -81,7 +90,7 @@ def _cause(idn: Any) -> Section:
     )
 
 
-def _parameters(idn: Any, view: View, drawn: Charts) -> Section:
+def _parameters(idn: Identification, view: View, drawn: Charts) -> Section:
     axis, m = view.axis, idn.mechanics
     parts: list[str] = []
     if m is None:
@@ -91,18 +100,18 @@ def _parameters(idn: Any, view: View, drawn: Charts) -> Section:
         if idn.falsified or idn.adequacy.undecided:
             word = "falsified: these are bent by what the model lacks" if idn.falsified else "undecided: take these with reserve"
             parts.append(box(tag("p", f"The linear model is {word}."), kind="warn"))
-        damped = getattr(m, "with_shaft_damping", None)
+        damped = m.with_shaft_damping if isinstance(m, TwoMass) else None
         rows: list[Row] = []
         for name, rotary in m.UNITS.items():
             value = getattr(m, name)
             cell = "0 (set)" if name == "DG" and value == 0.0 else estimate(value, m.std.get(name))
             beside = () if damped is None else (estimate(getattr(damped, name), damped.std.get(name)),)
-            rows.append((name, cell, *beside, typeset(unit(rotary, axis)), meaning_of(name, hasattr(m, "KG"), axis)))
+            rows.append((name, cell, *beside, typeset(unit(rotary, axis)), meaning_of(name, isinstance(m, TwoMass), axis)))
         head: tuple[str, ...] = (
             ("", "value", "unit", "") if damped is None else ("", "no shaft damping", "with shaft damping", "unit", "")
         )
         parts.append(table(head, [rows]))
-        if hasattr(m, "resonance"):
+        if isinstance(m, TwoMass):
             high, low = (plain_number(x / math.tau) for x in (m.resonance, m.antiresonance))
             words = (f"Resonance {high} Hz, antiresonance {low} Hz (undamped)", inconsistency_words(m))
             parts.append(tag("p", typeset("; ".join(filter(None, words)) + ".")))
@@ -120,20 +129,20 @@ def _parameters(idn: Any, view: View, drawn: Charts) -> Section:
     return Section("parameters", "Parameters", *parts)
 
 
-def _root(parameters: Any, stem: str) -> Row:
+def _root(parameters: Mapping[str, Estimate], stem: str) -> Row:
     name = stem.replace("_", " ")
     if stem in parameters:
         e = parameters[stem]
-        frequency = estimate(abs(e.value) / math.tau, e.std / math.tau) if e.value else None
-        return (name, estimate(e.value, e.std), None, frequency, None, flags_of([e], e.value))
-    parts = [parameters[f"{stem}_{what}"] for what in ("real", "imaginary", "frequency", "damping")]
-    real, imaginary, frequency, damping = parts
+        shown = estimate(abs(e.value) / math.tau, e.std / math.tau) if e.value else None
+        return (name, estimate(e.value, e.std), None, shown, None, flags_of([e], e.value))
+    estimates = [parameters[f"{stem}_{what}"] for what in ("real", "imaginary", "frequency", "damping")]
+    real, imaginary, frequency, damping = estimates
     cells = (estimate(real.value, real.std), estimate(imaginary.value, imaginary.std))
     hz = estimate(frequency.value / math.tau, frequency.std / math.tau)
-    return (name, *cells, hz, estimate(damping.value, damping.std), flags_of(parts, real.value))
+    return (name, *cells, hz, estimate(damping.value, damping.std), flags_of(estimates, real.value))
 
 
-def _structures(idn: Any, view: View, drawn: Charts) -> Section:
+def _structures(idn: Identification, view: View, drawn: Charts) -> Section:
     parts: list[str] = []
     others = [f"({r.p},{r.q})" for r in idn.rivals]
     text = f"Reported: ({idn.p},{idn.q}). "
@@ -152,7 +161,7 @@ def _low_high(pair: tuple[float, float]) -> str:
     return f"{plain_number(pair[0])} to {plain_number(pair[1])}"
 
 
-def _how(idn: Any, view: View) -> Section:
+def _how(idn: Identification, view: View) -> Section:
     s, space, axis = idn.settings, idn.space, view.axis
     rows: dict[str, str | None] = {
         "controller": typeset(controller_words(idn.controller, axis)),

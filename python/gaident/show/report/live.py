@@ -6,24 +6,23 @@ import html
 import json
 import math
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
+from gaident.show.chart import Chart, Trace, Vector, bar_width
 from gaident.show.html import Html
-from gaident.show.report.chart import Chart, Trace, Vector
 
-__all__ = ["bar_width", "figure", "script_json"]
+__all__ = ["figure", "script_json"]
 
 GAP = 0.04  # of the height, between two panels
 DIGITS = 6  # significant ones of what is drawn
 SYMBOLS = {"means": ("circle", 5), "crosses": ("x-thin-open", 11), "rings": ("circle-open", 11)}
 
 
-def figure(chart: Chart) -> dict[str, Any]:
+def figure(chart: Chart) -> dict[str, object]:
     """{"data": ..., "layout": ...}; one y axis per panel, all over one x axis."""
     data, shapes, notes = [], [], []
-    layout: dict[str, Any] = {
+    layout: dict[str, object] = {
         "height": chart.height,
         "margin": {"l": 72, "r": 16, "t": 8, "b": 48},
         "font": {"color": "@ink", "size": 13},
@@ -52,7 +51,8 @@ def figure(chart: Chart) -> dict[str, Any]:
             if mark.y is None:
                 shapes.append({"type": "line", "x0": mark.x, "x1": mark.x, "yref": f"y{end} domain", "y0": 0, "y1": 1,
                                "line": {"color": "@faint", "width": 1, "dash": "dot"}})  # fmt: skip
-                notes.append({**common, "yref": f"y{end} domain", "y": 1, "yanchor": "top", "xanchor": "left", "xshift": 3})
+                if mark.text:
+                    notes.append({**common, "yref": f"y{end} domain", "y": 1, "yanchor": "top", "xanchor": "left", "xshift": 3})
             else:
                 high = math.log10(mark.y) if panel.log else mark.y
                 notes.append({**common, "yref": f"y{end}", "y": high, "yanchor": "bottom"})
@@ -65,7 +65,7 @@ def figure(chart: Chart) -> dict[str, Any]:
     return {"data": data, "layout": layout}
 
 
-def script_json(data: Any) -> Html:
+def script_json(data: object) -> Html:
     """JSON that may stand inside a script element: no < > & and no line separators of JavaScript."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     for letter in ("<", ">", "&", "\u2028", "\u2029"):
@@ -84,7 +84,7 @@ def _spans(heights: Iterable[float]) -> list[list[float]]:
     return spans
 
 
-def _axis(title: str, log: bool, limits: tuple[float, float] | None, **more: Any) -> dict[str, Any]:
+def _axis(title: str, log: bool, limits: tuple[float, float] | None, **more: object) -> dict[str, object]:
     axis = {
         "title": {"text": _text(title), "standoff": 6},
         "type": "log" if log else "linear",
@@ -105,17 +105,17 @@ def _axis(title: str, log: bool, limits: tuple[float, float] | None, **more: Any
     return axis
 
 
-def _decades(values: Iterable[Vector]) -> dict[str, Any]:
+def _decades(values: Iterable[Vector]) -> dict[str, object]:
     """Plain numbers on a logarithmic axis, at 1, 2, 5 where few decades are shown."""
     shown = np.concatenate([v[np.isfinite(v) & (v > 0.0)] for v in values] or [np.ones(1)])
     few = len(shown) == 0 or float(shown.max()) < 300.0 * float(shown.min())
     return {"dtick": "D2" if few else 1, "tickformat": "~g"}
 
 
-def _traces(t: Trace, y: str) -> list[dict[str, Any]]:
+def _traces(t: Trace, y: str) -> list[dict[str, object]]:
     """One trace, of an area two."""
     colour, label = f"@{t.role}", _text(t.label)
-    base: dict[str, Any] = {"type": "scatter", "yaxis": y, **_places(t.x), "name": label, "showlegend": bool(label)}
+    base: dict[str, object] = {"type": "scatter", "yaxis": y, **_places(t.x), "name": label, "showlegend": bool(label)}
     base["legendgroup"] = t.role  # hidden and shown together in all panels
     if not t.hover:
         base["hoverinfo"] = "skip"
@@ -137,7 +137,7 @@ def _traces(t: Trace, y: str) -> list[dict[str, Any]]:
     return [{**base, "mode": "lines", "line": {"color": colour, "width": t.width, "dash": t.dash}}]
 
 
-def _places(x: Vector) -> dict[str, Any]:
+def _places(x: Vector) -> dict[str, object]:
     """x as start and step where it is even, which is a third of the page."""
     if len(x) > 2:
         step = float(x[-1] - x[0]) / (len(x) - 1)
@@ -146,13 +146,7 @@ def _places(x: Vector) -> dict[str, Any]:
     return {"x": _numbers(x, 8)}
 
 
-def bar_width(t: Trace) -> float:
-    """Width of a bar: nine tenths of the least distance between two, or of 1."""
-    steps = np.diff(np.unique(t.x))
-    return 0.9 * min(float(steps.min(initial=1.0)), 1.0)
-
-
-def _numbers(values: Any, digits: int = DIGITS) -> list[float | None]:
+def _numbers(values: Vector | None, digits: int = DIGITS) -> list[float | None]:
     """Rounded for display; what is no number is a gap."""
     return [float(f"{x:.{digits}g}") if math.isfinite(x) else None for x in values.tolist()] if values is not None else []
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from functools import lru_cache
 from importlib.resources import files
-from typing import Any
 
+from gaident.results.diagnosis import Diagnosis
+from gaident.results.identification import Identification
+from gaident.show.chart import PALETTES
 from gaident.show.html import Html, joined, tag, typeset
 from gaident.show.report import diagnosis, identification
-from gaident.show.report.chart import PALETTES
 from gaident.show.report.live import figure, script_json
-from gaident.show.report.parts import Charts, Section, box, sentences, title_of
+from gaident.show.report.parts import Charts, box, sentences, title_of
 from gaident.show.report.views import View
 from gaident.show.wording import sentence
 
@@ -20,23 +21,23 @@ __all__ = ["page"]
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:"
 
 
-def page(result: Any, view: View, plotly_js: str) -> str:
-    """The whole page of a Diagnosis or an Identification (or what has its attributes); plotly_js: the library's text."""
-    is_diagnosis = hasattr(result, "findings")
-    book: Any = diagnosis if is_diagnosis else identification
+def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
+    """The whole page of a Diagnosis or an Identification; plotly_js: the library's text."""
     drawn = Charts()
-    chapters: list[Section] = book.chapters(result, view, drawn)
-    kind, sign, word = book.mark(result)
+    if isinstance(result, Diagnosis):
+        head_of, tiles, chapters = diagnosis.head(result), diagnosis.tiles(result, view), diagnosis.chapters(result, view, drawn)
+    else:
+        head_of, tiles = identification.head(result), identification.tiles(result, view)
+        chapters = identification.chapters(result, view, drawn)
     names = title_of(view.fitted)
-    title = f"{'Diagnosis' if is_diagnosis else 'Identification'}{f' of {names}' if names else ''}"
-    notes = tuple(result.notes if is_diagnosis else (w for w in result.warnings if w != result.adequacy.sentence))
+    title = f"{head_of.title}{f' of {names}' if names else ''}"
     verdict = tag(
         "section",
-        tag("p", tag("span", f"{sign} {word}", class_="badge"), class_="badges"),
-        tag("p", typeset(sentence(book.headline(result), view.axis)), class_="headline"),
-        tag("div", book.tiles(result, view), class_="tiles"),
-        box(tag("b", "Keep in mind"), sentences(notes, view.axis), kind="quiet") if notes else "",
-        class_=f"verdict {kind}",
+        tag("p", tag("span", f"{head_of.sign} {head_of.word}", class_="badge"), class_="badges"),
+        tag("p", typeset(sentence(head_of.headline, view.axis)), class_="headline"),
+        tag("div", tiles, class_="tiles"),
+        box(tag("b", "Keep in mind"), sentences(head_of.notes, view.axis), kind="quiet") if head_of.notes else "",
+        class_=f"verdict {head_of.kind}",
         id="verdict",
     )
     contents = tag("nav", tag("ol", *(tag("li", tag("a", c.title, href=f"#{c.key}")) for c in chapters)), aria_label="Contents")

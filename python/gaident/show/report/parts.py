@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
+from gaident.control.pi import PI
+from gaident.show.chart import Chart
+from gaident.show.diagnosis_charts import missing_over_velocity, missing_reversals, residual_spectrum, torque_word
+from gaident.show.draw import picture
 from gaident.show.html import Html, Row, joined, number, png_uri, table, tag, typeset
 from gaident.show.report import charts
-from gaident.show.report.chart import Chart
-from gaident.show.report.still import picture
 from gaident.show.report.views import Run, View
+from gaident.show.response_plots import response_chart
 from gaident.show.wording import number as plain_number
 from gaident.show.wording import sentence, unit, velocity_unit, with_std
 
 __all__ = [
     "Charts",
+    "Head",
     "Section",
     "box",
     "controller_words",
@@ -34,6 +38,18 @@ __all__ = [
 ]
 
 SHOWN = 4  # records with a chart of their own
+
+
+@dataclass(frozen=True)
+class Head:
+    """What stands at the top of a page: title, verdict as (kind, sign, word) of its badge, headline, what to keep in mind."""
+
+    title: str
+    kind: str
+    sign: str
+    word: str
+    headline: str
+    notes: tuple[str, ...]
 
 
 class Section:
@@ -120,7 +136,7 @@ def missing_section(view: View, noise: float, drawn: Charts, *before: str) -> Se
     """What is wrong: the missing torque over velocity, place, reversals, time; the error over frequency."""
     run, axis = view.longest, view.axis
     if run is None:
-        text = f"The missing {charts.torque_word(axis)} over velocity, position and time needs the record."
+        text = f"The missing {torque_word(axis)} over velocity, position and time needs the record."
         return Section("wrong", "What is wrong", *before, needs_record(view, text))
     parts: list[str] = list(before)
     if len(view.runs) > 1:
@@ -130,33 +146,32 @@ def missing_section(view: View, noise: float, drawn: Charts, *before: str) -> Se
             tag("p", "Shown for ", tag("b", run.name or f"record {view.runs.index(run) + 1}"), f", {which} of those fitted.")
         )
     if run.dhat is None:
-        parts.append(box(tag("p", f"The missing {charts.torque_word(axis)} could not be worked out, see above."), kind="quiet"))
+        parts.append(box(tag("p", f"The missing {torque_word(axis)} could not be worked out, see above."), kind="quiet"))
     else:
         parts.append(tag("h3", "Against the velocity"))
-        parts.append(drawn.put(charts.missing_over_velocity(run, run.dhat, view.curve, axis)))
+        parts.append(drawn.put(missing_over_velocity(run.measured, run.dhat, run.dt, run.std, view.curve, axis)))
     if run.dhat is not None and float(np.abs(run.dhat).max()) <= 2.0 * run.std:
-        text = f"None of the missing {charts.torque_word(axis)} can be told from zero: there is no more to show."
+        text = f"None of the missing {torque_word(axis)} can be told from zero: there is no more to show."
         parts.append(tag("p", text))
     elif run.dhat is not None:
-        turning = drawn.put(charts.missing_reversals(run, run.dhat, axis))
-        parts += (
-            [tag("h3", "Around a reversal"), turning or tag("p", f"{charts.no_reversals(run)}.")]
-            if run.torque is not None
-            else []
-        )
+        if run.torque is not None:
+            turning = missing_reversals(run.measured, run.dhat, run.torque, run.dt, axis)
+            none = turning.panels[0].note
+            parts += [tag("h3", "Around a reversal"), tag("p", f"{none.capitalize()}.") if none else drawn.put(turning)]
         place = charts.missing_over_place(run, run.dhat, axis)
         if place:
             parts += [tag("h3", "Against the position"), *(drawn.put(c) for c in place)]
         key = f"run-{view.runs.index(run)}"
         parts += [tag("h3", "Over time"), drawn.put(charts.missing_over_time(run, run.dhat, key, axis))]
-    parts += [tag("h3", "Over frequency"), drawn.put(charts.residual_spectrum(run, noise, axis))]
+    after = None if run.extended is None else run.measured - run.extended
+    parts += [tag("h3", "Over frequency"), drawn.put(residual_spectrum(run.measured - run.linear, after, run.dt, noise, axis))]
     return Section("wrong", "What is wrong", *parts)
 
 
 def response_part(view: View, drawn: Charts) -> Html:
     """The Bode diagram, or why there is none."""
     if view.response is not None:
-        return drawn.put(charts.response_chart(view.response, view.axis))
+        return drawn.put(response_chart(view.response, view.axis))
     if view.no_response:
         return box(tag("p", typeset(f"No frequency response is drawn: {view.no_response}.")), kind="quiet")
     return needs_record(view, "The frequency response needs the record.")
@@ -180,10 +195,10 @@ def _hash(digest: str) -> Html:
     return tag("code", digest, class_="hash")
 
 
-def controller_words(controller: Any, axis: str) -> str:
+def controller_words(controller: PI | None, axis: str) -> str:
     """The loop that was simulated."""
     if controller is None:
-        kind = charts.torque_word(axis)
+        kind = torque_word(axis)
         return f"none: open loop, {kind} [{unit('N m', axis)}] to velocity [{velocity_unit(axis)}]"
     parts = [
         f"{controller.loop} PI, kp {plain_number(controller.kp)} {unit('N m s/rad', axis)}",

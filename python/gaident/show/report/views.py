@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gaident.results.frequency import Responses
 
 __all__ = ["Curve", "Run", "Vector", "View"]
 
@@ -53,13 +54,13 @@ class View:
     """All that a report knows beside the result.
 
     runs: one per record, those that were fitted first. curve: (velocity, torque, label) of named effects. response: of the
-    longest record, see `gaident.identification.frequency.Responses`; without it no_response says why. made_with: what computed
+    longest record, see `gaident.results.frequency.Responses`; without it no_response says why. made_with: what computed
     and drew the page -> version. axis: "rotary" or "linear".
     """
 
     runs: tuple[Run, ...] = ()
     curve: Curve | None = None
-    response: Any = None
+    response: Responses | None = None
     no_response: str = ""
     axis: str = "rotary"
     made_with: Mapping[str, str] = field(default_factory=dict)

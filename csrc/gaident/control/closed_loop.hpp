@@ -1,0 +1,80 @@
+// The linear closed loop as ONE difference equation (equation 7), in delta form: where a genetic run spends its life.
+//
+// With the plant B/A and the controller ((kp + ki Ts/2) delta + ki Ts)/delta,
+//
+//     N = (PI numerator) B,   D = delta A,   w/w* = N/(D + N)        (the algebraic loop, if any, is solved by dividing by
+//                                                                     the leading coefficient of D + N)
+#pragma once
+
+#include "controller.hpp"
+
+#include <type_traits>
+
+namespace gaident {
+
+template <class R, int N>
+    Delta < R,
+    N<0 ? -1 : N + 1> close_loop(const Delta<R, N>& plant, double kp, double ki, double sample_time) {
+    const R c1 = R(kp + 0.5 * ki * sample_time), c0 = R(ki * sample_time);
+    const int n = N >= 0 ? N : plant.order;
+    Delta < R, N<0 ? -1 : N + 1> loop;
+    loop.order = n + 1;
+    const R scale = R(1.0) / (R(1.0) + c1 * plant.b[0]);
+    for (int i = 0; i <= n + 1; ++i) {
+        const R head = i <= n ? R(c1 * plant.b[i]) : R(0.0);
+        const R numerator = i > 0 ? R(head + c0 * plant.b[i - 1]) : head;
+        loop.b[i] = numerator * scale;
+        if (i > 0) loop.a[i - 1] = ((i <= n ? plant.a[i - 1] : R(0.0)) + numerator) * scale;
+    }
+    return loop;
+}
+
+// The recurrence, in observer form; every arithmetic runs these lines:
+//
+//     y(n)       = x[0](n) + b[0] r(n)
+//     x[i](n+1)  = x[i](n) + x[i+1](n) + b[i+1] r(n) - a[i] y(n),   x[N] = 0
+//
+// y enters last: what does not depend on it is ready before it is, which shortens the chain from one sample to the next.
+// `N` is the order when known at compile time, so that the state lives in registers; -1 otherwise. Without input (r = 0) the terms in b
+// are left out. Coefficients C and states X are of the signals' own type R, but for a drive's arithmetic that keeps them in memory words
+// and computes in wider registers (c30.hpp, fixed.hpp).
+template <class R, int N, bool driven = true, class C = R, class X = R>
+[[gnu::always_inline]] inline R recurrence_step(int order, const C* a, const std::type_identity_t<C>* b, X* x, R r) {
+    const int n = N >= 0 ? N : order;
+    const auto with_input = [&](const auto& sum, int i) [[gnu::always_inline]] {
+        if constexpr (driven) return sum + b[i] * r;
+        else return sum;
+    };
+    const R y = with_input(x[0], 0);
+    for (int i = 0; i + 1 < n; ++i) x[i] = with_input(x[i] + x[i + 1], i + 1) - a[i] * y;
+    if (n > 0) x[n - 1] = with_input(x[n - 1], n) - a[n - 1] * y;
+    return y;
+}
+
+// Under a constant command r a PI loop rests at y = r, since its a[N-1] is its b[N], and its states at x[i] = at_rest(i) r. Deviations
+// from that rest obey the recurrence without input, which is nearly half the work.
+template <class A, class B>
+[[gnu::always_inline]] inline auto at_rest(int i, const A& a, const B& b) {
+    using R = std::remove_cvref_t<decltype(b(0))>;
+    return i == 0 ? R(R(1.0) - b(0)) : R(a(i - 1) - b(i));
+}
+
+// A loop at constant velocity y0 under constant input r0, the state a record that starts in steady motion starts from.
+template <class R>
+void steady_state(const Delta<R>& h, double y0, double r0, R* x) {
+    const R y = R(y0), r = R(r0);
+    for (int i = 0; i < h.order; ++i) x[i] = i == 0 ? y - h.b[0] * r : h.a[i - 1] * y - h.b[i] * r;
+}
+
+// From the plant's states (observer form) and the controller's stored torque s to the states of the closed loop's difference equation:
+// (D + N) Y = N R + (delta + 1) (B s + delta X),  X = x[0] delta^(n-1) + ... + x[n-1].
+template <class R>
+void loop_state(const Delta<R>& plant, double kp, double ki, double sample_time, const R* x, R s, R* out) {
+    const R lead = R(1.0) + R(kp + 0.5 * ki * sample_time) * plant.b[0];
+    for (int i = 0; i <= plant.order; ++i) {
+        const R own = i < plant.order ? x[i] : R(0.0);
+        out[i] = (own + plant.b[i] * s) / lead;
+    }
+}
+
+}  // namespace gaident

@@ -1,0 +1,41 @@
+// What of a controller's replay on a measured velocity only one sample after the other gives. In place.
+#pragma once
+
+#include "slope_limit.hpp"
+
+#include <span>
+
+namespace gaident {
+
+// I(n) = I(n-1) + step(n), clamped to +-limit after each update, from I(-1) = start
+inline void clamped_sum(std::span<double> step, double limit, double start) {
+    double I = start;
+    for (double& x : step) x = I = clamp(I + x, -limit, limit);
+}
+
+// r'(n) = r'(n-1) + clip(r(n) - r'(n-1), +-step), from r'(-1) = start
+inline void rate_limited(std::span<double> command, double step, double start) {
+    double before = start;
+    for (double& r : command) r = before = follow(step, r, before);
+}
+
+// How a controller keeps its integrator from winding up at the torque limit: held; held where the error would drive it further; set
+// back to what the limited torque leaves of it.
+enum class Hold { held, held_back, tracked };
+
+// e(n) -> u(n) of a PI with the torque limit U: I' = clamp(I(n-1) + newest e(n) + before e(n-1), +-clamp), v = kp e(n) + I',
+// u(n) = clamp(v, +-U); I(n) = I', but where |v| > U as the rule says: I(n-1), I(n-1) where e(n) v > 0, u(n) - kp e(n)
+inline void held_torque(std::span<double> error, double kp, double newest, double before, double torque_limit,
+                        double integrator_limit, Hold rule, double integral) {
+    double last = 0.0;
+    for (double& x : error) {
+        const double e = x, next = clamp(integral + (newest * e + before * last), -integrator_limit, integrator_limit);
+        const double v = kp * e + next, u = clamp(v, -torque_limit, torque_limit);
+        if (u == v || (rule == Hold::held_back && e * v <= 0.0)) integral = next;
+        else if (rule == Hold::tracked) integral = u - kp * e;
+        last = e;
+        x = u;
+    }
+}
+
+}  // namespace gaident

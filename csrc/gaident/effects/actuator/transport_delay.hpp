@@ -1,0 +1,71 @@
+// u(t - delay), any fraction of a sample. A held torque delayed is still piecewise constant: over the substep [t, t + h] its mean is
+//
+//     (1 - v) u(k) + v u(k+1),   x = (t - delay)/T,  k = floor(x),  v = max(0, (x - k) + h/T - 1) T/h
+//
+// with T the time each torque is held.
+#pragma once
+
+#include "../effect.hpp"
+
+namespace gaident {
+
+inline constexpr double longest_delay = 1.0;  // s
+
+struct TransportDelay {
+    static constexpr EffectParameter parameters[] = {{"delay", "s", 0.0, 0.0, longest_delay}};
+    static constexpr EffectInfo info{
+        .name = "transport_delay",
+        .place = Place::actuator,
+        .meaning = "the torque acts later than it was commanded",
+        .parameters = parameters,
+    };
+
+    // The mean over substep j: (1 - share) u(n - back) + share u(n - back + 1).
+    struct Table {
+        int back[max_substeps];
+        double share[max_substeps];
+    };
+    static constexpr Pace pace = Pace::fine;
+    static bool possible(const double* p) { return p[0] >= 0.0 && p[0] <= longest_delay; }
+    static void tabulate(const double* p, const Timing& time, Table& table) {
+        const double delay = possible(p) ? p[0] : 0.0;
+        for (int j = 0; j < time.steps; ++j) mean(delay, time.hold, j, time.steps, table.back[j], table.share[j]);
+    }
+    static int reach(const Table& table, int steps) {
+        int back = 0;
+        for (int j = 0; j < steps; ++j) back = back < table.back[j] ? table.back[j] : back;
+        return back;
+    }
+
+    // For substep j of m: `back` = -k counted from the present value, `share` = v.
+    static void mean(double delay, double hold, int j, int m, int& back, double& share) {
+        const double x = static_cast<double>(j) / m - delay / hold;
+        int k = static_cast<int>(x);
+        if (static_cast<double>(k) > x) --k;
+        const double over = (x - static_cast<double>(k)) * m + 1.0 - m;
+        back = -k;
+        share = over > 0.0 ? over : 0.0;
+        // Rounding may put the present substep a hair before the present value, or ask for one that is not there yet.
+        if (back <= 0) {
+            back = 0;
+            share = 0.0;
+        }
+    }
+
+    template <class None, class NoState, class Past, class R>
+    [[gnu::always_inline]] static R actuator_dynamics(const None&, NoState&, const Past& past, R) {
+        constexpr std::size_t width = static_cast<std::size_t>(Pack<R>::width);
+        alignas(64) double old[width], young[width], share[width];
+        for (std::size_t lane = 0; lane < width; ++lane) {
+            const Table& table = past.template table<TransportDelay>(lane);
+            const std::size_t at = past.newest - static_cast<std::size_t>(table.back[past.substep]);
+            old[lane] = past.torque(at, lane);
+            young[lane] = past.torque(at + (table.back[past.substep] > 0 ? 1U : 0U), lane);
+            share[lane] = table.share[past.substep];
+        }
+        const R from = Pack<R>::load(old), to = Pack<R>::load(young);
+        return from + (to - from) * Pack<R>::load(share);
+    }
+};
+
+}  // namespace gaident

@@ -1,0 +1,29 @@
+// The controller's integrator is limited: abs(I) <= limit, after each update.
+#pragma once
+
+#include "../effect.hpp"
+
+namespace gaident {
+
+struct IntegratorClamp {
+    static constexpr EffectParameter parameters[] = {{"limit", "N m", infinite, 0.0, infinite, true}};
+    static constexpr EffectInfo info{
+        .name = "integrator_clamp",
+        .place = Place::controller,
+        .meaning = "the controller's integrator is limited",
+        .parameters = parameters,
+    };
+
+    template <class R>
+    struct Coefficients {
+        R limit;
+    };
+    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.limit = p[0]; }
+
+    template <class R>
+    static void controller(const Coefficients<R>& c, Controller<R>& pi) {
+        pi.integrator_limit = minimum(pi.integrator_limit, c.limit);
+    }
+};
+
+}  // namespace gaident

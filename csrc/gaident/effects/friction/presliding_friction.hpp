@@ -1,0 +1,50 @@
+// Dahl's friction: an elastic bristle that breaks away, torque -s0 z,
+//
+//     dz/dt = w - abs(w) z/zc,   zc = Tc/s0
+//
+// solved as in bristle.hpp.
+#pragma once
+
+#include "../effect.hpp"
+#include "bristle.hpp"
+
+namespace gaident {
+
+struct PreslidingFriction {
+    static constexpr EffectParameter parameters[] = {
+        {"torque", "N m", 0.0, 0.0},
+        {"stiffness", "N m/rad", any_value, 0.0, infinite, true},
+    };
+    static constexpr EffectInfo info{
+        .name = "presliding_friction",
+        .place = Place::shaft,
+        .meaning = "friction that is a spring over small angles before it slides (Dahl)",
+        .parameters = parameters,
+    };
+
+    template <class R>
+    struct Coefficients {
+        R stiffness, per_break;  // s0 [N m/rad], 1/zc [1/rad]
+    };
+    template <class R>
+    using State = Bristle<R>;
+    static constexpr Pace pace = Pace::fine;
+    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[1], p[1] / p[0]}; }
+    static double substeps(const double* p, const Circumstances& at) {
+        if (at.plant.structure.p != 1) return 1.0;
+        return __builtin_sqrt(__builtin_fabs(at.plant.gain * p[1])) * at.sample_time / 0.3;
+    }
+
+    template <class R>
+    [[gnu::always_inline]] static void friction(const Coefficients<R>& c, Bristle<R>& s, FrictionStep<R>& step) {
+        s.weigh(step.h, (step.h * absolute(step.w)) * c.per_break, (step.beta * step.h) * c.stiffness);
+        s.join(c.stiffness, c.per_break, step);
+    }
+    template <class R>
+    [[gnu::always_inline]] static void after_friction(const Coefficients<R>& c, Bristle<R>& s, const FrictionStep<R>& step,
+                                                      R w_next) {
+        s.move(step, w_next, R(1.0) / c.per_break);
+    }
+};
+
+}  // namespace gaident

@@ -1,0 +1,112 @@
+// THE list of effects: the registry, the order of the public table, and the order in which effects that share a hook act. A new effect is
+// its header and one line in each of the two lists here; all else follows from it.
+#pragma once
+
+#include "actuator/torque_dead_band.hpp"
+#include "actuator/torque_lag.hpp"
+#include "actuator/torque_saturation.hpp"
+#include "actuator/transport_delay.hpp"
+#include "controller/command_rate_limit.hpp"
+#include "controller/integrator_clamp.hpp"
+#include "coupling/backlash.hpp"
+#include "coupling/extra_resonance.hpp"
+#include "coupling/hardening_stiffness.hpp"
+#include "friction/asymmetric_friction.hpp"
+#include "friction/coulomb_friction.hpp"
+#include "friction/friction_drift.hpp"
+#include "friction/lugre_friction.hpp"
+#include "friction/presliding_friction.hpp"
+#include "friction/quadratic_drag.hpp"
+#include "friction/stribeck_friction.hpp"
+#include "load/cogging.hpp"
+#include "load/load_torque.hpp"
+#include "load/unbalance.hpp"
+#include "sensor/outliers.hpp"
+#include "sensor/velocity_filter.hpp"
+#include "sensor/velocity_quantisation.hpp"
+#include "sensor/velocity_ripple.hpp"
+
+#include "registry.hpp"
+
+namespace gaident {
+
+using Effects = EffectList<CoulombFriction,       //
+                           StribeckFriction,      //
+                           AsymmetricFriction,    //
+                           PreslidingFriction,    //
+                           LugreFriction,         //
+                           QuadraticDrag,         //
+                           LoadTorque,            //
+                           Unbalance,             //
+                           Cogging,               //
+                           FrictionDrift,         //
+                           Backlash,              //
+                           HardeningStiffness,    //
+                           TorqueSaturation,      //
+                           TorqueDeadBand,        //
+                           TransportDelay,        //
+                           TorqueLag,             //
+                           IntegratorClamp,       //
+                           CommandRateLimit,      //
+                           VelocityFilter,        //
+                           VelocityRipple,        //
+                           VelocityQuantisation,  //
+                           ExtraResonance,        //
+                           Outliers>;
+
+inline constexpr auto& effect_table = Effects::table;
+inline constexpr int effect_count = Effects::size;
+
+// An effect's number: its place in the list.
+template <class E>
+inline constexpr Effect effect = Effects::number<E>;
+
+// By name; throws std::invalid_argument for a name that is none.
+inline Effect effect_named(std::string_view name) {
+    for (int i = 0; i < effect_count; ++i)
+        if (name == effect_table[static_cast<std::size_t>(i)].name) return static_cast<Effect>(i);
+    throw std::invalid_argument("effects: '" + std::string(name) + "' is no effect");
+}
+constexpr const EffectInfo& info_of(Effect e) { return effect_table[static_cast<std::size_t>(e)]; }
+
+// A set of effects; in a model each appears at most once.
+struct EffectSet {
+    std::uint32_t bits = 0;
+    static_assert(effect_count <= 32);
+
+    static constexpr std::uint32_t bit(Effect e) { return std::uint32_t{1} << static_cast<unsigned>(e); }
+    constexpr bool has(Effect e) const { return (bits & bit(e)) != 0; }
+    template <class E>
+    constexpr bool has() const {
+        return has(effect<E>);
+    }
+    // Whether one of them is so.
+    template <class Property>
+    constexpr bool any(Property&& property) const {
+        for (int i = 0; i < effect_count; ++i)
+            if (has(static_cast<Effect>(i)) && property(effect_table[static_cast<std::size_t>(i)])) return true;
+        return false;
+    }
+    constexpr bool needs_two_masses() const {
+        return any([](const EffectInfo& info) { return info.needs_two_masses; });
+    }
+    constexpr void add(Effect e) { bits |= bit(e); }
+    constexpr void remove(Effect e) { bits &= ~bit(e); }
+    friend constexpr bool operator==(EffectSet, EffectSet) = default;
+};
+
+// A candidate: the linear drive and its effects.
+struct EffectModel {
+    Factors<double> linear;
+    EffectSet effects;
+    double parameter[Effects::parameters] = {};  // one effect's after the other's
+
+    const double* of(Effect e) const { return parameter + Effects::first_parameter[static_cast<std::size_t>(e)]; }
+    void add(Effect e, const double* values) {
+        effects.add(e);
+        for (int i = 0; i < info_of(e).count(); ++i)
+            parameter[Effects::first_parameter[static_cast<std::size_t>(e)] + i] = values[i];
+    }
+};
+
+}  // namespace gaident

@@ -1,0 +1,29 @@
+// A constant load: -T.
+#pragma once
+
+#include "../effect.hpp"
+
+namespace gaident {
+
+struct LoadTorque {
+    static constexpr EffectParameter parameters[] = {{"torque", "N m", 0.0}};
+    static constexpr EffectInfo info{
+        .name = "load_torque",
+        .place = Place::shaft,
+        .meaning = "constant load; positive brakes positive rotation",
+        .parameters = parameters,
+    };
+
+    template <class R>
+    struct Coefficients {
+        R load;
+    };
+    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.load = p[0]; }
+
+    template <class R>
+    [[gnu::always_inline]] static R torque(const Coefficients<R>& c, R) {
+        return c.load;
+    }
+};
+
+}  // namespace gaident

@@ -1,0 +1,195 @@
+// What follows from a list of effects (list.hpp) and from what their headers say (effect.hpp): the table, the coefficients and states of
+// all side by side, and which hooks an effect has.
+#pragma once
+
+#include "effect.hpp"
+
+#include <array>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+namespace gaident {
+
+enum class Effect : std::uint8_t {};
+
+// One type for each effect, so that none of them takes room.
+template <class E>
+struct Nothing {};
+
+namespace detail {
+
+template <class E, class R>
+struct CoefficientsOf {
+    using Type = Nothing<E>;
+};
+template <class E, class R>
+    requires requires { typename E::template Coefficients<R>; }
+struct CoefficientsOf<E, R> {
+    using Type = typename E::template Coefficients<R>;
+};
+
+template <class E, class R>
+struct StateOf {
+    using Type = Nothing<E>;
+};
+template <class E, class R>
+    requires requires { typename E::template State<R>; }
+struct StateOf<E, R> {
+    using Type = typename E::template State<R>;
+};
+
+template <class E>
+struct TableOf {
+    using Type = Nothing<E>;
+};
+template <class E>
+    requires requires { typename E::Table; }
+struct TableOf<E> {
+    using Type = typename E::Table;
+};
+
+// E tells apart effects whose members look alike.
+template <class E, class Value>
+struct Slot {
+    [[no_unique_address]] Value value;
+};
+
+}  // namespace detail
+
+template <class E, class R>
+using CoefficientsOf = typename detail::CoefficientsOf<E, R>::Type;
+template <class E, class R>
+using StateOf = typename detail::StateOf<E, R>::Type;
+template <class E>
+using TableOf = typename detail::TableOf<E>::Type;
+
+template <class E>
+concept HasTable = requires { typename E::Table; };
+template <class E>
+concept HasCoefficients = requires { typename E::template Coefficients<double>; };
+
+template <class... E>
+struct EffectList {
+    static constexpr int size = sizeof...(E);
+    static constexpr std::array<EffectInfo, sizeof...(E)> table{E::info...};
+    static constexpr int parameters = (0 + ... + E::info.count());
+    static constexpr std::array<int, sizeof...(E)> first_parameter = [] {
+        std::array<int, sizeof...(E)> first{};
+        int sum = 0;
+        for (std::size_t i = 0; i < sizeof...(E); ++i) {
+            first[i] = sum;
+            sum += table[i].count();
+        }
+        return first;
+    }();
+
+    template <class One>
+    static constexpr Effect number = [] {
+        std::uint8_t i = 0;
+        static_cast<void>(((std::is_same_v<One, E> || (++i, false)) || ...));
+        return static_cast<Effect>(i);
+    }();
+
+    // call.operator()<E>() for each effect, in the order of the list, unrolled.
+    template <class Call>
+    [[gnu::always_inline]] static constexpr void each(Call&& call) {
+        (call.template operator()<E>(), ...);
+    }
+    // x through step.operator()<E>(x) of each effect.
+    template <class R, class Step>
+    [[gnu::always_inline]] static constexpr R chain(R x, Step&& step) {
+        static_cast<void>(((x = step.template operator()<E>(x)), ...));
+        return x;
+    }
+    template <class Call>
+    static constexpr void each_backwards(Call&& call) {
+        int unused = 0;
+        static_cast<void>(((call.template operator()<E>(), unused) = ... = 0));
+    }
+
+    template <class R>
+    struct Coefficients : detail::Slot<E, CoefficientsOf<E, R>>... {
+        template <class One>
+        [[gnu::always_inline]] CoefficientsOf<One, R>& of() {
+            return static_cast<detail::Slot<One, CoefficientsOf<One, R>>&>(*this).value;
+        }
+        template <class One>
+        [[gnu::always_inline]] const CoefficientsOf<One, R>& of() const {
+            return static_cast<const detail::Slot<One, CoefficientsOf<One, R>>&>(*this).value;
+        }
+    };
+    template <class R>
+    struct States : detail::Slot<E, StateOf<E, R>>... {
+        template <class One>
+        [[gnu::always_inline]] StateOf<One, R>& of() {
+            return static_cast<detail::Slot<One, StateOf<One, R>>&>(*this).value;
+        }
+        template <class One>
+        [[gnu::always_inline]] const StateOf<One, R>& of() const {
+            return static_cast<const detail::Slot<One, StateOf<One, R>>&>(*this).value;
+        }
+    };
+    struct Tables : detail::Slot<E, TableOf<E>>... {
+        template <class One>
+        [[gnu::always_inline]] const TableOf<One>& of() const {
+            return static_cast<const detail::Slot<One, TableOf<One>>&>(*this).value;
+        }
+        template <class One>
+        TableOf<One>& of() {
+            return static_cast<detail::Slot<One, TableOf<One>>&>(*this).value;
+        }
+    };
+};
+
+// Which hooks an effect has.
+namespace hook {
+
+template <class E>
+using C = const CoefficientsOf<E, double>&;
+template <class E>
+using S = StateOf<E, double>&;
+struct Past {
+    std::size_t newest;
+    int substep;
+    double torque(std::size_t at, std::size_t lane) const;
+    template <class E>
+    const typename E::Table& table(std::size_t lane) const;
+};
+
+template <class E>
+concept command = requires(C<E> c, S<E> s, double x) { E::command(c, s, x); };
+template <class E>
+concept controller = requires(C<E> c, Controller<double>& pi) { E::controller(c, pi); };
+template <class E>
+concept actuator = requires(C<E> c, double x) { E::actuator(c, x); };
+template <class E>
+concept actuator_dynamics = requires(C<E> c, S<E> s, const Past& past, double x) { E::actuator_dynamics(c, s, past, x); };
+template <class E>
+concept torque = requires(C<E> c, double x) { E::torque(c, x); };
+template <class E>
+concept law = requires { &E::template law<double>; };
+template <class E>
+concept level = requires(C<E> c, double x) { E::level(c, x); };
+template <class E>
+concept friction = requires { &E::template friction<double>; };
+template <class E>
+concept after_friction = requires { &E::template after_friction<double>; };
+template <class E>
+concept coupling = requires(C<E> c, double x) { E::coupling(c, x, x, x, x); };
+template <class E>
+concept sensor = requires(C<E> c, double x) { E::sensor(c, x, x); };
+template <class E>
+concept sensor_dynamics = requires(C<E> c, S<E> s, double x) { E::sensor_dynamics(c, s, x); };
+template <class E>
+concept reading = requires(C<E> c, double x) { E::reading(c, x); };
+template <class E>
+concept plant = requires(const double* p, const Factors<double>& g) { E::plant(p, g); };
+template <class E>
+concept begin = requires(C<E> c, S<E> s, const Beginning<double>& b) { E::begin(c, s, b); };
+
+}  // namespace hook
+
+}  // namespace gaident

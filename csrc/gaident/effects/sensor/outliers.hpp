@@ -1,0 +1,19 @@
+// Samples that are no measurement; found and masked by the diagnosis, not simulated.
+#pragma once
+
+#include "../effect.hpp"
+
+namespace gaident {
+
+struct Outliers {
+    static constexpr EffectParameter parameters[] = {{"fraction", "1", 0.0, 0.0, 1.0}};
+    static constexpr EffectInfo info{
+        .name = "outliers",
+        .place = Place::record,
+        .meaning = "isolated wrong samples (noise); found and masked, not simulated",
+        .parameters = parameters,
+        .simulated = false,
+    };
+};
+
+}  // namespace gaident

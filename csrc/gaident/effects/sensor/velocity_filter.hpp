@@ -1,0 +1,45 @@
+// The measured velocity's filter 1/(1 + s tau), exact for a velocity that is linear over the substep, x = h/tau:
+//
+//     y+ = e^-x y + (1 - e^-x - c) w + c w+,   c = 1 - (1 - e^-x)/x
+#pragma once
+
+#include "../effect.hpp"
+
+namespace gaident {
+
+struct VelocityFilter {
+    static constexpr EffectParameter parameters[] = {{"time_constant", "s", 0.0, 0.0}};
+    static constexpr EffectInfo info{
+        .name = "velocity_filter",
+        .place = Place::sensor,
+        .meaning = "the measured velocity is filtered, first order",
+        .parameters = parameters,
+    };
+
+    template <class R>
+    struct Coefficients {
+        R decay, of_old, of_new;  // e^-x, 1 - e^-x - c, c
+    };
+    template <class R>
+    struct State {
+        R output, w;  // rad/s
+    };
+    static constexpr Pace pace = Pace::fine;
+    static void prepare(const double* p, const Timing& time, Coefficients<double>& c) {
+        const Decay decay(time.step / p[0]);
+        c = {decay.power, decay.mean - decay.power, 1.0 - decay.mean};
+    }
+    template <class R>
+    static void begin(const Coefficients<R>&, State<R>& s, const Beginning<R>& start) {
+        s.output = s.w = start.velocity;
+    }
+
+    template <class R>
+    [[gnu::always_inline]] static R sensor_dynamics(const Coefficients<R>& c, State<R>& s, R w_next) {
+        s.output = (c.decay * s.output + c.of_old * s.w) + c.of_new * w_next;
+        s.w = w_next;
+        return s.output;
+    }
+};
+
+}  // namespace gaident

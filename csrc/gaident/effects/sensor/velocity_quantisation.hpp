@@ -1,0 +1,29 @@
+// A velocity that comes in steps: round(w/step) step.
+#pragma once
+
+#include "../effect.hpp"
+
+namespace gaident {
+
+struct VelocityQuantisation {
+    static constexpr EffectParameter parameters[] = {{"step", "rad/s", 0.0, 0.0}};
+    static constexpr EffectInfo info{
+        .name = "velocity_quantisation",
+        .place = Place::sensor,
+        .meaning = "the measured velocity comes in steps (noise)",
+        .parameters = parameters,
+    };
+
+    template <class R>
+    struct Coefficients {
+        R step;
+    };
+    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.step = p[0]; }
+
+    template <class R>
+    [[gnu::always_inline]] static R reading(const Coefficients<R>& c, R w) {
+        return nearest(w / c.step) * c.step;
+    }
+};
+
+}  // namespace gaident

@@ -1,0 +1,40 @@
+// What the loop with effects needs to know of one candidate (R = double) or of one per lane: the parameters as the sample loop uses
+// them, for its substep. Numbers only, so that candidates are laid side by side without naming each.
+#pragma once
+
+#include "../effects/list.hpp"
+#include "../plant/two_mass.hpp"
+
+#include <cstring>
+#include <type_traits>
+
+namespace gaident {
+
+template <class R>
+struct EffectConstants {
+    // The plant in observer form at the substep, and its state at the record's start ...
+    R a[max_plant_order], b[max_plant_order + 1], x[max_plant_order];
+    // ... or two masses (two_mass.hpp)
+    R phi[3][3], motor[3], coupling[3];
+    R KG, DG, per_scale;
+
+    typename Effects::Coefficients<R> effects;
+
+    R stored;  // the controller's stored torque at the start
+    R before;  // torque that acted before the record's start
+};
+
+inline constexpr std::size_t effect_constants = sizeof(EffectConstants<double>) / sizeof(double);
+
+template <class R>
+EffectConstants<R> load_constants(const double* interleaved) {
+    static_assert(std::is_trivially_copyable_v<EffectConstants<R>> && sizeof(EffectConstants<R>) == effect_constants * sizeof(R));
+    R all[effect_constants];
+    for (std::size_t i = 0; i < effect_constants; ++i)
+        all[i] = Pack<R>::load(interleaved + i * static_cast<std::size_t>(Pack<R>::width));
+    EffectConstants<R> c;
+    std::memcpy(&c, all, sizeof c);
+    return c;
+}
+
+}  // namespace gaident

@@ -1,0 +1,362 @@
+// The closed loop with effects at their places, written once for one candidate (R = double) and for lanes of candidates that have the same
+// effects with different parameters; every lane equals the scalar bit for bit. Which effects there are is the same for all lanes and may
+// be asked with a branch; on numbers there are selections only. The loop names no effect: it runs over the list (effects/list.hpp) at each
+// hook (effects/effect.hpp). The chain, with a user's own effects (own_effects.hpp) at those marked with a star:
+//
+//     command -> PI -> *actuator -> actuator_dynamics -> *torque -> coupling, *friction -> *sensor -> sensor_dynamics -> reading
+//
+// One sample is `substeps` steps of h. In the sampled and the open loop the torque is held over the sample; in the continuous one the
+// controller acts every substep on the linearly interpolated command, and its torque is extrapolated to the substep's mean (third order).
+#pragma once
+
+#include "mechanism.hpp"
+#include "own_effects.hpp"
+
+#include <span>
+
+namespace gaident {
+
+// What lanes of one run have in common.
+struct EffectRun {
+    EffectSet effects;
+    Loop loop;
+    double sample_time = 0.0;
+    int substeps = 1;
+    int order = 0;                     // of the plant in observer form
+    bool two_masses = false;           // the coupling is not linear
+    bool moving = false;               // the record does not start at rest
+    std::span<const double> input;     // command, or torque in open loop
+    std::span<const double> position;  // measured, or empty
+    double start_angle = 0.0;
+
+    // Written where not null, lanes side by side: input.size() * width numbers.
+    double* velocity = nullptr;
+    double* torque = nullptr;
+    double* angle = nullptr;
+
+    const Effects::Tables* tables = nullptr;  // one per lane
+    double* history = nullptr;                // past torques: (history_mask + 1) * width numbers
+    std::size_t history_mask = 0;
+
+    OwnEffects* own = nullptr;           // asked through these
+    OwnSignals own_signals{};            // width numbers each,
+    const double* own_answer = nullptr;  // and answering there
+};
+
+// The torques issued so far, as an effect of the actuator looks back on them.
+struct PastTorques {
+    const EffectRun& run;
+    std::size_t width, newest;
+    int substep;
+
+    // Number `at`, counted as `newest` is.
+    [[gnu::always_inline]] double torque(std::size_t at, std::size_t lane) const {
+        return run.history[(at & run.history_mask) * width + lane];
+    }
+    template <class E>
+    [[gnu::always_inline]] const typename E::Table& table(std::size_t lane) const {
+        return run.tables[lane].template of<E>();
+    }
+};
+
+template <class R, class Plant>
+class EffectLoop {
+public:
+    EffectLoop(const EffectRun& run, const EffectConstants<R>& constants)
+        : run_(run), set_(run.effects), c_(constants), plant_(constants, run.order), pi_(run.loop, run.sample_time) {
+        const bool continuous = run.loop.kind == LoopKind::continuous;
+        h_ = run.sample_time / run.substeps;
+        if (continuous) pi_ = Controller<R>(run.loop, h_);
+        turning_ = run.own != nullptr;
+        const Beginning<R> start{plant_.velocity(), c_.before, R(run.moving && !run.input.empty() ? run.input[0] : 0.0)};
+        Effects::each([&]<class E>() {
+            if (!set_.has<E>()) return;
+            const auto& c = c_.effects.template of<E>();
+            turning_ = turning_ || E::info.turns;
+            dry_ = dry_ || hook::law<E> || hook::level<E> || hook::friction<E>;
+            actuator_in_time_ = actuator_in_time_ || hook::actuator_dynamics<E>;
+            looking_back_ = looking_back_ || HasTable<E>;
+            filtering_ = filtering_ || hook::sensor_dynamics<E>;
+            if constexpr (hook::controller<E>) E::controller(c, pi_);
+            if constexpr (hook::law<E>) E::law(c, law_);
+            if constexpr (hook::begin<E>) E::begin(c, states_.template of<E>(), start);
+        });
+        pi_.s = c_.stored;
+        if (run.own != nullptr) {
+            own_torque_ = run.own->at(OwnPlace::torque);
+            own_friction_ = run.own->at(OwnPlace::friction);
+            own_shaft_ = own_torque_ || own_friction_;
+            own_actuator_ = run.own->at(OwnPlace::actuator);
+            own_sensor_ = run.own->at(OwnPlace::sensor);
+            dry_ = dry_ || own_friction_;
+        }
+        angle_ = R(run.start_angle);
+        theta_middle_ = angle_ + plant_.velocity() * R(0.5 * h_);
+        own_w_before_ = plant_.velocity();
+        if (looking_back_)
+            for (std::size_t i = 0; i <= run.history_mask; ++i) Pack<R>::store(c_.before, run.history + i * width);
+        // Friction that would push is no friction: such a candidate is as good as diverged.
+        if (dry_) plant_.x[0] = greater(plant_.beta(), R(0.0), plant_.x[0], R(any_value));
+        per_beta_ = R(1.0) / plant_.beta();
+    }
+
+    void operator()() {
+        if (run_.loop.kind == LoopKind::continuous) continuous();
+        else held();
+    }
+
+private:
+    static constexpr std::size_t width = static_cast<std::size_t>(Pack<R>::width);
+
+    // All zero.
+    static typename Effects::States<R> no_states() {
+        typename Effects::States<R> s;
+        std::memset(static_cast<void*>(&s), 0, sizeof s);
+        return s;
+    }
+
+    void held() {
+        const bool open = run_.loop.kind == LoopKind::open;
+        const double share = 1.0 / run_.substeps;
+        for (std::size_t n = 0; n < run_.input.size(); ++n) {
+            const double here = position_at(n), next = position_after(n);
+            theta_ = run_.position.empty() ? angle_ : R(here);
+            time_ = static_cast<double>(n) * run_.sample_time;
+            const R y = sensor();
+            const R u = open ? R(run_.input[n]) : control(R(run_.input[n]), y);
+            write(n, y, u);
+            act(u);
+            for (int j = 0; j < run_.substeps; ++j) {
+                middle(here, next, (j + 0.5) * share);
+                substep(j, (static_cast<double>(n) + (j + 0.5) * share) * run_.sample_time);
+                if (filtering_) {
+                    theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
+                    time_ = (static_cast<double>(n) + (j + 1) * share) * run_.sample_time;
+                    filter();
+                }
+            }
+        }
+    }
+
+    void continuous() {
+        const double share = 1.0 / run_.substeps;
+        double r_before = run_.moving && !run_.input.empty() ? run_.input[0] : 0.0;
+        R u_before = c_.before, u_long_before = c_.before;
+        theta_ = run_.position.empty() ? angle_ : R(position_at(0));
+        R y = sensor(), u = control(R(r_before), y);
+        for (std::size_t n = 0; n < run_.input.size(); ++n) {
+            const double r = run_.input[n], here = position_at(n > 0 ? n - 1 : 0), next = position_at(n);
+            const int steps = n == 0 && run_.moving ? 0 : run_.substeps;
+            for (int j = 0; j < steps; ++j) {
+                // Adams and Bashforth's mean over the substep to come.
+                act(u * R(23.0 / 12.0) - u_before * R(16.0 / 12.0) + u_long_before * R(5.0 / 12.0));
+                middle(here, next, (j + 0.5) * share);
+                substep(0, (static_cast<double>(n) - 1.0 + (j + 0.5) * share) * run_.sample_time);
+                theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
+                time_ = (static_cast<double>(n) - 1.0 + (j + 1) * share) * run_.sample_time;
+                if (filtering_) filter();
+                y = sensor();
+                u_long_before = u_before;
+                u_before = u;
+                u = control(R(r_before + (r - r_before) * ((j + 1) * share)), y);
+            }
+            r_before = r;
+            write(n, y, u);
+        }
+    }
+
+    [[gnu::always_inline]] double position_at(std::size_t n) const { return run_.position.empty() ? 0.0 : run_.position[n]; }
+    [[gnu::always_inline]] double position_after(std::size_t n) const {
+        if (run_.position.empty()) return 0.0;
+        const std::size_t last = run_.position.size() - 1;
+        if (n < last) return run_.position[n + 1];
+        return last == 0 ? run_.position[0] : 2.0 * run_.position[last] - run_.position[last - 1];
+    }
+
+    // theta in the middle of the substep
+    [[gnu::always_inline]] void middle(double here, double next, double share) {
+        if (!turning_) return;
+        if (!run_.position.empty()) {
+            theta_ = R(here + (next - here) * share);
+            return;
+        }
+        // Foreseen a substep ahead (second order), so that its sine need not be waited for.
+        theta_ = theta_middle_;
+        theta_middle_ = angle_ + plant_.velocity() * R(1.5 * h_);
+    }
+
+    [[gnu::always_inline]] void write(std::size_t n, R y, R u) {
+        if (run_.velocity != nullptr) Pack<R>::store(y, run_.velocity + n * width);
+        if (run_.torque != nullptr) Pack<R>::store(u, run_.torque + n * width);
+        if (run_.angle != nullptr) Pack<R>::store(angle_, run_.angle + n * width);
+    }
+
+    // What the sensor measures, before it is filtered.
+    [[gnu::always_inline]] R measured() const {
+        R w = plant_.velocity();
+        if (own_sensor_) [[unlikely]]
+            w = asked(OwnPlace::sensor, w, held_, time_);
+        return Effects::chain(w, [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::sensor<E>)
+                if (set_.has<E>()) return E::sensor(c_.effects.template of<E>(), theta_, x);
+            return x;
+        });
+    }
+
+    [[gnu::always_inline]] void filter() {
+        Effects::chain(measured(), [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::sensor_dynamics<E>)
+                if (set_.has<E>()) [[likely]]
+                    return E::sensor_dynamics(c_.effects.template of<E>(), states_.template of<E>(), x);
+            return x;
+        });
+    }
+
+    // Of the last filter there is.
+    [[gnu::always_inline]] R filter_output() const {
+        return Effects::chain(plant_.velocity(), [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::sensor_dynamics<E>)
+                if (set_.has<E>()) return R(states_.template of<E>().output);
+            return x;
+        });
+    }
+
+    [[gnu::always_inline]] R sensor() const {
+        const R y = filtering_ ? filter_output() : measured();
+        return Effects::chain(y, [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::reading<E>)
+                if (set_.has<E>()) return E::reading(c_.effects.template of<E>(), x);
+            return x;
+        });
+    }
+
+    [[gnu::always_inline]] R control(R r, R y) {
+        r = Effects::chain(r, [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::command<E>)
+                if (set_.has<E>()) return E::command(c_.effects.template of<E>(), states_.template of<E>(), x);
+            return x;
+        });
+        return pi_.step(r - y);
+    }
+
+    [[gnu::noinline]] R asked(OwnPlace place, R w, R u, double t) const {
+        Pack<R>::store(w, run_.own_signals.velocity);
+        Pack<R>::store(theta_, run_.own_signals.angle);
+        Pack<R>::store(u, run_.own_signals.torque);
+        run_.own->ask(place, t);
+        return Pack<R>::load(run_.own_answer);
+    }
+
+    // The torque u is issued, to be held until the next.
+    [[gnu::always_inline]] void act(R u) {
+        if (own_actuator_) [[unlikely]]
+            u = asked(OwnPlace::actuator, plant_.velocity(), u, time_);
+        u = Effects::chain(u, [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::actuator<E>)
+                if (set_.has<E>()) return E::actuator(c_.effects.template of<E>(), x);
+            return x;
+        });
+        held_ = u;
+        if (looking_back_) {
+            ++issued_;
+            Pack<R>::store(u, run_.history + (issued_ & run_.history_mask) * width);
+        }
+    }
+
+    [[gnu::always_inline]] void substep(int j, double t) {
+        R T = held_;
+        if (actuator_in_time_) {
+            const PastTorques past{run_, width, issued_, j};
+            T = Effects::chain(T, [&]<class E>(R x) __attribute__((always_inline)) {
+                if constexpr (hook::actuator_dynamics<E>)
+                    if (set_.has<E>())
+                        return E::actuator_dynamics(c_.effects.template of<E>(), states_.template of<E>(), past, x);
+                return x;
+            });
+        }
+        T = Effects::chain(T, [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::torque<E>)
+                if (set_.has<E>()) return x - E::torque(c_.effects.template of<E>(), theta_);
+            return x;
+        });
+
+        const R w = plant_.velocity();
+        if (own_shaft_) [[unlikely]]
+            T = with_own(w, T, t);
+        const R w_free = plant_.free_velocity(T, friction_torque_);
+        R w_next = w_free;
+        if (dry_) {
+            w_next = under_friction(w, w_free, t);
+            friction_torque_ = (w_free - w_next) * per_beta_;
+            T = T - friction_torque_;
+        }
+        plant_.move(T, w_next);
+        angle_ = angle_ + (w + w_next) * R(0.5 * h_);
+    }
+
+    // The torque with effects of one's own, asked at the mean velocity, which is foreseen. Apart, because it is seldom there.
+    [[gnu::noinline]] R with_own(R w, R T, double t) {
+        const R middle = w + (w - own_w_before_) * R(0.5);
+        own_w_before_ = w;
+        if (own_friction_) own_level_ = asked(OwnPlace::friction, middle, T, t > 0.0 ? t : 0.0);
+        return own_torque_ ? T + asked(OwnPlace::torque, middle, T, t > 0.0 ? t : 0.0) : T;
+    }
+
+    [[gnu::always_inline]] R under_friction(R w, R w_free, double t) {
+        FrictionStep<R> step{R(h_), w, w_free, plant_.beta(), law_};
+        const auto add = [&](R level) __attribute__((always_inline)) {
+            step.law.level_positive = step.law.level_positive + level;
+            step.law.level_negative = step.law.level_negative + level;
+        };
+        if (own_friction_) add(own_level_);
+        Effects::each([&]<class E>() __attribute__((always_inline)) {
+            if constexpr (hook::level<E>)
+                if (set_.has<E>()) add(E::level(c_.effects.template of<E>(), R(t > 0.0 ? t : 0.0)));
+        });
+        Effects::each([&]<class E>() __attribute__((always_inline)) {
+            if constexpr (hook::friction<E>)
+                if (set_.has<E>()) [[unlikely]]  // keeps what it needs out of the registers of the others
+                    E::friction(c_.effects.template of<E>(), states_.template of<E>(), step);
+        });
+        const R w_next = velocity_under_friction(step.law, w, step.w_free, step.beta);
+        Effects::each([&]<class E>() __attribute__((always_inline)) {
+            if constexpr (hook::after_friction<E>)
+                if (set_.has<E>()) [[unlikely]]
+                    E::after_friction(c_.effects.template of<E>(), states_.template of<E>(), step, w_next);
+        });
+        return w_next;
+    }
+
+    const EffectRun& run_;
+    const EffectSet set_;
+    const EffectConstants<R>& c_;
+    Plant plant_;
+    Controller<R> pi_;
+    double h_;
+    bool dry_ = false, actuator_in_time_ = false, looking_back_ = false, filtering_ = false, turning_ = false;
+    bool own_shaft_ = false, own_torque_ = false, own_friction_ = false, own_actuator_ = false, own_sensor_ = false;
+    double time_ = 0.0;
+
+    typename Effects::States<R> states_ = no_states();
+    FrictionLaw<R> law_;
+    R angle_, theta_ = R(0.0), theta_middle_;
+    R held_ = R(0.0);
+    R friction_torque_ = R(0.0), per_beta_;
+    R own_w_before_, own_level_ = R(0.0);
+    std::size_t issued_ = 0;
+};
+
+// Runs the lanes whose constants are given, with the plant's order known to the compiler where it is a usual one.
+template <class R>
+void run_effects(const EffectRun& run, const EffectConstants<R>& c) {
+    if (run.two_masses) return EffectLoop<R, TwoMassPlant<R>>(run, c)();
+    switch (run.order) {
+        case 1: return EffectLoop<R, ObserverPlant<R, 1>>(run, c)();
+        case 2: return EffectLoop<R, ObserverPlant<R, 2>>(run, c)();
+        case 3: return EffectLoop<R, ObserverPlant<R, 3>>(run, c)();
+        case 5: return EffectLoop<R, ObserverPlant<R, 5>>(run, c)();
+        default: return EffectLoop<R, ObserverPlant<R, -1>>(run, c)();
+    }
+}
+
+}  // namespace gaident

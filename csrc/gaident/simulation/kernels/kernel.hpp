@@ -1,0 +1,233 @@
+// The one source of the sample loops; included by one .cpp per instruction set, each with its own tag type.
+#pragma once
+
+#include "../../plant/held.hpp"
+#include "../../numeric/lanes.hpp"
+#include "../../control/loop.hpp"
+#include "kernels.hpp"
+#include "products.hpp"
+
+namespace gaident {
+
+// The factors of a group in registers.
+template <class L>
+struct LaneFactors {
+    Counts sizes;
+    L gain, pole, zero, has_excess[max_plant_order];
+    Pair<L> pole_pair[max_pairs], zero_pair[max_pairs];
+
+    Counts counts() const { return sizes; }
+};
+
+template <class L>
+[[gnu::always_inline]] inline L excess(const LaneFactors<L>& g, int i, L factor, L neutral) {
+    return where(g.has_excess[i], factor, neutral);
+}
+
+template <class Isa>
+struct KernelSource {
+    // Calls call(std::integral_constant<int, n>) for orders up to `most`, so that everything of that order unrolls and stays in registers;
+    // with -1 for larger ones.
+    template <int most, int n = 0, class Call>
+    static void by_order(int order, Call&& call) {
+        if constexpr (n > most) return call(std::integral_constant<int, -1>{});
+        else if (order == n) return call(std::integral_constant<int, n>{});
+        else return by_order<most, n + 1>(order, call);
+    }
+
+    static void coefficients(const FactorGroup& f, const Loop& loop, double sample_time, bool closed, DoubleGroup& out) {
+        using L = Lanes<double, double_lanes, Isa>;
+        LaneFactors<L> g;
+        g.sizes = f.counts;
+        g.gain = L::load(f.gain);
+        for (int i = 0; i < f.counts.pole_pairs; ++i) g.pole_pair[i] = {L::load(f.pole_e1[i]), L::load(f.pole_e0[i])};
+        for (int i = 0; i < f.counts.zero_pairs; ++i) g.zero_pair[i] = {L::load(f.zero_e1[i]), L::load(f.zero_e0[i])};
+        if (f.counts.single_pole) g.pole = L::load(f.pole);
+        if (f.counts.single_zero) g.zero = L::load(f.zero);
+        for (int i = 0; i < f.counts.p; ++i) g.has_excess[i] = L::load(f.excess[i]);
+        const auto store = [&](const auto& h, int order) {
+            out.order = order;
+            for (int i = 0; i < order; ++i) h.a[i].store(out.a[i]);
+            for (int i = 0; i <= order; ++i) h.b[i].store(out.b[i]);
+        };
+        by_order<6>(f.counts.order, [&](auto constant) {
+            constexpr int N = constant;
+            const int n = N >= 0 ? N : f.counts.order;
+            Delta<L, N> plant;
+            if (loop.kind == LoopKind::continuous) plant = bilinear_plant<L, N>(g, sample_time);
+            else if constexpr (N != 0) plant = held_plant<L, N>(g, sample_time, f.doublings);
+            if (closed) store(close_loop(plant, loop.kp, loop.ki, sample_time), n + 1);
+            else store(plant, n);
+        });
+    }
+
+    static void words(std::uint64_t base, std::uint64_t* out, std::size_t n) {
+        constexpr std::size_t W = Isa::register_bytes / sizeof(std::uint64_t);
+        using L = Lanes<std::uint64_t, static_cast<int>(W), Isa>;
+        std::uint64_t counters[W];
+        for (std::size_t lane = 0; lane < W; ++lane) counters[lane] = base + lane * golden_gamma;
+        L counter = L::load(counters);
+        std::size_t i = 0;
+        for (; i + W <= n; i += W, counter = counter + L::all(W * golden_gamma)) mix(counter).store(out + i);
+        for (; i < n; ++i) out[i] = mix(base + i * golden_gamma);
+    }
+
+    template <class T, int W, int N>
+    struct Bank {  // a group in registers
+        using L = Lanes<T, W, Isa>;
+        static constexpr int capacity = N >= 0 ? (N > 0 ? N : 1) : max_loop_order;
+        L a[capacity], b[capacity + 1], x[capacity];
+        int order;
+
+        explicit Bank(const Group<T, W>& g) : order(N >= 0 ? N : g.order) {
+            for (int i = 0; i < order; ++i) a[i] = L::load(g.a[i]);
+            for (int i = 0; i <= order; ++i) b[i] = L::load(g.b[i]);
+            for (int i = 0; i < order; ++i) x[i] = L::load(g.x[i]);
+            if (order == 0) x[0] = L(0.0);
+        }
+        void save(Group<T, W>& g) const {
+            for (int i = 0; i < order; ++i) x[i].store(g.x[i]);
+        }
+    };
+
+    template <class T, int W, int N>
+    struct Linear {
+        static void outputs(Group<T, W>& g, const T* input, std::size_t n, T* y) {
+            using L = Lanes<T, W, Isa>;
+            Bank<T, W, N> k(g);
+            for (std::size_t i = 0; i < n; ++i) recurrence_step<L, N>(k.order, k.a, k.b, k.x, L::all(input[i])).store(y + i * W);
+            k.save(g);
+        }
+    };
+
+    // Squared errors of S registers of candidates of one order side by side, from register `first` of the array of groups on: while one
+    // waits for the sample before, the others compute. `driven` false: without input, outputs being deviations from rest.
+    template <class T, int W, int N, bool driven>
+    struct SideBySide {
+        using L = Lanes<T, static_cast<int>(Isa::register_bytes / sizeof(T)), Isa>;
+        static constexpr int per_group = W / L::per_register, capacity = room_for(N);
+        template <int S>
+        static void errors(Group<T, W>* groups, int first, const T* input, const T* output, std::size_t n, T* sums) {
+            const int order = N >= 0 ? N : groups[first / per_group].order;
+            L a[S][capacity], b[S][capacity + 1], x[S][capacity], sum[S];
+            const auto row = [&](auto& rows, int s, int i) { return rows[i] + (first + s) % per_group * L::per_register; };
+            for (int s = 0; s < S; ++s) {
+                Group<T, W>& g = groups[(first + s) / per_group];
+                for (int i = 0; i < order; ++i) a[s][i] = L::load(row(g.a, s, i));
+                for (int i = 0; i < order; ++i) x[s][i] = L::load(row(g.x, s, i));
+                if (order == 0) x[s][0] = L(0.0);
+                if constexpr (driven)
+                    for (int i = 0; i <= order; ++i) b[s][i] = L::load(row(g.b, s, i));
+                sum[s] = L(0.0);
+            }
+            for (std::size_t i = 0; i < n; ++i) {
+                const L wanted = L::all(output[i]), r = driven ? L::all(input[i]) : L(0.0);
+                for (int s = 0; s < S; ++s) {
+                    const L e = wanted - recurrence_step<L, N, driven>(order, a[s], b[s], x[s], r);
+                    sum[s] = sum[s] + e * e;
+                }
+            }
+            for (int s = 0; s < S; ++s) {
+                Group<T, W>& g = groups[(first + s) / per_group];
+                for (int i = 0; i < order; ++i) x[s][i].store(row(g.x, s, i));
+                sum[s].store(sums + (first + s) * L::per_register);
+            }
+        }
+    };
+
+    template <class T, int W, int N>
+    struct Stepped {
+        using L = Lanes<T, W, Isa>;
+        static SteppedLoop<L, N> loop_of(const Group<T, W>& g, const Controller<T>& c) {
+            SteppedLoop<L, N> loop{Controller<L>(Loop{}, 0.0)};
+            loop.pi.kp = L::all(c.kp);
+            loop.pi.g = L::all(c.g);
+            loop.pi.torque_limit = L::all(c.torque_limit);
+            loop.pi.integrator_limit = L::all(c.integrator_limit);
+            loop.pi.s = L::load(g.s);
+            return loop;
+        }
+        static void errors(Group<T, W>& g, const Controller<T>& c, const T* input, const T* output, std::size_t n, T* sums) {
+            Bank<T, W, N> k(g);
+            SteppedLoop<L, N> loop = loop_of(g, c);
+            L sum(0.0), u(0.0);
+            for (std::size_t i = 0; i < n; ++i) {
+                const L e = L::all(output[i]) - loop.step(k.order, k.a, k.b, k.x, L::all(input[i]), u);
+                sum = sum + e * e;
+            }
+            k.save(g);
+            loop.pi.s.store(g.s);
+            sum.store(sums);
+        }
+        static void outputs(Group<T, W>& g, const Controller<T>& c, const T* input, std::size_t n, T* y) {
+            Bank<T, W, N> k(g);
+            SteppedLoop<L, N> loop = loop_of(g, c);
+            L u(0.0);
+            for (std::size_t i = 0; i < n; ++i) loop.step(k.order, k.a, k.b, k.x, L::all(input[i]), u).store(y + i * W);
+            k.save(g);
+            loop.pi.s.store(g.s);
+        }
+    };
+
+    template <class T, int W, bool driven>
+    static void side_by_side(Group<T, W>* groups, int lanes, const T* input, const T* output, std::size_t n, T* sums) {
+        constexpr int per_register = static_cast<int>(Isa::register_bytes / sizeof(T));
+        const int registers = (lanes + per_register - 1) / per_register;
+        const auto order = [&](int r) { return groups[r * per_register / W].order; };
+        for (int r = 0; r < registers;) {
+            int same = 1;  // registers of one order from here on
+            while (r + same < registers && order(r + same) == order(r)) ++same;
+            const int s = same <= 3 ? same : (same == 4 ? 2 : Isa::side_by_side);  // none stays alone that need not
+            by_order<8>(order(r), [&](auto N) {
+                using Form = SideBySide<T, W, N, driven>;
+                if (s == 3) Form::template errors<3>(groups, r, input, output, n, sums);
+                else if (s == 2) Form::template errors<2>(groups, r, input, output, n, sums);
+                else Form::template errors<1>(groups, r, input, output, n, sums);
+            });
+            r += s;
+        }
+    }
+    template <class T, int W>
+    static void errors(Group<T, W>* groups, int lanes, const T* input, const T* output, std::size_t n, T* sums) {
+        side_by_side<T, W, true>(groups, lanes, input, output, n, sums);
+    }
+    template <class T, int W>
+    static void settling_errors(Group<T, W>* groups, int lanes, const T* output, std::size_t n, T* sums) {
+        side_by_side<T, W, false>(groups, lanes, nullptr, output, n, sums);
+    }
+    template <class T, int W>
+    static void group_errors(Group<T, W>& g, const T* input, const T* output, std::size_t n, T* sums) {
+        errors<T, W>(&g, W, input, output, n, sums);
+    }
+    template <class T, int W>
+    static void outputs(Group<T, W>& g, const T* in, std::size_t n, T* y) {
+        by_order<8>(g.order, [&](auto N) { Linear<T, W, N>::outputs(g, in, n, y); });
+    }
+    template <class T, int W>
+    static void stepped_errors(Group<T, W>& g, const Controller<T>& c, const T* in, const T* out, std::size_t n, T* sums) {
+        by_order<8>(g.order, [&](auto N) { Stepped<T, W, N>::errors(g, c, in, out, n, sums); });
+    }
+    template <class T, int W>
+    static void stepped_outputs(Group<T, W>& g, const Controller<T>& c, const T* in, std::size_t n, T* y) {
+        by_order<8>(g.order, [&](auto N) { Stepped<T, W, N>::outputs(g, c, in, n, y); });
+    }
+
+    template <class T, int W>
+    static constexpr KernelSet<Group<T, W>, T> set() {
+        return {group_errors<T, W>, errors<T, W>, settling_errors<T, W>, outputs<T, W>};
+    }
+    static Kernels all(const char* name) {
+        using Products = ProductSource<Isa>;
+        return {name,
+                coefficients,
+                words,
+                {set<double, double_lanes>(), stepped_errors<double, double_lanes>, stepped_outputs<double, double_lanes>},
+                set<float, float_lanes>(),
+                Products::gram,
+                Products::differences,
+                Products::whiten,
+                Products::colour};
+    }
+};
+
+}  // namespace gaident

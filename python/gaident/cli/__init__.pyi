@@ -1,0 +1,6 @@
+from .main import COMMANDS, main
+
+__all__ = [
+    "COMMANDS",
+    "main",
+]

@@ -1,0 +1,1 @@
+"""The commands, a module each; gaident/cli/main.py says which name calls which."""

@@ -1,0 +1,87 @@
+"""gaident identify."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+
+from gaident.cli.drive import drive_of, read_all, reading_notes
+from gaident.cli.options import PICTURES
+from gaident.cli.output import apart, draw, naming, print_json, summary_of, target_of
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.diagnosis.controller.replay import Replay, replay
+from gaident.identification.identify import identify
+from gaident.results.settings import Settings
+from gaident.show.progress_bar import Progress
+
+__all__ = ["identify_command"]
+
+_REPLAYED = 1 << 18  # samples of a log on which the controller is run again
+
+
+def identify_command(args: argparse.Namespace) -> None:
+    drive = drive_of(args)
+    out = target_of(args.out, args.logs)
+    plot = target_of(args.plot, args.logs, PICTURES)
+    page = target_of(args.report, args.logs)
+    apart({"--out": out, "--plot": plot, "--report": page})
+    controller = drive.controller()
+    records = read_all(drive, args.logs, controller)
+    settings = Settings.paper() if args.paper else Settings()
+    settings = replace(settings, initial_state=args.initial_state)
+    with Progress(None if args.quiet else sys.stderr) as progress:
+        idn = identify(
+            records,
+            controller,
+            drive.space(records, controller),
+            settings,
+            trials=args.trials,
+            seed=args.seed,
+            workers=args.workers,
+            progress=progress,
+        )
+    # What the logs say of the controller, which the search takes as given.
+    off = [
+        (f"{name}: " if len(records) > 1 else "") + said.sentence + _instead(said, controller)
+        for name, said in _replayed(records, controller)
+    ]
+    idn = replace(idn, warnings=(*reading_notes(drive, records), *off, *idn.warnings))
+    written = []
+    if out is not None:
+        with naming(out):
+            idn.save(out)
+        written.append(out)
+    if plot is not None:
+        draw(idn, records, drive.axis, plot)
+        written.append(plot)
+    if page is not None:
+        from gaident.cli.commands.report import write_report
+
+        write_report(idn, page, records, (), drive.axis)
+        written.append(page)
+    if args.json:
+        print_json(idn.to_dict())
+        return
+    print(summary_of(idn, drive.axis))
+    if written:
+        print(f"\nwritten: {', '.join(map(str, written))}")
+
+
+def _replayed(records: Sequence[Record], controller: PI | None) -> list[tuple[str, Replay]]:
+    """(name, what its replay says) of the records, long ones by their start, whose torque does not follow from the loop."""
+    if controller is None:
+        return []
+    said = [(rec.name, replay(rec[:_REPLAYED], controller)) for rec in records if rec.torque is not None]
+    return [(name, r) for name, r in said if r.follows is False]
+
+
+def _instead(said: Replay, given: PI | None) -> str:
+    """The options of the controller that the log shows, where a PI with a trapezoidal integral has what differs."""
+    found = said.controller
+    if found is None or given is None or said.cause == "scale":  # a wrong unit is not to be mended by gains
+        return ""
+    options = (("kp", found.kp, given.kp), ("ki", found.ki, given.ki), ("torque-limit", found.torque_limit, given.torque_limit))
+    return f" Give {' '.join(f'--{name} {value:.6g}' for name, value, old in options if value is not None and value != old)}."

@@ -1,0 +1,141 @@
+"""What is installed and whether it works: versions, instruction set, threads, libraries, a small identification."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata as metadata
+import os
+import platform
+import re
+import sys
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from gaident.version import version as own_version
+
+__all__ = ["Examination", "Library", "examine"]
+
+_REQUIREMENT = re.compile(r"^([\w.-]+)[^;]*(?:;(.*))?$")
+_EXTRA = re.compile(r"extra\s*==\s*['\"]([\w.-]+)['\"]")
+_MODULES = {"pillow": "PIL"}  # what is imported, where it is not the distribution's name
+_FOR_DEVELOPERS = {"test", "peers", "compare", "tidy", "docs"}
+
+
+@dataclass(frozen=True)
+class Library:
+    """A library that this package uses; version None: it is not there. extra: what installs it, "" if it is required."""
+
+    name: str
+    version: str | None
+    extra: str
+    flaw: str = ""
+
+
+@dataclass(frozen=True)
+class Examination:
+    """What was found; flaws: what is missing or broken, each with its remedy."""
+
+    version: str
+    python: str
+    system: str
+    processor: str
+    instruction_set: str
+    threads: int
+    libraries: tuple[Library, ...]
+    self_test: str
+    flaws: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {"schema": "gaident/doctor", "schema_version": 1, **asdict(self)}
+
+    def __str__(self) -> str:
+        rows = [
+            ("gaident", self.version),
+            ("Python", self.python),
+            ("system", self.system),
+            ("instruction set", self.instruction_set),
+            ("threads", str(self.threads)),
+        ]
+        width = max(len(name) for name, _ in [*rows, *((x.name, "") for x in self.libraries)])
+        lines = [f"{name.ljust(width)}  {value}" for name, value in rows]
+        needed = [x for x in self.libraries if not x.extra]
+        optional = [x for x in self.libraries if x.extra]
+        lines += ["", "needed"] + [f"  {x.name.ljust(width)}{x.flaw or x.version}" for x in needed] if needed else []
+        if optional:
+            missing = 'not installed: pip install "gaident[{}]"'
+            lines += ["", "optional"] + [f"  {x.name.ljust(width)}{x.version or missing.format(x.extra)}" for x in optional]
+        return "\n".join([*lines, "", f"self test: {self.self_test}", *(f"WRONG: {flaw}" for flaw in self.flaws)])
+
+
+def examine() -> Examination:
+    """Looks at this installation; never raises."""
+    libraries = tuple(_libraries())
+    flaws = [f'{x.name} {x.flaw}: pip install --upgrade "{x.name}"' for x in libraries if x.flaw]
+    try:
+        instructions, verdict, right = _self_test()
+    except Exception as error:  # whatever is broken, this is what is asked here
+        instructions, verdict, right = "unknown", f"failed: {type(error).__name__}: {error}", False
+    if not right:
+        flaws.append("the self test failed: install gaident again, and report this output if that does not help")
+    return Examination(
+        own_version(), f"{platform.python_version()} ({sys.executable})", platform.platform(), platform.machine(), instructions,
+        _threads(), libraries, verdict, tuple(flaws),
+    )  # fmt: skip
+
+
+def _threads() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _libraries() -> list[Library]:
+    """What the package's own metadata names; nothing where it runs from its sources."""
+    try:
+        requirements = metadata.requires("gaident") or []
+    except metadata.PackageNotFoundError:
+        return []
+    found: dict[str, Library] = {}
+    for requirement in requirements:
+        match = _REQUIREMENT.match(requirement)
+        if match is None:
+            continue
+        name, marker = match[1], match[2] or ""
+        extra = _EXTRA.search(marker)
+        if (extra is not None and extra[1] in _FOR_DEVELOPERS) or "python_version" in marker or name in (*found, "gaident"):
+            continue
+        found[name] = _library(name, "" if extra is None else extra[1])
+    return sorted(found.values(), key=lambda x: (bool(x.extra), x.extra, x.name))
+
+
+def _library(name: str, extra: str) -> Library:
+    try:
+        version = metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return Library(name, None, extra, "" if extra else "is not installed")
+    if extra:
+        return Library(name, version, extra)
+    try:
+        importlib.import_module(_MODULES.get(name.lower(), name.replace("-", "_")))
+    except Exception as error:
+        return Library(name, version, extra, f"cannot be imported ({type(error).__name__}: {error})")
+    return Library(name, version, extra)
+
+
+def _self_test() -> tuple[str, str, bool]:
+    """(instruction set, what was found, whether that is right): the two masses of the demonstration."""
+    import numpy as np
+
+    from gaident.cli import demonstration as demo
+    from gaident.control import core
+    from gaident.identification.identify import identify
+
+    rest = np.zeros(20)
+    chosen = core.experiment([(rest, rest, 1e-3, "rest", 0.0)], None).kernels
+    rec = demo.two_mass_record(0)
+    began = time.perf_counter()
+    idn = identify(rec, controller=demo.CONTROLLER, seed=0)
+    seconds = time.perf_counter() - began
+    right = (idn.p, idn.q) == (1, 2)
+    found = "two masses found, as they should be" if right else f"(p,q) = ({idn.p},{idn.q}) found where (1,2) is right"
+    return chosen, f"{found}, in {1e3 * seconds:.0f} ms", right

@@ -1,0 +1,8 @@
+"""Controllers as objects, and what they make of a measured velocity."""
+
+from __future__ import annotations
+
+import lazy_loader
+
+# The names stand in __init__.pyi; a name's module is imported when the name is first used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

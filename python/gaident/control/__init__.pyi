@@ -1,0 +1,5 @@
+from .pi import PI
+
+__all__ = [
+    "PI",
+]

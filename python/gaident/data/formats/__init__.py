@@ -1,0 +1,1 @@
+"""Readers of log formats: a file becomes a table of named columns."""

@@ -1,0 +1,1 @@
+"""Work on arrays of samples: differentiate, decimate, resample, lags."""

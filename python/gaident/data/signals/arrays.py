@@ -1,0 +1,109 @@
+"""The checks that every measured channel passes, shared by Record and differentiate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gaident.arguments import arg
+from gaident.errors import RecordError
+
+__all__ = ["MINIMUM_SAMPLES", "channel", "first_not_finite", "positive_number"]
+
+MINIMUM_SAMPLES = 20
+"""Fewer samples identify nothing."""
+
+_REFUSED_KINDS = {
+    "b": ("boolean", "convert it with .astype(float) if 0 and 1 are really meant"),
+    "c": ("complex", "give the real part, x.real"),
+    "O": ("object", "give numbers only, for example numpy.asarray(x, dtype=float)"),
+    "U": ("text", "convert the strings to numbers first"),
+    "S": ("text", "convert the strings to numbers first"),
+    "M": ("a date", "give plain numbers"),
+    "m": ("a time difference", "give plain numbers"),
+    "V": ("structured", "give one of its fields"),
+}
+
+
+def channel(values: ArrayLike, argument: str) -> NDArray[np.float64]:
+    """Copy `values` to a read-only float64 array, shape (n,), n >= 20, all finite; units are the caller's.
+
+    Exactly one copy is made. The result is a view of a read-only array, so that not even its write flag can
+    be set again. Raises RecordError naming `argument`.
+    """
+    array = _as_array(values, argument)
+    if array.ndim != 1:
+        raise RecordError(
+            f"{argument} has the shape {array.shape}, but one dimension is needed, time only; give one "
+            "column, "
+            f"for example {argument}=x[:, 0]"
+        )
+    if array.dtype.kind in _REFUSED_KINDS:
+        kind, remedy = _REFUSED_KINDS[array.dtype.kind]
+        raise RecordError(f"{argument} is {kind} (dtype {array.dtype}), but real numbers are needed; {remedy}")
+    if array.size < MINIMUM_SAMPLES:
+        raise RecordError(f"{argument} has {array.size} samples, but at least {MINIMUM_SAMPLES} are needed; give a longer record")
+    own = isinstance(values, list | tuple) and array.dtype == np.float64
+    with np.errstate(over="ignore"):
+        copy = array if own else np.array(array, dtype=np.float64, order="C")
+    bad = first_not_finite(copy)
+    if bad is not None:
+        raise RecordError(
+            f"{argument}[{bad}] = {copy[bad]}, but every value must be finite; cut the record before that "
+            "sample or "
+            f"repair the value"
+        )
+    copy.flags.writeable = False
+    view: NDArray[np.float64] = copy.view()
+    return view
+
+
+def _as_array(values: ArrayLike, argument: str) -> NDArray[Any]:
+    """numpy.asarray with our errors; a list of whole numbers too large for int64 still is one of numbers."""
+    if isinstance(values, np.ma.MaskedArray) and np.ma.getmaskarray(values).any():
+        bad = int(np.argmax(np.ma.getmaskarray(values).ravel()))
+        raise RecordError(f"{argument}[{bad}] is masked, but every value must be there; cut or repair the record")
+    try:
+        array = np.asarray(values)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise RecordError(
+            f"{argument} is no array ({error}); give one number per sample, for example numpy.asarray(x, dtype=float)"
+        ) from None
+    if array.dtype.kind == "O" and array.ndim == 1 and isinstance(values, list | tuple):
+        return _from_objects(values, array, argument)
+    return array
+
+
+def _from_objects(values: Sequence[Any], array: NDArray[Any], argument: str) -> NDArray[Any]:
+    for index, value in enumerate(values):
+        if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+            raise RecordError(f"{argument}[{index}] = {value!r} is no number; give real numbers only")
+    try:
+        return array.astype(np.float64)
+    except OverflowError:
+        raise RecordError(f"{argument} holds a whole number too large for a float64; scale it first") from None
+
+
+def first_not_finite(array: NDArray[np.float64]) -> int | None:
+    """Index of the first NaN or infinity, None if there is none."""
+    finite = np.isfinite(array)
+    return None if finite.all() else int(np.argmin(finite))
+
+
+def positive_number(value: object, argument: str, unit: str, remedy: str) -> float:
+    """`value` as a float > 0 and finite. Raises RecordError naming `argument`, the value and the remedy."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
+        raise RecordError(f"{arg(argument, repr(value))} is no number; {remedy}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not (math.isfinite(number) and number > 0.0):
+        raise RecordError(f"{arg(argument, repr(value))} {unit}, but it must be positive and finite; {remedy}")
+    return number

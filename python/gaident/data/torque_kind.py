@@ -1,0 +1,52 @@
+"""What a logged torque is, as far as its name tells: the controller's command, or what was measured behind the actuator."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from itertools import pairwise
+
+from gaident.data.column_words import COMMAND_WORDS, FOREIGN_WORDS, QUANTITY_WORDS, words_of
+
+__all__ = ["COMMANDED", "MEASURED", "TORQUE_KINDS", "kind_of_torque", "kind_of_column"]
+
+COMMANDED, MEASURED = "commanded", "measured"
+TORQUE_KINDS = (COMMANDED, MEASURED)
+"""What a logged torque may be: the controller's command, or a measured current times a constant."""
+
+_BEHIND_ACTUATOR = frozenset(
+    {"act", "actual", "ist", "istwert", "meas", "measured", "gemessen", "fb", "fbk", "feedback", "sensor"}
+)
+_QUADRATURE = frozenset({"iq"})  # a drive's name for the torque-forming current that its transducers see
+_SYMBOL = re.compile(r"(?:current|torque|strom|moment|trq|tau|iq|i|m|t)(?=\w\w)")
+
+
+def kind_of_torque(names: Iterable[str]) -> str | None:
+    """ "commanded" or "measured", from a torque column's names; None where they do not say.
+
+    A word for a command (reference, set point, Soll) counts before one for a measurement (actual, feedback, Ist): the actual
+    set point is a set point. `I_q` alone is the measured current.
+
+    >>> [kind_of_torque([name]) for name in ("Iq_ref", "Actual current [A]", "M_ist", "Iist", "I_q", "Torque")]
+    ['commanded', 'measured', 'measured', 'measured', 'measured', None]
+    """
+    words = {word for name in names for word in _split(name)}
+    if words & COMMAND_WORDS:
+        return COMMANDED
+    return MEASURED if words & (_BEHIND_ACTUATOR | _QUADRATURE) else None
+
+
+def kind_of_column(names: Iterable[str]) -> str | None:
+    """The same for any column: None where its name speaks of no torque and no current."""
+    held = tuple(names)
+    words = {word for name in held for word in _split(name)}
+    return kind_of_torque(held) if words & QUANTITY_WORDS["torque"].keys() and not words & FOREIGN_WORDS else None
+
+
+def _split(name: str) -> list[str]:
+    """The words, with what stands behind a symbol as a word of its own: `Iist` is I and ist, `I_q` is iq."""
+    words = words_of(name)
+    cut = [(symbol[0], word[symbol.end() :]) for word in words if (symbol := _SYMBOL.match(word)) is not None]
+    behind = [part for symbol, rest in cut if rest in COMMAND_WORDS | _BEHIND_ACTUATOR for part in (symbol, rest)]
+    joined = ["iq" for one, two in pairwise(words) if (one, two) == ("i", "q")]
+    return [*words, *behind, *joined]

@@ -1,0 +1,1 @@
+"""The logged torque against the controller: its replay, and what explains a difference."""

@@ -1,0 +1,216 @@
+"""What the logged torque says of the controller, decided without a plant: gains, limits, effects at its place.
+
+Where the log follows from command and velocity through the controller, nothing of it needs a plant any more. Where it follows
+only with other gains, these are used; where only with a limit, that is a finding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.pi import PI
+from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
+from gaident.data.record import Record
+from gaident.diagnosis.controller.replay import Replay, replay
+from gaident.diagnosis.controller.replay_causes import white_noise
+from gaident.diagnosis.library.names import CLAMP, SATURATION
+from gaident.diagnosis.library.terms import IN_CONTROLLER
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.term import Scales, Term
+from gaident.models.effects import table
+from gaident.results.diagnosis import Finding
+from gaident.results.estimate import Estimate
+
+__all__ = ["AtController", "as_logged", "as_read", "controller_findings"]
+
+Vector = NDArray[np.float64]
+
+DECIDED = tuple(t.name for t in IN_CONTROLLER)
+SAME_GAINS, SAME_LIMITS = 1e-2, 2e-3  # relative differences within which records show the same gains or limits
+LIMITS = ("torque_limit", CLAMP, "anti_windup")  # causes that a replay finds
+CLOSE = 1e-3  # of the replay's squared error: what an effect may leave that explains it
+
+
+@dataclass
+class AtController:
+    """Which effects of the controller need no plant any more, and those that are there, with parameters.
+
+    controller: the given one with the limits that were found; None: none were. follows: whether the logged torque follows from
+    all that, or there is none.
+    """
+
+    decided: tuple[str, ...] = ()
+    effects: dict[str, dict[str, float]] = field(default_factory=dict)
+    controller: PI | None = None
+    follows: bool = True
+
+
+def as_logged(records: Sequence[Record], controller: PI | None) -> tuple[PI | None, list[str]]:
+    """(the controller with the gains that all logged torques show where they do not follow from the given ones, notes).
+
+    A rectangular integral is a trapezoidal one with kp + ki dt/2, or kp - ki dt/2 where it lacks the newest error.
+    """
+    if controller is None or any(r.torque is None or r.command is None for r in records):
+        return controller, []
+    off = [r for r in (replay(r, controller) for r in records) if r.follows is False]
+    found = [r.controller for r in off if r.controller is not None and r.cause in ("gains", "scale", "integration_rule")]
+    if not found or len(found) < len(records):
+        return controller, []
+    gains = np.array([[c.kp, c.ki] for c in found])
+    if np.any(np.ptp(gains, axis=0) > SAME_GAINS * gains.max(axis=0)):
+        return controller, []
+    kp, ki = (float(g) for g in gains.mean(axis=0))
+    if all(r.cause == "integration_rule" for r in off):
+        used = f"All simulations use kp = {kp:.4g} N m s/rad, with which a trapezoidal integral makes the same torque."
+    else:
+        used = (
+            f"All simulations use these (kp = {kp:.4g} N m s/rad, ki = {ki:.4g} N m/rad, trapezoidal integral) instead of the "
+            f"given ones ({controller.kp:.4g} and {controller.ki:.4g})."
+        )
+    return replace(controller, kp=kp, ki=ki), [off[0].sentence, used]
+
+
+def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: PI | None) -> tuple[Record, ...]:
+    """The records as the controller read them: cleaned of outliers only where the logged torque follows better from that."""
+    if controller is None or any(r.torque is None or r.command is None for r in recorded):
+        return tuple(cleaned)
+    pairs = [
+        (r, c) if r is c else min((r, c), (c, r), key=lambda pair: _replay_error(pair[0], controller))
+        for r, c in zip(recorded, cleaned, strict=True)
+    ]
+    return tuple(best for best, _ in pairs)
+
+
+def _replay_error(rec: Record, controller: PI) -> float:
+    """Mean square of logged minus replayed torque [(N m)^2]."""
+    assert rec.command is not None and rec.torque is not None
+    return float(np.mean((rec.torque - pi_torque(rec.command, rec.velocity, rec.dt, controller)) ** 2))
+
+
+def controller_findings(data: DataSet, scales: Scales) -> tuple[list[Finding], AtController, list[str]]:
+    """(findings, what is decided, notes). Without a logged torque nothing is decided here."""
+    controller = data.controller
+    if controller is None or not data.torque_logged or data.command is None:
+        return [], AtController(), []
+    replays = [replay(r, controller) for r in data.read]
+    off = [r for r in replays if not r.follows]
+    if not off:
+        return [], AtController(DECIDED), []
+    said = [(rec.name or f"a record of {len(rec)} samples", r) for rec, r in zip(data.read, replays, strict=True)]
+    notes = list(dict.fromkeys(f"{name}: {r.sentence}" if len(said) > 1 else r.sentence for name, r in said if not r.follows))
+    plain = data.replayed_error({})
+    floor = len(plain) * max(max(r.resolution for r in replays), 1e-9 * scales.torque) ** 2
+    shown = _limits_shown(off, controller)
+    if shown is not None:
+        return _limit_findings(data, shown, off, plain, floor, notes)
+    best = min(((*_fitted(data, scales, term), term) for term in IN_CONTROLLER), key=lambda found: found[1])
+    value, cost, term = best
+    effect = term.name
+    n, before = len(plain), float(plain @ plain)
+    left = data.replayed_error({term: np.array([value])})
+    if cost < CLOSE * before or cost < 4.0 * floor or white_noise(left, data.torque):
+        parameter = next(r for r in table() if r.name == effect).parameters[0]
+        name, unit = parameter.name, parameter.unit
+        text = (
+            f"The logged torque does not follow from command and velocity (rms {np.sqrt(before / n):.3g} N m); with "
+            f"{name} {value:.4g} {unit} of the {effect.replace('_', ' ')} it does, to {np.sqrt(cost / n):.2g} N m rms. "
+            "No model of the plant is involved."
+        )
+        finding = _finding(effect, name, Estimate(value, _std(data, term, value, cost), unit), before, cost, floor, n, text)
+        at = AtController(DECIDED, {effect: {name: value}})
+        if effect == CLAMP:
+            at.controller = replace(controller, integrator_limit=value)
+        return [finding], at, []
+    return [], AtController(DECIDED, follows=False), notes
+
+
+def _limits_shown(off: Sequence[Replay], controller: PI) -> PI | None:
+    """The controller with the limits that all replays that do not follow agree on; None where they do not, or there are none."""
+    found = [r.controller for r in off if r.controller is not None and r.cause in LIMITS]
+    if len(found) < len(off):
+        return None
+    limits = np.array([c.limits for c in found])
+    low, high = limits.min(axis=0), limits.max(axis=0)
+    if np.any(low < (1.0 - SAME_LIMITS) * high):
+        return None
+    torque, clamp = (None if not np.isfinite(x) else float(x) for x in high)
+    return replace(controller, torque_limit=torque, integrator_limit=clamp)
+
+
+def _limit_findings(
+    data: DataSet, shown: PI, off: Sequence[Replay], plain: Vector, floor: float, notes: list[str]
+) -> tuple[list[Finding], AtController, list[str]]:
+    """What the limits that the log shows are findings of; the note that the replay wrote is their evidence."""
+    given = data.controller
+    assert given is not None
+    n, before, after = len(plain), float(plain @ plain), _left_with(data, shown)
+    held = any(r.cause == "anti_windup" for r in off)
+    at = AtController((*DECIDED, SATURATION), controller=shown, follows=not held)
+    if not held and shown.limits[1] == given.limits[1]:
+        notes = []  # the finding says it all
+    findings = []
+    for effect, value, was in (
+        (SATURATION, shown.torque_limit, given.torque_limit),
+        (CLAMP, shown.integrator_limit, given.integrator_limit),
+    ):
+        if value is None or value == was:
+            continue
+        at.effects[effect] = {"limit": value}
+        name = "plateau of the logged torque" if effect == SATURATION else "highest integral that the log shows"
+        text = f"{off[0].sentence} The limit is the {name}; no model of the plant is involved."
+        std = max(*(r.resolution for r in off), float(np.sqrt(after / n)))
+        findings.append(_finding(effect, "limit", Estimate(value, std, "N m"), before, after, floor, n, text))
+    if held:
+        notes = [] if findings else notes
+        notes.append(
+            "The simulated controller does not hold its integrator at the limit: its free run winds up where the drive's does "
+            "not, and says nothing about the mechanics there."
+        )
+    return findings, at, notes
+
+
+def _left_with(data: DataSet, controller: PI) -> float:
+    """Squared error of the logged torques that a limited controller leaves, with or without an anti-windup [(N m)^2]."""
+    total = 0.0
+    for r in data.read:
+        assert r.command is not None and r.torque is not None
+        made = [pi_torque(r.command, r.velocity, r.dt, controller)]
+        made += [held_torque(r.command, r.velocity, r.dt, controller, rule) for rule in HOLDS]
+        total += min(float(np.sum((r.torque - u) ** 2)) for u in made)
+    return total
+
+
+def _finding(effect: str, name: str, estimate: Estimate, before: float, after: float, floor: float, n: int, text: str) -> Finding:
+    gain = float(n * np.log(before / max(after, floor, 1e-300)) - np.log(n))
+    return Finding(effect, {name: estimate}, (), 1.0 - float(np.sqrt(min(after / before, 1.0))), gain, None, text)
+
+
+def _fitted(data: DataSet, scales: Scales, term: Term) -> tuple[float, float]:
+    """(value, cost) of the effect that comes closest to the logged torque: grid, then golden section on the logarithm."""
+    from scipy.optimize import minimize_scalar
+
+    low, high = term.limits(scales)[0]
+
+    def cost(z: float) -> float:
+        e = data.replayed_error({term: np.array([np.exp(z)])})
+        return float(e @ e)
+
+    grid = np.linspace(low, high, 25)
+    costs = [cost(z) for z in grid]
+    k = int(np.argmin(costs))
+    bracket = (grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)])
+    found = minimize_scalar(cost, bounds=bracket, method="bounded", options={"xatol": 1e-7})
+    return (float(np.exp(found.x)), float(found.fun)) if found.fun < costs[k] else (float(np.exp(grid[k])), costs[k])
+
+
+def _std(data: DataSet, term: Term, value: float, cost: float) -> float:
+    """Standard deviation from the slope of the replay."""
+    h = 1e-4 * value
+    low, high = (data.replayed_error({term: np.array([v])}) for v in (value - h, value + h))
+    slope = (high - low) / (2.0 * h)
+    power = float(slope @ slope)
+    return float(np.sqrt(cost / len(slope) / power)) if power > 0.0 else float("inf")

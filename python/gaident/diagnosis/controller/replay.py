@@ -1,0 +1,131 @@
+"""Controller replay: the PI run again on the measured velocity; does the logged torque follow from it?
+
+No plant is needed: what the controller does is decided before any mechanism is blamed. The rule stands in `pi_torque`; where
+the logged torque does not follow, `replay_causes` looks for the simple reasons.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.arguments import TORQUE
+from gaident.control.pi import PI
+from gaident.control.pi_torque import pi_torque
+from gaident.data.record import Record
+from gaident.diagnosis.controller.replay_causes import explain, rounded_command, white_noise
+from gaident.diagnosis.records.lattice import lattice_step, rounding_step
+from gaident.errors import RecordError
+
+__all__ = ["Replay", "replay"]
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """What the controller must have issued, and how the log compares.
+
+    torque      the best torque there is [N m], shape (n,): the logged one, or the replayed one where none is logged
+    replayed    what the controller as configured makes of command and velocity [N m], shape (n,); None without a controller
+    rms, maximum  of logged minus replayed [N m]; nan where there is nothing to compare
+    resolution  lattice of the logged torque [N m]; 0: none
+    follows     the logged torque follows from command and velocity as configured, to its resolution or within white noise,
+                with a free start of the integrator; None: nothing to compare
+    cause       what makes it follow: "" (nothing found, or nothing needed), "initial_integral" (the record starts under load),
+                or, where it does not follow as configured, "scale", "gains", "integration_rule", "shift", "torque_limit",
+                "integrator_clamp", "anti_windup" (a torque limit at which the integrator does not wind up),
+                "command_rate_limit"
+    value       the number of the cause: initial integral [N m], factor, samples of shift, limit [N m], rate [rad/s^2]; nan for
+                the others
+    departs     first sample at which the configured controller departs from the log; None: it does not
+    sentence    all this in words
+    controller  as the log shows it, where a PI has what differs: gains and limits; else None
+    """
+
+    torque: Vector
+    replayed: Vector | None
+    rms: float
+    maximum: float
+    resolution: float
+    follows: bool | None
+    cause: str
+    value: float
+    departs: int | None
+    sentence: str
+    controller: PI | None = None
+
+
+def replay(rec: Record, controller: PI | None) -> Replay:
+    """Runs the controller again on the measured velocity and compares with the logged torque.
+
+    controller: None for the open loop, where the record's torque is returned as it is. Raises RecordError where neither a
+    torque nor what makes one is there.
+    """
+    logged = rec.torque
+    if controller is None or rec.command is None:
+        if logged is None:
+            raise RecordError(f"the record has no torque and nothing to make it from: give {TORQUE}, or a command and PI(...)")
+        why = "open loop, there is no controller" if controller is None else "the record has no command"
+        return _unchecked(logged, None, f"The logged torque cannot be checked: {why}.")
+    replayed = pi_torque(rec.command, rec.velocity, rec.dt, controller)
+    if logged is None:
+        return _unchecked(replayed, replayed, "No torque is logged: it is replayed from command and velocity, unchecked.")
+    return _compared(rec, rec.command, controller, logged, replayed)
+
+
+def _unchecked(torque: Vector, replayed: Vector | None, sentence: str) -> Replay:
+    resolution = 0.0 if torque is replayed else lattice_step(torque)
+    return Replay(torque, replayed, np.nan, np.nan, resolution, None, "", np.nan, None, sentence)
+
+
+def _compared(rec: Record, command: Vector, controller: PI, logged: Vector, replayed: Vector) -> Replay:
+    resolution = lattice_step(logged)
+    tolerance = _tolerance(rec, command, controller, logged)
+    off = logged - replayed
+    rms, maximum = float(np.sqrt(np.mean(off**2))), float(np.abs(off).max())
+    figures = (logged, replayed, rms, maximum, resolution)
+    head = "The logged torque follows from command and velocity through this controller"
+    if maximum <= tolerance:
+        to = f"to {maximum:.1g} N m" + (f" (its resolution is {resolution:.2g} N m)" if resolution > 0.0 else "")
+        return Replay(*figures, True, "", np.nan, None, f"{head}, {to}.")
+    if rounded_command(off, command, rec.dt, controller):
+        return Replay(*figures, True, "", np.nan, None, f"{head}, to {maximum:.1g} N m, which is the rounding of the log.")
+    if noise := white_noise(off, logged):
+        text = f"{head} up to white noise of {noise:.2g} N m rms: it is a measured torque, or a coarsely rounded one."
+        return Replay(*figures, True, "", np.nan, None, text)
+    found = explain(command, rec.velocity, rec.dt, controller, logged, tolerance)
+    if found is not None and found.cause == "initial_integral":
+        return Replay(*figures, True, found.cause, found.value, None, f"{head}, {found.sentence}")
+    departs = int(np.argmax(np.abs(off) > tolerance))
+    head = (
+        "The logged torque does not follow from command and velocity through this controller: it departs first at sample "
+        f"{departs} ({departs * rec.dt:.4g} s), by {rms:.2g} N m rms and {maximum:.2g} N m at most"
+    )
+    if found is not None:
+        return Replay(*figures, False, found.cause, found.value, departs, f"{head}. {found.sentence}", found.controller)
+    text = (
+        f"{head}, and none of the simple reasons explains it (start of the integrator, gains, scale, sign, rule of integration, "
+        "shift by samples, limits). Is this the controller, and are these the signals it saw?"
+    )
+    return Replay(*figures, False, "", np.nan, departs, text)
+
+
+def _tolerance(rec: Record, command: Vector, controller: PI, logged: Vector) -> float:
+    """Three steps of the torque's rounding, and what rounded decimals of velocity and command do to P part and integral [N m].
+
+    A coarse lattice of the velocity is the encoder's, and the controller read the same numbers; a fine one is the text log's,
+    and then the command's decimals are no finer. Each of N velocities is rounded by itself, a command once for all the samples
+    that it is held; the integrator adds up what is off, evenly within +-q/2:
+
+        sum of the squares = ki^2 dt^2 (N q_w^2 + sum L_i^2 q_r^2)/12        L_i: samples for which a command is held
+    """
+    q = rounding_step(rec.velocity)
+    q_w = q if q < 1e-3 * float(np.ptp(rec.velocity)) else 0.0
+    q_r = min(q_w, rounding_step(command))
+    held = np.diff(np.flatnonzero(np.concatenate([[True], np.diff(command) != 0.0, [True]])))
+    drift = controller.ki * rec.dt * np.sqrt((len(rec) * q_w**2 + float(held @ held) * q_r**2) / 12.0)
+    own = 3.0 * rounding_step(logged) + 1e-6 * float(np.abs(logged).max())
+    return float(own + controller.kp * (q_w + q_r) + 3.0 * drift)

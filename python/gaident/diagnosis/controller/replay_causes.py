@@ -1,0 +1,300 @@
+"""Why a logged torque does not follow from command and velocity: the simple reasons, simplest first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.filtering import filtered, rate_limited
+from gaident.control.pi import PI
+from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
+from gaident.diagnosis.library.names import CLAMP, RATE_LIMIT
+from gaident.identification.noise import ljung_box
+
+__all__ = ["Explanation", "explain", "rounded_command", "white_noise"]
+
+Vector = NDArray[np.float64]
+
+SHIFTS = (0, 1, -1, 2, -2)  # samples by which what the controller saw may be older (+) than the log's
+# By how much of ki dt the newest error counts more than half, and the one before less: the rule of integration in words.
+RULES = {0.0: "", 0.5: "a rectangular integral", -0.5: "a rectangular integral that lacks the newest error"}
+PLATEAU = 5  # samples at a limit from which it is one that an integrator is held at
+SAME = 2e-3  # relative difference below which a fitted gain is the configured one
+RPM = 30.0 / np.pi  # rpm in 1 rad/s
+ROUNDED = 5e-5  # part of the largest command, that a command may be off in a log of few decimals
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A changed controller; its torque [N m], shape (n,), but for `edge` samples at both ends. Cause and value as in `Replay`.
+
+    controller: the changed one, where a PI has what was changed.
+    """
+
+    torque: Vector
+    cause: str
+    value: float
+    sentence: str
+    edge: int = 0
+    changes: int = 1  # how much of the configured controller is given up; the fewer the better
+    controller: PI | None = None
+
+    def off(self, logged: Vector) -> Vector:
+        """Logged minus explained torque [N m], without the edges."""
+        return (logged - self.torque)[self.edge : len(logged) - self.edge]
+
+
+class _Gains(NamedTuple):
+    """Gains as a fit gives them, of either sign: those of a PI are not negative."""
+
+    kp: float  # N m s/rad
+    ki: float  # N m/rad
+
+
+class _Case(NamedTuple):
+    """What every reason is tried on."""
+
+    command: Vector
+    velocity: Vector
+    dt: float
+    controller: PI
+    logged: Vector
+
+    def torque(self, controller: PI, start: float = 0.0) -> Vector:
+        return pi_torque(self.command, self.velocity, self.dt, controller, start)
+
+
+def explain(command: Vector, velocity: Vector, dt: float, controller: PI, logged: Vector, tolerance: float) -> Explanation | None:
+    """The first reason that leaves at most `tolerance` [N m] at every sample; else the best, if it leaves white noise."""
+    case = _Case(command, velocity, dt, controller, logged)
+    best, least = None, np.inf
+    for reason in (_start, _limits, _held, _rate, _linear):
+        for found in reason(case):
+            off = found.off(logged)
+            if float(np.abs(off).max()) <= tolerance or rounded_command(off, command, dt, found.controller or controller):
+                return found
+            rms = float(np.sqrt(np.mean(off**2)))
+            if rms < 0.99 * least:  # a later, more complicated reason must be better
+                best, least = found, rms
+    return best if best is not None and white_noise(best.off(logged), logged) else None
+
+
+def rounded_command(off: Vector, command: Vector, dt: float, controller: PI) -> bool:
+    """Whether what is off [N m] is what the controller makes of a command that is off by no more than a log's decimals.
+
+    A command that is held is off by the same for as long, which adds up in the integrator. The error d(n) of the command that
+    makes off(n), h = ki dt/2:
+
+        off(n) - off(n-1) = (kp + h) d(n) - (kp - h) d(n-1)
+    """
+    if controller.kp <= 0.5 * controller.ki * dt or controller.limited:
+        return False
+    d = _error_of(off, controller, dt)
+    return float(np.abs(d).max()) <= ROUNDED * float(np.abs(command).max())
+
+
+def _error_of(torque: Vector, controller: PI, dt: float) -> Vector:
+    """The control error e [rad/s] that makes this torque u [N m], h = ki dt/2:
+
+        (kp + h) e(n) = (kp - h) e(n-1) + u(n) - u(n-1)
+
+    Both are 0 before the record.
+    """
+    kp, h = controller.kp, 0.5 * controller.ki * dt
+    rise = np.array([1.0, -1.0]) / (kp + h)
+    decay = np.array([1.0, (h - kp) / (kp + h)])
+    error: Vector = filtered(rise, decay, torque[None, :], [len(torque)])[0]
+    return error
+
+
+def white_noise(off: Vector, logged: Vector) -> float:
+    """Standard deviation [N m] of `off` where it is white noise small against the torque; 0.0 where it is not."""
+    spread = float(np.std(off))
+    small = spread < 0.1 * float(np.std(logged)) and abs(float(np.mean(off))) < 4.0 * spread / np.sqrt(len(off))
+    return spread if small and ljung_box([off], min(20, len(off) // 5)) > 1e-4 else 0.0
+
+
+def _start(case: _Case) -> Iterator[Explanation]:
+    """A record that starts under load: the integrator held something before it."""
+    start = float(np.median(case.logged - case.torque(case.controller)))
+    sentence = f"with {start:.4g} N m in the integrator at the record's start: the record begins under load."
+    yield Explanation(case.torque(case.controller, start), "initial_integral", start, sentence)
+
+
+def _limits(case: _Case) -> Iterator[Explanation]:
+    """Clamps that are not configured act where the log shows their plateaus."""
+    controller, highest = case.controller, float(np.abs(case.logged).max())
+    if not highest > 0.0:
+        return
+    for limited in _limited(case):
+        limit = float(limited.limits[0])
+        for share, words in _rules(controller):
+            alike = _trapezoidal(limited, share, case.dt)
+            torque = case.torque(alike)
+            acting = _acting(torque, limit)
+            if share and acting < PLATEAU:  # the log's largest torque may have another reason
+                continue
+            sentence = f"It does with {words}a torque limit of {limit:.4g} N m, which acts at {acting} samples."
+            yield Explanation(torque, "torque_limit", limit, sentence, controller=alike)
+    proportional = controller.kp * (case.command - case.velocity)
+    for torque_limit in (controller.torque_limit, highest):
+        free = np.ones(len(proportional), bool) if torque_limit is None else np.abs(case.logged) < 0.999 * torque_limit
+        clamp = float(np.abs((case.logged - proportional)[free]).max(initial=0.0))
+        if not clamp > 0.0:
+            continue
+        limited = replace(controller, torque_limit=torque_limit, integrator_limit=clamp)
+        torque = case.torque(limited)
+        more = "" if torque_limit == controller.torque_limit else f" and a torque limit of {torque_limit:.4g} N m"
+        acting = int(np.sum(np.abs(torque - proportional) >= 0.999 * clamp))
+        sentence = f"It does with the integral clamped to {clamp:.4g} N m{more}; the clamp acts at {acting} samples."
+        yield Explanation(torque, CLAMP, clamp, sentence, controller=limited)
+
+
+def _limited(case: _Case) -> list[PI]:
+    """The controller with limits that are not configured: the log's highest torque, the middle of its noisy plateau."""
+    size = np.abs(case.logged)
+    highest = float(size.max())
+    if case.controller.torque_limit is not None and highest >= 0.999 * case.controller.torque_limit:
+        return []
+    middle = float(np.median(size[size > 0.95 * highest]))
+    return [replace(case.controller, torque_limit=limit) for limit in dict.fromkeys((highest, middle))]
+
+
+def _rules(controller: PI) -> Iterator[tuple[float, str]]:
+    """(share, words to go before others) of the rules of integration; one alone where nothing is integrated."""
+    for share, words in RULES.items():
+        if share == 0.0 or controller.ki:
+            yield share, f"{words} and " if words else ""
+
+
+def _trapezoidal(controller: PI, share: float, dt: float) -> PI:
+    """The PI whose trapezoidal integral does, within the limits, what this one does with a rule of that share."""
+    return replace(controller, kp=max(controller.kp + share * controller.ki * dt, 0.0))
+
+
+def _acting(torque: Vector, limit: float) -> int:
+    return int(np.sum(np.abs(torque) >= 0.999 * limit))
+
+
+def _held(case: _Case) -> Iterator[Explanation]:
+    """A torque limit, configured or seen as a plateau of the log, at which the integrator does not wind up."""
+    if not case.controller.ki or not np.any(case.logged):
+        return
+    for limited in _limited(case) or [case.controller]:
+        limit = float(limited.limits[0])
+        for share, integral in _rules(limited):
+            for rule, words in HOLDS.items():
+                torque = held_torque(case.command, case.velocity, case.dt, limited, rule, share=share)
+                acting = _acting(torque, limit)
+                if acting < PLATEAU:
+                    continue
+                sentence = f"It does with {integral}{words} (anti-windup): the limit of {limit:.4g} N m acts at {acting} samples."
+                alike = _trapezoidal(limited, share, case.dt)
+                yield Explanation(torque, "anti_windup", limit, sentence, controller=alike)
+
+
+def _rate(case: _Case) -> Iterator[Explanation]:
+    """A rate limit ahead of the controller: the command it must have seen, solved from the torque,
+
+        u(n) - u(n-1) = (kp + h) e(n) - (kp - h) e(n-1),  h = ki dt/2,  r(n) = e(n) + w(n),
+
+    moves with the slope of the limit where it is not the logged one.
+    """
+    if case.controller.kp <= 0.5 * case.controller.ki * case.dt or case.controller.limited:
+        return
+    seen = _error_of(case.logged, case.controller, case.dt) + case.velocity
+    behind = np.abs(seen - case.command)[1:] > 1e-3 * float(np.abs(case.command).max())
+    slopes = np.abs(np.diff(seen))[behind] / case.dt
+    if len(slopes) == 0:
+        return
+    middle = float(np.median(slopes))
+    near = slopes[np.abs(slopes - middle) <= 0.2 * middle]
+    if len(near) == 0 or not middle > 0.0:
+        return
+    rate = float(np.mean(near))
+    for start in (float(case.command[0]), 0.0):
+        limited = rate_limited(case.command, rate, case.dt, start)
+        torque = pi_torque(limited, case.velocity, case.dt, case.controller)
+        sentence = f"It does with the command limited to a slope of {rate:.4g} rad/s^2 ahead of the controller."
+        yield Explanation(torque, RATE_LIMIT, rate, sentence)
+
+
+def _linear(case: _Case) -> Iterator[Explanation]:
+    """u(n) = kp' e(n - shift) + ki' dt sum e + I0 by least squares, for every rule of integration and shift.
+
+    A rectangular integral is a trapezoidal one with kp + ki dt/2 or kp - ki dt/2: what keeps the configured gains comes first.
+    """
+    yield from sorted(_fitted(case), key=lambda found: found.changes)
+
+
+def _fitted(case: _Case) -> Iterator[Explanation]:
+    top = case.controller.limits[0]
+    for shift in SHIFTS:
+        e = _shifted(case.command - case.velocity, shift)
+        for share, _ in _rules(case.controller):
+            columns = [e, case.dt * _sum(e, share), np.ones(len(e))] if case.controller.ki else [e, np.ones(len(e))]
+            table = np.column_stack(columns)
+            used = np.abs(case.logged) < 0.999 * top
+            used[: abs(shift)] = used[len(used) - abs(shift) :] = False
+            sizes = np.linalg.norm(table[used], axis=0)
+            if not np.all(sizes > 0.0):
+                continue
+            solved = np.linalg.lstsq(table[used] / sizes, case.logged[used], rcond=1e-12)[0] / sizes
+            torque = np.clip(table @ solved, -top, top)
+            gains = _Gains(float(solved[0]), float(solved[1]) if case.controller.ki else 0.0)
+            yield _named(case.controller, gains, case.dt, float(solved[-1]), shift, share, torque)
+
+
+def _named(controller: PI, gains: _Gains, dt: float, start: float, shift: int, share: float, torque: Vector) -> Explanation:
+    """Says what of a fitted controller differs from the configured one."""
+    kp, ki = gains
+    differs, cause, value = [], "", np.nan
+    if shift:
+        age = "older" if shift > 0 else "newer"
+        differs.append(f"command and velocity {abs(shift)} sample{'s' if abs(shift) > 1 else ''} {age} than the log's")
+        cause, value = "shift", float(shift)
+    if share:
+        differs.append(RULES[share])
+        cause = cause or "integration_rule"
+    factors = [found / given for found, given in ((kp, controller.kp), (ki, controller.ki)) if given]
+    fitted_kp = abs(kp) > SAME * ki and not controller.kp
+    if any(abs(f - 1.0) > SAME for f in factors) or fitted_kp:
+        if max(factors) - min(factors) <= SAME * abs(factors[0]) and not fitted_kp:
+            turned = " (a reversed sign)" if factors[0] < 0.0 else ""
+            differs.append(f"its torque multiplied by {factors[0]:.5g}{turned}: {_check_unit(factors[0])}")
+            cause, value = "scale", factors[0]
+        else:
+            differs.append(f"kp = {kp:.4g} N m s/rad and ki = {ki:.4g} N m/rad")
+            cause, value = "gains", np.nan
+    if abs(start) > 1e-3 * float(np.abs(torque).max()):
+        differs.append(f"an integral that starts at {start:.4g} N m")
+        if not cause:
+            cause, value = "initial_integral", start
+    sentence = f"It does with {', and '.join(differs) or 'these gains'}."
+    same_kp = kp + share * ki * dt  # of a trapezoidal integral
+    known = cause in ("gains", "scale", "integration_rule") and same_kp >= 0.0 and ki >= 0.0 and same_kp + ki > 0.0
+    found = replace(controller, kp=same_kp, ki=ki) if known else None
+    return Explanation(torque, cause or "gains", value, sentence, abs(shift), len(differs) + 2 * (cause == "gains"), found)
+
+
+def _check_unit(factor: float) -> str:
+    if abs(factor * RPM - 1.0) <= SAME:
+        return "speeds in rpm seem to be taken for rad/s; check their unit"
+    return "check the units of the torque, of the speeds and of the gains"
+
+
+def _sum(e: Vector, share: float) -> Vector:
+    return np.cumsum(e) - (0.5 - share) * e
+
+
+def _shifted(x: Vector, shift: int) -> Vector:
+    """x(n - shift); what lies beyond the ends repeats them."""
+    if shift == 0:
+        return x
+    if shift > 0:
+        return np.concatenate([np.full(shift, x[0]), x[:-shift]])
+    return np.concatenate([x[-shift:], np.full(-shift, x[-1])])

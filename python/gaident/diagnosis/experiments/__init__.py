@@ -1,0 +1,1 @@
+"""What a record excites, and which experiment to make."""

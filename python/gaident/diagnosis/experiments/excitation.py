@@ -1,0 +1,188 @@
+"""What records excited, and what they therefore cannot judge: "no evidence of X" and "X was never triggered" are two answers.
+
+Figures are of all records together; plain physics only. Whether two effects that were triggered can be told apart is another
+question, which the rival fits answer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.diagnosis.library.triggers import Motion, not_testable, one_sided
+from gaident.errors import RecordError
+from gaident.models.drive_torque import torque_of
+from gaident.models.model import Model
+from gaident.models.starts import noise_std
+
+__all__ = ["Excitation", "excitation", "position_of"]
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What the records did.
+
+    duration          [s], of all records
+    highest_speed     max |w| [rad/s]
+    speeds            distinct speeds held, signed, ascending [rad/s]; standstill is 0.0
+    reversals         changes of the velocity's sign, noise left out
+    slow              time moving below a tenth of the highest speed [s]
+    standstill        time at rest [s]
+    highest_torque    max |u| [N m]; torque_share: of the controller's torque limit (nan without one)
+    torque_reversals  changes of the torque's sign, noise left out
+    opposed           share of the moving time in which torque and velocity have opposite signs
+    revolutions       travel (farthest minus nearest position) in turns
+    steps             distinct sizes of command jumps [rad/s], ascending
+    repeated          a speed held in the first third is held in the last third too
+    not_testable      effect -> why the records say nothing about it
+    one_sided         effect -> which sizes of it would not have shown
+    """
+
+    duration: float
+    highest_speed: float
+    speeds: tuple[float, ...]
+    reversals: int
+    slow: float
+    standstill: float
+    highest_torque: float
+    torque_share: float
+    torque_reversals: int
+    opposed: float
+    revolutions: float
+    steps: tuple[float, ...]
+    repeated: bool
+    not_testable: Mapping[str, str]
+    one_sided: Mapping[str, str]
+
+    @property
+    def sentence(self) -> str:
+        """The figures in words."""
+        moving = [v for v in self.speeds if v]
+        held = f"{len(moving)} speed{'s' if len(moving) != 1 else ''} held" if moving else "no speed held"
+        share = f" ({100.0 * self.torque_share:.0f} % of the limit)" if math.isfinite(self.torque_share) else ""
+        return (
+            f"{self.duration:.3g} s, up to {self.highest_speed:.4g} rad/s and {self.highest_torque:.3g} N m{share}; {held}, "
+            f"{self.reversals} reversal{'s' if self.reversals != 1 else ''}, {self.revolutions:.3g} turns, "
+            f"{self.slow:.2g} s slow and {self.standstill:.2g} s at rest."
+        )
+
+
+def excitation(records: Record | Sequence[Record], controller: PI | None = None, model: Model | None = None) -> Excitation:
+    """Looks at one record or several; with `model`, its structure too decides what can be judged.
+
+    Raises RecordError where there is no record, or a record has no torque and nothing to make it from.
+    """
+    listed = [records] if isinstance(records, Record) else list(records)
+    if not listed:
+        raise RecordError("records is empty: give at least one Record")
+    top = max(float(np.abs(rec.velocity).max()) for rec in listed)
+    motions = [_motion(rec, controller, top) for rec in listed]
+    speeds = _distinct([v for m in motions for v in m.held], 0.05 * top)
+    torque = max(float(np.abs(m.torque).max()) for m in motions)
+    limit = None if controller is None else controller.torque_limit
+    moving = sum(int(np.sum(m.moving)) for m in motions)
+    opposed = sum(int(np.sum(m.moving & (np.sign(m.torque) * np.sign(m.velocity) < 0.0))) for m in motions)
+    return Excitation(
+        duration=sum(rec.duration for rec in listed),
+        highest_speed=top,
+        speeds=speeds,
+        reversals=sum(_changes(m.velocity, m.velocity_floor) for m in motions),
+        slow=sum(m.dt * int(np.sum(m.moving & (np.abs(m.velocity) < 0.1 * top))) for m in motions),
+        standstill=sum(m.dt * int(np.sum(~m.moving)) for m in motions),
+        highest_torque=torque,
+        torque_share=math.nan if limit is None else torque / limit,
+        torque_reversals=sum(_changes(m.torque, m.torque_floor) for m in motions),
+        opposed=opposed / moving if moving else 0.0,
+        revolutions=max(float(np.ptp(m.position)) for m in motions) / math.tau,
+        steps=_distinct([s for m in motions for s in m.jumps], 0.05 * max(top, 1e-300)),
+        repeated=any(m.repeated for m in motions),
+        not_testable=not_testable(motions, controller, model),
+        one_sided=one_sided(motions, controller),
+    )
+
+
+def position_of(rec: Record) -> Vector:
+    """The record's position [rad], shape (n,), or its velocity integrated from 0."""
+    if rec.position is not None:
+        return rec.position
+    w = rec.velocity
+    return np.concatenate([[0.0], np.cumsum(0.5 * rec.dt * (w[1:] + w[:-1]))])
+
+
+def _motion(rec: Record, controller: PI | None, top: float) -> Motion:
+    w = rec.velocity
+    u = torque_of(rec, controller)
+    floor = max(6.0 * noise_std(w), 1e-3 * top, 1e-300)
+    smooth = _smoothed(w, max(5, len(w) // 400))
+    moving = np.abs(smooth) > floor
+    position = position_of(rec)
+    command = rec.command
+    jumps = [] if command is None else _jumps(command, top)
+    held, early, late = _held(smooth, rec.dt, floor, top)
+    torque_floor = max(6.0 * noise_std(u), 0.02 * float(np.abs(u).max()), 1e-300)
+    repeated = any(abs(a - b) < 0.05 * top for a in early for b in late if a)
+    return Motion(rec.dt, w, smooth, u, position, command, floor, torque_floor, moving, tuple(held), tuple(jumps), repeated)
+
+
+def _smoothed(x: Vector, width: int) -> Vector:
+    """Moving average over an odd `width`, the ends repeated."""
+    half = min(width, len(x)) // 2
+    total = np.concatenate([[0.0], np.cumsum(np.concatenate([np.full(half, x[0]), x, np.full(half, x[-1])]))])
+    smooth: Vector = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+    return smooth
+
+
+def _held(smooth: Vector, dt: float, floor: float, top: float) -> tuple[list[float], list[float], list[float]]:
+    """Speeds held (velocity within 2 % of the highest for 20 samples or more): all, those of the first and of the last third."""
+    band = max(0.04 * top, 2.0 * floor)
+    held, early, late = [], [], []
+    n, start = len(smooth), 0
+    low = high = float(smooth[0])
+    values = smooth.tolist()
+    for i in range(1, n + 1):
+        if i < n:
+            value = values[i]
+            lower, higher = value if value < low else low, value if value > high else high
+            if higher - lower <= band:
+                low, high = lower, higher
+                continue
+        middle = (start + i) // 2
+        # On a ramp the halves of the stretch differ by half the band.
+        if i - start >= 20 and abs(np.median(smooth[start:middle]) - np.median(smooth[middle:i])) < 0.35 * band:
+            level = float(np.median(smooth[start:i]))
+            level = 0.0 if abs(level) <= floor else level
+            held.append(level)
+            early += [level] if start < n / 3 else []
+            late += [level] if i > 2 * n / 3 else []
+        if i < n:
+            start, low, high = i, values[i], values[i]
+    return held, early, late
+
+
+def _jumps(command: Vector, top: float) -> list[float]:
+    """Sizes of the command's jumps [rad/s]: within one sample, above 2 % of the highest speed; the first from rest."""
+    steps = np.abs(np.diff(command, prepend=0.0))
+    return [float(s) for s in steps if s > 0.02 * top]
+
+
+def _distinct(values: Sequence[float], apart: float) -> tuple[float, ...]:
+    """Ascending values of which each is more than `apart` above the last one kept; zero is kept as zero."""
+    kept: list[float] = []
+    for value in sorted(values):
+        if not kept or value - kept[-1] > apart or (value == 0.0) != (kept[-1] == 0.0):
+            kept.append(value)
+    return tuple(kept)
+
+
+def _changes(x: Vector, floor: float) -> int:
+    """Changes of sign between values beyond +-floor."""
+    signs = np.sign(x[np.abs(x) > floor])
+    return int(np.sum(signs[1:] != signs[:-1]))

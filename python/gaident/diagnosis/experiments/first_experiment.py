@@ -1,0 +1,181 @@
+"""Which experiment to make: before any record the one that excites everything, afterwards a menu to choose from.
+
+Commands keep to the drive's limits: speed; travel, by integrating the command exactly; torque, as far as the drive is known:
+
+    u = kp d      what a loop answers to a jump of the command by d, before the drive has moved
+    u = J a       what a ramp of slope a takes; where it ends, the speed overshoots by J a / kp at most
+
+Where kp is known, no jump asks for more than 80 % of the torque, so that nothing shows a saturation, and speeds leave room
+for the overshoot: a third of a jump, and that of the ramps. What is not known, the proposal says. A tenth of speed and travel
+is kept free in any case.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.checks import real_number
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.diagnosis.experiments.commands import largest_jump
+from gaident.diagnosis.experiments.excitation import position_of
+from gaident.diagnosis.experiments.menu import MENU, Bench, Builder, prbs_moving, reversals, slow_stairs, speed_ladder, steps
+from gaident.diagnosis.library.names import SATURATION
+from gaident.errors import SettingsError
+from gaident.models.drive_torque import torque_of
+from gaident.results.experiment import Limits, Proposal, swept
+
+__all__ = ["Limits", "MenuItem", "Proposal", "candidate_commands", "first_experiment", "limits_of"]
+
+Vector = NDArray[np.float64]
+
+FREE = 0.9  # of speed and travel that commands use
+ROOM = 0.25  # of the speed limit, for the overshoot of ramps where kp is known
+AT_ONCE = 2  # samples within which the command's changes are one jump: reversals have a sample of rest between
+LEAST_SAMPLES = 400
+
+
+@dataclass(frozen=True, eq=False)
+class MenuItem:
+    """One experiment of the menu: name, command [rad/s] (n,), the effects it is good at, one line why."""
+
+    name: str
+    command: Vector
+    dt: float
+    separates: tuple[str, ...]
+    reason: str
+
+    def proposal(self, separates: Sequence[str], margin: float) -> Proposal:
+        """This item as a proposal for the rivals `separates`."""
+        return Proposal(self.command, self.dt, tuple(separates), margin, self.reason)
+
+
+def first_experiment(dt: float, limits: Limits, inertia: float | None = None, kp: float | None = None) -> Proposal:
+    """A command for the first record of a drive: it triggers every effect of the library within the limits.
+
+    dt       sample time [s]
+    inertia  total inertia [kg m^2]: ramps then use at most 60 % of the torque; None: gentle ramps
+    kp       proportional gain of the controller [N m s/rad]: no jump of the command then asks for more torque than there is, and
+             none shows torque_saturation; None: jumps are sized by the speed alone, `reason` says what they ask for
+
+    Levels with reversals and dither, slow stairs with rests, reversals with small and large torque, steps of three sizes, and
+    the first levels once more at the end. Raises SettingsError for a duration of fewer than 400 samples.
+    """
+    bench = _bench(dt, limits, inertia, kp)
+    course: tuple[tuple[Builder, float], ...] = (
+        (speed_ladder, 0.22),
+        (slow_stairs, 0.18),
+        (reversals, 0.10),
+        (prbs_moving, 0.12),
+        (steps, 0.16),
+        (speed_ladder, 0.22),
+    )
+    command = _within(
+        np.concatenate([_filled(build, replace(bench, seconds=share * bench.seconds)) for build, share in course]), bench
+    )
+    names = dict.fromkeys(effect for item in MENU for effect in item[2])
+    if kp is not None:
+        del names[SATURATION]
+    return Proposal(command, dt, tuple(names), math.nan, _first_reason(command, limits, inertia, bench))
+
+
+def _first_reason(command: Vector, limits: Limits, inertia: float | None, b: Bench) -> str:
+    """What the first experiment is for, and which of the limits it cannot promise to keep."""
+    jump = largest_jump(command, AT_ONCE)
+    parts = ["No record yet: this triggers every effect, as far as travel allows."]
+    if b.kp is not None:
+        asked = f"{b.kp * jump:.3g} of {limits.torque:.3g} N m"
+        parts = [
+            "No record yet: this triggers every effect but torque saturation, as far as travel allows: its largest jump, of "
+            f"{jump:.3g} rad/s, asks for {asked}."
+        ]
+    else:
+        top = float(np.abs(command).max())
+        parts.append(
+            f"Torque and speed limit are not promised: its largest jump, of {jump:.3g} rad/s, asks for kp times that, more than "
+            f"{limits.torque:.3g} N m where kp is above {limits.torque / jump:.3g} N m s/rad, and may overshoot its "
+            f"{top:.3g} rad/s; give kp to keep both."
+        )
+    if inertia is None:
+        parts.append(
+            f"Its ramps of up to {b.slope:.3g} rad/s^2 ask for the inertia times that, and overshoot by as much divided by kp "
+            "where they end; give the inertia to size them by torque and speed limit."
+        )
+    return " ".join(parts)
+
+
+def candidate_commands(dt: float, limits: Limits, inertia: float | None = None, kp: float | None = None) -> list[MenuItem]:
+    """The menu within the limits; arguments as for `first_experiment`. Each command fills the duration at most."""
+    bench = _bench(dt, limits, inertia, kp)
+    return [MenuItem(name, _within(_filled(build, bench), bench), dt, effects, why) for name, build, effects, why in MENU]
+
+
+def limits_of(records: Record | Sequence[Record], controller: PI | None = None) -> Limits:
+    """What records show to be allowed, see `Limits.of`."""
+    listed = [records] if isinstance(records, Record) else list(records)
+    asked = [rec.velocity if rec.command is None else rec.command for rec in listed]
+    travel = max((float(np.ptp(position_of(rec))) for rec in listed), default=0.0)
+    torque = max((float(np.abs(torque_of(rec, controller)).max()) for rec in listed), default=0.0)
+    if controller is not None and controller.torque_limit is not None:
+        torque = controller.torque_limit
+    return Limits(
+        speed=max((float(np.abs(r).max()) for r in asked), default=0.0) / FREE,
+        torque=torque,
+        travel=math.inf if travel >= math.tau else travel / FREE,
+        duration=max((rec.duration for rec in listed), default=0.0),
+    )
+
+
+def _bench(dt: float, limits: Limits, inertia: float | None, kp: float | None) -> Bench:
+    if not isinstance(limits, Limits):
+        raise SettingsError(f"limits is {limits!r}: give gaident.Limits(speed, torque, travel, duration)")
+    for name, value in (("dt", dt), ("inertia", inertia), ("kp", kp)):
+        if value is not None and not real_number(value, name, SettingsError, "give one number > 0") > 0.0:
+            raise SettingsError(f"{name} is {value!r}: give one number > 0")
+    if limits.duration < LEAST_SAMPLES * dt:
+        raise SettingsError(
+            f"duration is {limits.duration:g} s, {int(limits.duration / dt)} samples: give {LEAST_SAMPLES * dt:g} s or more"
+        )
+    stroke = FREE * limits.travel
+    speed = min(FREE * limits.speed, stroke / (20.0 * dt))  # a stroke lasts 20 samples at least
+    top, slope = _ramps(limits, inertia, kp)
+    # Half a stroke to rise, half to fall: v^2 = slope * stroke.
+    speed = min(speed, 0.8 * math.sqrt(slope * stroke)) if math.isfinite(stroke) else speed
+    return Bench(dt, speed, min(speed, top), stroke, slope, limits.duration, limits.torque, kp)
+
+
+def _ramps(limits: Limits, inertia: float | None, kp: float | None) -> tuple[float, float]:
+    """(speed to go to [rad/s], slope [rad/s^2]): speed + J a / kp <= speed limit, J a <= 60 % of the torque."""
+    if kp is not None and inertia is not None:
+        torque = min(0.6 * limits.torque, kp * ROOM * limits.speed)
+        return min(FREE * limits.speed, limits.speed - torque / kp), torque / inertia
+    # What is not known is left to time: a ramp takes a share of the record's, with kp a longer one to a lower speed.
+    top, hurry = (FREE, 150.0) if kp is None else (1.0 - ROOM, 100.0)
+    slope = hurry * top * limits.speed / limits.duration if inertia is None else 0.6 * limits.torque / inertia
+    return top * limits.speed, slope
+
+
+def _filled(build: Builder, bench: Bench) -> Vector:
+    """The pattern, quickened (then slowed down) until it fits the bench's time, as often as it then fits."""
+    room = int(bench.seconds / bench.dt + 1e-9)
+    pattern = build(bench)
+    for attempt in range(60):
+        if len(pattern) <= room:
+            break
+        # Ramps of a heavy axis take their time whatever the dwell: lower speeds are reached sooner.
+        slower = 1.0 if attempt < 10 else 0.9
+        bench = replace(bench, seconds=0.85 * bench.seconds, speed=slower * bench.speed, top=slower * bench.top)
+        pattern = build(bench)
+    return np.tile(pattern, max(1, room // len(pattern)))[: max(room, 1)]
+
+
+def _within(command: Vector, bench: Bench) -> Vector:
+    """The command, lowered where it still is too fast, sweeps too much or jumps too far."""
+    low, high = swept(command, bench.dt)
+    factor = min(1.0, bench.travel / max(high - low, 1e-300), bench.speed / max(float(np.abs(command).max()), 1e-300))
+    return command * min(factor, bench.jump / max(largest_jump(command, AT_ONCE), 1e-300))

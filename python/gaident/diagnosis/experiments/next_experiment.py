@@ -1,0 +1,188 @@
+"""The next experiment: the command of the menu on which the wrong one of two explanations would fail most clearly.
+
+One explanation A at its estimate is simulated in the loop without noise; the other one, B, is fitted to that record, its base
+parameters included, as the diagnosis would fit it:
+
+    T(A|B) = min over x_B of |v_B|^2 / s^2,   s^2 = V/N,   margin = N ln(1 + T/N)
+
+v whitened by the noise filter of the diagnosed record, V and N of its final fit. A pair's T is the smaller one of both
+directions, as nobody knows which is true; where B contains A only B is simulated, as it can follow anything that A does. The
+command's T is that of its worst pair. Without the fit of the rival every experiment would look good (T-optimal design, Atkinson
+and Fedorov).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.diagnosis.experiments.first_experiment import MenuItem, candidate_commands
+from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
+from gaident.diagnosis.selection.rivals import Rival
+from gaident.errors import GaidentError
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.least_squares import fit as fitted
+from gaident.estimation.noise_model import NoiseFilter
+from gaident.estimation.objective import Fit, Hypothesis, Objective
+from gaident.estimation.prediction import ClosedLoop, OpenLoop
+from gaident.estimation.projection import WORST, project_out
+from gaident.models.simulate import run
+from gaident.results.diagnosis import Finding
+from gaident.results.experiment import Limits, Proposal
+
+__all__ = ["propose"]
+
+Vector = NDArray[np.float64]
+
+CLEAR = 25.0  # chi2 from which two explanations are told apart
+SAMPLES = 4000  # of a proposed record at least, where the diagnosed one is shorter
+PAIRS = 3  # of explanations, the closest ones
+REFITTED = 4  # commands whose rivals are really fitted; the others are judged by the linearised fit
+ITERATIONS = 6
+
+
+def _listed(effects: Sequence[str]) -> str:
+    """'a, b and c', as people write the names."""
+    names = [e.replace("_", " ") for e in effects]
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+
+
+@dataclass(frozen=True)
+class _Bench:
+    """What a proposed command is tried on."""
+
+    controller: PI
+    noise: NoiseFilter
+    variance: float  # of the whitened noise
+    torque_logged: bool
+    elsewhere: Mapping[str, Mapping[str, float]]  # effects at the controller, known from the replay
+
+    def record(self, fit: Fit, item: MenuItem) -> Record | None:
+        """The noise-free record of one explanation; None where it diverges."""
+        model = fit.parameters.model(fit.x)
+        for name, values in self.elsewhere.items():
+            model = model.with_effect(name, **values)
+        command = Record(item.dt, command=item.command, velocity=np.zeros(len(item.command)))
+        with np.errstate(over="ignore", invalid="ignore"):
+            done = run(model, command, self.controller)
+        if not (np.all(np.isfinite(done.velocity)) and np.all(np.isfinite(done.torque))):
+            return None
+        return Record(item.dt, command=item.command, velocity=done.velocity, torque=done.torque if self.torque_logged else None)
+
+    def left(self, record: Record, rival: Fit, refitted: bool) -> float:
+        """T of the rival, fitted to the other explanation's record (or its linearised fit, which costs one step)."""
+        data = DataSet.of([record], self.controller)
+        objective = Objective(data, np.ones(len(record)))
+        hypothesis, x = at_rest(rival, data)
+        if refitted:
+            cost = fitted(objective, hypothesis, x, self.noise, ITERATIONS).cost
+        else:
+            v, J, _ = objective.linearised(hypothesis, x, self.noise)
+            rest = project_out(J, v[None, :])[0]
+            cost = float(rest @ rest) if np.all(np.isfinite(rest)) else WORST
+        return cost / self.variance
+
+
+def propose(
+    findings: Sequence[Finding],
+    rivals: Mapping[str, tuple[float, Sequence[Rival]]],
+    final: Fit,
+    data: DataSet,
+    count: float,
+    elsewhere: Mapping[str, Mapping[str, float]],
+) -> tuple[Proposal | None, list[str]]:
+    """(the experiment that separates the rivals of ambiguous findings, None where there is none; what to say beside it).
+
+    rivals: effect -> (its gain, the explanations in its place); final: the diagnosed model; count: samples behind its cost;
+    elsewhere: effects at the controller, effect -> parameter -> value.
+    """
+    notes = [text for alike, text in EQUIVALENT.items() if any(alike <= {f.effect, *f.alternatives} for f in findings)]
+    pairs = [
+        (f.effect, rival)
+        for f in findings
+        if f.effect in rivals
+        for rival in rivals[f.effect][1]
+        if not any({f.effect, rival.effect} <= alike for alike in EQUIVALENT)
+    ]
+    pairs = sorted(pairs, key=lambda p: p[1].behind)[:PAIRS]
+    if not pairs:
+        return None, notes
+    names = tuple(dict.fromkeys(name for effect, rival in pairs for name in (effect, rival.effect)))
+    if data.controller is None or data.command is None:
+        remedy = "give the controller, and a log with the velocity command"
+        return None, [*notes, f"Without a controller no command can be worked out that tells {_listed(names)} apart: {remedy}."]
+    bench = _Bench(data.controller, final.noise, max(final.cost / count, 1e-300), data.torque_logged, elsewhere)
+    items = menu(data, final)
+    # A generalisation that was fitted as its neutral case is the same drive: such a pair no command separates.
+    table = [
+        (pair, trial, [_tried(bench, item, trial, False) for item in items]) for pair in pairs for trial in _trials([pair], final)
+    ]
+    hopeless = {id(pair) for pair, _, T in table if max(T, default=0.0) < 0.5 * CLEAR}
+    table = [row for row in table if id(row[0]) not in hopeless]
+    pairs = [pair for pair in pairs if id(pair) not in hopeless]
+    if pairs:
+        names = tuple(dict.fromkeys(name for effect, rival in pairs for name in (effect, rival.effect)))
+    trials = [trial for _, trial, _ in table]
+    rough = np.min([T for *_, T in table], axis=0) if table and items else np.zeros(0)
+    best, most = None, -1.0
+    for i in np.argsort(rough)[::-1][:REFITTED]:
+        T = np.inf
+        for trial in trials:
+            T = min(T, _tried(bench, items[i], trial, True))
+            if most >= T:
+                break
+        if most < T:
+            best, most = items[i], T
+    if best is None or most < CLEAR:
+        return None, [*notes, f"No experiment of the menu within the limits of these records tells {_listed(names)} apart."]
+    n = len(best.command)
+    proposal = best.proposal(names, float(n * np.log1p(most / n)))
+    return replace(proposal, reason=f"{best.name.capitalize()}: {best.reason[0].lower()}{best.reason[1:]}"), notes
+
+
+def at_rest(fit: Fit, data: DataSet) -> tuple[Hypothesis, Vector]:
+    """Hypothesis and x for one record that starts at rest."""
+    parameters = fit.parameters
+    loop = ClosedLoop if fit.predictor.closed else OpenLoop
+    hypothesis = Hypothesis(replace(parameters, starts=(0,)), loop(data, fit.predictor.own_angle))
+    return hypothesis, fit.x[: len(fit.x) - sum(parameters.starts)]
+
+
+def menu(data: DataSet, fit: Fit) -> list[MenuItem]:
+    """The menu within the limits that the records show, for the mechanism that was found."""
+    dt = data.dt
+    try:
+        limits = Limits.of(data.records, data.controller)
+        limits = replace(limits, duration=max(limits.duration, SAMPLES * dt))
+        assert data.controller is not None
+        return candidate_commands(dt, limits, inertia_of(fit), data.controller.kp or None)
+    except GaidentError:
+        return []  # nothing moves, or nothing may
+
+
+def inertia_of(fit: Fit) -> float:
+    """Total inertia [kg m^2]: 1/J = K for one mass, K f0/e0 for two."""
+    values = fit.parameters.base_values(fit.x[None, :])[0]
+    gain = abs(values[0] * values[5] / values[3]) if len(values) > 2 and values[3] and values[5] else abs(values[0])
+    return 1.0 / max(float(gain), 1e-300)
+
+
+def _trials(pairs: Sequence[tuple[str, Rival]], final: Fit) -> list[tuple[Fit, Fit]]:
+    """(what is simulated, what is fitted) of every pair and direction that can fail."""
+    trials = []
+    for effect, rival in pairs:
+        if effect not in LIBRARY[rival.effect].nested:
+            trials.append((final, rival.fit))
+        if rival.effect not in LIBRARY[effect].nested:
+            trials.append((rival.fit, final))
+    return trials
+
+
+def _tried(bench: _Bench, item: MenuItem, trial: tuple[Fit, Fit], refitted: bool) -> float:
+    record = bench.record(trial[0], item)
+    return 0.0 if record is None else bench.left(record, trial[1], refitted)

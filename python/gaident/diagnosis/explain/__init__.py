@@ -1,0 +1,1 @@
+"""What was found, in torque, curves and sentences."""

@@ -1,0 +1,80 @@
+"""User-defined effects as terms of a diagnosis: coordinates, bounds and starts from their parameters alone."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.estimation.term import Term
+from gaident.models.effects import Row, table
+from gaident.models.own_effects import starts
+
+__all__ = ["Library"]
+
+Matrix = NDArray[np.float64]
+
+STEP = 0.05  # of the range between the bounds: what makes a difference
+MOST_STARTS = 64
+
+
+class Library(Mapping[str, Term]):
+    """The built-in terms, and behind them those of the user-defined effects that are registered now."""
+
+    def __init__(self, built_in: Mapping[str, Term]) -> None:
+        self._built_in = dict(built_in)
+        self._own: dict[str, tuple[Row, Term]] = {}
+
+    def __getitem__(self, effect: str) -> Term:
+        if effect in self._built_in:
+            return self._built_in[effect]
+        row = next((row for row in table() if row.own and row.name == effect), None)
+        if row is None:
+            raise KeyError(effect)
+        known = self._own.get(effect)
+        if known is None or known[0] is not row:
+            known = self._own[effect] = (row, _term(row))
+        return known[1]
+
+    def __iter__(self) -> Iterator[str]:
+        yield from self._built_in
+        yield from (row.name for row in table() if row.own)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
+def _term(row: Row) -> Term:
+    logs = [i for i, p in enumerate(row.parameters) if p.logarithmic]
+
+    def natural(z: Matrix) -> Matrix:
+        out = z.copy()
+        out[:, logs] = np.exp(z[:, logs])
+        return out
+
+    def coordinates(p: Mapping[str, float]) -> NDArray[np.float64]:
+        z = np.array([p[q.name] for q in row.parameters])
+        z[logs] = np.log(np.maximum(z[logs], 1e-300))
+        return z
+
+    def along(i: int, value: float) -> float:
+        return float(np.log(value)) if i in logs else value
+
+    limits = [(along(i, p.lowest), along(i, p.highest)) for i, p in enumerate(row.parameters)]
+    # Fewer values of each parameter, the more there are.
+    count = next(n for n in (5, 4, 3, 2, 1) if n ** len(row.parameters) <= MOST_STARTS or n == 1)
+    axes = [[along(i, v) for v in starts(p, count)] for i, p in enumerate(row.parameters)]
+    rows = list(itertools.islice(itertools.product(*axes), MOST_STARTS))
+    steps = tuple(1.0 if p.logarithmic else STEP * (p.highest - p.lowest) for p in row.parameters)
+
+    return Term(
+        row.name,
+        row.place,
+        natural,
+        coordinates,
+        lambda scales: list(limits),
+        lambda scales: list(rows),
+        lambda scales: steps,
+    )

@@ -1,0 +1,80 @@
+"""What diagnose() is given, checked: each error names the argument, its value and the remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from gaident.arguments import NO_CONTROLLER
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.errors import RecordError, SettingsError
+from gaident.results.identification import Identification
+
+__all__ = ["LEAST_SAMPLES", "ProgressCallback", "checked", "noise_std_of", "records_of"]
+
+ProgressCallback = Callable[[float, str], None]
+
+LEAST_SAMPLES = 100
+"""Of a record: below, the noise filter and the base parameters alone use up what it knows."""
+
+
+def records_of(rec: Record | Sequence[Record], name: str) -> tuple[Record, ...]:
+    """The records as a tuple; raises RecordError."""
+    given = (rec,) if isinstance(rec, Record) else tuple(rec) if isinstance(rec, Sequence) else ()
+    if not given or not all(isinstance(r, Record) for r in given):
+        raise RecordError(f"{name} is {type(rec).__name__}: give a gaident.Record or a list of them, at least one")
+    return given
+
+
+def checked(
+    records: tuple[Record, ...],
+    held: tuple[Record, ...],
+    controller: PI | None,
+    idn: Identification | None,
+    bootstrap: int,
+    seed: int,
+    progress: ProgressCallback | None,
+) -> None:
+    """Raises RecordError or SettingsError for what cannot be diagnosed."""
+    if controller is not None and not isinstance(controller, PI):
+        raise SettingsError(f"controller is {controller!r}: give a gaident.PI, or None for a record in open loop")
+    if idn is not None and not isinstance(idn, Identification):
+        raise SettingsError(f"identification is {type(idn).__name__}: give what identify() returned, or None")
+    for r in (*records, *held):
+        if controller is not None and r.command is None:
+            raise RecordError(f"record {r.name or '(without a name)'} has no command: give one, or {NO_CONTROLLER} for open loop")
+        if controller is None and r.torque is None:
+            raise RecordError(f"record {r.name or '(without a name)'} has no torque: give one, or the controller that makes it")
+    if len({r.dt for r in (*records, *held)}) > 1:
+        raise RecordError("records have different sample times: a diagnosis needs one; diagnose them apart")
+    for i, r in enumerate(records):
+        if len(r) < LEAST_SAMPLES:
+            raise RecordError(
+                f"record {r.name or i + 1} has {len(r)} samples: a diagnosis needs {LEAST_SAMPLES} or more, thousands are good; "
+                "record a longer motion"
+            )
+    known = {r.digest for r in records}
+    for i, r in enumerate(held):
+        if r.digest in known:
+            raise RecordError(
+                f"validation record {r.name or i + 1} is one that the model is fitted to: give another run, or leave validation "
+                "out, then a part of each record is held out"
+            )
+    if progress is not None and not callable(progress):
+        raise SettingsError(f"progress is {progress!r}: give a function of (fraction, message), or None")
+    for name, value, low, high in (("bootstrap", bootstrap, 0, 100_000), ("seed", seed, 0, 2**63 - 1)):
+        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
+            raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
+
+
+def noise_std_of(noise: float | Record | None) -> float | None:
+    """Standard deviation of the noise [rad/s], None where it has to come from the record."""
+    if noise is None:
+        return None
+    if isinstance(noise, Record):
+        return float(np.std(noise.velocity))
+    if isinstance(noise, bool) or not isinstance(noise, (int, float)) or not 0.0 < float(noise) < float("inf"):
+        raise SettingsError(f"noise is {noise!r}: give its standard deviation in rad/s, above 0, or a Record at standstill")
+    return float(noise)

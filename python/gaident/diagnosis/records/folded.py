@@ -1,0 +1,50 @@
+"""A sensor that shows the speed without its sign: the velocity turns back at zero, as if from a wall.
+
+An axis that passes zero with a slope a shows |w|: -a before, +a after, while the torque stays as it is. No axis can do that: its
+acceleration would have to jump with nothing to make it jump. Turned over, the slope just goes on.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.models.starts import noise_std
+
+__all__ = ["ADVICE", "FOLDED", "folded"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+FOLDED = "the sensor shows the speed without its sign"
+
+ADVICE = (
+    "No cause can be named: the sensor shows the speed without its sign. The velocity turns back at zero while the torque stays "
+    "as it is, so that the direction of motion is not known; log a signed velocity, or the position."
+)
+
+STEEP = 0.15  # of the slopes that are common: what is no rest
+SMOOTHER = 0.8  # of the curvature around a turning point: less is left when what follows is turned over; far from zero far more
+LEAST = 3  # turning points; one or two may be chance
+
+
+def folded(rec: Record) -> bool:
+    """Whether the velocity is an absolute value."""
+    w, u = rec.velocity, rec.torque
+    top = float(w.max())
+    if u is None or len(w) < 5 or not top > 0.0 or float(w.min()) < -0.02 * top:
+        return False
+    around = np.lib.stride_tricks.sliding_window_view(w, 5)
+    before, after = 0.5 * (around[:, 2] - around[:, 0]), 0.5 * (around[:, 4] - around[:, 2])
+    steep = max(STEEP * float(np.quantile(np.abs(np.diff(w)), 0.95)), 6.0 * noise_std(w))
+    turning = (before < -steep) & (after > steep) & (around[:, 2] <= np.minimum(around[:, 1], around[:, 3]))
+    held = np.ptp(np.lib.stride_tricks.sliding_window_view(u[:-1], 4), axis=1) < 0.02 * float(np.ptp(u))
+    # The sign changes just before or just after the lowest sample.
+    turned = [_curvature(around * np.where(np.arange(5) < first, 1.0, -1.0)) for first in (2, 3)]
+    through = np.minimum(*turned) < SMOOTHER * _curvature(around)
+    return int(np.sum(turning & held & through)) >= LEAST
+
+
+def _curvature(rows: Matrix) -> Vector:
+    return np.asarray(np.abs(np.diff(rows, 2, axis=1)).sum(axis=1))

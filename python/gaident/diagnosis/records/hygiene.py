@@ -1,0 +1,101 @@
+"""What describes the record rather than the drive: outliers and the lattice of a quantised velocity."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.diagnosis.records.lattice import lattice_step
+
+__all__ = ["cleaned", "outliers", "quantisation"]
+
+Vector = NDArray[np.float64]
+
+ROBUST = 1.4826  # median absolute deviation of normal noise -> standard deviation
+FAR = 9.0  # standard deviations
+MISSED = 0.4  # of what an outlier stands out by: the least that the lines from either side, and a model, miss it by
+NEAR = 8  # samples on either side that an outlier stands out of
+PASSES = 4
+
+
+def outliers(velocity: Vector, error: Vector | None = None) -> NDArray[np.intp]:
+    """Samples of the sensor that leave the signal and come back at once.
+
+    Such a sample exceeds its neighbours by far more than is usual, and the lines through the samples on either side miss it by
+    as much, in the same direction. A corner, an impact or the end of a delay lies on the line from one side; from a round top
+    both lines lead beyond it. What a model follows, its `error` not leaving as well, is none.
+    """
+    w, e = velocity.copy(), None if error is None else error.copy()
+    hit = np.zeros(0, dtype=np.intp)
+    for _ in range(PASSES):  # neighbours hide each other
+        more = np.union1d(hit, _leaving(w, e))
+        if len(more) == len(hit):
+            break
+        hit = more
+        for signal in (w,) if e is None else (w, e):
+            _interpolate(signal, hit)
+    return hit
+
+
+def _leaving(w: Vector, error: Vector | None) -> NDArray[np.intp]:
+    """One pass of `outliers`."""
+    if len(w) < 7:
+        return np.zeros(0, dtype=np.intp)
+    middle = _middle(w)
+    spread = ROBUST * float(np.median(np.abs(middle - np.median(middle))))
+    steps = np.abs(np.diff(w))
+    quantum = float(steps[steps > 0.0].min()) if np.any(steps > 0.0) else 0.0
+    size, least = np.abs(middle), FAR * max(spread, quantum)
+    left = (size > least) & _missed(w, middle, least) & _missed(w[::-1], middle[::-1], least)[::-1]
+    if error is not None:
+        left &= np.sign(middle) * _middle(error) > MISSED * size
+    found = np.flatnonzero(left)
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(size, NEAR), 2 * NEAR + 1)[found]
+    beside = np.abs(np.arange(-NEAR, NEAR + 1)) <= 2  # where the outlier itself shows
+    largest = size[found] >= around[:, beside].max(axis=1)
+    alone = np.sum(around[:, ~beside] > 0.5 * size[found, None], axis=1) < 2  # where much is as rough it rings
+    kept: NDArray[np.intp] = found[largest & alone] + 2
+    return kept
+
+
+def _middle(w: Vector) -> Vector:
+    """By how much each sample but two at either end exceeds the mean of its four neighbours."""
+    exceeds: Vector = w[2:-2] - 0.25 * (w[:-4] + w[1:-3] + w[3:-1] + w[4:])
+    return exceeds
+
+
+def _missed(w: Vector, middle: Vector, least: float) -> NDArray[np.bool_]:
+    """Whether the line through the two samples before each misses it by a good part of `middle` and by `least`.
+
+    The sample just before may be spoiled too: then the two before that decide, with more noise.
+    """
+    before = np.concatenate([[w[0]], w])  # w(-1) = w(0)
+    now, one, two, three = before[3:-2], before[2:-3], before[1:-4], before[:-5]
+    sign = np.sign(middle)
+    first, second = sign * (now - 2.0 * one + two), sign * (now - 3.0 * two + 2.0 * three)
+    missed: NDArray[np.bool_] = np.maximum(first, second / 1.5) > np.maximum(MISSED * np.abs(middle), least)
+    return missed
+
+
+def _interpolate(w: Vector, hit: NDArray[np.intp]) -> None:
+    """Straight lines over the samples `hit`, in place."""
+    good = np.ones(len(w), dtype=bool)
+    good[hit] = False
+    w[hit] = np.interp(hit, np.flatnonzero(good), w[good])
+
+
+def cleaned(rec: Record, hit: NDArray[np.intp]) -> Record:
+    """The record with interpolated velocities in place of outliers: what the controller saw, as far as it is known."""
+    if len(hit) == 0:
+        return rec
+    w = rec.velocity.copy()
+    _interpolate(w, hit)
+    return rec.with_channels(velocity=w)
+
+
+def quantisation(records: tuple[Record, ...]) -> float:
+    """Step of the lattice that all velocities lie on [rad/s], 0 where there is none or only a text log's."""
+    w = np.concatenate([r.velocity for r in records])
+    step = lattice_step(w)
+    return step if step > 1e-4 * float(np.ptp(w)) else 0.0

@@ -1,0 +1,172 @@
+"""The linear models that a search starts from, on one grid of time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gaident.diagnosis.library.terms import of_inverse_dynamics
+from gaident.diagnosis.policy import POLICY
+from gaident.diagnosis.selection.mechanisms import is_mechanism, one_mass, reduced, resonant, rigid, swings
+from gaident.diagnosis.selection.moves import Moves
+from gaident.diagnosis.selection.score_test import ScoreTest
+from gaident.errors import RecordError, SettingsError
+from gaident.estimation import least_squares as ls
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.noise_model import WHITE, ShaftNoise
+from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
+from gaident.estimation.parameterisation import Parameterisation
+from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
+from gaident.estimation.projection import WORST
+from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
+from gaident.estimation.term import Scales, Term
+from gaident.models.model import Model
+from gaident.models.simulate import simulate
+
+__all__ = ["Task", "linear_bases", "noise_floor", "plain_bases", "regressed"]
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """One selection on its grid of time."""
+
+    objective: Objective
+    scales: Scales
+    model: Model
+    allowed: tuple[Term, ...]
+    note: Callable[[str], None]
+
+    @property
+    def data(self) -> DataSet:
+        return self.objective.data
+
+    def space(self) -> Moves:
+        return Moves(self.objective, self.allowed, self.note)
+
+    def under(self, family: Innovations | OutputErrors) -> Task:
+        return replace(self, objective=self.objective.under(family))
+
+    def predictor(self) -> Predictor:
+        """Of linear models: the loop only where a torque is not to be had."""
+        return ClosedLoop(self.data) if self.data.loop_only else OpenLoop(self.data)
+
+    def start(self, model: Model, iterations: int = 20) -> Fit:
+        """A mechanism fitted to the records' plain errors."""
+        parameters = Parameterisation.of(model, self.scales, self.data.moving)
+        return ls.fit(self.objective, Hypothesis(parameters, self.predictor()), parameters.start(model), WHITE, iterations)
+
+    def one_mass(self) -> Fit:
+        return self.start(one_mass(self.data, self.model))
+
+    def two_masses(self, one: Fit) -> tuple[list[Fit], list[Fit]]:
+        """Short fits of two masses: from the identified model, and from the resonances that help one mass most."""
+        starts = (reduced(self.model), resonant(self.objective, one))
+        fits = [[self.start(m, 6) for m in models] for models in starts]
+        known, other = ([f for f in part if f.cost < WORST and is_mechanism(f.parameters, f.x)] for part in fits)
+        return known, other
+
+
+def linear_bases(task: Task) -> tuple[Task, list[Fit]]:
+    """(the task with torques at the shaft in its noise family, linear fits that the search starts from).
+
+    One mass, two masses, or both where only the effects can decide. Two alone where they resonate as on a shaft and nothing on
+    one mass comes near, else one mass first: a delay or a lag looks like a resonance as long as nothing else is tried, and a load
+    or a saturation hides one.
+    """
+    one = task.one_mass()
+    known, others = task.two_masses(one)
+    space = task.space()
+    one = ls.reestimated(task.objective, one)
+    fits = known + others
+    if not fits:
+        return task, [one]
+    chosen = sorted(fits, key=lambda f: f.cost)[:1] + sorted(known, key=lambda f: f.cost)[:1]
+    two = min((space.refitted(f.hypothesis, f.x, 20) for f in chosen), key=lambda f: f.bic)
+    best = min((one, two), key=lambda f: f.bic)
+    family = task.objective.family
+    shaft = ShaftNoise(best.parameters.linear(best.x), task.scales.dt, task.data.controller)
+    task = task.under(Innovations(shaft, family.floor))
+    one, two = (ls.reestimated(task.objective, f) for f in (one, two))
+    if one.bic < two.bic or not swings(two) or task.scales.blocks > 1:
+        return task, [one, two]
+    space = task.space()
+    test = ScoreTest(task.objective)
+    test.add(one.hypothesis, one.x, [t for t in space.candidates(one) if not t.nested and not t.resonates])
+    tried: set[str] = set()
+    for noise in (WHITE, two.noise):
+        for s in test.ranked(noise)[:3]:
+            if s.term.name not in tried:
+                short = ls.scored(task.objective, ls.fit(task.objective, s.hypothesis, s.starts[0], noise, 5))
+                if short.bic - two.bic < POLICY.near_mass * task.objective.count:
+                    return task, [one, two]
+            tried.add(s.term.name)
+    return task, [two]
+
+
+def plain_bases(task: Task, bases: Sequence[Fit]) -> list[Fit]:
+    """The best linear fit of one mass and of two to the plain errors: from the bases, and from the identified mechanism.
+
+    In the loop where the log shows that the loop is the drive's: a replayed torque that a limit of the controller spoils leads
+    the bases astray, and the model was identified in the loop.
+    """
+    looped = task.data.loopable and task.data.loop_follows
+    view: Predictor = ClosedLoop(task.data) if looped else OpenLoop(task.data)
+    starts = [(f.parameters, f.x) for f in bases]
+    for model in rigid(task.model) + reduced(task.model):
+        parameters = Parameterisation.of(model, task.scales, task.data.moving)
+        starts.append((parameters, parameters.start(model)))
+    fits = [ls.fit(task.objective, Hypothesis(p, view), x, WHITE, 12) for p, x in starts]
+    fits.sort(key=lambda f: (not swings(f), f.cost))
+    return [next(f for f in fits if f.parameters.masses == m) for m in sorted({f.parameters.masses for f in fits})]
+
+
+def noise_floor(task: Task, one: Fit) -> float:
+    """Variance of what counts as noise beside the noise that the velocity shows [(rad/s)^2]."""
+    objective, data = task.objective, task.data
+
+    def beyond(power: float) -> float:
+        return max(POLICY.immaterial**2 * power - data.noise**2, 0.0)
+
+    used = objective.weight > 0.0
+    floor = beyond(float(np.mean(objective.error(one)[used] ** 2)))
+    if not np.isfinite(floor):
+        return 0.0
+    if floor > 0.0 and data.loopable:  # what the loop does not let through is none either, as a load that adds up without it
+        inside = np.concatenate([r.velocity - simulate(task.model, r, data.controller) for r in data.records])
+        floor = min(floor, beyond(float(np.mean(inside[used] ** 2))))
+    if floor > 0.0:  # a shaft that resonates is no misfit
+        fits = [f for part in task.two_masses(one) for f in part if swings(f)]
+        floor = min([floor, *(beyond(f.cost / objective.count) for f in fits)])
+    return floor
+
+
+def regressed(task: Task, predictor: Predictor) -> Fit | None:
+    """The rigid axis of the inverse-dynamics regression, fitted to the plain errors; None where the records do not show one.
+
+    The regression needs no start: where a simulation has valleys, as with gravity, it says where to begin.
+    """
+    data = task.data
+    if not data.torque_logged:
+        return None
+    try:
+        found = inverse_dynamics(list(data.records))
+    except (RecordError, SettingsError):
+        return None
+    values = {name: e.value for name, e in found.parameters.items()}
+    viscous = values.get("viscous", min(values.get("viscous_positive", 0.0), values.get("viscous_negative", 0.0)))
+    inertia = values.get("inertia", 0.0)
+    if not inertia > 0.0:
+        return None
+    slowest = 1.0 / max(r.duration for r in data.records)
+    rigid_axis = Model(1.0 / inertia, [-max(viscous / inertia, slowest)])
+    parameters = Parameterisation.of(rigid_axis, task.scales, data.moving)
+    x = parameters.base_vector(rigid_axis)
+    for term, own in of_inverse_dynamics(values).items():
+        if term in task.allowed:
+            low, high = np.array(term.limits(parameters.scales)).T
+            x = np.concatenate([x, np.clip(term.coordinates(own), low, high)])
+            parameters = parameters.extended(term)
+    x = np.concatenate([x, np.zeros(sum(parameters.starts))])
+    return ls.fit(task.objective, Hypothesis(parameters, predictor), x, WHITE, 20)

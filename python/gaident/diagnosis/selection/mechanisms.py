@@ -1,0 +1,171 @@
+"""The linear mechanism that effects are added to: one mass or two, starts for both, and how one becomes the other.
+
+Lags, delays and filters are linear too, and an identification absorbs them in poles and zeros of no mechanical meaning. A
+diagnosis starts from the mechanism, so that they can be told by name.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.diagnosis.library.terms import RESONANCE
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.noise_model import WHITE
+from gaident.estimation.objective import Fit, Hypothesis, Objective
+from gaident.estimation.parameterisation import Parameterisation
+from gaident.estimation.projection import project_out
+from gaident.estimation.term import Term
+from gaident.models.model import Model
+from gaident.models.roots import quadratic_roots
+
+__all__ = [
+    "as_one_mass",
+    "as_two_masses",
+    "evenly_damped",
+    "is_mechanism",
+    "one_mass",
+    "reduced",
+    "resonant",
+    "rigid",
+    "swings",
+]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+def one_mass(data: DataSet, identified: Model) -> Model:
+    """Inertia and damping from the balance of momentum, w = K int u dt - A int w dt + w(0); or the identified ones.
+
+    The gain is positive: below the resonance of a pendulum the balance alone would have a negative inertia.
+    """
+    if (identified.p, identified.q) == (1, 0) and identified.gain > 0.0:
+        return identified
+    gram, right = np.zeros((2, 2)), np.zeros(2)
+    for r in data.driven:
+        assert r.torque is not None
+        columns = np.vstack([np.cumsum(r.torque), -np.cumsum(r.velocity)]) * r.dt
+        columns = columns - columns.mean(axis=1, keepdims=True)
+        gram += columns @ columns.T
+        right += columns @ (r.velocity - r.velocity.mean())
+    K, a = np.linalg.lstsq(gram, right, rcond=1e-12)[0]
+    slow = 1.0 / max(r.duration for r in data.records)
+    return Model(abs(float(K)) or 1.0, [-max(float(a), slow)])
+
+
+def rigid(identified: Model) -> list[Model]:
+    """The identified model's slowest real pole alone, with its gain at standstill; none without a real pole."""
+    real = [r for r in identified.poles if r.imag == 0.0]
+    if not real:
+        return []
+    slow = min(real, key=abs)
+    others = [r for r in identified.poles if r != slow]
+    return [Model(float(identified.gain * np.prod(np.abs(identified.zeros)) / np.prod(np.abs(others))), [slow])]
+
+
+def reduced(identified: Model) -> list[Model]:
+    """Two-mass starts: each resonance of the identified model with each of its antiresonances.
+
+    A lag or a delay adds roots of its own to those of the mechanism, which stand between them. With p, z one pair each and a the
+    slowest real pole, K |z|^2/(a |p|^2) is the identified model's gain at standstill.
+    """
+    slow = rigid(identified)
+    poles, zeros = ([r for r in roots if r.imag > 0.0] for roots in (identified.poles, identified.zeros))
+    return [
+        Model(one.gain * abs(p) ** 2 / abs(z) ** 2, [one.poles[0], p, p.conjugate()], [z, z.conjugate()])
+        for one in slow for p in poles for z in zeros
+    ]  # fmt: skip
+
+
+def resonant(objective: Objective, one: Fit) -> list[Model]:
+    """Two-mass starts: the resonances that help the one mass most, linearised."""
+    longer = one.hypothesis.extended(RESONANCE)
+    rows = np.array(RESONANCE.starts(one.parameters.scales))
+    X = np.vstack([one.parameters.inserted(one.x, z) for z in rows])
+    _, J, _ = objective.linearised(one.hypothesis, one.x, WHITE)
+    E = objective.errors(longer, X)
+    finite = np.all(np.isfinite(E), axis=1)
+    rest = project_out(J, np.where(finite[:, None], E, 0.0))
+    costs = np.where(finite, np.einsum("ij,ij->i", rest, rest), np.inf)
+    return [_two_masses(longer.parameters, X[i]) for i in np.argsort(costs)[:3]]
+
+
+def _resonance_of(parameters: Parameterisation) -> Term:
+    return next(t for t in parameters.terms if t.resonates)
+
+
+def _two_masses(parameters: Parameterisation, x: Vector) -> Model:
+    """The drive of two masses whose resonance is the extra one of x: K (wp/wz)^2 (s^2 + ...)/((s + a)(s^2 + ...)).
+
+    On one mass the extra resonance is the second mass; on two it takes the place of theirs, K f0/e0 the gain of the whole.
+    """
+    K, a, *pairs = parameters.base_values(x[None, :])[0]
+    if pairs:
+        K *= pairs[3] / pairs[1]
+    wp, zp, wz, zz = parameters.effect_values(x[None, :], _resonance_of(parameters).name)[0]
+    poles = [complex(-a), *quadratic_roots(2.0 * zp * wp, wp**2)]
+    return Model(K * (wp / wz) ** 2, poles, quadratic_roots(2.0 * zz * wz, wz**2))
+
+
+def moved_to(model: Model, fit: Fit, left_out: str = "") -> tuple[Hypothesis, Vector]:
+    """The effects of a fit, but one, on another linear mechanism; start states at 0."""
+    old = fit.parameters
+    new = Parameterisation.of(model, old.scales, [n > 0 for n in old.starts])
+    x = new.base_vector(model)
+    for t in old.terms:
+        if t.name != left_out:
+            new = new.extended(t)
+            x = np.concatenate([x, fit.x[old.slot(t.name)]])
+    return Hypothesis(new, fit.predictor), np.concatenate([x, np.zeros(sum(new.starts))])
+
+
+def as_two_masses(fit: Fit) -> tuple[Hypothesis, Vector]:
+    """The drive of two masses whose resonance is the extra one of a fit, with its other effects."""
+    return moved_to(_two_masses(fit.parameters, fit.x), fit, _resonance_of(fit.parameters).name)
+
+
+def as_one_mass(fit: Fit) -> tuple[Hypothesis, Vector]:
+    """The effects of a fit of two masses on one: K f0/e0 is the gain of the whole."""
+    K, a, _, e0, _, f0 = fit.parameters.base_values(fit.x[None, :])[0]
+    return moved_to(Model(float(K * f0 / e0) if e0 else float(K), [-float(a)]), fit)
+
+
+def evenly_damped(parameters: Parameterisation, x: Vector) -> Vector:
+    """Two masses with the damping of the zeros that the rest implies: f1 = a + (e1 - a) f0/e0.
+
+    With bearings in proportion to the inertias, D_M/J_M = D_L/J_L = a, the shaft's damping D_G makes
+
+        e1 = a + D_G (1/J_M + 1/J_L),   f1 = a + D_G/J_L,   f0/e0 = J_M/(J_M + J_L)
+
+    A linear fit of a shaft with a gap damps the zeros instead, as if bearings of the load braked and those of the motor drove it.
+    A gap put into such a mechanism makes it no better, whatever its width; in a passive one the cost has one broad valley.
+    """
+    _, a, e1, e0, _, f0 = parameters.base_values(x[None, :])[0]
+    if not 0.0 < f0 < e0:
+        return x
+    even = x.copy()
+    even[4] = (a + (e1 - a) * f0 / e0) / parameters.units[3]
+    return even
+
+
+def is_mechanism(parameters: Parameterisation, x: Vector) -> bool:
+    """Whether two masses are two masses on a shaft: sum of pairwise A = K_G (1/J_M + 1/J_L) is above prod B = K_G/J_L."""
+    if parameters.masses == 1:
+        return True
+    _, a, e1, e0, _, f0 = parameters.base_values(x[None, :])[0]
+    return bool(e0 + a * e1 > f0)
+
+
+def swings(fit: Fit) -> bool:
+    """Whether two masses are damped as those on a shaft: e1 < 2 zeta sqrt(e0), f1 < 2 zeta sqrt(f0), zeta = 0.5."""
+    if fit.parameters.masses == 1:
+        return True
+    _, _, e1, e0, f1, f0 = fit.parameters.base_values(fit.x[None, :])[0]
+    return bool(e0 > 0.0 and f0 > 0.0 and abs(e1) < np.sqrt(e0) and abs(f1) < np.sqrt(f0))
+
+
+def resonance(fit: Fit) -> float:
+    """Of a fit of two masses [rad/s]; 0 for one."""
+    values = fit.parameters.base_values(fit.x[None, :])[0]
+    return float(np.sqrt(abs(values[3]))) if len(values) > 2 else 0.0

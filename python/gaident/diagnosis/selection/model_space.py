@@ -1,0 +1,229 @@
+"""The models that can be made of a library over one objective, what they are worth, and how they are fitted.
+
+A fuller model is *worth* its effects where its score
+
+    BIC + penalty per effect (a generalisation counts as two, a second mass as one)
+
+is lower than the simpler model's, both seen by the same predictors, and where what it explains is material. This is the one
+decision of the search; its numbers stand in the policy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
+from gaident.diagnosis.policy import POLICY, Policy
+from gaident.diagnosis.selection.mechanisms import as_two_masses
+from gaident.estimation import least_squares as ls
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.noise_model import WHITE
+from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective
+from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
+from gaident.estimation.term import Term
+
+__all__ = ["ModelSpace", "words"]
+
+Vector = NDArray[np.float64]
+
+
+def words(effects: Iterable[str]) -> str:
+    """Effects as people write them."""
+    return ", ".join(e.replace("_", " ") for e in effects)
+
+
+def _representative(term: Term) -> str:
+    """Of effects that are the same to every record and have as many parameters, the first."""
+    alike = (n for c in EQUIVALENT if term.name in c for n in c if LIBRARY[n].size == term.size)
+    return min((*alike, term.name))
+
+
+def _depth(term: Term) -> int:
+    """1, and one more for each effect that is nested in the next."""
+    return 1 + max((_depth(LIBRARY[name]) for name in term.nested), default=0)
+
+
+@dataclass(frozen=True, eq=False)
+class ModelSpace:
+    """The models that can be made of a library over one objective, and the moves between them."""
+
+    objective: Objective
+    allowed: tuple[Term, ...]
+    note: Callable[[str], None]
+    policy: Policy = POLICY
+    grown: dict[Hashable, list[Fit]] = field(default_factory=dict)
+
+    # What a model is worth.
+
+    @property
+    def data(self) -> DataSet:
+        """The records."""
+        return self.objective.data
+
+    @property
+    def whitens(self) -> bool:
+        """Whether errors are whitened, each hypothesis with a noise filter of its own."""
+        return isinstance(self.objective.family, Innovations)
+
+    @property
+    def penalty(self) -> float:
+        """BIC units that an effect costs."""
+        if not self.whitens:
+            return self.policy.misfit_penalty
+        return self.policy.effect_penalty * (1.0 + self.policy.short_record / self.objective.count)
+
+    @property
+    def margin(self) -> float:
+        """BIC units within which two explanations are not told apart."""
+        short = self.policy.rival_short / self.objective.count if self.whitens else 0.0
+        return self.policy.rival_margin * (1.0 + short)
+
+    def score(self, fit: Fit) -> float:
+        """BIC and what the effects cost; the lower the better."""
+        effects = sum(_depth(t) for t in fit.parameters.terms)
+        # An order of the angle that was searched for counts as so many candidates more.
+        orders = sum(2.0 * float(np.log(t.orders[1] - t.orders[0] + 1)) for t in fit.parameters.terms)
+        return fit.bic + self.penalty * (effects + fit.parameters.masses - 1) + orders
+
+    def key(self, fit: Fit) -> Hashable:
+        """The same for the same mechanism with the same effects, or with equivalent ones."""
+        return fit.parameters.masses, frozenset(_representative(t) for t in fit.parameters.terms)
+
+    def ratio(self, fit: Fit) -> float:
+        """Rms of the whitened errors over the noise that the measured velocity itself shows."""
+        return float(np.sqrt(fit.cost / self.objective.count)) / max(self.data.noise, 1e-300)
+
+    def quiet(self, fit: Fit) -> bool:
+        """Whether a fit leaves so little that no effort is spent beyond it."""
+        return self.ratio(fit) < self.policy.effort_ratio
+
+    def is_noise(self, fit: Fit) -> bool:
+        """The variance-ratio test: whether a fit leaves noise."""
+        return self.ratio(fit) < self.policy.noise_ratio
+
+    def runs_free(self, fit: Fit) -> bool:
+        """Whether the free run, of the loop where there is one, misses the velocity by little more than its noise."""
+        inside = fit.hypothesis.driven_by(self.closed(fit.predictor)) if self.data.loopable else fit.hypothesis
+        cost = float(self.objective.costs(inside, fit.x[None, :], WHITE)[0])
+        return bool(np.sqrt(cost / self.objective.count) < self.policy.loop_ratio * self.data.noise)
+
+    def worth(self, fuller: Fit, simpler: Fit) -> bool:
+        """The decision: whether a fuller model is worth its effects against a simpler one."""
+        simpler = self.in_view_of(simpler, fuller)
+        if not self.score(fuller) < self.score(simpler):
+            return False
+        more = [t for t in fuller.parameters.terms if t.name not in simpler.effects]
+        if any(set(t.nested) & set(simpler.effects) for t in more) and not self.in_both_views(simpler, fuller):
+            return False
+        return self.material(simpler, fuller)
+
+    def in_view_of(self, fit: Fit, other: Fit) -> Fit:
+        """The fit as the other's predictor sees it, where that is better: models are compared under the same predictors."""
+        if fit.predictor == other.predictor:
+            return fit
+        return min((fit, self.seen(fit, other.predictor)), key=lambda f: f.bic)
+
+    def material(self, simpler: Fit, fuller: Fit) -> bool:
+        """Whether a model explains a fair part of what a simpler one leaves beyond the noise, or leaves noise.
+
+        Significant alone is not enough where a model is wrong: anything that moves a little helps a little. The part counts
+        whitened, or in the plain error of the free run: a noise filter may take the larger misfit for noise and whiten it. Beside
+        impacts the part is larger: one impact more or less leaves something at the truth, too, for other effects to describe.
+        """
+        impacts = any(t.multimodal and t.in_coupling for t in simpler.parameters.terms)
+        if self.quiet(fuller) and not impacts:
+            return True
+        noise = self.objective.count * self.data.noise**2
+        share = self.policy.material_beside_impacts if impacts else self.policy.material_share
+        if simpler.cost - fuller.cost > share * (simpler.cost - noise):
+            return True
+        before, after = (self.plain_cost(f) for f in (simpler, fuller))
+        return before - after > share * (before - noise)
+
+    def plain_cost(self, fit: Fit) -> float:
+        """Sum of squared plain errors, refitted to these, of the loop where there is one."""
+        view = self.closed(fit.predictor) if self.data.loopable and self.data.loop_follows else fit.predictor
+        return ls.fit(self.objective, fit.hypothesis.driven_by(view), fit.x, WHITE, 8).cost
+
+    def in_both_views(self, simpler: Fit, fuller: Fit) -> bool:
+        """Whether a generalisation is worth its place in its loop, too, and not for its finer simulation.
+
+        Driven by the torque, a model with dry friction comes to rest a little before or after the drive wherever a torque that
+        nobody commanded has turned the shaft, and two levels of friction may describe that better than one. Where a model leaves
+        white noise there was no such torque.
+        """
+        if self.neutral_score(simpler, fuller) <= self.score(fuller):
+            return False
+        if fuller.predictor.closed or not self.data.loopable or fuller.noise.size == 0:
+            return True
+        inside = [self.seen(f, self.closed(f.predictor)) for f in (simpler, fuller)]
+        return self.score(inside[1]) < self.score(inside[0])
+
+    def neutral_score(self, simpler: Fit, fuller: Fit) -> float:
+        """Score of a nested model, simulated as the neutral case of its generalisation."""
+        terms = [t for t in fuller.parameters.terms if set(t.nested) & set(simpler.effects)]
+        if len(terms) != 1:
+            return np.inf
+        (term,) = terms
+        if term.neutral is None:
+            return np.inf
+        (inner,) = (t for t in simpler.parameters.terms if t.name in term.nested)
+        own = simpler.parameters
+        level = float(simpler.x[own.slot(inner.name)][0])
+        base, bare = own.removed(simpler.x, inner.name), own.without(inner.name)
+        if set(bare.effects) != set(fuller.parameters.without(term.name).effects) or bare.masses != fuller.parameters.masses:
+            return np.inf
+        neutral = np.array(term.neutral(level, fuller.parameters.scales))
+        hypothesis = Hypothesis(bare.extended(term), fuller.predictor)
+        x = bare.inserted(base, neutral)
+        as_fuller = ls.scored(self.objective, Fit(hypothesis, x, fuller.noise, 0.0, np.inf))
+        freedom = term.size - inner.size
+        return as_fuller.bic - freedom * float(np.log(self.objective.information)) + self.score(simpler) - simpler.bic
+
+    # Fits.
+
+    def closed(self, predictor: Predictor) -> Predictor:
+        """The closed loop with the same angle."""
+        return ClosedLoop(self.data, predictor.own_angle)
+
+    def seen(self, fit: Fit, predictor: Predictor) -> Fit:
+        """A model fitted under another predictor."""
+        if fit.predictor == predictor:
+            return fit
+        return self.refitted(fit.hypothesis.driven_by(predictor), fit.x, 8)
+
+    def seen_plainly(self, fit: Fit, predictor: Predictor) -> Fit:
+        """A model fitted to the plain errors of another predictor, from where it stands."""
+        return ls.fit(self.objective, fit.hypothesis.driven_by(predictor), fit.x, WHITE, 12)
+
+    def refitted(self, hypothesis: Hypothesis, x: Vector, iterations: int = 12) -> Fit:
+        """Plain least squares from x, then under a noise model of its own."""
+        return ls.reestimated(self.objective, ls.fit(self.objective, hypothesis, x, WHITE, iterations))
+
+    def continued(self, hypothesis: Hypothesis, fit: Fit, x: Vector, iterations: int = 8) -> Fit:
+        """From x under the noise model of a fit that it was made of, then under its own."""
+        return ls.reestimated(self.objective, ls.fit(self.objective, hypothesis, x, fit.noise, iterations))
+
+    def finished(self, fit: Fit) -> Fit:
+        """A short fit taken to the end under its own noise model, and under the predictors that may say more."""
+        fit = fit if fit.converged else ls.fit(self.objective, fit.hypothesis, fit.x, fit.noise, 8)
+        fit = ls.reestimated(self.objective, fit)
+        views: list[Predictor] = []
+        if fit.predictor.closed and self.whitens and not self.data.loop_only:
+            # Found in the loop's grip, the parameters may be good enough for a view that sees more.
+            views.append(OpenLoop(self.data, fit.predictor.own_angle))
+        if not fit.predictor.own_angle and not self.data.angle_logged and any(t.harmonic for t in fit.parameters.terms):
+            views.append(replace(fit.predictor, own_angle=True))  # type: ignore[type-var]
+        best = min((fit, *(self.seen(fit, v) for v in views)), key=lambda f: f.bic)
+        return self.canonical(best)
+
+    def canonical(self, fit: Fit) -> Fit:
+        """One mass with an extra resonance is a drive of two masses: part of the linear model, not an effect."""
+        if fit.parameters.masses == 2 or not any(t.resonates for t in fit.parameters.terms):
+            return fit
+        hypothesis, x = as_two_masses(fit)
+        return self.continued(hypothesis, fit, x)

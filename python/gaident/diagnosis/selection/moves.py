@@ -1,0 +1,271 @@
+"""The moves of the search.
+
+A model is a mechanism (one mass or two) with effects. The moves are
+
+    add         an effect, or a generalisation in the place of a simpler one of its family     (score test, then fits)
+    drop        an effect                                                                      (backward elimination)
+    simplify    a generalisation to what it contains
+    exchange    an effect for one of its equivalence class, where only others tell them apart
+    resettle    the mechanism's resonance at the place of an extra one
+    demote      two masses to one
+    close       the open loop to the closed one
+    search      the same model again, from all starts and globally, beside stops and impacts
+
+Whether a move is taken is one decision, `ModelSpace.worth`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
+from gaident.diagnosis.selection.mechanisms import as_one_mass, as_two_masses, is_mechanism
+from gaident.diagnosis.selection.model_space import ModelSpace, words
+from gaident.diagnosis.selection.score_test import ScoreTest
+from gaident.estimation import least_squares as ls
+from gaident.estimation.noise_model import WHITE
+from gaident.estimation.objective import Fit, Hypothesis
+from gaident.estimation.prediction import OpenLoop
+from gaident.estimation.projection import WORST
+from gaident.estimation.term import Term
+
+__all__ = ["Moves"]
+
+MISSED = 0.05  # of the largest torque: a level of friction to start from where the fitted one is lower
+
+
+@dataclass(frozen=True, eq=False)
+class Moves(ModelSpace):
+    """The models over one objective, and the moves between them."""
+
+    # Moves that add.
+
+    def candidates(self, fit: Fit) -> list[Term]:
+        """What may be added to a model."""
+        there = fit.parameters.terms
+        families = {t.family for t in there if t.family}
+        blocked = {name for t in there for name in t.excludes} | set(fit.effects)
+        return [
+            t
+            for t in self.allowed
+            if t.name not in blocked
+            and t.family not in families
+            and (fit.parameters.masses == 2 or not t.in_coupling)
+            and (self.whitens or not t.in_controller or fit.predictor.closed)
+        ]
+
+    def add(self, now: Fit) -> list[Fit]:
+        """Finished models with one effect more, or a generalisation in a simpler one's place; best first."""
+        if len(now.effects) >= self.policy.most_effects:
+            return []
+        key = "add", now.key, self.allowed
+        self.grown.setdefault((now.parameters.masses, frozenset(now.effects)), []).append(now)
+        return self.objective.once(key, lambda: self._add(now))
+
+    def known(self, fit: Fit) -> Fit:
+        """A fit of the same model that was grown already, where it is no worse by what swaps a place: its growth is known."""
+        same = self.grown.get((fit.parameters.masses, frozenset(fit.effects)), [])
+        near = [f for f in same if f.bic < fit.bic + self.policy.swap]
+        return min(near, key=lambda f: f.bic) if near else fit
+
+    def _add(self, now: Fit) -> list[Fit]:
+        self.note(f"looking beyond {words(now.effects) or 'the linear model'}")
+        test = ScoreTest(self.objective)
+        addable = self.candidates(now)
+        test.add(now.hypothesis, now.x, [t for t in addable if not t.nested])
+        fits: list[Fit] = []
+        simple = next((t for t in now.parameters.terms if t.family), None)
+        if simple is not None:
+            self._generalisations(test, now, simple)
+        else:
+            for first in [t for t in addable if t.family and not t.nested]:
+                # The simplest of a family first: its generalisations are tried at its level.
+                start = next((s for s in test.ranked(WHITE) if s.term is first), None)
+                if start is not None:
+                    fits.append(self.refitted(start.hypothesis, start.starts[0], 8))
+                    self._generalisations(test, fits[-1], first)
+        if not test.trials:
+            return []
+        rankings = [test.ranked(WHITE), test.ranked(None)] if self.whitens else [test.ranked(WHITE)]
+        if self.whitens and self.quiet(now):
+            # Where nothing but noise is left the linearised gains are near enough.
+            hopes = [s.hope for noise in (now.noise, None) for s in test.ranked(noise)]
+            if max(hopes, default=0.0) < 0.5 * self.penalty:
+                return self._best(fits)
+        done = {f.parameters.terms[-1] for f in fits}
+        short: dict[Term, Fit] = {}
+        for ranking in rankings:
+            for s in [s for s in ranking if s.term not in done][: self.policy.screened]:
+                for x in s.starts[:2]:
+                    fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, 3))
+                    if s.term not in short or fit.bic < short[s.term].bic:
+                        short[s.term] = fit
+        reach = self.policy.hopeless * self.objective.information
+        near = [f for f in short.values() if f.bic < now.bic + reach]
+        best = sorted(near, key=lambda f: f.bic)[: self.policy.finished]
+        fits += [self.finished(f) for f in best]
+        fits += [f for fit in fits for f in self.resettled(fit)]
+        return self._best(fits)
+
+    def _best(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Those that are mechanisms, best first, seen in the loop where the best one is."""
+        found = sorted((f for f in fits if f.cost < WORST and is_mechanism(f.parameters, f.x)), key=self.score)
+        if found and found[0].predictor.closed:
+            count = self.policy.screened
+            found = [self.in_view_of(f, found[0]) for f in found[:count]] + found[count:]
+            found = sorted(found, key=self.score)
+        return found
+
+    def _generalisations(self, test: ScoreTest, source: Fit, simple: Term) -> None:
+        """The rest of a family in the place of one of its members, at its level and at one that its own fit may have missed."""
+        parameters = source.parameters.without(simple.name)
+        x = source.parameters.removed(source.x, simple.name)
+        wanted = [t for t in self.allowed if t.family == simple.family and simple.name in t.nested]
+        level = abs(float(source.x[source.parameters.slot(simple.name)][0]))
+        torque = parameters.scales.torque
+        for friction in {max(level, 1e-4 * torque), max(level, MISSED * torque)}:
+            scales = replace(parameters.scales, friction=friction)
+            test.add(Hypothesis(replace(parameters, scales=scales), source.predictor), x, wanted)
+
+    def resettled(self, fit: Fit) -> list[Fit]:
+        """The two masses with the resonance that was found as their own, alone or with a simple effect beside it.
+
+        What delays the torque or blocks the shaft pulls the resonance of two masses out of its place, where a fit finds no way
+        back, and the true one is then found as an extra.
+        """
+        if fit.parameters.masses == 1 or not fit.parameters.terms[-1:] or not fit.parameters.terms[-1].resonates:
+            return []
+        shorter, y = as_two_masses(fit)
+        shorter = shorter.driven_by(OpenLoop(self.data, fit.predictor.own_angle)) if self.whitens else shorter
+        tries = [self.refitted(shorter, y, 20)]
+        for t in self.candidates(tries[0]):
+            if t.size > 1 or t.place == "shaft":
+                continue
+            rows = t.starts(shorter.parameters.scales)
+            if not rows:
+                continue
+            longer = shorter.extended(t)
+            if t.multimodal and self.data.loopable:
+                longer = longer.driven_by(self.closed(longer.predictor))
+            X = np.array([shorter.parameters.inserted(y, np.array(row)) for row in rows])
+            tries.append(self.refitted(longer, X[int(np.argmin(self.objective.costs(longer, X, WHITE)))], 20))
+        return tries
+
+    # Moves that reduce.
+
+    def drop(self, fit: Fit) -> list[Fit]:
+        """Without each of the effects."""
+        return [self.without(fit, e) for e in fit.effects]
+
+    def without(self, fit: Fit, effect: str) -> Fit:
+        """The model refitted without one of its effects; beside stops and impacts after a search of its own."""
+        less = self.continued(fit.hypothesis.without(effect), fit, fit.parameters.removed(fit.x, effect))
+        if any(t.multimodal and t.in_coupling for t in less.parameters.terms) and self.data.loopable and not self.quiet(less):
+            less = min((less, self.evolved(less)), key=lambda f: f.bic)
+        return less
+
+    def simplify(self, fit: Fit) -> list[Fit]:
+        """Each generalisation as what it contains, at its level."""
+        return [
+            self.as_nested(fit, t, LIBRARY[name])
+            for t in fit.parameters.terms
+            for name in t.nested
+            if LIBRARY[name] in self.allowed
+        ]
+
+    def as_nested(self, fit: Fit, term: Term, simple: Term) -> Fit:
+        """The model refitted with a simpler effect in the place of one that contains it, at its level."""
+        level = fit.x[fit.parameters.slot(term.name)][list(term.shared.get(simple.name, (0,)))]
+        hypothesis = fit.hypothesis.without(term.name).extended(simple)
+        x = hypothesis.parameters.without(simple.name).inserted(fit.parameters.removed(fit.x, term.name), level)
+        return self.continued(hypothesis, fit, x, 12)
+
+    def demote(self, fit: Fit) -> list[Fit]:
+        """Two masses with effects as one mass with these effects."""
+        if fit.parameters.masses == 1 or not fit.effects or any(t.in_coupling or t.resonates for t in fit.parameters.terms):
+            return []
+        hypothesis, x = as_one_mass(fit)
+        return [self.continued(hypothesis, fit, x, 20)]
+
+    def close(self, fit: Fit) -> list[Fit]:
+        """The closed loop's view of a model with dry friction, which holds a simulation to the record between its stops.
+
+        Driven by the torque, what nobody commanded adds up between the stops, for other effects to describe.
+        """
+        rests = any(t.levels for t in fit.parameters.terms)
+        if not self.whitens or fit.predictor.closed or not self.data.loopable or not rests or self.quiet(fit):
+            return []
+        return [self.seen(fit, self.closed(fit.predictor))]
+
+    def exchange(self, fit: Fit) -> list[Fit]:
+        """An effect as one of its equivalence class, where something else turns with an angle that was not logged.
+
+        Alone they are the same. But the angle of a filtered velocity is late, and so is not what a ripple turns with.
+        """
+        if self.data.angle_logged or not any(t.harmonic for t in fit.parameters.terms):
+            return []
+        found = []
+        for t in fit.parameters.terms:
+            for other in [LIBRARY[n] for c in EQUIVALENT if t.name in c for n in sorted(c - {t.name})]:
+                if other.seen_angle is None or other not in self.allowed or other.size != t.size:
+                    continue
+                short = fit.hypothesis.without(t.name)
+                z, x = fit.x[fit.parameters.slot(t.name)], fit.parameters.removed(fit.x, t.name)
+                found.append(self.refitted(short.extended(other), short.parameters.inserted(x, z)))
+        return found
+
+    def prefers(self, other: Fit, fit: Fit) -> bool:
+        """Whether a reduced model takes the place of a model."""
+        if len(other.effects) == len(fit.effects) and other.parameters.masses == fit.parameters.masses:
+            nested = any(set(t.nested) & set(other.effects) for t in fit.parameters.terms)
+            if not nested:
+                return self.score(other) < self.score(fit)
+        return not self.worth(fit, other)
+
+    # The same model again.
+
+    def search(self, fit: Fit) -> Fit:
+        """Where more than noise is left: every effect from all of its starts, those of valleys by a global search nearby."""
+        for term in fit.parameters.terms[::-1]:
+            if self.quiet(fit):
+                break
+            fit = min((fit, self.restarted(fit, term)), key=lambda f: f.bic)
+            if term.multimodal and not self.quiet(fit):
+                fit = min((fit, self.evolved(fit)), key=lambda f: f.bic)
+        return fit
+
+    def restarted(self, fit: Fit, term: Term) -> Fit:
+        """The best fit from an effect's starts, with the rest as it stands: the first began far from the rest's final values."""
+        rows = term.starts(fit.parameters.scales)
+        if not rows:
+            return fit
+        limits = np.array(term.limits(fit.parameters.scales)).T
+        X = np.repeat(fit.x[None, :], len(rows), axis=0)
+        X[:, fit.parameters.slot(term.name)] = np.clip(np.array(rows), *limits)
+        order = np.argsort(self.objective.costs(fit.hypothesis, X, fit.noise))[:3]
+        tries = [ls.scored(self.objective, ls.fit(self.objective, fit.hypothesis, X[i], WHITE, 8)) for i in order]
+        best = min(tries, key=lambda f: f.bic)
+        return self.refitted(best.hypothesis, best.x)
+
+    def evolved(self, fit: Fit) -> Fit:
+        """A global search nearby, in the loop where there is one."""
+        view = self.closed(fit.predictor) if self.data.loopable else fit.predictor
+        start = replace(fit, hypothesis=fit.hypothesis.driven_by(view))
+        key = "evolved", start.key, self.policy.evolution
+        return self.objective.once(key, lambda: self.finished(ls.evolved(self.objective, start, self.policy.evolution)))
+
+    def valleys(self, base: Fit) -> list[Fit]:
+        """Each effect of valleys alone beside a base, by a global search."""
+        found = []
+        for t in [t for t in self.candidates(base) if t.multimodal]:
+            hypothesis = base.hypothesis.extended(t)
+            rows = t.starts(base.parameters.scales)
+            if not rows:
+                continue
+            X = np.array([base.parameters.inserted(base.x, np.array(z)) for z in rows])
+            x = X[int(np.argmin(self.objective.costs(hypothesis, X, WHITE)))]
+            found.append(self.evolved(ls.scored(self.objective, ls.fit(self.objective, hypothesis, x, WHITE, 5))))
+        return found

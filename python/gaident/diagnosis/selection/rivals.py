@@ -1,0 +1,52 @@
+"""Other effects in a finding's place: what the record cannot tell from it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from gaident.diagnosis.selection.moves import Moves
+from gaident.estimation.objective import Fit
+
+__all__ = ["Rival", "rivals_of"]
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another effect in the place of one: how much worse (BIC units) the whole model is with it."""
+
+    effect: str
+    behind: float
+    fit: Fit
+
+
+def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str] = ()) -> tuple[float, list[Rival]]:
+    """(gain of `effect` in the final model, other effects in its place that come within reach, or are equivalent here)."""
+    less = space.known(space.without(final, effect))
+    gain = space.in_view_of(less, final).bic - final.bic
+    term = final.parameters.term(effect)
+    found = []
+    for f in space.add(less):
+        new = [t for t in f.parameters.terms if t.name not in final.effects]
+        if len(new) != 1 or len(f.effects) != len(final.effects):
+            continue
+        (other,) = new
+        behind = f.bic - final.bic
+        if other.name in equivalent:
+            found.append(Rival(other.name, behind, f))
+            continue
+        if effect in other.nested:
+            if not space.whitens:  # of a misfit any detail explains a part
+                continue
+            # A generalisation is never worse by more than its parameters: only a hint of what it adds counts.
+            more = other.size - term.size
+            hint = space.policy.hint + 3.0 * (more - 1)
+            if behind - more * np.log(space.objective.information) > -hint:
+                continue
+            if behind < -space.penalty and not space.in_both_views(final, f):
+                continue
+        if behind < space.margin:
+            found.append(Rival(other.name, behind, f))
+    return float(gain), found

@@ -1,0 +1,272 @@
+"""The score test: which effects are worth a fit.
+
+Each one's starts are simulated once, and what the present model could absorb is taken out.
+
+With v the whitened error of the present model, v_c that of a start row and P the projection beyond the present model's
+sensitivities,
+
+    d = P (v_c - v),   V_c = min over t of |P v + t d|^2,
+
+the cost after a linearised refit of everything else and of the size of the change. Harmonics of the angle need no grid: their two
+components are linear, order by order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.diagnosis.selection.mechanisms import evenly_damped
+from gaident.estimation.least_squares import fit
+from gaident.estimation.noise_model import WHITE, NoiseFilter
+from gaident.estimation.objective import Hypothesis, Objective
+from gaident.estimation.prediction import ClosedLoop
+from gaident.estimation.projection import orthonormal_rows, project_out
+from gaident.estimation.term import Term
+
+__all__ = ["Screened", "ScoreTest"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+TURN, SIXTH = 2.0 * np.pi, np.pi / 3.0  # rad
+FURTHEST = 2.0  # times the way to a start: the next one stands there
+
+
+@dataclass(frozen=True)
+class Screened:
+    """One candidate: its hypothesis, start vectors from the best on, the filter that it was judged with.
+
+    fall: what the best start promises against the model that it extends, under this filter; hope: the same against that model
+    under the filter of its own errors, in which the effect may pass for noise.
+    """
+
+    term: Term
+    hypothesis: Hypothesis
+    starts: tuple[Vector, ...]
+    noise: NoiseFilter
+    fall: float
+    hope: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    term: Term
+    hypothesis: Hypothesis
+    rows: Matrix  # start coordinates; for harmonics the orders
+    errors: Matrix  # plain errors; for harmonics the two columns of each order, what the error loses per unit
+    base: _Base
+    columns: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Base:
+    """The model that candidates extend: x, plain error and sensitivities."""
+
+    hypothesis: Hypothesis
+    x: Vector
+    error: Vector
+    J: Matrix
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """A base under one filter: an orthonormal basis of what its parameters can explain, the rest of its error, its BIC."""
+
+    noise: NoiseFilter
+    basis: Matrix
+    rest: Vector
+    own: float
+
+
+class ScoreTest:
+    """All candidates against one model; noise filters can be changed without a new simulation."""
+
+    def __init__(self, objective: Objective) -> None:
+        self.objective, self.data = objective, objective.data
+        self.trials: list[_Trial] = []
+        self._beyond: dict[_Base, tuple[int, NoiseFilter]] = {}
+        self._views: dict[tuple[_Base, NoiseFilter, bool], _View] = {}
+        self._screened: dict[tuple[_Trial, _View], Screened] = {}
+
+    def add(self, hypothesis: Hypothesis, x: Vector, terms: Sequence[Term]) -> None:
+        """Candidates as extensions of the model x."""
+        valleys = [t for t in terms if t.multimodal]
+        if valleys and self.data.loopable and not hypothesis.predictor.closed:
+            # A replayed torque that a limit inside the controller spoils has led the mechanism astray; the loop holds it.
+            inside = hypothesis.driven_by(ClosedLoop(self.data, hypothesis.predictor.own_angle))
+            held = x if self.data.torque_logged else fit(self.objective, inside, x, WHITE, 8).x
+            self.add(inside, held, valleys)
+            terms = [t for t in terms if not t.in_coupling]
+        self._add(hypothesis, x, terms)
+        between = [t for t in terms if t.in_coupling]
+        if between:
+            self._add(hypothesis, evenly_damped(hypothesis.parameters, x), between)
+
+    def _add(self, hypothesis: Hypothesis, x: Vector, terms: Sequence[Term]) -> None:
+        _, J, error = self.objective.linearised(hypothesis, x, WHITE)
+        base = _Base(hypothesis, x, error, J)
+        parameters = hypothesis.parameters
+        for term in terms:
+            longer = hypothesis.extended(term)
+            if term.harmonic:
+                orders, columns = self._columns(hypothesis, x, term, error)
+                if len(orders):
+                    self.trials.append(_Trial(term, longer, orders[:, None], columns, base, True))
+                continue
+            rows = np.array(term.starts(parameters.scales))
+            if rows.size == 0:
+                continue
+            low, high = np.array(term.limits(parameters.scales)).T
+            rows = np.clip(rows, low, high)
+            X = np.vstack([parameters.inserted(x, z) for z in rows])
+            self.trials.append(_Trial(term, longer, rows, self.objective.errors(longer, X), base, False))
+
+    def _columns(self, hypothesis: Hypothesis, x: Vector, term: Term, error: Vector) -> tuple[Vector, Matrix]:
+        """(orders, columns): what the plain error loses per unit of the two components, pairs of rows per order."""
+        angle = self.data.angle
+        first, last = term.orders
+        orders = np.arange(float(first), last + 1.0)
+        # Seen is what passes a few times, slowly enough for the sampling at the speeds that matter: there and back counts twice,
+        # but most of a turn has to be there. A single order once per turn is gravity, which a sixth of a turn shows.
+        turned, path = float(np.ptp(angle)), float(np.abs(np.diff(angle)).sum())
+        speed = float(np.median(np.abs(self.objective.measured)) + 1e-12)
+        seen = (orders * turned > 0.75 * TURN) & (orders * path > 3.0 * TURN)
+        if last == 1 and self.data.angle_logged:
+            seen |= turned > SIXTH
+        orders = orders[seen & (orders * speed * self.data.dt < 2.5)]
+        if len(orders) == 0:
+            return orders, np.zeros((0, len(error)))
+        waves = _harmonics(angle, orders)
+        if term.harmonic == "torque":
+            pairs = np.stack([-waves.imag, -waves.real], axis=1).reshape(-1, len(angle))
+            return orders, hypothesis.predictor.torque_response(hypothesis.parameters, x, pairs)
+        w = (self.objective.measured - error) * orders[:, None]
+        return orders, np.stack([w * waves.real, -w * waves.imag], axis=1).reshape(-1, len(angle))
+
+    def filter_beyond(self, base: _Base) -> NoiseFilter:
+        """Noise filter of what nothing in the library explains, to first order: no effect is whitened away as noise."""
+        directions = [base.J]
+        rest = project_out(base.J, base.error[None, :])[0]
+        for t in (t for t in self.trials if t.base is base):
+            if t.columns:
+                best = np.argsort(_pair_worth(project_out(base.J, t.errors), rest))[::-1][:2]
+                directions += [t.errors[2 * i : 2 * i + 2] for i in best]
+            else:
+                finite = np.all(np.isfinite(t.errors), axis=1)
+                if finite.any():
+                    nearest = np.argmin(_along(project_out(base.J, t.errors[finite]) - rest, rest))
+                    directions.append((t.errors[finite][nearest] - base.error)[None, :])
+        D = np.vstack(directions)[: max(len(base.error) // 8, 1)]
+        return self.objective.noise_of(project_out(D, base.error[None, :])[0], base.hypothesis.predictor.closed)
+
+    def ranked(self, noise: NoiseFilter | None) -> list[Screened]:
+        """Candidates from the most to the least promising, each in its better view.
+
+        What counts is the fall of a candidate's cost against the model that it extends, in the same view: a model in its loop
+        leaves another error than one that the torque drives. noise: the filter; None: each view's own of what nothing explains.
+        """
+        best: dict[Term, Screened] = {}
+        for t in self.trials:
+            view = self._view(t.base, noise)
+            key = t, view
+            if key not in self._screened:
+                self._screened[key] = self._judged(t, view)
+            found = self._screened[key]
+            if t.term not in best or found.fall > best[t.term].fall:
+                best[t.term] = found
+        return sorted(best.values(), key=lambda s: -s.fall)
+
+    def _view(self, base: _Base, noise: NoiseFilter | None) -> _View:
+        own = noise is None
+        if noise is None:
+            trials = sum(t.base is base for t in self.trials)
+            if base not in self._beyond or self._beyond[base][0] != trials:
+                self._beyond[base] = trials, self.filter_beyond(base)
+            noise = self._beyond[base][1]
+        key = base, noise, own
+        if key not in self._views:
+            basis = orthonormal_rows(self.objective.whitened(base.J, noise))
+            v = self.objective.whitened(base.error[None, :], noise)[0]
+            rest = v - (v @ basis.T) @ basis
+            self._views[key] = _View(noise, basis, rest, self._without(base, None if own else noise))
+        return self._views[key]
+
+    def _judged(self, t: _Trial, view: _View) -> Screened:
+        n, rest = self.objective.information, view.rest
+        V = self.objective.whitened(t.errors, view.noise)
+        finite = np.all(np.isfinite(V), axis=1)
+        V[~finite] = 0.0
+        V -= (V @ view.basis.T) @ view.basis
+        power = float(rest @ rest)
+        if t.columns:
+            worth = _pair_worth(V, rest)
+            order = np.argsort(worth)[::-1][:2]
+            costs = np.maximum(power - worth[order], 1e-300)
+            starts = tuple(_harmonic_start(t, V, rest, int(i)) for i in order)
+        else:
+            costs = np.where(finite, _along(V - rest, rest, t.term.proportional), np.inf)
+            order = np.argsort(costs)
+            starts = tuple(t.base.hypothesis.parameters.inserted(t.base.x, row) for row in _start_rows(t, V, rest, order[:3]))
+            costs = costs[order]
+        cost, size = max(float(costs[0]), 1e-300), t.term.size
+        fall = n * np.log(max(power, 1e-300) / cost) - size * np.log(n)
+        bic = n * np.log(cost / n) + (t.base.hypothesis.parameters.size + size + view.noise.size) * np.log(n)
+        return Screened(t.term, t.hypothesis, starts, view.noise, float(fall), float(view.own - bic))
+
+    def _without(self, base: _Base, noise: NoiseFilter | None) -> float:
+        """BIC of the model that is extended, under a filter or that of its own errors."""
+        n = self.objective.information
+        f = noise or self.objective.noise_of(base.error, base.hypothesis.predictor.closed)
+        v = self.objective.whitened(base.error[None, :], f)[0]
+        return float(n * np.log(max(float(v @ v), 1e-300) / n) + (base.hypothesis.parameters.size + f.size) * np.log(n))
+
+
+def _harmonics(angle: Vector, orders: Vector) -> NDArray[np.complex128]:
+    """exp(i n angle), a row for each order n, these rising by whole numbers: each from the one before."""
+    rows = np.empty((len(orders), len(angle)), dtype=np.complex128)
+    turn = np.exp(1j * angle)
+    wave, before = np.ones_like(turn), 0
+    for row, order in zip(rows, orders, strict=True):
+        for _ in range(int(order) - before):
+            wave = wave * turn
+        row[:], before = wave, int(order)
+    return rows
+
+
+def _along(D: Matrix, rest: Vector, proportional: bool = False) -> Vector:
+    """|rest|^2 after the best step forward along each row of D: as far as the next start, further where all is proportional."""
+    sizes = np.maximum(np.einsum("ij,ij->i", D, D), 1e-300)
+    slopes = D @ rest
+    steps = np.clip(-slopes / sizes, 0.0, np.inf if proportional else FURTHEST)
+    return np.asarray(float(rest @ rest) + 2.0 * steps * slopes + steps**2 * sizes)
+
+
+def _pair_worth(V: Matrix, rest: Vector) -> Vector:
+    """Fall of |rest|^2 by each pair of rows of V."""
+    A, B = V[0::2], V[1::2]
+    aa, bb, ab = (np.einsum("ij,ij->i", *p) for p in ((A, A), (B, B), (A, B)))
+    ra, rb = A @ rest, B @ rest
+    det = aa * bb - ab**2
+    good = det > 1e-9 * aa * bb
+    det = np.where(good, det, 1.0)
+    worth = (bb * ra**2 - 2.0 * ab * ra * rb + aa * rb**2) / det
+    return np.where(good, worth, 0.0)
+
+
+def _start_rows(t: _Trial, V: Matrix, rest: Vector, order: NDArray[np.intp]) -> Matrix:
+    """Start coordinates from the best on; where the torque is proportional to them, at the end of the best step."""
+    rows = t.rows[order]
+    if t.term.proportional:
+        D = V[order] - rest
+        rows = rows * np.maximum(-(D @ rest) / np.maximum(np.einsum("ij,ij->i", D, D), 1e-300), 0.0)[:, None]
+    return np.asarray(rows)
+
+
+def _harmonic_start(t: _Trial, V: Matrix, rest: Vector, i: int) -> Vector:
+    z: Vector = np.asarray(np.linalg.lstsq(V[2 * i : 2 * i + 2].T, rest, rcond=None)[0], dtype=np.float64)
+    coordinates: Vector = z if t.term.size == 2 else np.concatenate([z, t.rows[i]])
+    return t.base.hypothesis.parameters.inserted(t.base.x, coordinates)

@@ -1,0 +1,328 @@
+"""A drive.toml for the axis behind a log: what the log shows is written down, what it cannot show is marked FILL IN."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.formats.units import Constants, factor, needed_constant
+from gaident.data.guess import Guess, guess_channels, position_and_velocity, unit_from_position, unit_from_velocity
+from gaident.data.listing import Listing
+from gaident.data.timeaxis import stamp_unit
+from gaident.data.torque_kind import kind_of_torque
+from gaident.errors import ReadError
+
+__all__ = ["DriveDraft", "draft"]
+
+_SI = {"command": "rad/s", "velocity": "rad/s", "torque": "N m", "position": "rad"}
+_SI_LINEAR = {"command": "m/s", "velocity": "m/s", "torque": "N", "position": "m"}
+_CONSTANTS = {
+    "rated_torque": ("2.4", "N m at 100 %"),
+    "torque_constant": ("0.05", "N m/A"),
+    "torque_per_volt": ("0.24", "N m/V"),
+    "counts_per_turn": ("4096", "encoder counts per turn of the motor"),
+}
+_COMMENT = 26  # column where comments begin
+
+
+@dataclass(frozen=True)
+class DriveDraft:
+    """text: the drive.toml; fill_in: what a person must add, one line each; channels: channel -> column.
+
+    torque_is: what the torque is, as its column's name says; None where it does not, or there is none.
+    """
+
+    text: str
+    fill_in: tuple[str, ...]
+    channels: Mapping[str, str]
+    torque_is: str | None
+
+
+def draft(listing: Listing, values: Mapping[str, NDArray[np.float64]]) -> DriveDraft:
+    """The drive.toml for a log; values: its columns in the file's units, {} where it is too long to be looked into.
+
+    Raises ReadError where the log holds nothing that could be a channel.
+    """
+    guess = _with_content(listing, guess_channels(listing), values)
+    if not guess.channels and not any(c.samples > 1 for c in listing.columns):
+        raise ReadError(f"{listing.path}: the log holds no column of more than one number; give a log of a run")
+    return _Draft(listing, guess, values).done()
+
+
+def _with_content(listing: Listing, guess: Guess, values: Mapping[str, NDArray[np.float64]]) -> Guess:
+    """What no name tells: a pair of columns of which one is the derivative of the other."""
+    if "velocity" in guess.channels:
+        return guess
+    taken = {c.name for channel, c in guess.channels.items() if channel != "position"} | {guess.time.name if guess.time else ""}
+    moving = [c for c in listing.columns if c.samples > 20 and c.lowest != c.highest and not c.note and not c.rises_evenly]
+    longest = max((c.samples for c in moving), default=0)
+    candidates = {c.name: values[c.name] for c in moving if c.samples == longest and c.name not in taken and c.name in values}
+    pair = position_and_velocity(candidates, 1.0) if len(candidates) <= 30 else None
+    if pair is None or ("position" in guess.channels and pair[0] != guess.channels["position"].name):
+        return guess
+    by_name = {c.name: c for c in listing.columns}
+    found = dict(zip(("position", "velocity"), (by_name[name] for name in pair), strict=True))
+    reasons = {"position": "the log's velocity is its derivative", "velocity": "the derivative of the log's position"}
+    rest = {channel: c for channel, c in guess.channels.items() if c.name not in pair}
+    return replace(guess, channels={**rest, **found}, reasons={**guess.reasons, **reasons})
+
+
+class _Draft:
+    """The lines, as they are put together."""
+
+    def __init__(self, listing: Listing, guess: Guess, values: Mapping[str, NDArray[np.float64]]) -> None:
+        self.listing, self.guess, self.values = listing, guess, values
+        self.fill: list[str] = []
+        self.units = {channel: column.unit for channel, column in guess.channels.items()}
+        self.linear = any(_is_linear(channel, unit) for channel, unit in self.units.items())
+        torque = guess.channels.get("torque")
+        self.torque_is = None if torque is None else kind_of_torque((torque.name, *torque.names))
+        self.dt = (
+            next((c.sample_time for c in guess.channels.values() if c.sample_time is not None), None) or self._step_of_time()
+        )
+        self.compared: dict[str, tuple[str, str]] = {}  # channel -> (unit, what it was compared with)
+        self._compare_velocity()
+        self._compare_command()
+
+    def _step_of_time(self) -> float | None:
+        """dt of a time column that was known by its values."""
+        time = self.guess.time
+        if time is None or not time.rises_evenly or time.lowest is None or time.highest is None or time.samples < 2:
+            return time.sample_time if time is not None else None
+        second = factor("time", time.unit) if time.unit else stamp_unit(time.lowest)
+        return float(f"{(time.highest - time.lowest) / (time.samples - 1) * second:.9g}")
+
+    def _compare_velocity(self) -> None:
+        """The unit of the velocity by comparison with the position, where the log does not say it."""
+        held = self.guess.channels
+        if self.dt is None or not {"velocity", "position"} <= held.keys() or self.units["velocity"] is not None:
+            return
+        size = _factor("position", self.units["position"])
+        position, velocity = (self.values.get(held[channel].name) for channel in ("position", "velocity"))
+        if size is None or position is None or velocity is None or len(position) != len(velocity):
+            return
+        unit = unit_from_position(velocity, position * size, self.dt, self.linear)
+        if unit is not None:
+            self.compared["velocity"] = unit, "position"
+
+    def _compare_command(self) -> None:
+        """The unit of the command by comparison with the velocity, which follows it."""
+        held = self.guess.channels
+        if not {"velocity", "command"} <= held.keys() or self.units["command"] is not None:
+            return
+        size = _factor("velocity", self.units["velocity"] or self.compared.get("velocity", (None, ""))[0])
+        command, velocity = (self.values.get(held[channel].name) for channel in ("command", "velocity"))
+        if size is None or command is None or velocity is None or len(command) != len(velocity):
+            return
+        if not (np.isfinite(command).all() and np.isfinite(velocity).all()):
+            return
+        unit = unit_from_velocity(command, velocity * size, self.linear)
+        if unit is not None:
+            self.compared["command"] = unit, "velocity"
+
+    def done(self) -> DriveDraft:
+        top, columns, units = self._top(), self._columns(), self._units()
+        parts = [
+            _HEAD.format(log=_quoted(Path(self.listing.path).name)),
+            *top,
+            "",
+            "[columns]",
+            *columns,
+            "",
+            "[units]",
+            *units,
+            "",
+        ]
+        parts += [*self._controller(), "", *self._space(), "", *self._limits()]
+        names = {channel: column.name for channel, column in self.guess.channels.items()}
+        return DriveDraft("\n".join([*parts, ""]), tuple(self.fill), names, self.torque_is)
+
+    def _top(self) -> list[str]:
+        lines = [
+            _line(
+                'axis = "linear"' if self.linear else 'axis = "rotary"',
+                'or "rotary"' if self.linear else 'or "linear": m, m/s, N, kg',
+            )
+        ]
+        time = self.guess.time
+        if time is None and self.dt is None:
+            lines.append(self._todo("# dt = 1e-3", "dt", "s; no column looks like time"))
+        elif self.dt is None:
+            lines.append(
+                self._todo(
+                    "# resample = 1e-3", "resample", f"s; the time stamps are irregular: {_plain(time.note if time else '')}"
+                )
+            )
+        else:
+            source = f"from the column {_quoted(time.name)}" if time is not None else "as the file states"
+            lines.append(_line(f"# dt = {self.dt:.9g}", f"s, {source}; needed for logs without it, and for gaident experiment"))
+        for name in dict.fromkeys(needed_constant(channel, unit) for channel, unit in self.units.items() if unit):
+            if name is not None:
+                value, meaning = _CONSTANTS[name]
+                which = next(ch for ch, unit in self.units.items() if unit and needed_constant(ch, unit) == name)
+                lines.append(self._todo(f"# {name} = {value}", name, f"{meaning}; the {which} is logged in {self.units[which]}"))
+        if "torque" in self.guess.channels:
+            meaning = '"commanded": by the controller; "measured": a current times a constant'
+            if self.torque_is is not None:
+                lines.append(_line(f"torque_is = {_quoted(self.torque_is)}", f"as its column's name says; {meaning}"))
+            else:
+                lines.append(self._todo('# torque_is = "measured"', "torque_is", f"{meaning}; commanded is taken"))
+        lines.append(
+            _line("# gear_ratio = 10.0", 'turns of the motor per turn of the load, with load_side = ["position"], what was')
+        )
+        lines.append(_line("", "measured behind the gear"))
+        lines.append(_line("# decimate = 10", "keep every tenth sample behind a low-pass, for very long logs"))
+        return lines
+
+    def _columns(self) -> list[str]:
+        lines = []
+        if self.guess.time is not None:
+            lines.append(_line(f"time = {_quoted(self.guess.time.name)}", "rises evenly" if not self.guess.time.is_time else ""))
+        for channel, column in self.guess.channels.items():
+            lines.append(_line(f"{channel} = {_quoted(column.name)}", self.guess.reasons.get(channel, "")))
+        rest = [
+            c.name
+            for c in self.listing.columns
+            if c not in (*self.guess.channels.values(), self.guess.time)
+            and not c.is_time
+            and c.samples > 1
+            and c.lowest != c.highest
+        ]
+        others = f"; the log also holds {', '.join(map(_quoted, rest[:8]))}" if rest else ""
+        if "velocity" not in self.guess.channels and "position" not in self.guess.channels:
+            lines.append(self._todo('# velocity = "..."', "velocity", f"the measured velocity (or position = ...){others}"))
+        if "command" not in self.guess.channels:
+            needed = "torque" not in self.guess.channels
+            text = f"the velocity command, for closed loop{others}"
+            lines.append(self._todo('# command = "..."', "command", text) if needed else _line('# command = "..."', text))
+        if "torque" not in self.guess.channels:
+            needed = "command" not in self.guess.channels
+            text = f"the controller's torque (or current), for open loop{others}"
+            lines.append(self._todo('# torque = "..."', "torque", text) if needed else _line('# torque = "..."', text))
+        return lines
+
+    def _units(self) -> list[str]:
+        lines = []
+        si = _SI_LINEAR if self.linear else _SI
+        for channel in self.guess.channels:
+            unit = self.units[channel]
+            if unit is not None and _factor(channel, unit) is None:
+                lines.append(
+                    self._todo(
+                        f'# {channel} = "{si[channel]}"', f"units.{channel}", f"the log says {_quoted(unit)}, which is not known"
+                    )
+                )
+            elif unit is not None:
+                lines.append(_line(f"{channel} = {_quoted(unit)}", "as the log says"))
+            elif channel in self.compared:
+                known, other = self.compared[channel]
+                lines.append(_line(f"{channel} = {_quoted(known)}", f"by comparison with the {other}"))
+            else:
+                lines.append(
+                    self._todo(
+                        f'# {channel} = "{si[channel]}"', f"units.{channel}", f"the log does not say it; {si[channel]} is taken"
+                    )
+                )
+        time = self.guess.time
+        if time is not None and time.unit is None and (time.lowest is None or stamp_unit(time.lowest) == 1.0):
+            lines.append(_line('# time = "s"', "the log does not say it; s is taken"))
+        return lines
+
+    def _controller(self) -> list[str]:
+        unit = "N m s/rad", "N m/rad"
+        if self.linear:
+            unit = "N s/m", "N/m"
+        text = "as set in the drive"
+        if "torque" in self.guess.channels:
+            text += '; or loop = "open"'
+        mark = self._todo if "command" in self.guess.channels else lambda line, _, comment: _line(line, comment)
+        return [
+            "[controller]",
+            mark("# kp = 0.0232", "controller.kp", f"{unit[0]}; proportional gain {text}"),
+            mark("# ki = 1.367", "controller.ki", f"{unit[1]}; integral gain"),
+            _line('# loop = "sampled"', 'a digital drive; or "continuous"; or "open": the torque drives the model'),
+            _line("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
+        ]
+
+    def _space(self) -> list[str]:
+        return [
+            "[space]                   # where to look, if you know; what is not given is derived from the data",
+            _line("# inertia = [1e-4, 5e-3]", "total mass, kg" if self.linear else "total inertia at the motor, kg m^2"),
+            _line("# resonance_hz = [5, 200]", "where the mechanism may resonate"),
+        ]
+
+    def _limits(self) -> list[str]:
+        lines = ["[limits]                  # what an experiment may do, for `gaident experiment`"]
+        for name, channels, unit in (("speed", ("velocity", "command"), "rad/s"), ("torque", ("torque",), "N m")):
+            largest = self._largest(channels)
+            if largest is None:
+                lines.append(_line(f"# {name} = 1.0", f"{'m/s' if self.linear and name == 'speed' else unit}"))
+            else:
+                text = f"{_SI_LINEAR[channels[0]] if self.linear else unit}; the largest of this log"
+                lines.append(_line(f"# {name} = {largest:.3g}", text))
+        lines.append(_line("# travel = 100.0", "m" if self.linear else "rad; left out: it may turn freely"))
+        lines.append(_line("# duration = 5.0", "s"))
+        return lines
+
+    def _largest(self, channels: tuple[str, ...]) -> float | None:
+        """The largest absolute value of these channels in SI, where units are known; to three digits, rounded up."""
+        found = []
+        for channel in channels:
+            column = self.guess.channels.get(channel)
+            unit = self.units.get(channel) or self.compared.get(channel, (None, ""))[0]
+            size = _factor(channel, unit)
+            if column is None or size is None or (unit and needed_constant(channel, unit)):
+                continue
+            if column.lowest is not None and column.highest is not None:
+                found.append(size * max(abs(column.lowest), abs(column.highest)))
+        if not found or max(found) == 0.0:
+            return None
+        digits = 2 - math.floor(math.log10(max(found)))
+        return float(math.ceil(max(found) * 10.0**digits) / 10.0**digits)
+
+    def _todo(self, line: str, what: str, comment: str) -> str:
+        self.fill.append(f"{what}: {comment}")
+        return _line(line, f"FILL IN: {comment}")
+
+
+_HEAD = """\
+# What belongs to this axis, for `gaident identify LOG --drive drive.toml`. Written by `gaident init` from {log}.
+# FILL IN marks what the log cannot say: write the value and remove the # before it. All other lines are what it shows.
+# Every key: `gaident identify --help`.
+"""
+
+
+def _line(text: str, comment: str) -> str:
+    return f"{text.ljust(_COMMENT - 2)}  # {comment}" if comment else text
+
+
+def _quoted(text: str) -> str:
+    """As TOML and its comments take it, on one line."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _factor(channel: str, unit: str | None) -> float | None:
+    """Factor to SI, constants of the drive taken as 1; None where the unit is not known."""
+    if unit is None:
+        return None
+    try:
+        return factor(channel, unit, Constants(1.0, 1.0, 1.0, 1.0))
+    except ReadError:
+        return None
+
+
+def _is_linear(channel: str, unit: str | None) -> bool:
+    if unit is None or _factor(channel, unit) is None:
+        return False
+    plain = unit.casefold().replace(" ", "")
+    return plain.startswith(("m/", "mm", "um", "met")) or plain in ("m", "n", "kn", "mn", "newton")

@@ -1,0 +1,318 @@
+"""drive.toml: what belongs to the axis, checked key by key, and what follows from it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gaident.checks import known_keys, one_of, real_number
+from gaident.control.pi import PI
+from gaident.data.readers import read
+from gaident.data.record import CHANNELS, Record
+from gaident.data.torque_kind import TORQUE_KINDS
+from gaident.errors import ControllerError, ReadError, SettingsError, SpaceError
+from gaident.identification.space import derive_space
+from gaident.models.search_space import SearchSpace
+from gaident.results.experiment import Limits
+from gaident.show.wording import AXES
+
+__all__ = ["COLUMNS", "KEYS", "Drive", "read_drive_file", "unfilled_of"]
+
+
+COLUMNS = (*CHANNELS, "time")
+CONSTANTS = ("counts_per_turn", "torque_constant", "rated_torque", "torque_per_volt")
+RANGES = ("inertia", "resonance_hz", "damping", "gain", "real", "imaginary", "p", "q")
+
+Check = Callable[[object, str], object]
+
+
+def _number(value: object, name: str) -> float:
+    if isinstance(value, bool):
+        raise ReadError(f"{name} is {value!r}: give one number")
+    return real_number(value, name, ReadError, "give one number, without quotes")
+
+
+def _whole(value: object, name: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise ReadError(f"{name} is {value!r}: give a whole number")
+    return value
+
+
+def _text(value: object, name: str) -> str:
+    if not isinstance(value, str):
+        raise ReadError(f'{name} is {value!r}: give text in quotes, {name} = "..."')
+    return value
+
+
+def _column(value: object, name: str) -> str | int:
+    return value if isinstance(value, int) and not isinstance(value, bool) else _text(value, name)
+
+
+def _unit(value: object, name: str) -> str | float:
+    return value if isinstance(value, str) else _number(value, name)
+
+
+def _pair(value: object, name: str) -> tuple[float, float]:
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
+        hint = ", with decimal points" if isinstance(value, list) and len(value) in (3, 4) else ""
+        raise ReadError(f"{name} is {value!r}: give a pair{hint}, {name} = [lowest, highest]")
+    low, high = (_number(v, name) for v in value)
+    return low, high
+
+
+def _pair_or_one(value: object, name: str) -> tuple[int, int]:
+    if isinstance(value, int) and not isinstance(value, bool):
+        return value, value
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
+        raise ReadError(f"{name} is {value!r}: give one whole number or a pair, {name} = [lowest, highest]")
+    return _whole(value[0], name), _whole(value[1], name)
+
+
+def _channels(value: object, name: str) -> tuple[str, ...]:
+    listed = [value] if isinstance(value, str) else value
+    if not isinstance(listed, Sequence) or not listed:
+        raise ReadError(f'{name} is {value!r}: give a list of channels, {name} = ["position"]')
+    return tuple(one_of(_text(entry, name), name, CHANNELS, ReadError) for entry in listed)
+
+
+def _positive(value: object, name: str) -> float:
+    number = _number(value, name)
+    if not number > 0.0:
+        raise ReadError(f"{name} is {value!r}: give a number > 0")
+    return number
+
+
+def _axis(value: object, name: str) -> str:
+    return one_of(value, name, AXES, ReadError)
+
+
+def _torque_is(value: object, name: str) -> str:
+    return one_of(value, name, TORQUE_KINDS, ReadError)
+
+
+# Sections of drive.toml ("" is its top), their keys and what a value must be.
+KEYS: dict[str, dict[str, Check]] = {
+    "": {
+        "axis": _axis,
+        "dt": _number,
+        "velocity_cutoff_hz": _number,
+        **dict.fromkeys(CONSTANTS, _number),
+        "gear_ratio": _positive,
+        "load_side": _channels,
+        "torque_is": _torque_is,
+        "decimate": _whole,
+        "resample": _positive,
+        "delimiter": _text,
+        "decimal": _text,
+        "skip": _whole,
+        "encoding": _text,
+    },
+    "columns": dict.fromkeys(COLUMNS, _column),
+    "units": dict.fromkeys(COLUMNS, _unit),
+    "controller": {
+        "kp": _number,
+        "ki": _number,
+        "loop": _text,
+        "torque_limit": _number,
+        "integrator_limit": _number,
+    },
+    "space": {
+        **dict.fromkeys(RANGES, _pair),
+        "p": _pair_or_one,
+        "q": _pair_or_one,
+        "bits": _whole,
+    },
+    "limits": dict.fromkeys(("speed", "torque", "travel", "duration"), _positive),
+}
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What belongs to the axis: how its logs are read, its controller, where to look for its parameters."""
+
+    general: Mapping[str, Any]
+    columns: Mapping[str, Any]
+    units: Mapping[str, Any]
+    controller_values: Mapping[str, Any]
+    space_values: Mapping[str, Any]
+    limit_values: Mapping[str, Any] = field(default_factory=dict)
+    unfilled: Mapping[tuple[str, str], str] = field(default_factory=dict)  # (section, key) -> file and line, see `unfilled_of`
+
+    @property
+    def axis(self) -> str:
+        """ "rotary" or "linear": which units are printed."""
+        return str(self.general.get("axis", "rotary"))
+
+    def read(self, path: str, measured: bool = True) -> Record:
+        """The log as a Record; measured: as `gaident.read` takes it. Raises ReadError or RecordError.
+
+        A CSV that gaident wrote itself, of a proposed command, names its columns and units: the drive's are those of its logs.
+        """
+        if not measured and _is_proposal(path) and not {"command", "command [rad/s]", "command [m/s]"} & {*self.columns.values()}:
+            return read(path, measured=False)
+        columns = {k: None if v == "" else v for k, v in self.columns.items()}
+        left_out = {k for k, v in columns.items() if v is None}
+        not_read = {"axis", "dt"} | ({"torque_is"} if "torque" in left_out else set())
+        more = {k: v for k, v in self.general.items() if k not in not_read}
+        self._refuse_unfilled("units", [k for k in CHANNELS if k not in left_out], "or give it with --units CHANNEL=UNIT")
+        units = {k: v for k, v in self.units.items() if k not in left_out}
+        return read(path, columns or None, units or None, self.general.get("dt"), measured=measured, **more)
+
+    def controller(self) -> PI | None:
+        """The PI controller; None: open loop. Raises ControllerError where half of it is missing."""
+        values = self.controller_values
+        if values.get("loop") == "open":
+            return None
+        if self.columns.get("command") != "":
+            remedy = "or give --kp and --ki, or --loop open to work from torque to velocity"
+            self._refuse_unfilled("controller", ("kp", "ki"), remedy)
+        if not values:
+            return None
+        missing = [name for name in ("kp", "ki") if name not in values]
+        if missing:
+            raise ControllerError(
+                f"the controller lacks {' and '.join(missing)}: give --kp and --ki (or [controller] in "
+                "the drive file), or --loop open to work from torque to velocity"
+            )
+        return PI(**values)
+
+    def _refuse_unfilled(self, section: str, keys: Sequence[str], remedy: str) -> None:
+        """Raises SettingsError where the file marks keys of a section FILL IN that neither it nor an option gives."""
+        given = {"units": self.units, "controller": self.controller_values}[section]
+        missing = [key for key in keys if (section, key) in self.unfilled and key not in given]
+        if missing:
+            where = self.unfilled[section, missing[0]]
+            raise SettingsError(
+                f"{where}: {' and '.join(missing)} of [{section}], marked FILL IN, {'is' if len(missing) == 1 else 'are'} not "
+                f"filled in: write the value and remove the # before it, {remedy}"
+            )
+
+    def limits(self) -> Limits:
+        """What an experiment may do. Raises SettingsError where the speed or the torque is missing."""
+        missing = [name for name in ("speed", "torque") if name not in self.limit_values]
+        if missing:
+            raise SettingsError(
+                f"the limits lack {' and '.join(missing)}: give --{' and --'.join(missing)} (or [limits] in the drive file), "
+                "what the axis may do in an experiment"
+            )
+        return Limits(**self.limit_values)
+
+    def space(self, records: Sequence[Record], controller: PI | None) -> SearchSpace | None:
+        """The search space: what is given, the rest derived from the data; None where nothing is given."""
+        given = dict(self.space_values)
+        if not given:
+            return None
+        source = ", ".join(given)
+        for name, other in (("inertia", "gain"), ("resonance_hz", "imaginary")):
+            if name in given and other in given:
+                raise SpaceError(f"{name} and {other} both say where to look for the same thing: leave one out")
+        if "damping" in given and "inertia" not in given:
+            raise SpaceError("damping is given without inertia: give both, their ratio bounds the real parts")
+        derived = derive_space(records, controller)
+        mechanics = {k: given.pop(k) for k in ("inertia", "resonance_hz", "damping") if k in given}
+        if mechanics:
+            # What is not given stands in with any value; the ranges that come from it are not used.
+            top = derived.imaginary[1] / math.tau
+            whole = SearchSpace.from_mechanics(
+                mechanics.get("inertia", (1.0, 2.0)),
+                mechanics.get("resonance_hz", (0.5 * top, top)),
+                mechanics.get("damping"),
+            )
+            if "inertia" in mechanics:
+                given.setdefault("gain", whole.gain)
+            if "resonance_hz" in mechanics:
+                given.setdefault("imaginary", whole.imaginary)
+            if "resonance_hz" in mechanics or "damping" in mechanics:
+                given.setdefault("real", whole.real)
+        return dataclasses.replace(derived, **given, source=f"given: {source}; what is not, {derived.source}")
+
+
+def _is_proposal(path: str) -> bool:
+    """Whether a file is a command as `gaident experiment`, --next-command or a report writes it."""
+    try:
+        with open(path, "rb") as stream:
+            return re.fullmatch(rb"time \[s\],command \[(rad|m)/s\]\r?\n", stream.readline(64)) is not None
+    except OSError:
+        return False
+
+
+def read_drive_file(path: str) -> dict[str, dict[str, Any]]:
+    """drive.toml as {section: {key: value}}, checked; raises ReadError with file, key, value and remedy."""
+    if sys.version_info >= (3, 11):
+        import tomllib
+    else:
+        import tomli as tomllib
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ReadError(f"{path}: there is no such drive file; check --drive") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ReadError(f"{path}: cannot be read ({error}); give a TOML file in UTF-8") from None
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        comma = _decimal_comma(text, str(error))
+        raise ReadError(f"{path}: {comma or f'this is not TOML ({error}); see gaident identify --help'}") from None
+    if not data:
+        raise ReadError(
+            f"{path}: this drive file is empty: it holds {_SECTIONS} and {', '.join(KEYS[''])}; leave it out otherwise"
+        )
+    _misplaced(data, path, "")
+    top = known_keys(data, path, [*KEYS[""], *(s for s in KEYS if s)], (), ReadError)
+    sections: dict[str, dict[str, Any]] = {"": {k: v for k, v in top.items() if k not in KEYS or not k}}
+    for name in (s for s in KEYS if s):
+        _misplaced(top.get(name, {}), path, name)
+        sections[name] = known_keys(top.get(name, {}), f"{path}: [{name}]", KEYS[name], (), ReadError)
+    for name, values in sections.items():
+        where = f"{path}: [{name}] " if name else f"{path}: "
+        for key, value in values.items():
+            try:
+                values[key] = KEYS[name][key](value, key)
+            except ReadError as error:
+                raise ReadError(f"{where}{error.marked}") from None
+    return sections
+
+
+def unfilled_of(path: str) -> dict[tuple[str, str], str]:
+    """(section, key) -> "file: line n" of what `gaident init` marked FILL IN and is commented out still."""
+    found, section = {}, ""
+    for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):
+        if (header := _SECTION.match(line)) is not None:
+            section = header[1]
+        elif (mark := _MARK.match(line)) is not None:
+            found[section, mark[1]] = f"{path}: line {number}"
+    return found
+
+
+def _decimal_comma(text: str, error: str) -> str:
+    """What to write where TOML stumbled over 0,5; "" where it was something else."""
+    at = re.search(r"at line (\d+)", error)
+    lines = text.splitlines()
+    number = int(at[1]) if at is not None else len(lines)
+    found = _WITH_COMMA.match(lines[number - 1]) if 0 < number <= len(lines) else None
+    if found is None:
+        return ""
+    key, value = found.groups()
+    return f"line {number}: {key} is {value}, with a decimal comma: write {value.replace(',', '.')}"
+
+
+_SECTION = re.compile(r"\s*\[(\w+)\]")
+_MARK = re.compile(r"\s*#\s*(\w+)\s*=.*#\s*FILL IN\b")
+_WITH_COMMA = re.compile(r"\s*([\w.-]+)\s*=\s*([-+]?\d+,\d+(?:[eE][-+]?\d+)?)\s*(?:#|$)")
+_SECTIONS = ", ".join(f"[{name}]" for name in KEYS if name)
+
+
+def _misplaced(data: object, path: str, section: str) -> None:
+    """Raises ReadError for a key that another section knows."""
+    for key in data if isinstance(data, Mapping) else ():
+        homes = [name for name in KEYS if key in KEYS[name]]
+        if homes and section not in homes:
+            where = " or ".join(f"below the line [{name}]" if name else "at the top, above the first [section]" for name in homes)
+            found = f"in [{section}]" if section else "at the top"
+            raise ReadError(f"{path}: {key} stands {found}: put it {where}")

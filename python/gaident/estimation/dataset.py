@@ -1,0 +1,193 @@
+"""The records as an estimation sees them: what drove the motor, where it stood, how it began, how noisy the velocity is.
+
+A model is driven by the torque that the controller issued: as logged or, without a log, as the controller makes it from the
+command and the *measured* velocity. Noise inside the loop then acts in the model as it did on the drive, and what is left at
+the truth is the noise of the sensor and torques that nobody commanded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.data.torque_kind import MEASURED
+from gaident.estimation.term import Term
+from gaident.models.drive_torque import torque_of
+from gaident.models.starts import noise_std, starts_moving
+
+__all__ = ["DataSet", "with_angle"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+FINEST = 0.125e-3  # s, of a substep: the accuracy that friction on a stiff shaft needs
+
+
+@dataclass(frozen=True, eq=False)
+class DataSet:
+    """Records, each also as driven by its torque (`driven`), both with an angle, measured or integrated from the velocity.
+
+    turned: the record itself with that angle; free: torque-driven, without an angle that was not measured; read: the records
+    as the controller read them, which may hold samples that the fit leaves out. finest: no substep of a simulation is much
+    shorter [s]; resolution: step of the lattice that all velocities lie on [rad/s], 0: none; known_noise: standard deviation
+    of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
+    makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator.
+    """
+
+    records: tuple[Record, ...]
+    controller: PI | None
+    driven: tuple[Record, ...]
+    turned: tuple[Record, ...]
+    free: tuple[Record, ...]
+    moving: tuple[bool, ...]
+    spoiled: bool = False
+    read: tuple[Record, ...] = ()
+    finest: float = FINEST
+    resolution: float = 0.0
+    known_noise: float | None = None
+    loop_follows: bool = True
+    torque_measured: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        records: Sequence[Record],
+        controller: PI | None,
+        spoiled: bool = False,
+        read: Sequence[Record] | None = None,
+        resolution: float = 0.0,
+    ) -> DataSet:
+        """The records as driven by their torque; spoiled: some velocities are not what the controller read."""
+        driven = tuple(_driven(r, torque_of(r, controller)) for r in records)
+        turned = tuple(with_angle(r, angle_of(a)) for r, a in zip(records, driven, strict=True))
+        free = tuple(a if r.position is not None else with_angle(a, None) for r, a in zip(records, driven, strict=True))
+        moving = tuple(starts_moving(r, None) for r in driven)
+        seen = tuple(records if read is None else read)
+        measured = any(r.torque_is == MEASURED for r in records)
+        found = cls(tuple(records), controller, driven, turned, free, moving, spoiled, seen, resolution=resolution)
+        return replace(found, torque_measured=measured)
+
+    @property
+    def dt(self) -> float:
+        """Sample time [s]."""
+        return self.records[0].dt
+
+    @cached_property
+    def angle_logged(self) -> bool:
+        """Whether every record holds the angle."""
+        return all(r.position is not None for r in self.records)
+
+    @cached_property
+    def torque_logged(self) -> bool:
+        """Whether every record holds the controller's torque."""
+        return all(r.torque is not None for r in self.records)
+
+    @property
+    def loop_only(self) -> bool:
+        """Whether a torque is not to be had: a replay keeps what one wrong velocity adds to its integral for ever."""
+        return self.spoiled and not self.torque_logged and self.loopable
+
+    @cached_property
+    def loopable(self) -> bool:
+        """Whether command and controller can drive a model too."""
+        return self.controller is not None and self.command is not None and not any(self.moving)
+
+    @cached_property
+    def lengths(self) -> tuple[int, ...]:
+        """Samples of each record."""
+        return tuple(len(r) for r in self.records)
+
+    @cached_property
+    def velocity(self) -> Vector:
+        """Measured velocity, records one after the other [rad/s]."""
+        return np.concatenate([r.velocity for r in self.records])
+
+    @cached_property
+    def torque(self) -> Vector:
+        """Torque, records one after the other [N m]."""
+        return np.concatenate([torque_in(r) for r in self.driven])
+
+    @cached_property
+    def angle(self) -> Vector:
+        """Motor angle, records one after the other [rad]."""
+        return np.concatenate([angle_of(r) for r in self.driven])
+
+    @cached_property
+    def time(self) -> Vector:
+        """Time since each record's start, records one after the other [s]."""
+        return np.concatenate([r.time for r in self.records])
+
+    @cached_property
+    def command(self) -> Vector | None:
+        """Command, records one after the other [rad/s]; None where one record has none."""
+        commands = [r.command for r in self.records if r.command is not None]
+        return np.concatenate(commands) if len(commands) == len(self.records) else None
+
+    @cached_property
+    def noise(self) -> float:
+        """Standard deviation of white noise on the velocity, as its third differences show it [rad/s]."""
+        if self.known_noise is not None:
+            return self.known_noise
+        return float(np.mean([noise_std(r.velocity, self.resolution) for r in self.records]))
+
+    def replayed(self, effects: Mapping[Term, Vector]) -> tuple[Record, ...]:
+        """The records as driven by the torque that the controller makes with effects of its own, each with its parameters."""
+        driven = []
+        for r, read in zip(self.records, self.read, strict=True):
+            driven.append(_driven(r, replayed(read, self.controller, effects)))
+        return tuple(driven)
+
+    def replayed_error(self, effects: Mapping[Term, Vector]) -> Vector:
+        """Logged torque minus the controller's replay with these effects, records one after the other [N m]."""
+        return np.concatenate([torque_in(r) - replayed(r, self.controller, effects) for r in self.read])
+
+    def with_effects(self, effects: Mapping[Term, Vector]) -> DataSet:
+        """The same with records and controller as effects at the controller, which are known, make them."""
+
+        data = self
+        for term, values in effects.items():
+            assert term.replayed is not None and data.controller is not None
+            changed = [term.replayed(r, data.controller, values) for r in data.records]
+            turned = tuple(term.replayed(r, data.controller, values)[0] for r in data.turned)
+            data = replace(data, records=tuple(r for r, _ in changed), turned=turned, controller=changed[0][1])
+        return data
+
+
+def replayed(rec: Record, controller: PI | None, effects: Mapping[Term, Vector]) -> Vector:
+    """What the controller makes of command and measured velocity, with effects of its own [N m]."""
+    assert controller is not None and rec.command is not None
+    for term, values in effects.items():
+        assert term.replayed is not None
+        rec, controller = term.replayed(rec, controller, values)
+    return torque_of(rec.with_channels(torque=None, position=None), controller)
+
+
+def with_angle(rec: Record, angle: Vector | None) -> Record:
+    """The record with another angle [rad], or none."""
+    return rec.with_channels(position=angle)
+
+
+def _driven(rec: Record, torque: Vector) -> Record:
+    angle = rec.position
+    if angle is None:
+        w = rec.velocity
+        angle = np.concatenate([[0.0], np.cumsum(0.5 * rec.dt * (w[1:] + w[:-1]))])
+    return rec.with_channels(command=None, torque=torque, position=angle)
+
+
+def torque_in(rec: Record) -> Vector:
+    """The torque of a record that has one [N m]."""
+    assert rec.torque is not None
+    return rec.torque
+
+
+def angle_of(rec: Record) -> Vector:
+    """The angle of a record that has one [rad]."""
+    assert rec.position is not None
+    return rec.position

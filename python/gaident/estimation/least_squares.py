@@ -1,0 +1,141 @@
+"""Fits of one hypothesis: least squares from a start, noise re-estimated, and a global search where there are valleys."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.estimation.noise_model import WHITE, NoiseFilter
+from gaident.estimation.objective import Fit, Hypothesis, Objective
+from gaident.estimation.projection import WORST
+
+__all__ = ["evolved", "fit", "reestimated", "scored"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+SETTLED = 0.02  # of the noise variance: a fall of the cost by less changes no decision
+
+
+def fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, iterations: int) -> Fit:
+    """Least squares by Levenberg and Marquardt from x, eight dampings side by side, bounds by projection."""
+    key = "fit", hypothesis, x.tobytes(), noise.key, iterations
+    return objective.once(key, lambda: _fit(objective, hypothesis, x, noise, iterations))
+
+
+def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, iterations: int) -> Fit:
+    limits, steps = hypothesis.parameters.limits(), hypothesis.parameters.steps()
+    x = np.clip(x, *limits)
+    damping, converged = 1e-2, False
+    v, J, _ = objective.linearised(hypothesis, x, noise)
+    cost = min(float(v @ v), WORST) if np.all(np.isfinite(v)) else WORST
+    count = max(objective.count, 1.0)
+    for _ in range(iterations):
+        if cost >= WORST:
+            break
+        A, g = J @ J.T, J @ v
+        diagonal = np.diag(A).copy()
+        usable = (diagonal > 0.0) & (steps > 0.0) & np.isfinite(diagonal)
+        # At a bound with the descent pointing outward: not moved in this step.
+        usable &= ~(((x <= limits[0]) & (g > 0.0)) | ((x >= limits[1]) & (g < 0.0)))
+        if not usable.any():
+            break
+        index = np.flatnonzero(usable)
+        sub, gradient, scale = A[np.ix_(index, index)], g[index], diagonal[index]
+        factors = damping * 10.0 ** np.arange(-3.0, 5.0)
+        X = np.repeat(x[None, :], len(factors), axis=0)
+        X[:, index] -= damped_steps(sub, gradient, factors[:, None] * scale + 1e-18 * scale.max())
+        X = np.clip(X, *limits)
+        costs = objective.costs(hypothesis, X, noise)
+        best = int(np.argmin(costs))
+        if not costs[best] < cost:
+            if damping > 1e5:
+                converged = True
+                break
+            damping *= 1e5
+            continue
+        fall = cost - float(costs[best])
+        x, cost = X[best], float(costs[best])
+        damping = float(np.clip(damping * 10.0 ** (best - 3.0), 1e-9, 1e9))
+        if fall < SETTLED * cost / count:
+            converged = True
+            break
+        v, J, _ = objective.linearised(hypothesis, x, noise)
+    return objective.fitted(hypothesis, x, noise, cost, converged)
+
+
+def damped_steps(A: Matrix, g: Vector, damping: Matrix) -> Matrix:
+    """(A + diag(d))^-1 g for each row d of damping; 0 where there is none."""
+    M = A + damping[:, :, None] * np.eye(len(g))
+    try:
+        return np.asarray(np.linalg.solve(M, np.repeat(g[None, :, None], len(M), axis=0))[:, :, 0])
+    except np.linalg.LinAlgError:
+        return np.array([_solved(m, g) for m in M])
+
+
+def _solved(M: Matrix, g: Vector) -> Vector:
+    try:
+        return np.asarray(np.linalg.solve(M, g))
+    except np.linalg.LinAlgError:
+        return np.zeros_like(g)
+
+
+def scored(objective: Objective, found: Fit) -> Fit:
+    """The same x under the filter of what it leaves."""
+    if found.cost >= WORST:
+        return found
+    return objective.once(("scored", found.key), lambda: _scored(objective, found))
+
+
+def _scored(objective: Objective, found: Fit) -> Fit:
+    error = objective.error(found)
+    noise = objective.noise_of(error, found.predictor.closed)
+    v = objective.whitened(error[None, :], noise)[0]
+    return objective.fitted(found.hypothesis, found.x, noise, float(v @ v), found.converged)
+
+
+def reestimated(objective: Objective, found: Fit, iterations: int = 6) -> Fit:
+    """The fit under the filter of what it leaves itself (two rounds of generalised least squares)."""
+    if found.cost >= WORST:
+        return found
+    return objective.once(("reestimated", found.key, iterations), lambda: _reestimated(objective, found, iterations))
+
+
+def _reestimated(objective: Objective, found: Fit, iterations: int) -> Fit:
+    best = found
+    for n in (iterations, max(iterations // 2, 2)):
+        noise = objective.noise_of(objective.error(found), found.predictor.closed)
+        found = fit(objective, found.hypothesis, found.x, noise, n)
+        if found.bic < best.bic:
+            best = found
+        if found.converged and found.noise.key == noise.key == WHITE.key:
+            break
+    return best
+
+
+def evolved(objective: Objective, found: Fit, iterations: int) -> Fit:
+    """Differential evolution around a fit (Storn and Price 1997): a stop or an impact more or less makes valleys."""
+    from scipy.optimize import differential_evolution
+
+    hypothesis, parameters = found.hypothesis, found.parameters
+    limits, steps = parameters.limits(), parameters.steps()
+    reach = np.where(np.arange(parameters.size) < parameters.base, 0.15 * np.maximum(np.abs(found.x), 0.3), 0.7 * steps)
+    reach[0] = 0.15
+    moved = np.flatnonzero(steps > 0.0)
+    low, high = np.maximum(found.x - reach, limits[0])[moved], np.minimum(found.x + reach, limits[1])[moved]
+    if np.any(low >= high) or not np.all(np.isfinite(found.x)):
+        return found
+    start = low + (high - low) * np.clip((found.x[moved] - low) / (high - low), 1e-6, 1.0 - 1e-6)
+
+    def costs(columns: Matrix) -> Vector:
+        X = np.repeat(found.x[None, :], columns.shape[1], axis=0)
+        X[:, moved] = columns.T
+        return np.log(objective.costs(hypothesis, X, WHITE))
+
+    best = differential_evolution(
+        costs, list(zip(low, high, strict=True)), popsize=6, maxiter=iterations, x0=start, rng=0, vectorized=True,
+        updating="deferred", polish=False, tol=1e-4, mutation=(0.4, 0.9), recombination=0.9,
+    )  # fmt: skip
+    x = found.x.copy()
+    x[moved] = best.x
+    return fit(objective, hypothesis, x, WHITE, 15)

@@ -1,0 +1,180 @@
+"""Noise filters: what makes the error of a true model white.
+
+    v(n) = B(q)/A(q) e(n),   B and A monic
+
+Two families. An autoregression (A = 1) knows nothing of the drive. Where torques that nobody commanded turn the shaft and the
+sensor adds white noise, the error of a torque-driven model is e = n + G d; a long autoregression takes hundreds of BIC units to
+say what two numbers say:
+
+    d(n+1) = phi d(n) + w(n),   e(n) = n(n) + G(q) d(n),   phi = exp(-dt/tau)
+
+whose innovations are v = A(q)/C(q) e, A the characteristic polynomial of G and d together, C that of their steady Kalman filter.
+The error of a model that runs in the loop of its own controller is S e with S = 1/(1 + G C): in v the closed loop's polynomial
+takes the place of G's, and an integrator that of C.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.filtering import filtered
+from gaident.control.pi import PI
+from gaident.estimation.state_space import Discretised, discretised, disturbed, steady_covariances
+from gaident.identification.noise import autocorrelation, autoregression_of, highest_order
+from gaident.models.model import Model
+
+__all__ = ["HIGHEST", "WHITE", "NoiseFilter", "ShaftNoise", "autoregression"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+HIGHEST = 20  # order of an autoregression alone
+ON_TOP = 6  # and of one behind a shaft's noise: what the sensor does
+TAUS = 2.5 * 2.0 ** np.arange(10)  # samples
+SIZES = 2.0 ** np.arange(-12.0, 6.0)  # std of w times the velocity that 1 N m for one sample leaves, over the std of n
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseFilter:
+    """b, a: coefficients of B and A from q^0 on, both 1 there; size: numbers that were estimated for it."""
+
+    b: Vector = field(default_factory=lambda: np.ones(1))
+    a: Vector = field(default_factory=lambda: np.ones(1))
+    size: int = 0
+
+    @cached_property
+    def key(self) -> tuple[bytes, bytes, int]:
+        """The same for filters of the same numbers."""
+        return self.b.tobytes(), self.a.tobytes(), self.size
+
+    @cached_property
+    def power(self) -> float:
+        """Sum of the squared impulse response: what becomes of white noise of variance 1."""
+        if len(self.a) == 1:
+            return float(self.b @ self.b)
+        h = self.of(np.eye(1, 4096), (4096,))
+        return float(h[0] @ h[0])
+
+    def of(self, E: Matrix, lengths: Sequence[int]) -> Matrix:
+        """Rows of v, each record by itself with its past at 0."""
+        if len(self.b) == len(self.a) == 1:
+            return E
+        return filtered(self.b, self.a, E, lengths)
+
+    def then(self, phi: Vector) -> NoiseFilter:
+        """This filter, and the autoregression phi on what it leaves."""
+        return NoiseFilter(np.convolve(self.b, np.concatenate([[1.0], -phi])), self.a, self.size + len(phi))
+
+    def coloured(self, v: Vector) -> Vector:
+        """Noise of this colour from white noise, from rest."""
+        from scipy.signal import lfilter
+
+        return np.asarray(lfilter(self.a, self.b, v), dtype=np.float64)
+
+
+WHITE = NoiseFilter()
+
+
+def autoregression(parts: Sequence[Vector], highest: int = HIGHEST, floor: float = 0.0) -> Vector:
+    """Coefficients by least squares, order by BIC: of strong colour the biased autocovariance takes too little.
+
+    floor: variance of white noise that is taken to be on the parts beside what they show.
+    """
+    total = sum(len(e) for e in parts)
+    top = highest_order([len(e) for e in parts], highest)
+    products = [autocorrelation(e, top) for e in parts]
+    pooled: Vector = np.sum(products, axis=0)
+    pooled[0] += floor * total
+    order = autoregression_of(pooled, total).order
+    if order == 0:
+        return np.zeros(0)
+    M = sum(_moments(e, r, order) for e, r in zip(parts, products, strict=True))
+    M = M + floor * (total - order * len(parts)) * np.eye(order + 1)
+    return np.asarray(np.linalg.lstsq(M[1:, 1:], M[0, 1:], rcond=1e-13)[0], dtype=np.float64)
+
+
+def _moments(e: Vector, products: Vector, order: int) -> Matrix:
+    """sum over n >= order of e(n-i) e(n-j), i, j = 0..order, from the sums of products over all n.
+
+    The first row lacks the products at the start; each diagonal follows from its first by the two products at its ends.
+    """
+    head, tail = e[:order], e[len(e) - order :][::-1]
+    M = np.empty((order + 1, order + 1))
+    M[0] = products[: order + 1] - autocorrelation(head, order)
+    ends = np.outer(head[::-1], head[::-1]) - np.outer(tail, tail)
+    for i in range(order):
+        M[i + 1, i + 1 :] = M[i, i:-1] + ends[i, i:]
+    return np.triu(M) + np.triu(M, 1).T
+
+
+def _polynomials(roots: NDArray[Any]) -> Matrix:
+    """Real coefficients from the highest power on, of rows of roots."""
+    c = np.zeros((len(roots), roots.shape[1] + 1), dtype=np.complex128)
+    c[:, 0] = 1.0
+    for i, r in enumerate(roots.T):
+        c[:, 1 : i + 2] -= r[:, None] * c[:, : i + 1]
+    return c.real.copy()
+
+
+class ShaftNoise:
+    """The filters of torque noise at the shaft of one linear model, over a grid of tau and size, each made when asked for."""
+
+    def __init__(self, model: Model, dt: float, controller: PI | None) -> None:
+        self.plant: Discretised = discretised(model, dt)
+        self.roots = np.linalg.eigvals(self.plant.A)
+        self.loop = None if controller is None else np.linalg.eigvals(disturbed(self.plant, controller, dt).A)
+        self.last: dict[bool, tuple[int, int]] = {}
+        self.made: dict[tuple[int, int, bool], NoiseFilter | None] = {}
+
+    def filters(self, places: Sequence[tuple[int, int]], looped: bool = False) -> list[NoiseFilter | None]:
+        """The filters of TAUS[i] and SIZES[j]; None outside the grid or where there is none."""
+        keys = [(i, j, looped) for i, j in places]
+        missing = [k for k in keys if k not in self.made and 0 <= k[0] < len(TAUS) and 0 <= k[1] < len(SIZES)]
+        if missing:
+            phis = np.exp(-1.0 / TAUS[[i for i, _, _ in missing]])
+            sizes = SIZES[[j for _, j, _ in missing]] / self.plant.first_response
+            self.made.update(zip(missing, self._filters(phis, sizes, looped), strict=True))
+        return [self.made.get(k) for k in keys]
+
+    def _filters(self, phis: Vector, sizes: Vector, looped: bool) -> list[NoiseFilter | None]:
+        m = len(self.plant.B)
+        A = np.zeros((len(phis), m + 1, m + 1), dtype=np.complex128)
+        A[:, :m, :m], A[:, :m, m], A[:, m, m] = self.plant.A, self.plant.B, phis
+        H = np.append(self.plant.C, 0.0).astype(np.complex128)
+        Q = np.zeros_like(A)
+        Q[:, m, m] = sizes**2
+        P = steady_covariances(A, H, Q)
+        known = np.all(np.isfinite(P), axis=(1, 2))
+        PH = np.where(known[:, None, None], P, 0.0) @ H.conj()
+        K = (A @ PH[:, :, None])[:, :, 0] / (1.0 + (PH @ H).real)[:, None]
+        unfiltered: NDArray[Any] = self.roots
+        filtered: NDArray[Any] = np.linalg.eigvals(A - K[:, :, None] * H)
+        if looped and self.loop is not None:
+            unfiltered, filtered = self.loop, np.append(filtered, np.ones((len(A), 1)), axis=1)
+        numerators = _polynomials(np.append(np.tile(unfiltered, (len(A), 1)), phis[:, None], axis=1))
+        denominators = _polynomials(filtered)
+        return [NoiseFilter(b, a, 2) if k else None for b, a, k in zip(numerators, denominators, list(known), strict=True)]
+
+    def best(self, cost: Callable[[NoiseFilter], float], looped: bool) -> NoiseFilter | None:
+        """The filter of least cost, downhill from the one before; the first time from the middle of the grid, in large steps."""
+        costs: dict[tuple[int, int], float] = {}
+        here = self.last.get(looped, (4, 7))
+        for stride in (1,) if looped in self.last else (3, 1):
+            while True:
+                i, j = here
+                around = [(i + stride * u, j + stride * v) for u in (-1, 0, 1) for v in (-1, 0, 1)]
+                new = [k for k in around if k not in costs]
+                for k, f in zip(new, self.filters(new, looped), strict=True):
+                    costs[k] = np.inf if f is None else cost(f)
+                best = min(around, key=costs.__getitem__)
+                if not costs[best] < costs[here]:
+                    break
+                here = best
+        self.last[looped] = here
+        return self.filters([here], looped)[0] if np.isfinite(costs[here]) else None

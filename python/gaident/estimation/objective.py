@@ -1,0 +1,316 @@
+"""The objective of an estimation: errors of many parameter vectors at once, whitened, and what a hypothesis is worth.
+
+    e(n) = w(n) - w_model(n; x),   v = H^-1 e,   minimise V(x) = sum of v^2 over the samples in use
+
+What becomes of e is the choice of a noise family:
+
+*Innovations*: every hypothesis has a noise filter H^-1 of its own, which is part of it and charged for, so that no effect is
+whitened away by a filter that was estimated without it, and none is favoured by one estimated with it. A velocity of next to no
+noise would let the filter judge by what is of no account: the exact instant of a reversal, the corner that a jump of friction
+makes there. White noise of a variance f (`floor`) is then added to the account of every hypothesis alike, as if it had been on
+the velocity: H is that of e plus this noise, and V/N becomes V/N + f |h|^2, h the impulse response of H^-1.
+
+*Output errors*: the plain errors count (H = 1), with the information of their independent samples (see `criterion.py`). That is
+what is left where the errors are a misfit and no stationary noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.estimation.criterion import bic
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.noise_model import HIGHEST, ON_TOP, WHITE, NoiseFilter, ShaftNoise, autoregression
+from gaident.estimation.parameterisation import Parameterisation
+from gaident.estimation.prediction import Predictor
+from gaident.estimation.projection import WORST, project_out, sums_of_squares
+from gaident.estimation.term import Term
+
+__all__ = ["Fit", "Hypothesis", "Innovations", "NoiseFamily", "Objective", "OutputErrors"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Index = NDArray[np.intp]
+T = TypeVar("T")
+
+LOST = 1e60  # rad/s: the error of a model that diverges, every sample; its squares stay numbers
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """What is fitted: the parameters of a model, and how the data drive it."""
+
+    parameters: Parameterisation
+    predictor: Predictor
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects in the model, in the order in which they were added."""
+        return self.parameters.effects
+
+    def extended(self, term: Term) -> Hypothesis:
+        """With one effect more, behind the others."""
+        return replace(self, parameters=self.parameters.extended(term))
+
+    def without(self, effect: str) -> Hypothesis:
+        """With one effect less."""
+        return replace(self, parameters=self.parameters.without(effect))
+
+    def driven_by(self, predictor: Predictor) -> Hypothesis:
+        """The same model under another predictor."""
+        return replace(self, predictor=predictor)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A hypothesis with its best x under a noise filter: cost V there, and BIC."""
+
+    hypothesis: Hypothesis
+    x: Vector
+    noise: NoiseFilter
+    cost: float
+    bic: float
+    converged: bool = False
+
+    @property
+    def parameters(self) -> Parameterisation:
+        """Those of the hypothesis."""
+        return self.hypothesis.parameters
+
+    @property
+    def predictor(self) -> Predictor:
+        """That of the hypothesis."""
+        return self.hypothesis.predictor
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects in the model, in the order in which they were added."""
+        return self.hypothesis.effects
+
+    @cached_property
+    def key(self) -> Hashable:
+        """The same for fits of the same numbers."""
+        return self.hypothesis, self.x.tobytes(), self.noise.key, self.cost, self.bic, self.converged
+
+
+class NoiseFamily(Protocol):
+    """How errors are whitened and what they are worth."""
+
+    @property
+    def floor(self) -> float:
+        """Variance of white noise that is taken to be on the velocity beside what it shows [(rad/s)^2]."""
+        ...
+
+    def information(self, count: float) -> float:
+        """Independent samples among so many."""
+        ...
+
+    def estimated(self, objective: Objective, error: Vector, closed: bool) -> NoiseFilter:
+        """The filter of one row of plain errors."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Innovations:
+    """Every hypothesis under a noise filter of its own; shaft: filters of torques at the shaft, None: not looked for."""
+
+    shaft: ShaftNoise | None = None
+    floor: float = 0.0
+
+    def information(self, count: float) -> float:
+        """All samples count."""
+        return count
+
+    def estimated(self, objective: Objective, error: Vector, closed: bool) -> NoiseFilter:
+        """An autoregression, or noise at the shaft with a short one behind it, whichever has the lower BIC."""
+        lengths = objective.data.lengths
+        row = objective.bridged(error[None, :])
+        plain = WHITE.then(autoregression(objective.parts(row[0]), floor=self.floor))
+        if self.shaft is None:
+            return plain
+
+        def variance(f: NoiseFilter) -> float:
+            return objective.variance(float(sums_of_squares(objective.whitened(row, f))[0]), f)
+
+        shaft = self.shaft.best(variance, closed)
+        if shaft is None:
+            return plain
+        shaft = shaft.then(autoregression(objective.parts(shaft.of(row, lengths)[0]), ON_TOP, self.floor * shaft.power))
+        return min((plain, shaft), key=lambda f: bic(variance(f), objective.count, f.size))
+
+
+@dataclass(frozen=True, eq=False)
+class OutputErrors:
+    """Plain errors; samples: how many of them are independent."""
+
+    samples: float
+    floor = 0.0
+
+    def information(self, count: float) -> float:
+        """No more than there are."""
+        return min(self.samples, count)
+
+    def estimated(self, objective: Objective, error: Vector, closed: bool) -> NoiseFilter:
+        """None: the errors count as they are."""
+        return WHITE
+
+
+class Counter:
+    """How many simulations were made."""
+
+    def __init__(self) -> None:
+        self.simulations = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """Errors over one data set.
+
+    weight: (N,), 0 for samples that are left out. measured: (N,), the velocity that models are held against [rad/s].
+    """
+
+    data: DataSet
+    weight: Vector
+    family: NoiseFamily = field(default_factory=Innovations)
+    measured: Vector = field(default_factory=lambda: np.zeros(0))
+    counter: Counter = field(default_factory=Counter)
+    _memory: dict[Hashable, object] = field(init=False, default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        if len(self.measured) == 0:
+            object.__setattr__(self, "measured", self.data.velocity)
+
+    def once(self, key: Hashable, work: Callable[[], T]) -> T:
+        """What is asked for again, on another way to the same model, is remembered: work depends on its key alone."""
+        if key not in self._memory:
+            self._memory[key] = work()
+        found: T = self._memory[key]  # type: ignore[assignment]
+        return found
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Samples of each record."""
+        return self.data.lengths
+
+    def errors(self, hypothesis: Hypothesis, X: Matrix) -> Matrix:
+        """Rows of plain errors."""
+        self.counter.simulations += len(X)
+        with np.errstate(invalid="ignore", over="ignore"):
+            E = self.measured - hypothesis.predictor.velocities(hypothesis.parameters, X)
+            E[~np.all(np.abs(E) < LOST, axis=1)] = LOST
+        return E
+
+    def error(self, fit: Fit) -> Vector:
+        """The plain error of a fit."""
+        return self.once(("error", fit.hypothesis, fit.x.tobytes()), lambda: self.errors(fit.hypothesis, fit.x[None, :])[0])
+
+    def whitened(self, E: Matrix, noise: NoiseFilter) -> Matrix:
+        """Rows of whitened errors; samples that do not count are 0."""
+        V = noise.of(self.bridged(E), self.lengths)
+        with np.errstate(invalid="ignore"):
+            return np.multiply(V, self.counted, out=None if V is E else V)
+
+    @cached_property
+    def counted(self) -> Vector:
+        """1 for samples that count: all but the masked ones and the head of each record."""
+        use = self.weight.copy()
+        at = 0
+        for n in self.lengths:
+            use[at : at + self.head] = 0.0
+            at += n
+        return use
+
+    def bridged(self, E: Matrix) -> Matrix:
+        """Errors with a straight line over the masked samples, so that a filter does not see them."""
+        gaps, before, after, share = self._bridges
+        if len(gaps) == 0:
+            return E
+        E = E.copy()
+        E[:, gaps] = E[:, before] + share * (E[:, after] - E[:, before])
+        return E
+
+    @cached_property
+    def _bridges(self) -> tuple[Index, Index, Index, Vector]:
+        """Masked samples, those that count before and after each, and its place between them from 0 to 1."""
+        gaps, known = np.flatnonzero(self.weight == 0.0), np.flatnonzero(self.weight > 0.0)
+        right = np.searchsorted(known, gaps)
+        before, after = known[np.maximum(right - 1, 0)], known[np.minimum(right, len(known) - 1)]
+        return gaps, before, after, np.clip((gaps - before) / np.maximum(after - before, 1), 0.0, 1.0)
+
+    @property
+    def head(self) -> int:
+        """Samples at the start of each record that never count, so that filters of all orders are judged on the same ones."""
+        return min(HIGHEST, min(self.lengths) // 12)
+
+    @cached_property
+    def count(self) -> float:
+        """Number of samples that count."""
+        return float(self.counted.sum())
+
+    @cached_property
+    def information(self) -> float:
+        """Independent samples among those that count."""
+        return self.family.information(self.count)
+
+    def noise_of(self, error: Vector, closed: bool) -> NoiseFilter:
+        """The noise filter of one row of plain errors, of a model in its loop or not."""
+        if float(np.abs(error).max()) >= LOST:
+            return WHITE
+        return self.family.estimated(self, error, closed)
+
+    def parts(self, row: Vector) -> list[Vector]:
+        """The records without their heads, where filters begin."""
+        return [part[self.head // 2 :] for part in np.split(row, np.cumsum(self.lengths)[:-1])]
+
+    def costs(self, hypothesis: Hypothesis, X: Matrix, noise: NoiseFilter) -> Vector:
+        """V of each row; WORST where a model diverges."""
+        return sums_of_squares(self.whitened(self.errors(hypothesis, X), noise))
+
+    def linearised(self, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter) -> tuple[Vector, Matrix, Vector]:
+        """(v, J, plain errors) at x: J[j] = dv/dx_j, forward differences; rows of entries that are not moved are 0."""
+        parameters = hypothesis.parameters
+        steps, limits = parameters.steps(), parameters.limits()
+        moved = np.flatnonzero(steps > 0.0)
+        h = hypothesis.predictor.difference * steps
+        h = np.where(x + h > limits[1], -h, h)
+        X = np.repeat(x[None, :], len(moved) + 1, axis=0)
+        X[np.arange(1, len(moved) + 1), moved] += h[moved]
+        E = self.errors(hypothesis, X)
+        V = self.whitened(E, noise)
+        J = np.zeros((parameters.size, V.shape[1]))
+        with np.errstate(invalid="ignore", over="ignore"):
+            J[moved] = (V[1:] - V[0]) / h[moved][:, None]
+        return V[0], J, E[0]
+
+    def plain(self, rows: Matrix, error: Vector) -> float:
+        """Sum of squared plain errors, beside what the rows can explain."""
+        rest = project_out(self.whitened(rows, WHITE), self.whitened(error[None, :], WHITE))[0]
+        return float(rest @ rest)
+
+    def bic(self, cost: float, noise: NoiseFilter, numbers: int) -> float:
+        """BIC of a cost V under a filter, for so many fitted numbers beside those of the filter."""
+        return bic(self.variance(cost, noise), self.information, numbers + noise.size)
+
+    def variance(self, cost: float, noise: NoiseFilter) -> float:
+        """V/N + f |h|^2."""
+        floor = self.family.floor
+        return max(cost, 1e-300) / self.count + (floor * noise.power if floor else 0.0)
+
+    def fitted(self, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, cost: float, converged: bool = False) -> Fit:
+        """A fit of this cost."""
+        worth = self.bic(cost, noise, hypothesis.parameters.size) if cost < WORST else np.inf
+        return Fit(hypothesis, x, noise, cost, worth, converged)
+
+    def under(self, family: NoiseFamily) -> Objective:
+        """The same data and weights under another noise family."""
+        return Objective(self.data, self.weight, family, self.measured, self.counter)
+
+    def weighted(self, weight: Vector) -> Objective:
+        """The same with other samples left out."""
+        return Objective(self.data, weight, self.family, self.measured, self.counter)

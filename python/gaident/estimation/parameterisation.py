@@ -1,0 +1,219 @@
+"""The parameters of an extended model as one vector, and back.
+
+    one mass   x = [ln |K|, a | effects | start states]                  G(s) = K / (s + a)
+    two masses x = [ln |K|, a, e1, e0, f1, f0 | effects | start states]  G(s) = K (s^2 + f1 s + f0) / ((s + a) (s^2 + e1 s + e0))
+
+a, e1, e0, f1, f0 in units of their own size, so that a step of 1 is large and one of 1e-4 small for every entry. Pairs pass
+smoothly from complex to real roots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.estimation.term import Scales, Term
+from gaident.models.effects import place_of, table
+from gaident.models.factors import Structure
+from gaident.models.model import Model
+from gaident.models.roots import quadratic_roots
+
+__all__ = ["Parameterisation", "mechanism", "parameter_names"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+def parameter_names(effect: str) -> tuple[str, ...]:
+    """Names of an effect's parameters, in the order of the effects table."""
+    return next(tuple(p.name for p in row.parameters) for row in table() if row.name == effect)
+
+
+def mechanism(model: Model) -> Vector:
+    """[K, a] or [K, a, e1, e0, f1, f0] of a model of structure (1, 0) or (1, 2); of three real poles the slowest is a."""
+    poles = sorted(model.poles, key=lambda r: (r.imag != 0.0, abs(r)))
+    a, rest = -poles[0].real, poles[1:]
+    values = [model.gain, a]
+    for pair in (rest, model.zeros):
+        if pair:
+            values += [-(pair[0] + pair[1]).real, (pair[0] * pair[1]).real]
+    return np.array(values)
+
+
+def described(scales: Scales, model: Model) -> Scales:
+    """Scales with what the mechanism of a model says."""
+    values = mechanism(model)
+    if len(values) == 2:
+        return replace(scales, two_masses=False)
+    K, a, e1, e0, _, f0 = values
+    JM = 1.0 / abs(K)
+    # sum of pairwise A = K_G (1/J_M + 1/J_L) and prod B = K_G/J_L, dampings left out
+    load = max(e0 + a * e1 - f0, 1e-3 * abs(e0))
+    KG = JM * load
+    return replace(scales, two_masses=True, stiffness=KG, resonance=float(np.sqrt(abs(e0))))
+
+
+@dataclass(frozen=True)
+class Parameterisation:
+    """What the entries of x mean.
+
+    masses: 1 or 2. sign: of K. units: size of a, e1, ...; starts: start states of each record (0: it starts at rest).
+    """
+
+    masses: int
+    sign: float
+    units: tuple[float, ...]
+    terms: tuple[Term, ...]
+    starts: tuple[int, ...]
+    scales: Scales
+
+    @classmethod
+    def of(cls, model: Model, scales: Scales, moving: Sequence[bool]) -> Parameterisation:
+        """That of a linear model of one or two masses (effects are added by `extended`); scales as the model describes them."""
+        values = mechanism(model)
+        floor = 2.0 / scales.duration
+        units = [max(abs(values[1]), floor)]
+        for _, e0 in values[2:].reshape(-1, 2):
+            w = max(np.sqrt(abs(e0)), floor)
+            units += [w, w * w]
+        masses = 1 if len(values) == 2 else 2
+        starts = tuple((1, 3)[masses - 1] if m else 0 for m in moving)
+        return cls(masses, float(np.sign(values[0])), tuple(float(u) for u in units), (), starts, described(scales, model))
+
+    @cached_property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects, in the order in which they were added."""
+        return tuple(t.name for t in self.terms)
+
+    def extended(self, term: Term) -> Parameterisation:
+        """With one effect more, behind the others."""
+        return replace(self, terms=(*self.terms, term))
+
+    def without(self, effect: str) -> Parameterisation:
+        """With one effect less."""
+        return replace(self, terms=tuple(t for t in self.terms if t.name != effect))
+
+    def term(self, effect: str) -> Term:
+        """The term of one of the effects."""
+        return next(t for t in self.terms if t.name == effect)
+
+    @property
+    def structure(self) -> Structure:
+        """The linear part as the core takes it: one real pole, and a pair of poles and of zeros for two masses."""
+        return Structure(1, 0, 0, 0) if self.masses == 1 else Structure(1, 1, 0, 1)
+
+    @property
+    def base(self) -> int:
+        """Number of base parameters, which come first."""
+        return 1 + len(self.units)
+
+    @cached_property
+    def size(self) -> int:
+        """Length of x."""
+        return self.base + sum(t.size for t in self.terms) + sum(self.starts)
+
+    @cached_property
+    def _slots(self) -> dict[str, slice]:
+        slots, at = {}, self.base
+        for t in self.terms:
+            slots[t.name] = slice(at, at + t.size)
+            at = slots[t.name].stop
+        return slots
+
+    @cached_property
+    def _ordered(self) -> tuple[Term, ...]:
+        return tuple(sorted(self.terms, key=lambda t: place_of(t.name)))
+
+    def slot(self, effect: str) -> slice:
+        """Where an effect's coordinates stand."""
+        return self._slots[effect]
+
+    def base_vector(self, model: Model) -> Vector:
+        """x of the base parameters of a model of this structure."""
+        values = mechanism(model)
+        return np.concatenate([[np.log(abs(values[0]))], values[1:] / np.array(self.units)])
+
+    def start(self, model: Model) -> Vector:
+        """x of a linear model that starts at rest; without effects."""
+        return np.concatenate([self.base_vector(model), np.zeros(sum(self.starts))])
+
+    def inserted(self, x: Vector, z: Vector) -> Vector:
+        """x of `extended(...)`: the coordinates z go before the start states."""
+        at = len(x) - sum(self.starts)
+        return np.concatenate([x[:at], z, x[at:]])
+
+    def removed(self, x: Vector, effect: str) -> Vector:
+        """x of `without(effect)`."""
+        s = self.slot(effect)
+        return np.concatenate([x[: s.start], x[s.stop :]])
+
+    def base_values(self, X: Matrix) -> Matrix:
+        """Rows [K, a, ...] of rows of x."""
+        values = np.empty((len(X), self.base))
+        values[:, 0] = self.sign * np.exp(np.clip(X[:, 0], -300.0, 300.0))
+        values[:, 1:] = X[:, 1 : self.base] * np.array(self.units)
+        return values
+
+    def effect_values(self, X: Matrix, effect: str) -> Matrix:
+        """Rows of an effect's parameters, in the order of the effects table."""
+        return self.term(effect).natural(X[:, self.slot(effect)])
+
+    def values(self, X: Matrix, left_out: Sequence[str] = ()) -> tuple[tuple[str, ...], Matrix]:
+        """(effects in the order of the table, rows of base parameters and theirs) for `simulate_values`."""
+        shown = [t for t in self._ordered if t.name not in left_out]
+        rows = np.hstack([self.base_values(X), *(t.natural(X[:, self.slot(t.name)]) for t in shown)])
+        return tuple(t.name for t in shown), rows
+
+    def start_values(self, X: Matrix, record: int) -> Matrix | None:
+        """Rows of start states of one record, None where it starts at rest."""
+        n = self.starts[record]
+        if n == 0:
+            return None
+        first = self.size - sum(self.starts) + sum(self.starts[:record])
+        own = X[:, first : first + n]
+        for t in self.terms:
+            if t.poles is None:
+                continue
+            # In the difference operator d the free motion is S(d)/A(d) = S(d) B(d)/(A(d) B(d)): the same motion, B unexcited.
+            values = t.natural(X[:, self.slot(t.name)])
+            roots = [np.expm1(np.array(t.poles(row)) * self.scales.dt) for row in values]
+            own = np.array([np.convolve(s, np.poly(r).real) for s, r in zip(own, roots, strict=True)])
+        return own
+
+    def linear(self, x: Vector) -> Model:
+        """The linear mechanism of one x."""
+        values = self.base_values(x[None, :])[0]
+        poles = [complex(-values[1])]
+        zeros: list[complex] = []
+        if self.masses == 2:
+            poles += quadratic_roots(float(values[2]), float(values[3]))
+            zeros += quadratic_roots(float(values[4]), float(values[5]))
+        return Model(float(values[0]), poles, zeros)
+
+    def model(self, x: Vector) -> Model:
+        """The model of one x, with its effects."""
+        model = self.linear(x)
+        for t in self.terms:
+            row = t.natural(x[None, self.slot(t.name)])[0]
+            model = model.with_effect(t.name, **dict(zip(parameter_names(t.name), (float(v) for v in row), strict=True)))
+        return model
+
+    def limits(self) -> Matrix:
+        """Lowest and highest value of each entry, (2, size)."""
+        rows: list[tuple[float, ...]] = [(-np.inf, np.inf)] * self.base
+        for t in self.terms:
+            rows += t.limits(self.scales)
+        rows += [(-np.inf, np.inf)] * sum(self.starts)
+        return np.array(rows).T
+
+    def steps(self) -> Vector:
+        """What counts as a large change of each entry; 0: not moved by a fit."""
+        rows = [1.0] * self.base
+        for t in self.terms:
+            rows += t.steps(self.scales)
+        rows += [0.05 * self.scales.speed] * sum(self.starts)
+        return np.array(rows)

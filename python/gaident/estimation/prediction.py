@@ -1,0 +1,207 @@
+"""Predictors: how the data drive a model.
+
+    open loop    w = model(u),            u the torque that the controller issued, from the measured velocity
+    closed loop  w = loop(r; model, PI),  r the command; the simulated controller reads the simulated velocity
+
+The open loop shows everything that the torque does not explain; what nobody commanded adds up there between the stops of dry
+friction. The closed loop holds a simulation to the record: what happens in a gap is so sensitive to its start that an open-loop
+simulation of the true drive loses its way.
+
+The angle that effects depend on is the logged one (or the measured velocity, integrated), or that of the simulation itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.filtering import filtered
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.estimation.dataset import DataSet, angle_of, with_angle
+from gaident.estimation.parameterisation import Parameterisation
+from gaident.estimation.term import Term
+from gaident.models.effects import place_of
+from gaident.models.model import Model
+from gaident.models.own_effects import OWN
+from gaident.models.roots import quadratic_roots
+from gaident.models.simulate import simulate_values
+
+__all__ = ["ClosedLoop", "OpenLoop", "Predictor", "coupling_response", "twist"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+MOST_SUBSTEPS = 5  # powers of two
+
+
+class Predictor(Protocol):
+    """Simulated velocities of models, and what a torque at the shaft adds to them."""
+
+    @property
+    def closed(self) -> bool:
+        """Whether the simulated controller closes the loop."""
+        ...
+
+    @property
+    def own_angle(self) -> bool:
+        """Whether effects of the angle turn with the simulated shaft."""
+        ...
+
+    @property
+    def difference(self) -> float:
+        """Step of a forward difference, in parts of what makes a difference: stops and impacts roughen the error."""
+        ...
+
+    def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
+        """Simulated velocities of rows of x, (n, samples)."""
+        ...
+
+    def torque_response(self, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
+        """Velocity of the linear part of the model x, from rest, under rows of torque held over each sample."""
+        ...
+
+
+@dataclass(frozen=True)
+class OpenLoop:
+    """The torque drives the model."""
+
+    data: DataSet
+    own_angle: bool = False
+    closed = False
+    difference = 1e-3
+
+    def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
+        """See `Predictor`."""
+        inside = [t for t in parameters.terms if t.in_controller]
+        if inside:
+            return self._limited(parameters, X, [t.name for t in inside])
+        if not self.own_angle and _bends_the_angle(self.data, parameters):
+            return np.vstack([_of_true_angle(self.data, parameters, x, self.data.driven, None) for x in X])
+        names, values = parameters.values(X)
+        records = self.data.free if self.own_angle else self.data.driven
+        return _simulated(parameters, X, names, values, records, substeps(self.data, parameters.terms))
+
+    def _limited(self, parameters: Parameterisation, X: Matrix, inside: Sequence[str]) -> Matrix:
+        """With effects of the controller the torque itself depends on x: rows that share it are simulated together."""
+        values = np.column_stack([parameters.effect_values(X, e)[:, 0] for e in inside])
+        distinct, group = np.unique(values, axis=0, return_inverse=True)
+        out = np.empty((len(X), sum(self.data.lengths)))
+        steps = substeps(self.data, parameters.terms)
+        for i, row in enumerate(distinct):
+            of_row = np.flatnonzero(group.ravel() == i)
+            records = self.data.replayed({parameters.term(e): row[k : k + 1] for k, e in enumerate(inside)})
+            names, own = parameters.values(X[of_row], inside)
+            out[of_row] = _simulated(parameters, X[of_row], names, own, records, steps)
+        return out
+
+    def torque_response(self, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
+        """See `Predictor`."""
+        d = parameters.linear(x).discrete(parameters.scales.dt)
+        return filtered(d.alpha, np.append(1.0, -d.beta), torques, self.data.lengths)
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """The command drives controller and model."""
+
+    data: DataSet
+    own_angle: bool = False
+    closed = True
+    difference = 3e-3
+
+    def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
+        """See `Predictor`."""
+        data = self.data
+        inside = any(t.in_controller for t in parameters.terms)
+        if not inside and not self.own_angle and _bends_the_angle(data, parameters):
+            return np.vstack([_of_true_angle(data, parameters, x, data.turned, data.controller) for x in X])
+        names, values = parameters.values(X)
+        steps = substeps(data, parameters.terms)
+        records = data.records if self.own_angle else data.turned
+        parts = [simulate_values(parameters.structure, names, values, r, data.controller, substeps=steps) for r in records]
+        return np.concatenate(parts, axis=1)
+
+    def torque_response(self, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
+        """See `Predictor`; the controller answers: G d - T (G d), T the closed loop's response to the command."""
+        linear = parameters.linear(x)
+        open_loop = OpenLoop(self.data).torque_response(parameters, x, torques)
+        d = linear.discrete(parameters.scales.dt, self.data.controller)
+        return open_loop - filtered(d.alpha, np.append(1.0, -d.beta), open_loop, self.data.lengths)
+
+
+def substeps(data: DataSet, terms: Sequence[Term]) -> int | None:
+    """As many for every model with effects, so that no candidate is ahead for being simulated more finely."""
+    acting = [t for t in terms if not t.resonates]
+    if not acting or all(t.name in OWN for t in acting):  # user-defined effects are smooth, and dear to ask
+        return None
+    return int(2 ** np.clip(np.ceil(np.log2(data.dt / data.finest)), 0.0, MOST_SUBSTEPS))
+
+
+def _simulated(
+    parameters: Parameterisation,
+    X: Matrix,
+    names: tuple[str, ...],
+    values: Matrix,
+    records: Sequence[Record],
+    steps: int | None,
+) -> Matrix:
+    """Rows of x under the torques of the records."""
+    parts = [
+        simulate_values(parameters.structure, names, values, r, initial_states=parameters.start_values(X, i), substeps=steps)
+        for i, r in enumerate(records)
+    ]
+    return np.concatenate(parts, axis=1)
+
+
+def _bends_the_angle(data: DataSet, parameters: Parameterisation) -> bool:
+    """Whether the angle comes from a velocity that the sensor bends, and something else turns with the true one."""
+    if data.angle_logged:
+        return False
+    turning = {t.name for t in parameters.terms if t.harmonic}
+    return any(turning - {t.name} for t in parameters.terms if t.seen_angle is not None)
+
+
+def _of_true_angle(
+    data: DataSet, parameters: Parameterisation, x: Vector, records: Sequence[Record], controller: PI | None
+) -> Matrix:
+    """One x with the true angle, from which the sensor of this model makes the angle that was seen."""
+    names, values = parameters.values(x[None, :])
+    # Back through the sensor: what stands last in the chain is taken back first.
+    bending = sorted((t for t in parameters.terms if t.seen_angle), key=lambda t: -place_of(t.name))
+    bent = [(t.seen_angle, parameters.effect_values(x[None, :], t.name)[0]) for t in bending]
+    steps = substeps(data, parameters.terms)
+    parts = []
+    for i, (record, driven) in enumerate(zip(records, data.driven, strict=True)):
+        angle = angle_of(driven)
+        for true_angle, own in bent:
+            assert true_angle is not None
+            angle = true_angle(angle, driven.velocity, own)
+        states = None if controller is not None else parameters.start_values(x[None, :], i)
+        turned = with_angle(record, angle)
+        parts.append(
+            simulate_values(parameters.structure, names, values, turned, controller, initial_states=states, substeps=steps)
+        )
+    return np.concatenate(parts, axis=1)
+
+
+def twist(data: DataSet, parameters: Parameterisation, x: Vector) -> Vector:
+    """Twist of the shaft of two masses, to scale, as the linear part of the model x has it: u e0/(s^2 + e1 s + e0)."""
+    _, _, e1, e0, *_ = parameters.base_values(x[None, :])[0]
+    row: Vector = _second_order(data, data.torque[None, :], e0, (), e1, e0)[0]
+    return row
+
+
+def coupling_response(data: DataSet, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
+    """Motor velocity under rows of a torque between the masses: -K s/(s^2 + e1 s + e0), open loop."""
+    K, _, e1, e0, *_ = parameters.base_values(x[None, :])[0]
+    return _second_order(data, torques, -K, (0.0,), e1, e0)
+
+
+def _second_order(data: DataSet, rows: Matrix, gain: float, zeros: tuple[float, ...], e1: float, e0: float) -> Matrix:
+    held = Model(1.0, quadratic_roots(max(e1, 0.0), abs(e0)), zeros).discrete(data.dt)
+    return filtered(gain * held.alpha, np.append(1.0, -held.beta), rows, data.lengths)

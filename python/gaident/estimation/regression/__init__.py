@@ -1,0 +1,1 @@
+"""Regressions whose solution needs no search and no simulation: inverse dynamics."""

@@ -1,0 +1,296 @@
+"""Inverse-dynamics regression: the torque that a motion needs, by least squares. No search and no simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.errors import RecordError, SettingsError
+from gaident.estimation.regression.inverse_dynamics_result import InverseDynamics
+from gaident.estimation.regression.motion import cutoff_of, noise_share
+from gaident.estimation.regression.regression import bic, covariance, effective_samples, solve
+from gaident.estimation.regression.rows import Rows, decimation_of, rows_of
+from gaident.estimation.regression.torque_terms import CHOICES, TERMS, estimates_of
+
+__all__ = ["inverse_dynamics"]
+
+Vector = NDArray[np.float64]
+
+ORDER = 4
+HELD_OUT = 0.3
+RIVAL = 10.0
+MATERIAL = 0.05
+LEAST_ROWS = 20
+LEAST_SHARE = 0.02
+"""Of the rows, in each direction of motion, before dry friction is told from a constant torque."""
+SIXTH_OF_A_TURN = np.pi / 3.0
+MOST_OF_A_SPRING = 20.0 * np.pi
+"""rad: over more than ten turns no spring is fixed to the ground; such a column is time, warmth or drift."""
+
+
+def inverse_dynamics(
+    rec: Record | Sequence[Record],
+    *,
+    terms: Sequence[str] | None = None,
+    cutoff_hz: float | None = None,
+    order: int = ORDER,
+    decimation: int | None = None,
+    standstill: float | None = None,
+    validation: Record | Sequence[Record] | None = None,
+    axis: str = "rotary",
+) -> InverseDynamics:
+    """The torque of an axis as a sum of inertia, friction, load, gravity and spring, by least squares.
+
+        u = J a + B w + C sign(w) + T + A sin(theta + phase) + K theta
+
+    All channels pass the same zero-phase filter; velocity and acceleration are central differences of the position, or, where
+    none is logged, the velocity and its differences. The columns and the torque are then low-passed alike and decimated.
+    Samples with a velocity below three deviations of its noise, or below 0.5 % of its rms, and those within 1/cutoff of
+    them, are left out: dry friction at standstill is whatever the other torques are. The terms are those with the smallest
+    BIC over the number of independent samples; gravity, a spring and friction by direction also have to take 5 % of the sum
+    of squares. Gravity is tried from a sixth of a turn of travel on, a spring to ground in its place.
+    Theory: docs/theory/inverse-dynamics.md.
+
+    Parameters
+    ----------
+    rec
+        One Record or several of one sample time; one set of parameters for all. Each needs its torque.
+    terms
+        Names of terms, or None to let the criterion choose: "inertia", "viscous" or "viscous_by_direction", "coulomb" or
+        "coulomb_by_direction", "offset", "gravity", "spring".
+    cutoff_hz
+        Corner of the filter [Hz]. None: the highest at which noise is at most 0.1 % of the acceleration's power, at
+        most a tenth of the sample rate.
+    order
+        Order of the Butterworth filter, 1 to 10; it runs forward and backward.
+    decimation
+        Every so many samples one row. None: one row for each 1/cutoff_hz.
+    standstill
+        Velocity up to which the axis stands [rad/s]. None: the rule above. 0.0: nothing is left out, as in the literature.
+    validation
+        Records that are not fitted, for the held-out force error. None: the last 30 % of the samples in motion of each
+        record are held out from a second fit of the same terms.
+    axis
+        "rotary" or "linear" (m, m/s, N). Gravity depends on the angle of a rotary axis only.
+
+    Returns
+    -------
+    InverseDynamics
+        Frozen: `parameters`, `terms`, the filter as it was used, `force_error`, `torque(record)`, `summary()`.
+
+    Raises
+    ------
+    RecordError
+        No torque, unequal sample times, too little motion, or a term that the motion does not show.
+    SettingsError
+        A setting out of its range.
+
+    References
+    ----------
+    M. Gautier, "Dynamic identification of robots with power model", ICRA 1997. A. Janot, P.-O. Vandanjon, M. Gautier,
+    "A generic instrumental variable approach for industrial robot identification", IEEE Transactions on Control
+    Systems Technology 22(1):132-145, 2014.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> t = 1e-3 * np.arange(4000)
+    >>> angle, w, a = 1 - np.cos(5 * t), 5 * np.sin(5 * t), 25 * np.cos(5 * t)
+    >>> rec = ga.Record(1e-3, velocity=w, position=angle, torque=2e-3 * a + 0.01 * w + 0.1 * np.sign(w))
+    >>> found = ga.inverse_dynamics(rec, terms=("inertia", "viscous", "coulomb"))
+    >>> {name: round(e.value, 3) for name, e in found.parameters.items()}
+    {'inertia': 0.002, 'viscous': 0.01, 'coulomb': 0.1}
+    """
+    records = _checked(rec, "rec")
+    if axis not in ("rotary", "linear"):
+        raise SettingsError(f"axis is {axis!r}: it must be 'rotary' or 'linear'")
+    if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= 10:
+        raise SettingsError(f"order={order!r}: give a whole number from 1 to 10, the filter's order in each direction")
+    nyquist = 0.5 / records[0].dt
+    cutoff = (
+        min(cutoff_of(r, order) for r in records) if cutoff_hz is None else _number(cutoff_hz, "cutoff_hz", "the corner in Hz")
+    )
+    if not 0.0 < cutoff < nyquist:
+        raise SettingsError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {nyquist:g} Hz, half the sample rate, or None")
+    if standstill is not None and not _number(standstill, "standstill", "a velocity in rad/s") >= 0.0:
+        raise SettingsError(f"standstill={standstill!r}: give a velocity from 0 on in rad/s, or None")
+    factor = decimation_of(decimation, cutoff, records[0].dt)
+
+    asked = None if terms is None else _known_terms(terms)
+    everything = tuple(TERMS)
+    rows = [rows_of(r, everything, cutoff, int(order), factor, standstill) for r in records]
+    count = sum(len(r.torque) for r in rows)
+    if count < LEAST_ROWS:
+        raise RecordError(
+            f"only {count} rows are left in motion of {sum(map(len, records))} samples (cutoff {cutoff:g} Hz, every "
+            f"{factor}th sample), but at least {LEAST_ROWS} are needed; give a record that moves more, or a higher cutoff_hz"
+        )
+    refused = _refused(records, rows, axis)
+    if asked is not None:
+        for name in asked:
+            if name in refused:
+                raise RecordError(f"terms has {name!r}, but {refused[name]}; leave it out, or give a record that shows it")
+    possible = [asked] if asked is not None else [c for c in CHOICES if not set(c) & set(refused)]
+    n_eff = _effective(rows, possible)
+    squares = {choice: _squares(rows, choice) for choice in possible}
+    scores = {c: bic(squares[c], count, n_eff, _count(c)) for c in possible}
+    chosen = _material(min(possible, key=lambda c: (scores[c], len(c))), squares)
+    theta, rank = _fitted(rows, chosen)
+    X, left = [r.of(chosen) for r in rows], [r.torque - r.of(chosen) @ theta for r in rows]
+    cov = covariance(X, left)
+    result = InverseDynamics(
+        parameters=estimates_of(chosen, theta, cov, axis),
+        terms=chosen,
+        coefficients=tuple(float(x) for x in theta),
+        cutoff_hz=cutoff,
+        order=int(order),
+        decimation=factor,
+        axis=axis,
+        dt=records[0].dt,
+        standstill=standstill,
+        slowest=max(r.threshold for r in rows),
+        samples=count,
+        effective_samples=n_eff,
+        noise_share=max(noise_share(r, cutoff, int(order)) for r in records),
+        force_error=_relative(left, rows),
+        force_error_held_out=float("nan"),
+        held_out="",
+        rivals=_rivals(scores, chosen),
+        not_tried=() if asked is not None else tuple(f"{name}: {reason}" for name, reason in refused.items()),
+        digests=tuple(r.digest for r in records),
+    )
+    if rank < len(theta):
+        result = replace(result, not_tried=(*result.not_tried, "the motion does not tell all terms apart: deviations of inf"))
+    error, held_out = _held_out(rows, result, validation)
+    return replace(result, force_error_held_out=error, held_out=held_out)
+
+
+def _checked(rec: Record | Sequence[Record], argument: str) -> list[Record]:
+    records = [rec] if isinstance(rec, Record) else list(rec)
+    if not records or not all(isinstance(r, Record) for r in records):
+        raise RecordError(f"{argument} is {rec!r}: give a Record or a list of Records")
+    for i, r in enumerate(records):
+        if r.torque is None:
+            raise RecordError(
+                f"{argument}[{i}] {r.name!r} has no torque, which this regression explains; log it, or use identify"
+            )
+        if r.dt != records[0].dt:
+            raise RecordError(
+                f"{argument}[{i}] has dt={r.dt:g} s, the first record {records[0].dt:g} s; bring them to one sample time, "
+                "for example with decimate"
+            )
+    return records
+
+
+def _number(value: object, argument: str, what: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        raise SettingsError(f"{argument}={value!r} is no number; give {what}, or None")
+    return float(value)
+
+
+def _known_terms(terms: Sequence[str]) -> tuple[str, ...]:
+    names = (terms,) if isinstance(terms, str) else tuple(terms)
+    unknown = [name for name in names if name not in TERMS]
+    if unknown or not names:
+        raise SettingsError(f"terms={terms!r}: give names of {', '.join(TERMS)}")
+    for one, other in (
+        ("viscous", "viscous_by_direction"),
+        ("coulomb", "coulomb_by_direction"),
+        ("offset", "coulomb_by_direction"),
+    ):
+        if one in names and other in names:
+            raise SettingsError(f"terms={terms!r}: {one} and {other} are the same columns; give one of them")
+    return tuple(name for name in TERMS if name in names)
+
+
+def _refused(records: Sequence[Record], rows: Sequence[Rows], axis: str) -> dict[str, str]:
+    """Term -> why these records cannot show it."""
+    velocity = np.concatenate([r.of(("viscous",))[:, 0] for r in rows])
+    travel = max(r.travel for r in rows)
+    refused: dict[str, str] = {}
+    slower = min(np.count_nonzero(velocity > 0.0), np.count_nonzero(velocity < 0.0))
+    if slower < max(10, LEAST_SHARE * len(velocity)):
+        why = "the velocity hardly changes its sign: dry friction and a constant torque cannot be told apart, offset is both"
+        refused |= dict.fromkeys(("viscous_by_direction", "coulomb", "coulomb_by_direction"), why)
+    if axis == "linear":
+        refused["gravity"] = "a linear axis has no angle"
+    elif travel < SIXTH_OF_A_TURN:
+        refused["gravity"] = (
+            f"the travel is {travel:.2g} rad, and gravity shows from a sixth of a turn on, {SIXTH_OF_A_TURN:.3g} rad"
+        )
+    if axis == "rotary" and travel > MOST_OF_A_SPRING:
+        refused["spring"] = f"the travel is {travel / (2.0 * np.pi):.3g} turns, and a spring to ground ends after ten"
+    return refused
+
+
+def _fitted(rows: Sequence[Rows], terms: tuple[str, ...]) -> tuple[Vector, int]:
+    return solve(np.vstack([r.of(terms) for r in rows]), np.concatenate([r.torque for r in rows]))
+
+
+def _squares(rows: Sequence[Rows], terms: tuple[str, ...]) -> float:
+    theta, _ = _fitted(rows, terms)
+    return sum(float(np.sum((r.torque - r.of(terms) @ theta) ** 2)) for r in rows)
+
+
+def _count(terms: tuple[str, ...]) -> int:
+    return sum(len(TERMS[name].parameters) for name in terms)
+
+
+def _material(best: tuple[str, ...], squares: dict[tuple[str, ...], float]) -> tuple[str, ...]:
+    """The best choice without the generalisations that take less than 5 % of the sum of squares.
+
+    A misfit that returns with every stroke looks like many independent samples of a small spring; the criterion does not know.
+    """
+    for simpler in (_without_angle, _common):
+        other = simpler(best)
+        if other in squares and squares[best] > (1.0 - MATERIAL) * squares[other]:
+            best = other
+    return best
+
+
+def _without_angle(terms: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(name for name in terms if name not in ("gravity", "spring"))
+
+
+def _common(terms: tuple[str, ...]) -> tuple[str, ...]:
+    """Friction of both directions alike, with a constant."""
+    if "viscous_by_direction" not in terms:
+        return terms
+    return ("inertia", "viscous", "coulomb", "offset", *(name for name in terms if name in ("gravity", "spring")))
+
+
+def _rivals(scores: dict[tuple[str, ...], float], chosen: tuple[str, ...]) -> tuple[tuple[tuple[str, ...], float], ...]:
+    worse = {c: score - scores[chosen] for c, score in scores.items() if c != chosen}
+    return tuple(sorted(((c, d) for c, d in worse.items() if d < RIVAL), key=lambda item: item[1]))
+
+
+def _effective(rows: Sequence[Rows], possible: Sequence[tuple[str, ...]]) -> float:
+    """Independent samples of the residuals of the choice that leaves least, at least two for each column."""
+    fits = [(c, _fitted(rows, c)[0]) for c in possible]
+    lefts = [[r.torque - r.of(c) @ theta for r in rows] for c, theta in fits]
+    best = int(np.argmin([sum(float(x @ x) for x in left) for left in lefts]))
+    return max(effective_samples(lefts[best]), 2.0 * len(fits[best][1]))
+
+
+def _relative(left: Sequence[Vector], rows: Sequence[Rows]) -> float:
+    whole = float(np.sqrt(sum(float(r.torque @ r.torque) for r in rows)))
+    return float(np.sqrt(sum(float(x @ x) for x in left))) / whole if whole > 0.0 else float("nan")
+
+
+def _held_out(rows: Sequence[Rows], result: InverseDynamics, validation: Record | Sequence[Record] | None) -> tuple[float, str]:
+    """(relative force error on data that were not fitted, which data)."""
+    if validation is not None:
+        others = _checked(validation, "validation")
+        if {r.digest for r in others} & set(result.digests):
+            raise RecordError("a validation record is one that is fitted; give another record, or None")
+        return result.error(others), "validation records"
+    first, last = zip(*(r.split(1.0 - HELD_OUT) for r in rows), strict=True)
+    theta, rank = _fitted(first, result.terms)
+    if rank < len(theta):
+        return float("nan"), "no part: the first 70 % of the samples in motion do not determine the terms"
+    return _relative([r.torque - r.of(result.terms) @ theta for r in last], last), "the last 30 % of the samples in motion"

@@ -1,0 +1,138 @@
+"""The motion behind a record: position, velocity, acceleration and torque through one zero-phase filter.
+
+    x_f   = Butterworth(order, cutoff) forward and backward of x, the same for every channel: no phase, -6 dB at the cutoff
+    w     = (q_f(n+1) - q_f(n-1))/(2 dt) from the position, else the filtered velocity
+    a     = (w(n+1) - w(n-1))/(2 dt)
+
+The practice of M. Gautier, "Dynamic identification of robots with power model", ICRA 1997, and of A. Janot,
+P.-O. Vandanjon, M. Gautier, IEEE Transactions on Control Systems Technology 22(1):132-145, 2014.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+
+__all__ = ["Motion", "cutoff_of", "motion_of", "noise_share"]
+
+Vector = NDArray[np.float64]
+
+NOISE_SHARE = 1e-3
+"""Most of the acceleration's power that may be noise: so much is the inertia too small by it."""
+
+BAND = 0.1
+"""The cutoff is at most this share of the sample rate: the derivative is then exact to within 2 % in the pass band
+up to a third of the cutoff, and 100 Hz at 1 kHz is the practice of the literature."""
+
+LOWEST = 0.005
+"""The cutoff is at least this share of the sample rate, whatever the noise."""
+
+HIGH = (0.35, 0.475)
+"""Where the noise level is read, as shares of the sample rate: the signal is assumed to be elsewhere."""
+
+DEVIATIONS = 3.0
+OF_RMS = 0.005
+"""Standstill: velocity below 3 deviations of its noise, or below 0.5 % of its own rms, and 1/cutoff before and after."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Arrays (n,) at the record's rate; `still` marks the samples at which the sign of the velocity is not known."""
+
+    dt: float  # s
+    position: Vector  # rad
+    velocity: Vector  # rad/s
+    acceleration: Vector  # rad/s^2
+    torque: Vector | None  # N m
+    threshold: float  # rad/s
+    still: NDArray[np.bool_]
+
+
+def motion_of(rec: Record, cutoff_hz: float, order: int, standstill: float | None = None) -> Motion:
+    """The filtered motion of a record; standstill: velocity [rad/s] up to which it stands, None by the rule, 0.0 never."""
+    if rec.position is not None:
+        position = low_passed(rec.position, rec.dt, cutoff_hz, order)
+        velocity = np.gradient(position, rec.dt)
+    else:
+        velocity = low_passed(rec.velocity, rec.dt, cutoff_hz, order)
+        position = np.concatenate([[0.0], np.cumsum(0.5 * rec.dt * (velocity[1:] + velocity[:-1]))])
+    torque = None if rec.torque is None else low_passed(rec.torque, rec.dt, cutoff_hz, order)
+    least = max(DEVIATIONS * _velocity_noise(rec, cutoff_hz, order), OF_RMS * float(np.sqrt(np.mean(velocity**2))))
+    threshold = least if standstill is None else standstill
+    still = _beside(np.abs(velocity) <= threshold, max(1, round(1.0 / (cutoff_hz * rec.dt))))
+    if standstill == 0.0:
+        still = np.zeros(len(velocity), dtype=bool)
+    return Motion(rec.dt, position, velocity, np.gradient(velocity, rec.dt), torque, threshold, still)
+
+
+def _beside(still: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
+    """`still`, and `width` samples before and after: so far the filters carry the unknown friction into the motion."""
+    from scipy.ndimage import binary_dilation
+
+    return np.asarray(binary_dilation(still, np.ones(2 * width + 1)))
+
+
+def low_passed(x: Vector, dt: float, cutoff_hz: float, order: int) -> Vector:
+    """x behind the Butterworth filter run forward and backward; a straight line between its ends passes as it is."""
+    from scipy.signal import butter, sosfiltfilt
+
+    line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
+    extension = min(max(15, math.ceil(2.0 / (cutoff_hz * dt))), x.size - 1)
+    sections = butter(order, cutoff_hz * 2.0 * dt, output="sos")
+    return np.asarray(sosfiltfilt(sections, x - line, padlen=extension) + line)
+
+
+def cutoff_of(rec: Record, order: int) -> float:
+    """The cutoff [Hz]: the highest at which noise makes up at most a thousandth of the acceleration's power.
+
+    The noise of the sensor (of the position where it is logged, else of the velocity) is taken as white with the level that its
+    spectrum has between 0.35 and 0.475 of the sample rate; what is signal there makes the cutoff lower, never higher.
+    At most a tenth and at least a two-hundredth of the sample rate.
+    """
+    grid = BAND / rec.dt * np.geomspace(1.0, LOWEST / BAND, 60)
+    fit = (float(fc) for fc in grid if noise_share(rec, float(fc), order) <= NOISE_SHARE)
+    return _round(next(fit, float(grid[-1])))
+
+
+def noise_share(rec: Record, cutoff_hz: float, order: int) -> float:
+    """Share of noise in the power of the filtered acceleration, from 0 to 1."""
+    f, power, level = _spectrum(rec)
+    weight = _gain(rec, f, cutoff_hz, order, 2)
+    whole = float(np.sum(weight * power))
+    return min(level * float(np.sum(weight)) / whole, 1.0) if whole > 0.0 else 1.0
+
+
+def _velocity_noise(rec: Record, cutoff_hz: float, order: int) -> float:
+    """Standard deviation of the noise of the filtered velocity [rad/s]."""
+    f, _, level = _spectrum(rec)
+    return float(np.sqrt(level * np.sum(_gain(rec, f, cutoff_hz, order, 1)) * (f[1] - f[0])))
+
+
+def _gain(rec: Record, f: Vector, cutoff_hz: float, order: int, derivative: int) -> Vector:
+    """Squared gain from the sensor's signal to the velocity (derivative 1) or acceleration (2), at frequencies f [Hz]."""
+    warped = np.tan(np.pi * np.minimum(f, 0.499 / rec.dt) * rec.dt) / math.tan(math.pi * cutoff_hz * rec.dt)
+    twice = 1.0 / (1.0 + warped ** (2 * order))  # forward and backward: |H|^2
+    slope = np.sin(2.0 * np.pi * f * rec.dt) / rec.dt
+    steps = derivative if rec.position is not None else derivative - 1
+    return np.asarray((twice * slope**steps) ** 2)
+
+
+def _spectrum(rec: Record) -> tuple[Vector, Vector, float]:
+    """(frequencies [Hz], power density of the sensor's signal, level of its noise)."""
+    from scipy.signal import welch
+
+    x = rec.velocity if rec.position is None else rec.position
+    line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
+    f, power = welch(x - line, 1.0 / rec.dt, nperseg=min(x.size, 2048))
+    high = (f >= HIGH[0] / rec.dt) & (f <= HIGH[1] / rec.dt)
+    return f, power, float(np.median(power[high])) if np.any(high) else 0.0
+
+
+def _round(value: float) -> float:
+    """To three digits, so that what is said is what was used."""
+    return float(f"{value:.3g}")

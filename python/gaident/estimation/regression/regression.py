@@ -1,0 +1,93 @@
+"""Ordinary least squares whose deviations and whose criterion know that neighbouring residuals are alike.
+
+    theta = argmin |y - X theta|^2
+    cov   = (X'X)^-1 S (X'X)^-1
+    S     = sum_j k(j) sum_i (x_i r_i)(x_i-j r_i-j)',   k(j) = 1 - |j|/(L + 1) for |j| <= L       (Newey and West 1987)
+    n_eff = n/(1 + 2 sum_j rho(j)),   rho the autocorrelation of r up to its last positive pair    (Geyer 1992)
+    BIC   = n_eff ln(|r|^2/n) + k ln n_eff,   k columns
+
+L = 1.3 sqrt(n), as Lazarus, Lewis, Stock and Watson (2018) recommend for tests. No deviation is smaller than that of
+white residuals. Theory: docs/theory/inverse-dynamics.md.
+
+W. K. Newey, K. D. West, Econometrica 55(3):703-708, 1987. C. J. Geyer, Statistical Science 7(4):473-483, 1992.
+E. Lazarus, D. J. Lewis, J. H. Stock, M. W. Watson, Journal of Business and Economic Statistics 36(4):541-559, 2018.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["bic", "covariance", "effective_samples", "solve"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+LAGS_PER_ROOT = 1.3
+RANK = 1e-10
+"""Singular values below this share of the largest, of columns of equal length, are zero."""
+
+
+def solve(X: Matrix, y: Vector) -> tuple[Vector, int]:
+    """(theta (k,), rank): the least-squares solution of X theta = y, columns scaled to equal length first."""
+    length = np.linalg.norm(X, axis=0)
+    length[length == 0.0] = 1.0
+    theta, _, rank, _ = np.linalg.lstsq(X / length, y, rcond=RANK)
+    return np.asarray(theta / length), int(rank)
+
+
+def effective_samples(residuals: Sequence[Vector]) -> float:
+    """How many independent samples the residuals of these records, (n_i,) each, are worth; from 1 to the sum of n_i."""
+    n = sum(len(r) for r in residuals)
+    longest = max(len(r) for r in residuals)
+    size = 1 << (2 * longest - 1).bit_length()
+    products = np.zeros(longest)
+    for r in residuals:
+        spectrum = np.abs(np.fft.rfft(r, size)) ** 2
+        products[: len(r)] += np.fft.irfft(spectrum, size)[: len(r)]
+    if not products[0] > 0.0:
+        return float(n)
+    rho = products / products[0]
+    pairs = rho[1 : 2 * ((longest - 1) // 2) + 1].reshape(-1, 2).sum(axis=1)
+    negative = np.flatnonzero(pairs <= 0.0)
+    kept = pairs[: negative[0]] if negative.size else pairs
+    return float(np.clip(n / (1.0 + 2.0 * kept.sum()), 1.0, n))
+
+
+def bic(squares: float, n: int, n_eff: float, columns: int) -> float:
+    """The criterion of a model with this sum of squares; a perfect one is worth as much as the last digits are."""
+    return float(n_eff * np.log(max(squares, 1e-300) / n) + columns * np.log(n_eff))
+
+
+def covariance(X: Sequence[Matrix], residuals: Sequence[Vector]) -> Matrix:
+    """Covariance (k, k) of the solution; X (n_i, k) and residuals (n_i,) by record, which are independent of each other.
+
+    Directions that the columns do not determine have infinite variance.
+    """
+    whole = np.vstack(X)
+    n, k = whole.shape
+    length = np.linalg.norm(whole, axis=0)
+    scale = np.where(length > 0.0, length, 1.0)
+    values, vectors = np.linalg.eigh((whole / scale).T @ (whole / scale))
+    known = values > RANK**2 * values[-1] if values[-1] > 0.0 else np.zeros(k, dtype=bool)
+    known &= values > 1e-12 * k
+    inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
+    middle = np.zeros((k, k))
+    for part, r in zip(X, residuals, strict=True):
+        scores = part / scale * r[:, None]
+        middle += scores.T @ scores
+        for lag in range(1, min(int(np.ceil(LAGS_PER_ROOT * np.sqrt(len(r)))), len(r) - 1) + 1):
+            weight = 1.0 - lag / (np.ceil(LAGS_PER_ROOT * np.sqrt(len(r))) + 1.0)
+            product = scores[lag:].T @ scores[:-lag]
+            middle += weight * (product + product.T)
+    robust = inverse @ middle @ inverse
+    white = inverse * (sum(float(r @ r) for r in residuals) / max(n - k, 1))
+    # No smaller than white: both deviations are estimates, and the larger one is the safer.
+    ratio = np.sqrt(np.maximum(np.diag(white) / np.maximum(np.diag(robust), 1e-300), 1.0))
+    cov = robust * np.outer(ratio, ratio)
+    lost = np.sum(vectors[:, ~known] ** 2, axis=1) > 1e-6
+    cov[lost, :] = cov[:, lost] = 0.0
+    cov[lost, lost] = np.inf
+    return np.asarray(cov / np.outer(scale, scale))

@@ -1,0 +1,115 @@
+"""What the torque of an axis is made of, as columns of a regression, and which sets of them are compared.
+
+    u = J a + B w + C sign(w) + T + A sin(theta + phase) + K theta
+
+    by direction:  B w = B+ w (w > 0) + B- w (w < 0),   C sign(w) = C+ (w > 0) - C- (w < 0)
+    gravity:       A sin(theta + phase) = A cos(phase) sin(theta) + A sin(phase) cos(theta)
+
+Friction by direction and a constant T are the same columns: C+ = C + T, C- = C - T. Either stands in a model, not both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.estimation.regression.motion import Motion
+from gaident.results.estimate import Estimate
+
+__all__ = ["CHOICES", "TERMS", "Term", "columns_of", "estimates_of"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+class Parameter(NamedTuple):
+    name: str
+    rotary: str  # unit
+    linear: str
+
+
+@dataclass(frozen=True)
+class Term:
+    """One term: `columns(motion, sign)` gives an array (n,) for each coefficient."""
+
+    columns: Callable[[Motion, Vector], list[Vector]]
+    parameters: tuple[Parameter, ...]
+
+
+INERTIA = Parameter("inertia", "kg m^2", "kg")
+
+
+def _viscous(name: str) -> Parameter:
+    return Parameter(name, "N m s/rad", "N s/m")
+
+
+def _force(name: str) -> Parameter:
+    return Parameter(name, "N m", "N")
+
+
+TERMS: dict[str, Term] = {
+    "inertia": Term(lambda m, _: [m.acceleration], (INERTIA,)),
+    "viscous": Term(lambda m, _: [m.velocity], (_viscous("viscous"),)),
+    "viscous_by_direction": Term(
+        lambda m, _: [np.maximum(m.velocity, 0.0), np.minimum(m.velocity, 0.0)],
+        (_viscous("viscous_positive"), _viscous("viscous_negative")),
+    ),
+    "coulomb": Term(lambda _, sign: [sign], (_force("coulomb"),)),
+    "coulomb_by_direction": Term(
+        lambda _, sign: [np.maximum(sign, 0.0), np.minimum(sign, 0.0)],
+        (_force("coulomb_positive"), _force("coulomb_negative")),
+    ),
+    "offset": Term(lambda m, _: [np.ones_like(m.velocity)], (_force("offset"),)),
+    "gravity": Term(
+        lambda m, _: [np.sin(m.position), np.cos(m.position)],
+        (_force("gravity_amplitude"), Parameter("gravity_phase", "rad", "rad")),
+    ),
+    "spring": Term(lambda m, _: [m.position], (Parameter("spring", "N m/rad", "N/m"),)),
+}
+
+FRICTION = ((), ("viscous",), ("coulomb",), ("viscous", "coulomb"))
+BY_DIRECTION = ("viscous_by_direction", "coulomb_by_direction")
+WITH_CONSTANT = (*((*f, "offset") for f in FRICTION), BY_DIRECTION)
+CHOICES: tuple[tuple[str, ...], ...] = (
+    *(("inertia", *f) for f in (*FRICTION, *WITH_CONSTANT)),
+    *(("inertia", *f, "gravity") for f in (*FRICTION, *WITH_CONSTANT)),
+    *(("inertia", *f, "spring") for f in WITH_CONSTANT),
+)
+"""The sets of terms that the criterion compares: friction and load alone, with gravity, or with a spring to ground, whose rest
+angle needs the constant."""
+
+
+def columns_of(terms: tuple[str, ...], motion: Motion) -> Matrix:
+    """The columns of the terms (n, k). Below the threshold of standstill the sign runs as a straight line from -1 to 1: such
+    samples are no rows of a regression, and a predicted torque shall not jump with the noise."""
+    sign = np.clip(motion.velocity / motion.threshold, -1.0, 1.0) if motion.threshold > 0.0 else np.sign(motion.velocity)
+    return np.column_stack([column for name in terms for column in TERMS[name].columns(motion, sign)])
+
+
+def estimates_of(terms: tuple[str, ...], theta: Vector, cov: Matrix, axis: str) -> dict[str, Estimate]:
+    """The parameters by name; gravity as amplitude and phase, to first order in the deviations."""
+    found: dict[str, Estimate] = {}
+    k = 0
+    for name in terms:
+        parameters = TERMS[name].parameters
+        here = slice(k, k + len(parameters))
+        values, block = theta[here], cov[here, here]
+        k += len(parameters)
+        sizes = np.abs(values)
+        if name == "gravity":
+            amplitude = math.hypot(*values)
+            gradient = np.array([values, [-values[1], values[0]]]) / np.array([[amplitude], [amplitude**2]])
+            values = np.array([amplitude, math.atan2(values[1], values[0])])
+            sizes = np.array([amplitude, 1.0])
+            finite = bool(np.all(np.isfinite(block)))
+            block = gradient @ block @ gradient.T if finite else np.diag([np.inf, np.inf])
+        for parameter, value, variance, size in zip(parameters, values, np.diag(block), sizes, strict=True):
+            std = float(np.sqrt(variance))
+            unit = parameter.linear if axis == "linear" else parameter.rotary
+            found[parameter.name] = Estimate(float(value), std, unit, identifiable=bool(std < size))
+    return found

@@ -1,0 +1,102 @@
+"""An effect as an estimation sees it: coordinates that a fit can move, with bounds, starts and kinship.
+
+The estimation knows no effect by name. What it has to know of one is data of its `Term`; the terms themselves stand in the
+library of the diagnosis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from gaident.control.pi import PI
+    from gaident.data.record import Record
+
+__all__ = ["Scales", "Term"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Natural = Callable[[Matrix], Matrix]
+Rows = list[tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class Scales:
+    """The sizes that bounds and starts are made of, from the records and the model so far."""
+
+    dt: float  # s
+    duration: float  # s, of the longest record
+    speed: float  # rad/s, largest
+    torque: float  # N m, largest
+    acceleration: float  # rad/s^2, largest slope of the command, inf without one
+    travel: float  # rad
+    friction: float  # N m, Coulomb level as fitted alone, else a guess
+    stiffness: float  # N m/rad of the shaft; nan where the model has one mass
+    resonance: float  # rad/s of the model's fastest pole pair; nan where it has none
+    two_masses: bool
+    integral: float  # N m, largest integrator state of the controller's replay; nan without a controller
+    blocks: int = 1  # samples of the log in one of dt: a long record is searched on a coarser grid first
+
+    @property
+    def log_dt(self) -> float:
+        """Sample time of the log [s]: what the bounds of delays and lags are made of."""
+        return self.dt / self.blocks
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """One effect as the fit sees it.
+
+    natural: coordinates (n, k) -> parameters (n, m) in the order of the effects table; coordinates: its inverse for one vector.
+    limits, starts: bounds (k pairs) and start rows for given scales. steps: size of each coordinate that makes a difference; 0
+    for one that is chosen by search, not by slope (an order). nested: names of simpler effects that this one contains.
+    family: of effects that exclude each other in one model, "" for none; excludes: names of others that it does not stand beside.
+    """
+
+    name: str
+    place: str
+    natural: Natural
+    coordinates: Callable[[Mapping[str, float]], Vector]
+    limits: Callable[[Scales], Rows]
+    starts: Callable[[Scales], Rows]
+    steps: Callable[[Scales], tuple[float, ...]]
+    nested: tuple[str, ...] = ()
+    shared: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  # nested effect -> its coordinates here; else the first
+    family: str = ""
+    excludes: frozenset[str] = frozenset()
+    harmonic: str = ""  # "torque" or "velocity": phase and size follow from two columns per order of the angle
+    orders: tuple[int, int] = (1, 1)  # lowest and highest order of a harmonic
+    neutral: Callable[[float, Scales], tuple[float, ...]] | None = None  # the nested effect of this level as this one
+    proportional: bool = False  # its torque is proportional to its one coordinate
+    multimodal: bool = False  # a stop or an impact more or less makes valleys: fitted in the loop first, searched globally
+    domains: frozenset[str] = frozenset()  # signals whose free function imitates it
+    levels: bool = False  # its first coordinate is the level of dry friction
+    resonates: bool = False  # a pair of poles and zeros in series with the mechanism: a second mass in disguise
+    poles: Callable[[Vector], tuple[complex, ...]] | None = None  # poles in series [rad/s] of natural parameters
+    seen_angle: Callable[[Vector, Vector, Vector], Vector] | None = None  # (seen angle, velocity, parameters) -> true angle
+    replayed: Callable[[Record, PI, Vector], tuple[Record, PI]] | None = None  # an effect in the controller, in its replay
+    curve: Callable[[Vector, Mapping[str, float]], Vector] | None = None  # static torque at velocities [rad/s], as friction
+
+    @cached_property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return len(self.limits(_UNIT))
+
+    @property
+    def in_controller(self) -> bool:
+        """Whether it changes what the controller makes of command and velocity."""
+        return self.replayed is not None
+
+    @property
+    def in_coupling(self) -> bool:
+        """Whether it needs two masses, between which it acts."""
+        return self.place == "coupling"
+
+
+_UNIT = Scales(1e-3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 100.0, True, 1.0)

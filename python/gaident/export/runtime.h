@@ -1,0 +1,93 @@
+/* The gaident runtime: what a drive and its loop are, and what they remember. C99.
+ *
+ * Effects have the coefficients that the simulation uses (csrc/gaident/effects, one header each), in the same order.
+ */
+#ifndef GAIDENT_RUNTIME_DECLARED
+#define GAIDENT_RUNTIME_DECLARED
+
+enum { GAIDENT_ORDER = 14 }; /* of a mechanism, at most */
+
+enum { /* the effects that act */
+    GAIDENT_COULOMB_FRICTION = 1 << 0,
+    GAIDENT_STRIBECK_FRICTION = 1 << 1,
+    GAIDENT_ASYMMETRIC_FRICTION = 1 << 2,
+    GAIDENT_PRESLIDING_FRICTION = 1 << 3,
+    GAIDENT_QUADRATIC_DRAG = 1 << 4,
+    GAIDENT_LOAD_TORQUE = 1 << 5,
+    GAIDENT_UNBALANCE = 1 << 6,
+    GAIDENT_COGGING = 1 << 7,
+    GAIDENT_FRICTION_DRIFT = 1 << 8,
+    GAIDENT_BACKLASH = 1 << 9,
+    GAIDENT_HARDENING_STIFFNESS = 1 << 10,
+    GAIDENT_TORQUE_SATURATION = 1 << 11,
+    GAIDENT_TORQUE_DEAD_BAND = 1 << 12,
+    GAIDENT_TRANSPORT_DELAY = 1 << 13,
+    GAIDENT_TORQUE_LAG = 1 << 14,
+    GAIDENT_INTEGRATOR_CLAMP = 1 << 15,
+    GAIDENT_COMMAND_RATE_LIMIT = 1 << 16,
+    GAIDENT_VELOCITY_FILTER = 1 << 17,
+    GAIDENT_VELOCITY_RIPPLE = 1 << 18,
+    GAIDENT_VELOCITY_QUANTISATION = 1 << 19,
+    GAIDENT_LUGRE_FRICTION = 1 << 20,
+    GAIDENT_DRY = GAIDENT_COULOMB_FRICTION | GAIDENT_STRIBECK_FRICTION | GAIDENT_ASYMMETRIC_FRICTION |
+                  GAIDENT_PRESLIDING_FRICTION | GAIDENT_LUGRE_FRICTION | GAIDENT_QUADRATIC_DRAG | GAIDENT_FRICTION_DRIFT
+};
+
+typedef struct {
+    int closed;                            /* whether there is a controller: the input is a command [rad/s], else a torque [N m] */
+    double kp, g;                          /* proportional gain, integral gain times dt/2 [N m s/rad] */
+    double torque_limit, integrator_limit; /* N m */
+    int order;                             /* of the mechanism */
+    double a[GAIDENT_ORDER], b[GAIDENT_ORDER + 1]; /* its denominator and numerator in delta = z - 1, at the substep */
+    int substeps;                          /* of a sample; 0: the mechanism is linear and no effect acts */
+    double h;                              /* substep [s] */
+    int two_masses;                        /* with a nonlinear coupling: in place of a and b */
+    double phi[9];                         /* e^(A h) - 1 over motor velocity, load velocity, twist to scale */
+    double motor[3], coupling[3];          /* response to 1 N m at the motor, to 1 N m more in the coupling */
+    double stiffness, damping, per_scale;  /* of the coupling [N m/rad], [N m s/rad]; twist per scaled twist */
+
+    long effects;
+    struct { double torque; } coulomb_friction;
+    struct { double torque, static_torque, slowness; } stribeck_friction;
+    struct { double torque_positive, torque_negative, viscous_positive, viscous_negative; } asymmetric_friction;
+    struct { double stiffness, per_break; } presliding_friction;
+    struct { double torque, static_torque, slowness, stiffness, damping; } lugre_friction;
+    struct { double coefficient; } quadratic_drag;
+    struct { double load; } load_torque;
+    struct { double amplitude, phase; } unbalance;
+    struct { double amplitude, order, phase; } cogging;
+    struct { double torque, rate; } friction_drift;
+    struct { double half_gap; } backlash;
+    struct { double cubic; } hardening_stiffness;
+    struct { double limit; } torque_saturation;
+    struct { double width; } torque_dead_band;
+    struct { int length; const int *back; const double *share; } transport_delay; /* torques kept; per substep */
+    struct { double decay, mean; } torque_lag;
+    struct { double limit; } integrator_clamp;
+    struct { double step; } command_rate_limit;
+    struct { double decay, of_old, of_new; } velocity_filter;
+    struct { double amplitude, order, phase; } velocity_ripple;
+    struct { double step; } velocity_quantisation;
+} gaident_drive;
+
+typedef struct {
+    double z, other;           /* deflection [rad], the other friction's torque one substep ago [N m] */
+    double theta, e, one_plus; /* of the substep being solved */
+} gaident_bristle;
+
+typedef struct {
+    double x[GAIDENT_ORDER]; /* the mechanism */
+    double stored;           /* of the controller [N m] */
+    double angle, theta;     /* of the motor; in the middle of the substep, foreseen [rad] */
+    double friction;         /* of the substep before [N m] */
+    double time;             /* s */
+    int newest;              /* of the torques on their way */
+    struct { double w_before; } stribeck_friction;
+    gaident_bristle presliding_friction;
+    struct { gaident_bristle bristle; double w_before; } lugre_friction;
+    struct { double T; } torque_lag;
+    struct { double before; } command_rate_limit;
+    struct { double output, w; } velocity_filter;
+} gaident_memory;
+
+#endif

@@ -1,0 +1,89 @@
+"""How the loop stood when a record began."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.pi import PI
+from gaident.data.record import Record
+
+__all__ = ["doubtful_start", "noise_std", "starts_moving", "stretches"]
+
+
+def noise_std(velocity: NDArray[np.float64], step: float = 0.0) -> float:
+    """Standard deviation of white noise on a smooth signal, from its third differences (median, so robust) [rad/s].
+
+    step: of the lattice that the signal lies on, where it is known [rad/s]; rounding alone then makes step/sqrt(12).
+
+    A third difference of white noise has the variance 1 + 9 + 9 + 1 = 20 times the noise's. Runs of four equal values and more
+    are left out: an axis at rest, or a coarse encoder between two of its steps, shows no noise. Of a long signal evenly spaced
+    stretches, a million samples in all, will do.
+    """
+    thirds = np.concatenate([np.diff(w, 3)[_outside_runs(w)] for w in stretches(velocity)])
+    least = step / np.sqrt(12.0)
+    return float(max(1.4826 * np.median(np.abs(thirds)) / np.sqrt(20.0), least)) if len(thirds) else float(least)
+
+
+def _outside_runs(x: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Of each four neighbouring samples, whether none of them is part of a run of four equal values or more."""
+    same = np.diff(x) == 0.0
+    four = same[:-2] & same[1:-1] & same[2:]  # samples i to i + 3 are equal
+    in_run = np.zeros(len(x), dtype=bool)
+    for k in range(4):
+        in_run[k : k + len(four)] |= four
+    clear: NDArray[np.bool_] = ~(in_run[:-3] | in_run[1:-2] | in_run[2:-1] | in_run[3:])
+    return clear
+
+
+def stretches(x: NDArray[np.float64], count: int = 64, length: int = 16384) -> list[NDArray[np.float64]]:
+    """Evenly spaced views of a long signal; of a shorter one the whole."""
+    if len(x) <= count * length:
+        return [x]
+    return [x[i : i + length] for i in np.linspace(0, len(x) - length, count).astype(int).tolist()]
+
+
+def starts_moving(rec: Record, controller: PI | None) -> bool:
+    """Whether the record does not start at rest.
+
+    At rest the first velocity is noise: within six standard deviations of it, or one step of a quantised signal, of zero. In the
+    continuous loop a command at sample 0 passes through at once, so a first velocity between 0 and 0.6 of that command is no
+    motion.
+    A record whose input never changes counts as started at rest by a step at sample 0: with an unknown state before it, it
+    would say
+    nothing about zeros and gain (see `doubtful_start`).
+    """
+    return _first_is_motion(rec, controller) and not _constant_input(rec, controller)
+
+
+def doubtful_start(rec: Record, controller: PI | None) -> str | None:
+    """A sentence where a record's input is constant and its first velocity is not that of rest."""
+    if not (_constant_input(rec, controller) and _first_is_motion(rec, controller)):
+        return None
+    name = f"Record {rec.name}" if rec.name else "The record"
+    return (
+        f"{name} starts at {rec.velocity[0]:.4g} rad/s while its input never changes: taken as a step from rest at its "
+        "first sample. If the step came earlier, give the record from before it; if the drive is not a digital one, "
+        "give its loop "
+        "as continuous."
+    )
+
+
+def _constant_input(rec: Record, controller: PI | None) -> bool:
+    source = rec.torque if controller is None else rec.command
+    return source is not None and bool(np.all(source == source[0]))
+
+
+def _first_is_motion(rec: Record, controller: PI | None) -> bool:
+    w = rec.velocity
+    steps = np.concatenate([np.abs(np.diff(part)) for part in stretches(w)])
+    moves = steps[steps > 0.0]
+    # Repeats betray a quantised signal.
+    quantum = float(moves.min()) if len(moves) and len(moves) < 0.9 * len(steps) else 0.0
+    tolerance = max(6.0 * noise_std(w), 1.5 * quantum, 1e-3 * max(float(w.max()), -float(w.min())))
+    first = float(w[0])
+    if controller is not None and controller.loop == "continuous" and rec.command is not None and rec.command[0] != 0.0:
+        passed = first / float(rec.command[0])
+        if 0.0 <= passed <= 0.6:
+            return False
+    return abs(first) > tolerance

@@ -1,0 +1,6 @@
+from .report import report, report_page
+
+__all__ = [
+    "report",
+    "report_page",
+]

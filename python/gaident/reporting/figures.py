@@ -1,0 +1,62 @@
+"""The pictures of a result: what they draw is worked out here and in runs.py, how it is drawn stands in `gaident.show`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.diagnosis.explain.evidence import velocity_curve
+from gaident.errors import GaidentError
+from gaident.identification.frequency import response_of
+from gaident.models.model import Model
+from gaident.reporting.runs import run_of
+from gaident.results.diagnosis import Diagnosis
+from gaident.show import plots, response_plots
+from gaident.show.diagnosis_plots import plot_evidence
+from gaident.show.wording import unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["plot_bode", "plot_diagnosis"]
+
+
+def plot_diagnosis(dia: Diagnosis, records: Sequence[Record], axis: str = "rotary") -> Figure:
+    """Six panels of the longest record; axis="linear" for m and N. Raises SettingsError for another axis."""
+    unit("N m", axis)
+    rec = max(records, key=len)
+    run = run_of(dia, rec)
+    if run.dhat is None or run.torque is None:
+        raise GaidentError(f"there is no picture of {rec.name or 'the record'}: {' '.join(run.notes)}")
+    return plot_evidence(
+        run.time,
+        run.measured,
+        run.linear,
+        run.dhat,
+        run.position,
+        run.torque,
+        dia.after.noise_floor,
+        std=run.std,
+        extended=run.extended,
+        curve=velocity_curve(dia, float(rec.velocity.min()), float(rec.velocity.max())),
+        title=_title(dia, rec, records),
+        axis=axis,
+    )
+
+
+def _title(dia: Diagnosis, rec: Record, records: Sequence[Record]) -> str:
+    found = ", ".join(" or ".join((f.effect, *f.alternatives)).replace("_", " ") for f in dia.causes)
+    of = f"{rec.name}: " if rec.name else ""
+    if len(records) > 1:
+        alone = sum(len(r) == len(rec) for r in records) == 1
+        of = f"{rec.name or 'record'}, {'the longest' if alone else 'the first of the longest'} of {len(records)}: "
+    return f"{of}{dia.verdict}{f' - {found}' if found else ''}"
+
+
+def plot_bode(model: Model, controller: PI | None, records: Sequence[Record], hz: bool, axis: str) -> Figure:
+    """A model against the frequency response of the longest record, or alone; see `Identification.plot_bode`."""
+    if not records:
+        return plots.plot_bode(model, axis=axis, hz=hz)
+    return response_plots.plot_response(response_of(max(records, key=len), model, controller), hz, axis)

@@ -1,0 +1,98 @@
+"""ga.report(): a result and its records as one HTML page. What it draws is worked out here, how in `gaident.show.report`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.diagnosis.explain.evidence import velocity_curve
+from gaident.errors import GaidentError
+from gaident.files import write_whole
+from gaident.identification.frequency import response_of
+from gaident.reporting.runs import run_of
+from gaident.results.diagnosis import Diagnosis
+from gaident.results.identification import Identification
+from gaident.show.report.page import page
+from gaident.show.report.views import View
+from gaident.show.wording import unit
+from gaident.version import version
+
+__all__ = ["report", "report_page"]
+
+Vector = NDArray[np.float64]
+Records = Record | Sequence[Record] | None
+
+
+def report(
+    result: Diagnosis | Identification,
+    path: str | os.PathLike[str],
+    records: Records = None,
+    validation: Records = None,
+    axis: str = "rotary",
+) -> None:
+    """Writes the result as one HTML page that needs nothing else: no network, no other file, no Python.
+
+    From top to bottom: the verdict, measured against simulated, what is wrong, cause and evidence, parameters, before and after,
+    what could not be tested, the next experiment with its command as CSV, how it was computed. About 5 MB, most of it plotly.js.
+
+    records: as used, unless given; a loaded result holds none, and its page says what is left out for that. validation: the
+        records that were held out, likewise. axis: "rotary", or "linear" for units of m and N.
+
+    The file appears whole or not at all. Raises GaidentError where result or records are something else, SettingsError for
+    another axis, OSError where the file cannot be written.
+    """
+    write_whole(path, report_page(result, records, validation, axis).encode())
+
+
+def report_page(
+    result: Diagnosis | Identification, records: Records = None, validation: Records = None, axis: str = "rotary"
+) -> str:
+    """The text of what `report` writes."""
+    from plotly.offline import get_plotlyjs
+
+    return page(result, view_of(result, records, validation, axis), get_plotlyjs())
+
+
+def view_of(result: Diagnosis | Identification, records: Records, validation: Records, axis: str) -> View:
+    """What a page shows beside the result: the records with what the models make of them."""
+    unit("N m", axis)
+    if not isinstance(result, Diagnosis | Identification):
+        raise GaidentError(f"result is {type(result).__name__}: give a Diagnosis or an Identification")
+    given = _records(records, result.records, "records")
+    held = _records(validation, result.validation_records if isinstance(result, Diagnosis) else (), "validation")
+    known = {r.digest for r in given}
+    runs = [run_of(result, rec) for rec in (*given, *(r for r in held if r.digest not in known))]
+    fitted = [rec for rec in given if rec.digest in result.digests] or list(given)
+    longest = max(fitted, key=len, default=None)
+    curve = response = None
+    missing = ""
+    if longest is not None:
+        if isinstance(result, Diagnosis):
+            curve = velocity_curve(result, float(longest.velocity.min()), float(longest.velocity.max()))
+            if curve is not None and any(f.alternatives for f in result.causes):
+                curve = (*curve[:2], f"{curve[2]} (not told apart from others)")
+        try:
+            response = response_of(longest, result.model, result.controller)
+        except GaidentError as error:
+            missing = str(error)
+    return View(tuple(runs), curve, response, missing, axis, _made_with())
+
+
+def _records(given: Records, own: Sequence[Record], name: str) -> tuple[Record, ...]:
+    chosen = own if given is None else (given,) if isinstance(given, Record) else given
+    if not isinstance(chosen, Sequence) or not all(isinstance(r, Record) for r in chosen):
+        raise GaidentError(f"{name} is {type(given).__name__}: give a gaident.Record or a list of them")
+    return tuple(chosen)
+
+
+def _made_with() -> dict[str, str]:
+    from importlib.metadata import version as installed
+
+    names = ("numpy", "scipy", "matplotlib", "plotly")
+    python = ".".join(map(str, sys.version_info[:3]))
+    return {"gaident": version(), "Python": python, **{n: installed(n) for n in names}}

@@ -1,0 +1,90 @@
+"""One record and what the models of a result make of it: worked out once for the pictures and for the page.
+
+The missing torque is that of the linear part of a diagnosed model, its parameters as refitted together with the effects: a
+linear model fitted alone has bent its damping and inertia to swallow part of them, and would show the rest distorted.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.diagnosis.experiments.excitation import position_of
+from gaident.diagnosis.explain.missing_torque import missing_torque
+from gaident.diagnosis.gains import IN_SAMPLE, SHARE, free_run_errors
+from gaident.diagnosis.records.hygiene import cleaned, outliers
+from gaident.errors import GaidentError
+from gaident.models.drive_torque import torque_of
+from gaident.models.model import Model
+from gaident.results.diagnosis import Diagnosis
+from gaident.results.identification import Identification
+from gaident.show.report.views import Run
+
+__all__ = ["run_of"]
+
+Vector = NDArray[np.float64]
+
+
+def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
+    """One record and what the models make of it."""
+    controller = result.controller
+    linear: Model = result.model.linear if isinstance(result, Diagnosis) else result.model
+    used = "fitted" if rec.digest in result.digests else "new"
+    notes: list[str] = []
+    extended = held_from = None
+    if isinstance(result, Diagnosis):
+        if rec.digest in result.validation_digests:
+            used, held_from = "held out", 0
+        elif used == "fitted" and not result.validation_digests and result.held_out != IN_SAMPLE:
+            held_from = int(SHARE * len(rec))
+        before = _free_run(result.identification.model, rec, controller, "linear", notes)
+        if result.model.effects:
+            extended = _free_run(result.model, rec, controller, "extended", notes)
+    else:
+        before = _finite(result.simulate(rec), rec, "linear", notes)
+    torque = torque_of(rec, controller)
+    dhat, std = None, 0.0
+    try:
+        hit = outliers(rec.velocity, rec.velocity - before if np.all(np.isfinite(before)) else None)
+        missing = missing_torque(linear, cleaned(rec, hit), controller, torque)
+        dhat, std = missing.dhat, float(np.median(missing.std))
+    except GaidentError as error:
+        notes.append(f"The missing torque cannot be worked out: {error}")
+    return Run(
+        name=rec.name,
+        digest=rec.digest,
+        used=used,
+        time=rec.time,
+        measured=rec.velocity,
+        position=position_of(rec),
+        linear=before,
+        command=rec.command,
+        torque=torque,
+        torque_logged=rec.torque is not None,
+        extended=extended,
+        dhat=dhat,
+        std=std,
+        held_from=held_from,
+        notes=tuple(notes),
+    )
+
+
+def _free_run(model: Model, rec: Record, controller: PI | None, what: str, notes: list[str]) -> Vector:
+    (error,) = free_run_errors(model, [(rec, 0)], controller)
+    return _finite(rec.velocity - error, rec, what, notes)
+
+
+def _finite(velocity: Vector, rec: Record, what: str, notes: list[str]) -> Vector:
+    """Without what would leave every picture: from where a simulation runs away it is a gap."""
+    limit = 1e3 * float(np.abs(rec.velocity).max() or 1.0)
+    with np.errstate(invalid="ignore"):
+        away = ~(np.abs(velocity) <= limit)
+    if not np.any(away):
+        return velocity
+    first = int(np.argmax(away))
+    notes.append(f"The free run of the {what} model runs away at {first * rec.dt:.4g} s; it is drawn up to there.")
+    out = velocity.copy()
+    out[first:] = np.nan
+    return out

@@ -1,0 +1,24 @@
+from .adequacy import Adequacy
+from .diagnosis import Diagnosis, Finding, Fitness
+from .estimate import Estimate
+from .experiment import Limits, Proposal
+from .frequency import FrequencyResponse, Responses
+from .identification import Identification
+from .settings import Settings
+from .store import load, schema
+
+__all__ = [
+    "Adequacy",
+    "Diagnosis",
+    "Estimate",
+    "Finding",
+    "Fitness",
+    "FrequencyResponse",
+    "Identification",
+    "Limits",
+    "Proposal",
+    "Responses",
+    "Settings",
+    "load",
+    "schema",
+]

@@ -1,0 +1,61 @@
+"""Whether a linear model holds, and the sentence that says so."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+__all__ = ["LEVEL", "Adequacy"]
+
+
+LEVEL = 1e-4  # p-value below which the linear model counts as falsified
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """What the residual says about the model.
+
+    white_p: Ljung-Box p-value of the residual; ar_order: order of the noise model; noise_std: standard deviation of the whitened
+    residual [rad/s]; predictable: share of the residual's power that its own past predicts (0: white); excess: rms of the
+    residual over
+    the noise as the measured velocity's own third differences show it;
+    independence_p: p-value of the test that the residual no longer depends on input and motion; falsified: it does;
+    undecided: it does not, but the residual is coloured and more than twice the noise, so that dynamics may be missing.
+    """
+
+    white_p: float
+    ar_order: int
+    noise_std: float
+    predictable: float
+    excess: float
+    independence_p: float
+    falsified: bool
+    undecided: bool
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in words."""
+        if self.falsified:
+            return (
+                "The linear model is falsified: the residual still depends on the input or the motion "
+                f"(p = {self.independence_p:.1g}), and its own past predicts {100 * self.predictable:.0f} % of its power. "
+                "Do not trust the mechanical parameters; an effect that is not in the model bends them."
+            )
+        if self.undecided:
+            if not math.isfinite(self.excess):
+                return (
+                    "Undecided: the residual is coloured, and the measured velocity shows no noise at all. Is it a measurement, "
+                    "or a command or a simulation? Missing dynamics cannot be told from coloured noise here."
+                )
+            return (
+                f"Undecided: the residual is coloured and {self.excess:.1f} times the noise on the measured velocity. "
+                "Coloured noise "
+                "or missing dynamics; this record cannot tell which, and parameters and standard deviations hold only "
+                "if it is noise."
+            )
+        if self.white_p < LEVEL:
+            return (
+                "The residual is not white but does not depend on input or motion: coloured noise. The linear model stands; "
+                "the standard deviations take the colour into account."
+            )
+        return "The residual is white: nothing left that this linear model could be blamed for."

@@ -1,0 +1,251 @@
+"""The result of a diagnosis."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.errors import GaidentError, check_schema
+from gaident.files import write_whole
+from gaident.models.model import Model
+from gaident.providers import provided
+from gaident.results.estimate import Estimate
+from gaident.results.experiment import Proposal
+from gaident.results.identification import Identification
+from gaident.results.json_text import json_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Diagnosis", "Finding", "Fitness"]
+
+SCHEMA = "gaident/diagnosis"
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was found.
+
+    effect: its name in the effects table; parameters: name -> Estimate. alternatives: effects that these data cannot tell from
+    it, by statistics or by nature; empty: the cause is named. gain: fall of the held-out error that it brought, a fraction of
+    the error before; delta_bic: what it is worth on whitened errors; p_value: of the bootstrap, else None; evidence: one
+    sentence. is_noise: it describes the record rather than the drive.
+    """
+
+    effect: str
+    parameters: Mapping[str, Estimate] = field(hash=False)
+    alternatives: tuple[str, ...] = ()
+    gain: float = 0.0
+    delta_bic: float = 0.0
+    p_value: float | None = None
+    evidence: str = ""
+    is_noise: bool = False
+
+    @property
+    def named(self) -> bool:
+        """Whether the cause is named, without an alternative."""
+        return not self.alternatives
+
+
+@dataclass(frozen=True)
+class Fitness:
+    """Free-run simulation against the measured velocity: rmse [rad/s], fit [%], rms that the noise alone leaves [rad/s]."""
+
+    rmse: float
+    fit_percent: float
+    noise_floor: float
+
+
+@dataclass(frozen=True, repr=False)
+class Diagnosis:
+    """What the simulation gets wrong, why, and what the extended model gains. Made by `diagnose`.
+
+    gain_interval: 95 % interval of the fall of the error from before to after, a fraction. held_out: how the figures of
+    `before` and `after` were held out ("in-sample" where they could not be). base_shift: parameter -> (before, after) of the
+    linear part. left: gain in BIC units of each driver of what is left; line: where that is time and one frequency, (frequency
+    [Hz], amplitude of the torque [N m]). mechanics: name -> Estimate of the linear part, fitted together with the effects.
+    noise [rad/s] and bootstrap as they were asked for; controller as it was used: with the gains that the logged torque shows.
+    torque_logged: whether all records hold the torque; loop_follows: False where it does not follow from command and velocity
+    through the simulated controller, whose free runs are then not the drive's. notes: what to keep in mind, in plain sentences.
+    records and validation_records: the data, empty where the diagnosis was loaded from a file.
+    """
+
+    verdict: str
+    findings: tuple[Finding, ...]
+    not_testable: Mapping[str, str] = field(hash=False)
+    model: Model
+    before: Fitness
+    after: Fitness
+    driver: str | None
+    next_experiment: Proposal | None
+    gain_interval: tuple[float, float]
+    held_out: str
+    base_shift: Mapping[str, tuple[float, float]] = field(hash=False)
+    left: Mapping[str, float] = field(hash=False)
+    notes: tuple[str, ...]
+    identification: Identification
+    controller: PI | None
+    seed: int
+    seconds: float = field(compare=False)
+    simulations: int
+    samples: int
+    digests: tuple[str, ...]
+    version: str = ""
+    validation_digests: tuple[str, ...] = ()
+    noise: float | None = None
+    bootstrap: int = 0
+    torque_logged: bool = False
+    loop_follows: bool = True
+    line: tuple[float, float] | None = None
+    mechanics: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
+    records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
+    validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
+
+    def __repr__(self) -> str:
+        named = ", ".join(f.effect + ("" if f.named else "?") for f in self.findings if not f.is_noise)
+        return f"<Diagnosis {self.verdict}{': ' + named if named else ''}; see summary()>"
+
+    @property
+    def causes(self) -> tuple[Finding, ...]:
+        """The findings that describe the drive."""
+        return tuple(f for f in self.findings if not f.is_noise)
+
+    def summary(self, axis: str = "rotary") -> str:
+        """The result as text; axis="linear" for units of m and N."""
+        text: str = provided("diagnosis_summary")(self, axis)
+        return text
+
+    def plot(self, records: Record | Sequence[Record] | None = None, axis: str = "rotary") -> Figure:
+        """What is wrong and what is left, as a matplotlib Figure; `records` as used unless given; axis="linear" for m and N.
+
+        Raises GaidentError where a loaded diagnosis is given no records, SettingsError for another axis.
+        """
+        given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
+        if not given:
+            raise GaidentError("records: a loaded diagnosis holds no data; give plot(records)")
+        figure: Figure = provided("plot_diagnosis")(self, given, axis)
+        return figure
+
+    def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str = "rotary") -> Figure:
+        """The extended model against the frequency response of the longest record, with coherence; see Identification.plot_bode.
+
+        Friction and other effects bend the record's response; the model, simulated and estimated the same way, has them too.
+        Raises GaidentError where a loaded diagnosis is given no records, RecordError where they show no frequency response.
+        """
+        given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
+        if not given:
+            raise GaidentError("records: a loaded diagnosis holds no data; give plot_bode(records)")
+        figure: Figure = provided("plot_bode")(self.model, self.controller, given, hz, axis)
+        return figure
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        html: str = provided("diagnosis_html")(self)
+        return html
+
+    def to_pandas(self) -> Any:
+        """The findings as a pandas DataFrame: a row per (effect, parameter), with what speaks for it.
+
+        Raises ImportError with the way to get pandas.
+        """
+        return provided("diagnosis_table")(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON, without the records."""
+        proposal = self.next_experiment
+        return {
+            "schema": SCHEMA,
+            "schema_version": SCHEMA_VERSION,
+            "gaident_version": self.version,
+            "verdict": self.verdict,
+            "findings": [
+                {**asdict(f), "parameters": {n: asdict(e) for n, e in f.parameters.items()}, "alternatives": list(f.alternatives)}
+                for f in self.findings
+            ],
+            "not_testable": dict(self.not_testable),
+            "model": self.model.to_dict(),
+            "before": asdict(self.before),
+            "after": asdict(self.after),
+            "driver": self.driver,
+            "next_experiment": None if proposal is None else proposal.to_dict(),
+            "gain_interval": list(self.gain_interval),
+            "held_out": self.held_out,
+            "base_shift": {n: list(v) for n, v in self.base_shift.items()},
+            "left": dict(self.left),
+            "notes": list(self.notes),
+            "identification": self.identification.to_dict(),
+            "controller": None if self.controller is None else self.controller.to_dict(),
+            "seed": self.seed,
+            "seconds": self.seconds,
+            "simulations": self.simulations,
+            "samples": self.samples,
+            "digests": list(self.digests),
+            "validation_digests": list(self.validation_digests),
+            "noise": self.noise,
+            "bootstrap": self.bootstrap,
+            "torque_logged": self.torque_logged,
+            "loop_follows": self.loop_follows,
+            "line": None if self.line is None else list(self.line),
+            "mechanics": {n: asdict(e) for n, e in self.mechanics.items()},
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Diagnosis:
+        """The inverse of to_dict. Raises GaidentError where the data are something else or of a newer schema."""
+        check_schema(data, SCHEMA, SCHEMA_VERSION)
+        try:
+            return cls(
+                verdict=data["verdict"],
+                findings=tuple(
+                    Finding(
+                        **{
+                            **f,
+                            "parameters": {n: Estimate(**e) for n, e in f["parameters"].items()},
+                            "alternatives": tuple(f["alternatives"]),
+                        }
+                    )
+                    for f in data["findings"]
+                ),
+                not_testable=data["not_testable"],
+                model=Model.from_dict(data["model"]),
+                before=Fitness(**data["before"]),
+                after=Fitness(**data["after"]),
+                driver=data["driver"],
+                next_experiment=None if data["next_experiment"] is None else Proposal.from_dict(data["next_experiment"]),
+                gain_interval=(data["gain_interval"][0], data["gain_interval"][1]),
+                held_out=data["held_out"],
+                base_shift={n: (v[0], v[1]) for n, v in data["base_shift"].items()},
+                left=data["left"],
+                notes=tuple(data["notes"]),
+                identification=Identification.from_dict(data["identification"]),
+                controller=None if data["controller"] is None else PI.from_dict(data["controller"]),
+                seed=data["seed"],
+                seconds=data["seconds"],
+                simulations=data["simulations"],
+                samples=data["samples"],
+                digests=tuple(data["digests"]),
+                version=data["gaident_version"],
+                # Files of gaident 0.1.0 may lack these.
+                validation_digests=tuple(data.get("validation_digests", ())),
+                noise=data.get("noise"),
+                bootstrap=data.get("bootstrap", 0),
+                torque_logged=data.get("torque_logged", False),
+                loop_follows=data.get("loop_follows", True),
+                line=None if data.get("line") is None else (data["line"][0], data["line"][1]),
+                mechanics={n: Estimate(**e) for n, e in data.get("mechanics", {}).items()},
+            )
+        except (KeyError, TypeError, AttributeError, IndexError) as error:
+            raise GaidentError(f"the saved diagnosis is damaged: {error!r}; save it again") from error
+
+    def to_json(self) -> str:
+        """What `save` writes."""
+        return json_text(self.to_dict())
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes JSON; the file appears whole or not at all."""
+        write_whole(path, self.to_json().encode())

@@ -1,0 +1,268 @@
+"""The result of an identification."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.errors import GaidentError, check_schema
+from gaident.files import write_whole
+from gaident.models.mechanics import Mechanics, mechanics_from_dict
+from gaident.models.model import Model
+from gaident.models.search_space import SearchSpace
+from gaident.models.simulate import initial_state, simulate
+from gaident.models.starts import starts_moving
+from gaident.providers import provided
+from gaident.results.adequacy import Adequacy
+from gaident.results.estimate import Estimate
+from gaident.results.json_text import json_text
+from gaident.results.settings import Settings
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Identification", "Rival", "Structure", "TrialOutcome"]
+
+SCHEMA = "gaident/identification"
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A structure whose whitened BIC is within 10 units of the winner's (negative delta_bic: it fits better but is larger)."""
+
+    p: int
+    q: int
+    delta_bic: float
+    model: Model
+
+
+@dataclass(frozen=True)
+class TrialOutcome:
+    """One independent genetic run: its best fitness (6), structure, generations and candidates simulated."""
+
+    p: int
+    q: int
+    fitness: float
+    generations: int
+    best_generation: int
+    evaluations: int
+    history: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Structure:
+    """One row of the structure comparison: error sum of the plain fit, whitened BIC relative to the best."""
+
+    p: int
+    q: int
+    error_sum: float
+    delta_bic: float
+
+
+@dataclass(frozen=True, repr=False)
+class Identification:
+    """Structure, parameters and what they are worth. Made by `identify`.
+
+    rmse [rad/s] and fit_percent are of the free-run simulation of all records used; `adequacy` says whether the linear model
+    holds,
+    `warnings` what to keep in mind, in plain sentences. `structures` compares every structure that was fitted.
+    """
+
+    model: Model
+    controller: PI | None
+    parameters: Mapping[str, Estimate] = field(hash=False)
+    mechanics: Mechanics | None
+    fitness: float
+    rmse: float
+    fit_percent: float
+    rivals: tuple[Rival, ...]
+    structures: tuple[Structure, ...]
+    trials: tuple[TrialOutcome, ...]
+    adequacy: Adequacy
+    warnings: tuple[str, ...]
+    space: SearchSpace
+    settings: Settings
+    seed: int
+    seconds: float = field(compare=False)
+    samples: int
+    digests: tuple[str, ...]
+    initial_states: Mapping[str, tuple[float, ...]] = field(hash=False)
+    version: str = ""
+    records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
+
+    def __repr__(self) -> str:
+        verdict = "falsified" if self.falsified else "undecided" if self.adequacy.undecided else "stands"
+        return f"<Identification ({self.p},{self.q}), fit {self.fit_percent:.2f} %, linear model {verdict}; see summary()>"
+
+    @property
+    def p(self) -> int:
+        """Poles in excess of zeros."""
+        return self.model.p
+
+    @property
+    def q(self) -> int:
+        """Zeros."""
+        return self.model.q
+
+    @property
+    def history(self) -> tuple[float, ...]:
+        """Best fitness (6) per generation of the genetic search, of the best trial."""
+        return min(self.trials, key=lambda t: t.fitness).history
+
+    @property
+    def falsified(self) -> bool:
+        """Whether the data contradict the linear model; its mechanics are then not to be trusted."""
+        return self.adequacy.falsified
+
+    def simulate(self, rec: Record) -> NDArray[np.float64]:
+        """Free-run velocity of the model on a record [rad/s].
+
+        A record that does not start at rest gets its initial state estimated (one that was used in the identification, the one
+        found there).
+        """
+        if not isinstance(rec, Record):
+            raise GaidentError(f"rec is {type(rec).__name__}: give a gaident.Record")
+        state: Sequence[float] | NDArray[np.float64] | None = self.initial_states.get(rec.digest)
+        unseen = rec.digest not in self.digests and self.settings.initial_state != "rest"
+        if state is None and unseen and starts_moving(rec, self.controller):
+            if self.controller is not None and self.controller.limited:
+                raise GaidentError(
+                    "rec starts in motion and the controller has limits: its initial state cannot be estimated; use a record "
+                    "from rest, or gaident.simulate(idn.model, rec, controller, initial_state=...)"
+                )
+            state = initial_state(self.model, rec, self.controller)
+        return simulate(self.model, rec, self.controller, state)
+
+    def residual(self, rec: Record) -> NDArray[np.float64]:
+        """Measured minus simulated velocity [rad/s]."""
+        return rec.velocity - self.simulate(rec)
+
+    def summary(self, axis: str = "rotary") -> str:
+        """The result as text; axis="linear" for units of m and N."""
+        text: str = provided("identification_summary")(self, axis)
+        return text
+
+    def plot(self, records: Record | Sequence[Record] | None = None, axis: str = "rotary") -> Figure:
+        """Measured against simulated velocity and the residual, as a matplotlib Figure; `records` as used unless given."""
+        given = self.records if records is None else (records,) if isinstance(records, Record) else records
+        if not isinstance(given, Sequence) or not all(isinstance(r, Record) for r in given):
+            raise GaidentError(f"records is {type(records).__name__}: give a gaident.Record or a list of them")
+        chosen = tuple(given)
+        if not chosen:
+            raise GaidentError("records: a loaded identification holds no data; give plot(records)")
+        figure: Figure = provided("plot_identification")(self, chosen, axis=axis)
+        return figure
+
+    def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str = "rotary") -> Figure:
+        """The model against the frequency response of the longest record (`records` as used unless given), with coherence.
+
+        In a loop with a command it is estimated by the command (joint input-output), else torque to velocity (H1). A loaded
+        identification without records shows the model alone. hz: frequencies in Hz instead of rad/s. Raises RecordError where
+        the record shows no frequency response.
+        """
+        given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
+        figure: Figure = provided("plot_bode")(self.model, self.controller, given, hz, axis)
+        return figure
+
+    def plot_poles(self, hz: bool = False) -> Figure:
+        """Poles and zeros in the s-plane with bars of 2 standard deviations; [rad/s], or divided by 2 pi [Hz]."""
+        figure: Figure = provided("plot_poles_zeros")(self, hz)
+        return figure
+
+    def plot_convergence(self) -> Figure:
+        """Best fitness (6) per generation of every trial."""
+        figure: Figure = provided("plot_convergence")(self)
+        return figure
+
+    def plot_structures(self) -> Figure:
+        """BIC of every structure (p,q) above the lowest."""
+        figure: Figure = provided("plot_structures")(self)
+        return figure
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        html: str = provided("identification_html")(self)
+        return html
+
+    def to_pandas(self) -> Any:
+        """The parameters as a pandas DataFrame: rows (model or mechanics, parameter), columns value, std, unit, ...
+
+        Raises ImportError with the way to get pandas.
+        """
+        return provided("identification_table")(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON, without the records."""
+        return {
+            "schema": SCHEMA,
+            "schema_version": SCHEMA_VERSION,
+            "gaident_version": self.version,
+            "p": self.p,
+            "q": self.q,
+            "falsified": self.falsified,
+            "model": self.model.to_dict(),
+            "controller": None if self.controller is None else self.controller.to_dict(),
+            "parameters": {name: asdict(e) for name, e in self.parameters.items()},
+            "mechanics": None if self.mechanics is None else self.mechanics.to_dict(),
+            "fitness": self.fitness,
+            "rmse": self.rmse,
+            "fit_percent": self.fit_percent,
+            "rivals": [{"p": r.p, "q": r.q, "delta_bic": r.delta_bic, "model": r.model.to_dict()} for r in self.rivals],
+            "structures": [asdict(s) for s in self.structures],
+            "trials": [asdict(t) for t in self.trials],
+            "adequacy": asdict(self.adequacy),
+            "warnings": list(self.warnings),
+            "space": self.space.to_dict(),
+            "settings": self.settings.to_dict(),
+            "seed": self.seed,
+            "seconds": self.seconds,
+            "samples": self.samples,
+            "digests": list(self.digests),
+            "initial_states": {d: list(s) for d, s in self.initial_states.items()},
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Identification:
+        """The inverse of to_dict. Raises GaidentError where the data are something else or of a newer schema."""
+        check_schema(data, SCHEMA, SCHEMA_VERSION)
+        try:
+            return cls(
+                model=Model.from_dict(data["model"]),
+                controller=None if data["controller"] is None else PI.from_dict(data["controller"]),
+                parameters={name: Estimate(**e) for name, e in data["parameters"].items()},
+                mechanics=None if data["mechanics"] is None else mechanics_from_dict(data["mechanics"]),
+                fitness=data["fitness"],
+                rmse=data["rmse"],
+                fit_percent=data["fit_percent"],
+                rivals=tuple(Rival(r["p"], r["q"], r["delta_bic"], Model.from_dict(r["model"])) for r in data["rivals"]),
+                structures=tuple(Structure(**s) for s in data["structures"]),
+                trials=tuple(TrialOutcome(**{**t, "history": tuple(t["history"])}) for t in data["trials"]),
+                adequacy=Adequacy(**data["adequacy"]),
+                warnings=tuple(data["warnings"]),
+                space=SearchSpace.from_dict(data["space"]),
+                settings=Settings.from_dict(data["settings"]),
+                seed=data["seed"],
+                seconds=data["seconds"],
+                samples=data["samples"],
+                digests=tuple(data["digests"]),
+                initial_states={d: tuple(s) for d, s in data["initial_states"].items()},
+                version=data["gaident_version"],
+            )
+        except (KeyError, TypeError, AttributeError) as error:
+            raise GaidentError(f"the saved identification is damaged: {error!r}; save it again") from error
+
+    def to_json(self) -> str:
+        """What `save` writes, see `json_text`."""
+        return json_text(self.to_dict())
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes JSON; the file appears whole or not at all."""
+        write_whole(path, self.to_json().encode())

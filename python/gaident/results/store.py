@@ -1,0 +1,63 @@
+"""Saved results back from their files."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from gaident.data.record import SCHEMA as RECORD
+from gaident.data.record import Record
+from gaident.errors import GaidentError
+from gaident.results.diagnosis import SCHEMA as DIAGNOSIS
+from gaident.results.diagnosis import Diagnosis
+from gaident.results.identification import SCHEMA as IDENTIFICATION
+from gaident.results.identification import Identification
+from gaident.results.json_text import decoded
+
+__all__ = ["load", "schema"]
+
+Saved = Identification | Diagnosis | Record
+
+READERS: dict[str, Callable[[Mapping[str, Any]], Saved]] = {
+    IDENTIFICATION: Identification.from_dict,
+    DIAGNOSIS: Diagnosis.from_dict,
+    RECORD: Record.from_dict,
+}
+
+
+def load(path: str | os.PathLike[str]) -> Saved:
+    """Reads what `Identification.save`, `Diagnosis.save` or `Record.save` wrote.
+
+    Raises GaidentError naming the file where it is missing, no JSON, none of them, of a newer schema, or names an effect of
+    your own that is not registered.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise GaidentError(f"{path}: there is no such file; check the path (now in {Path.cwd()})") from error
+    except UnicodeDecodeError as error:
+        raise GaidentError(f"{path}: is no text; give a file that save() wrote, or read a log with gaident.read") from error
+    except OSError as error:
+        raise GaidentError(f"{path}: cannot be read ({error.strerror}); give a file that save() wrote") from error
+    except TypeError as error:
+        raise GaidentError(f"path={path!r} is no path; give the file's name as str or pathlib.Path") from error
+    try:
+        data = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise GaidentError(f"{path}: line {error.lineno} is not JSON ({error.msg}); give a file that save() wrote") from error
+    reader = READERS.get(str(data.get("schema"))) if isinstance(data, dict) else None
+    if reader is None:
+        raise GaidentError(f"{path}: holds no saved identification, diagnosis or record; give a file that save() wrote")
+    try:
+        return reader(decoded(data))
+    except GaidentError as error:
+        raise GaidentError(f"{path}: {error.marked}") from error
+
+
+def schema() -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of the files that `load` reads; it stands in the package as results.schema.json."""
+    data: dict[str, Any] = json.loads(Path(__file__).with_name("results.schema.json").read_text(encoding="utf-8"))
+    return data

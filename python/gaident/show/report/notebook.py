@@ -1,0 +1,63 @@
+"""What a notebook shows of a result: the verdict and the main figures, without scripts, in the notebook's own colours."""
+
+from __future__ import annotations
+
+from gaident.results.diagnosis import Diagnosis
+from gaident.results.identification import Identification
+from gaident.show.html import Html, Row, joined, number, table, tag, typeset
+from gaident.show.report import diagnosis, identification
+from gaident.show.report.parts import Head, estimate
+from gaident.show.summary import meaning_of
+from gaident.show.wording import structure_words
+
+__all__ = ["diagnosis_html", "identification_html"]
+
+FRAME = "border-left: 4px solid #0072b2; padding: 0.2em 1em; max-width: 60em;"
+UNITS = "rmse in rad/s (m/s on a linear axis)"
+
+
+def diagnosis_html(dia: Diagnosis) -> Html:
+    """Verdict, causes with their parameters and evidence, error before and after."""
+    rows: list[Row] = []
+    for f in (f for f in dia.findings if not f.is_noise):
+        name = " or ".join((f.effect, *f.alternatives)).replace("_", " ")
+        for i, (parameter, e) in enumerate(f.parameters.items()):
+            cells = (parameter.replace("_", " "), estimate(e.value, e.std), typeset("" if e.unit == "1" else e.unit))
+            rows.append((name if i == 0 else "", *cells))
+    evidence = [tag("li", tag("b", f.effect.replace("_", " ")), ": ", typeset(f.evidence)) for f in dia.findings if f.evidence]
+    causes = table(("cause", "parameter", "value", "unit"), [rows], left=(0, 1, 3)) if rows else Html("")
+    if evidence:
+        causes = joined((causes, tag("ul", *evidence)))
+    errors: list[Row] = [("linear model", number(dia.before.rmse), f"{dia.before.fit_percent:.2f}")]
+    if dia.model.effects:
+        errors.append(("extended model", number(dia.after.rmse), f"{dia.after.fit_percent:.2f}"))
+    errors.append(("noise", number(dia.after.noise_floor), ""))
+    where = f"{UNITS}; {dia.held_out}"
+    return _framed(diagnosis.head(dia), causes, table(("", "rmse", "fit [%]"), [errors], left=(0,)), where)
+
+
+def identification_html(idn: Identification) -> Html:
+    """Verdict, mechanics or structure, fit."""
+    m = idn.mechanics
+    parts: Html | str = f"({idn.p},{idn.q}), {structure_words(idn.p, idn.q)}"
+    if m is not None:
+        rows: list[Row] = [
+            (name, estimate(getattr(m, name), m.std.get(name)), typeset(u), meaning_of(name, hasattr(m, "KG"), "rotary"))
+            for name, u in m.UNITS.items()
+        ]
+        parts = table(("", "value", "unit", ""), [rows], left=(0, 2, 3))
+    errors: list[Row] = [("model", number(idn.rmse), f"{idn.fit_percent:.2f}"), ("noise", number(idn.adequacy.noise_std), "")]
+    return _framed(identification.head(idn), parts, table(("", "rmse", "fit [%]"), [errors], left=(0,)), f"{UNITS}; in-sample")
+
+
+def _framed(head: Head, parts: str, errors: str, small: str) -> Html:
+    listed = tag("ul", *(tag("li", typeset(note)) for note in head.notes)) if head.notes else ""
+    return tag(
+        "div",
+        tag("p", tag("b", f"{head.sign} {head.word}. "), typeset(head.headline)),
+        tag("div", parts),
+        errors,
+        tag("p", tag("small", small)),
+        listed,
+        style=FRAME,
+    )

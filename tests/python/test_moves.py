@@ -1,0 +1,479 @@
+"""Every move of the search by itself, over a toy objective: its models are sums of given signals, and nothing is simulated.
+
+The toy has a predictor of its own. The velocity of a model is the sum of a signal for each base parameter and of a shape for each
+effect, so that the truth is known, and what a fit may find too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import gaident as ga
+from gaident.diagnosis.policy import POLICY
+from gaident.diagnosis.selection import model_space, moves, score_test
+from gaident.diagnosis.selection.moves import Moves
+from gaident.estimation import least_squares as ls
+from gaident.estimation import prediction
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.noise_model import WHITE
+from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
+from gaident.estimation.parameterisation import Parameterisation
+from gaident.estimation.term import Scales, Term
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+N, DT, NOISE = 800, 1e-3, 0.05
+SCALES = Scales(DT, N * DT, 1.0, 1.0, 1.0, 1.0, 0.02, float("nan"), float("nan"), False, 1.0)
+S = np.linspace(0.0, 1.0, N)  # time as a share of the record
+ONE = ga.OneMass(J=0.01, D=0.01).model()
+TWO = ga.TwoMass(JM=0.01, DM=0.01, JL=0.02, DL=0.02, KG=50.0, DG=0.01).model()
+BASE = [np.sin((2.0 + 1.7 * i) * np.pi * S + 0.4 * i) for i in range(6)]  # what each base parameter adds
+DRIFT = 0.6 * np.sin(9.3 * np.pi * S) * S  # what nobody commanded, which only a closed loop follows
+
+
+def wave(k: float) -> Vector:
+    return np.asarray(np.cos(k * np.pi * S + 0.1 * k))
+
+
+def pulse(at: float) -> Vector:
+    return np.asarray(np.exp(-(((S - at) / 0.03) ** 2)))
+
+
+def toy(name: str, starts: Sequence[tuple[float, ...]], **more: object) -> Term:
+    """A term whose coordinates are its parameters, between -10 and 10."""
+    size = max((len(row) for row in starts), default=1)
+    term = Term(
+        name,
+        str(more.pop("place", "shaft")),
+        natural=lambda z: z.copy(),
+        coordinates=lambda p: np.array(list(p.values())),
+        limits=lambda s: [(-10.0, 10.0)] * size,
+        starts=lambda s: list(starts),
+        steps=lambda s: (0.5,) * size,
+    )
+    return replace(term, **more)  # type: ignore[arg-type]
+
+
+A = toy("a", [(0.5,)])
+B = toy("b", [(0.5,)])
+C = toy("c", [(0.5,)])
+LEVEL = toy("level", [(0.5,)], family="friction", levels=True)
+GENERAL = toy("general", [(0.5, 0.3)], family="friction", levels=True, nested=("level",), neutral=lambda level, s: (level, 0.0))
+DEEP = toy("deep", [(0.5, 0.3, 0.1)], family="friction", levels=True, nested=("level", "general"))
+GAP = toy("gap", [(0.5,)], place="coupling", excludes=frozenset({"resonance"}))
+RESONANCE = toy("resonance", [(60.0, 0.1, 50.0, 0.1)], place="plant", resonates=True, excludes=frozenset({"gap"}))
+RESONANCE = replace(RESONANCE, limits=lambda s: [(1.0, 500.0), (0.0, 2.0)] * 2, steps=lambda s: (5.0, 0.1) * 2)
+LIMIT = toy("limit", [(0.5,)], place="controller", replayed=lambda rec, pi, v: (rec, pi))
+PLACED = toy("placed", [(0.1,), (0.5,), (0.9,)])
+VALLEY = toy("valley", [(0.25,)], multimodal=True)
+VALLEY = replace(VALLEY, limits=lambda s: [(0.0, 1.0)], steps=lambda s: (0.6,))
+RIPPLE = toy("ripple", [(0.5, 0.0)], harmonic="velocity", orders=(1, 8))
+LAG = toy("lag", [(0.5,)])
+SEEN = toy("seen", [(0.5,)], seen_angle=lambda angle, w, v: angle)
+TERMS = (A, B, C, LEVEL, GENERAL, DEEP, GAP, RESONANCE, LIMIT, PLACED, VALLEY, RIPPLE, LAG, SEEN)
+LIBRARY = {t.name: t for t in TERMS}
+
+SHAPES: dict[str, Callable[[Vector], Vector]] = {
+    "a": lambda z: z[0] * wave(12.0),
+    "b": lambda z: z[0] * wave(15.5),
+    "c": lambda z: z[0] * wave(19.0),
+    "level": lambda z: z[0] * wave(10.5),
+    "general": lambda z: z[0] * wave(10.5) + z[1] * wave(13.7),
+    "deep": lambda z: z[0] * wave(10.5) + z[1] * wave(13.7) + z[2] * wave(16.7),
+    "gap": lambda z: z[0] * wave(17.3),
+    "resonance": lambda z: 0.01 * (z[0] - z[2]) * wave(14.5) + (z[1] - z[3]) * wave(16.1),
+    "limit": lambda z: z[0] * wave(11.1),
+    "placed": lambda z: pulse(z[0]),
+    "valley": lambda z: pulse(z[0]),
+    "ripple": lambda z: z[0] * wave(21.0) + z[1] * wave(23.0),
+    "lag": lambda z: z[0] * wave(18.1),
+    "seen": lambda z: z[0] * wave(20.3),
+}
+
+
+@dataclass(frozen=True)
+class Toy:
+    """The predictor: signals of the base parameters around their start, shapes of the effects, the drift in a closed loop."""
+
+    data: DataSet
+    own_angle: bool = False
+    closed: bool = False
+    difference = 1e-3
+
+    def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
+        rows = X[:, : parameters.base] @ np.array(BASE[: parameters.base])
+        for t in parameters.terms:
+            rows = rows + np.array([SHAPES[t.name](z) for z in X[:, parameters.slot(t.name)]])
+        return np.asarray(rows + (DRIFT if self.closed else 0.0))
+
+    def torque_response(self, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
+        return np.zeros_like(torques)
+
+
+@pytest.fixture(autouse=True)
+def _no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The toy's library, and its predictor in the place of both loops; a simulation would be an error."""
+
+    def simulated(*args: object, **more: object) -> None:
+        raise AssertionError("a move on the toy has asked the simulator")
+
+    monkeypatch.setattr(prediction, "simulate_values", simulated)
+    for module in (moves, model_space):
+        monkeypatch.setattr(module, "LIBRARY", LIBRARY)
+        monkeypatch.setattr(module, "EQUIVALENT", {frozenset({"lag", "seen"}): ""})
+    monkeypatch.setattr(model_space, "ClosedLoop", lambda data, own=False: Toy(data, own, True))
+    monkeypatch.setattr(score_test, "ClosedLoop", lambda data, own=False: Toy(data, own, True))
+    monkeypatch.setattr(model_space, "OpenLoop", Toy)
+    monkeypatch.setattr(moves, "OpenLoop", Toy)
+
+
+class Bench:
+    """A record of a known truth, the moves over it, and fits of chosen models."""
+
+    def __init__(
+        self,
+        effects: dict[str, tuple[float, ...]] | None = None,
+        *,
+        masses: int = 1,
+        base: Sequence[float] = (),
+        extra: Vector | float = 0.0,
+        loop: bool = False,
+        angle: bool = False,
+        allowed: Sequence[Term] = TERMS,
+        plain: bool = False,
+        noise: float = NOISE,
+        seed: int = 0,
+    ) -> None:
+        self.masses = masses
+        x = np.array([*base, *np.ones((2, 6)[masses - 1] - len(base))])
+        w = x @ np.array(BASE[: len(x)]) + extra
+        for name, z in (effects or {}).items():
+            w = w + SHAPES[name](np.array(z))
+        w = w + noise * np.random.default_rng(seed).standard_normal(N)
+        still = np.zeros(N)
+        rec = ga.Record(DT, still if loop else None, w, still, np.arange(N) * DT if angle else None)
+        data = DataSet.of([rec], ga.PI(1.0, 1.0) if loop else None)
+        self.data = replace(data, known_noise=noise, moving=(False,))
+        family = OutputErrors(100.0) if plain else Innovations()
+        self.space = Moves(Objective(self.data, np.ones(N), family), tuple(allowed), lambda message: None)
+
+    def hypothesis(self, *terms: Term, masses: int = 0, closed: bool = False) -> Hypothesis:
+        parameters = Parameterisation.of(ONE if (masses or self.masses) == 1 else TWO, SCALES, [False])
+        for t in terms:
+            parameters = parameters.extended(t)
+        return Hypothesis(parameters, Toy(self.data, False, closed))
+
+    def start(self, hypothesis: Hypothesis) -> Vector:
+        rows = [t.starts(SCALES)[0] for t in hypothesis.parameters.terms]
+        return np.concatenate([np.ones(hypothesis.parameters.base), *map(np.array, rows)])
+
+    def fit(self, *terms: Term, masses: int = 0, closed: bool = False) -> Fit:
+        hypothesis = self.hypothesis(*terms, masses=masses, closed=closed)
+        return self.space.refitted(hypothesis, self.start(hypothesis))
+
+
+def names(fits: Sequence[Fit]) -> list[tuple[str, ...]]:
+    return [f.effects for f in fits]
+
+
+# What a model is worth.
+
+
+def test_an_effect_that_is_there_is_worth_it_and_one_that_is_not_is_none() -> None:
+    there, absent = Bench({"a": (0.3,)}), Bench()
+    assert there.space.worth(there.fit(A), there.fit())
+    assert not absent.space.worth(absent.fit(A), absent.fit())
+    assert not there.space.worth(there.fit(A, B), there.fit(A))
+
+
+def test_an_effect_is_worth_it_from_its_penalty_on() -> None:
+    """The gain in BIC grows with the square of the amplitude: below the penalty it is not worth it, above it is."""
+    gains = {}
+    for size in (0.006, 0.02):
+        bench = Bench({"a": (size,)})
+        less, more = bench.fit(), bench.fit(A)
+        gains[size] = less.bic - more.bic
+        assert bench.space.worth(more, less) is (gains[size] > bench.space.penalty)
+    assert gains[0.006] < POLICY.effect_penalty < gains[0.02]
+
+
+def test_the_score_counts_what_an_effect_contains_a_mass_once_and_orders_that_were_searched() -> None:
+    bench = Bench()
+    space = bench.space
+
+    def cost(fit: Fit) -> float:
+        return (space.score(fit) - fit.bic) / space.penalty
+
+    assert cost(bench.fit()) == 0.0
+    assert cost(bench.fit(A, B)) == pytest.approx(2.0)
+    assert cost(bench.fit(GENERAL)) == pytest.approx(2.0) and cost(bench.fit(LEVEL)) == pytest.approx(1.0)
+    assert cost(bench.fit(DEEP)) == pytest.approx(3.0), "a generalisation of a generalisation"
+    assert cost(bench.fit(masses=2)) == pytest.approx(1.0)
+    assert cost(bench.fit(RIPPLE)) * space.penalty == pytest.approx(space.penalty + 2.0 * np.log(8.0))
+    assert space.penalty == pytest.approx(POLICY.effect_penalty * (1.0 + POLICY.short_record / space.objective.count))
+    assert Bench(plain=True).space.penalty == POLICY.misfit_penalty
+
+
+def test_the_key_is_of_the_model_whatever_the_order_and_the_same_for_equivalent_effects() -> None:
+    bench = Bench()
+    key = bench.space.key
+    assert key(bench.fit(A, B)) == key(bench.fit(B, A))
+    assert key(bench.fit(LAG)) == key(bench.fit(SEEN))
+    assert key(bench.fit(A)) != key(bench.fit(B)) and key(bench.fit()) != key(bench.fit(masses=2))
+
+
+def test_what_explains_little_of_a_misfit_is_significant_and_not_material() -> None:
+    """Beside a misfit of 0.7 an effect of 0.1 explains 2 % of the squared error, one of 0.4 a quarter."""
+    misfit = 0.7 * np.sin(70.0 * S**2)
+    for size, counts in ((0.1, False), (0.4, True)):
+        bench = Bench({"a": (size,)}, extra=misfit, plain=True, noise=0.01)
+        less, more = bench.fit(), bench.fit(A)
+        assert bench.space.material(less, more) is counts
+        assert not bench.space.is_noise(more)
+    # The same small effect is material where it leaves noise.
+    bench = Bench({"a": (0.1,)}, plain=True, noise=0.05)
+    assert bench.space.is_noise(bench.fit(A)) and bench.space.material(bench.fit(), bench.fit(A))
+
+
+def test_what_is_not_material_is_not_worth_it_however_significant() -> None:
+    misfit = 0.7 * np.sin(70.0 * S**2)
+    bench = Bench({"a": (0.1,)}, extra=misfit, plain=True, noise=0.01)
+    bench.space = replace(bench.space, objective=bench.space.objective.under(OutputErrors(float(N))))
+    less, more = bench.fit(), bench.fit(A)
+    assert bench.space.score(more) < bench.space.score(less)
+    assert not bench.space.worth(more, less)
+
+
+def test_models_are_compared_in_the_same_view() -> None:
+    """A closed loop that follows the drift is no merit of the effect beside it."""
+    bench = Bench(extra=DRIFT, loop=True)
+    less, more = bench.fit(), bench.fit(A, closed=True)
+    assert bench.space.score(more) < bench.space.score(less)
+    assert not bench.space.worth(more, less)
+    seen = bench.space.in_view_of(less, more)
+    assert seen.predictor.closed and seen.bic < less.bic
+    assert bench.space.in_view_of(less, bench.fit(A)) is less
+
+
+def test_quiet_and_noise_are_ratios_to_the_noise_of_the_velocity() -> None:
+    quiet, loud = Bench(), Bench({"a": (0.3,)}, plain=True)
+    assert quiet.space.quiet(quiet.fit()) and quiet.space.is_noise(quiet.fit())
+    assert quiet.space.ratio(quiet.fit()) == pytest.approx(1.0, abs=0.08)
+    assert not loud.space.is_noise(loud.fit()) and loud.space.quiet(loud.fit(A))
+
+
+# Moves that add.
+
+
+def test_candidates_are_what_the_model_allows() -> None:
+    one, two = Bench(), Bench(masses=2)
+    assert GAP not in one.space.candidates(one.fit()) and GAP in two.space.candidates(two.fit())
+    beside = two.space.candidates(two.fit(GAP))
+    assert RESONANCE not in beside and GAP not in beside
+    assert not {LEVEL, GENERAL} & set(one.space.candidates(one.fit(LEVEL))), "one of a family"
+    assert LIMIT in one.space.candidates(one.fit())
+    plain = Bench(plain=True, loop=True)
+    assert LIMIT not in plain.space.candidates(plain.fit())
+    assert LIMIT in plain.space.candidates(plain.fit(closed=True))
+
+
+def test_add_finds_the_effect_and_puts_the_best_first() -> None:
+    bench = Bench({"b": (0.4,)}, allowed=(A, B, C))
+    found = bench.space.add(bench.fit())
+    assert found[0].effects == ("b",)
+    assert found[0].x[found[0].parameters.slot("b")] == pytest.approx([0.4], abs=0.02)
+    scores = [bench.space.score(f) for f in found]
+    assert scores == sorted(scores)
+
+
+def test_add_grows_a_model_behind_what_it_has() -> None:
+    bench = Bench({"b": (0.4,), "c": (-0.3,)}, allowed=(A, B, C))
+    assert bench.space.add(bench.fit(B))[0].effects == ("b", "c")
+    assert bench.space.add(bench.fit(C))[0].effects == ("c", "b")
+
+
+def test_add_is_remembered() -> None:
+    bench = Bench({"b": (0.4,)}, allowed=(A, B))
+    fit = bench.fit()
+    assert bench.space.add(fit) is bench.space.add(fit)
+
+
+def test_add_ends_at_the_most_effects_and_where_only_noise_is_left() -> None:
+    bench = Bench({"a": (0.3,), "b": (0.3,)}, allowed=(A, B, C))
+    small = replace(bench.space, policy=replace(POLICY, most_effects=1))
+    assert small.add(bench.fit(A)) == []
+    assert bench.space.add(bench.fit(A, B)) == [], "no linearised gain is near a penalty: no fit is spent"
+    assert replace(bench.space, allowed=()).add(bench.fit()) == []
+
+
+def test_a_generalisation_is_added_in_the_place_of_what_it_contains() -> None:
+    bench = Bench({"general": (0.5, 0.3)}, allowed=(A, LEVEL, GENERAL))
+    from_nothing = bench.space.add(bench.fit())
+    assert from_nothing[0].effects == ("general",) and ("level",) in names(from_nothing)
+    from_level = bench.space.add(bench.fit(LEVEL))
+    assert from_level[0].effects == ("general",)
+    assert all(len(set(f.effects) & {"level", "general"}) == 1 for f in from_level)
+
+
+def test_a_generalisation_is_worth_two_penalties() -> None:
+    for size, counts in ((0.0, False), (0.3, True)):
+        bench = Bench({"general": (0.5, size)})
+        assert bench.space.worth(bench.fit(GENERAL), bench.fit(LEVEL)) is counts
+
+
+def test_the_neutral_case_of_a_generalisation_scores_as_the_simpler_effect() -> None:
+    bench = Bench({"level": (0.5,)})
+    level, general = bench.fit(LEVEL), bench.fit(GENERAL)
+    # The same signal, under the filter of the same errors: the same score as that of the level itself.
+    assert bench.space.neutral_score(level, general) == pytest.approx(bench.space.score(level), abs=1e-6)
+    assert bench.space.neutral_score(bench.fit(), bench.fit(A)) == np.inf, "no generalisation"
+
+
+def test_what_was_grown_already_is_known() -> None:
+    bench = Bench({"a": (0.4,), "b": (0.4,)}, allowed=(A, B))
+    fit = bench.fit(A)
+    bench.space.add(fit)
+    near = replace(fit, bic=fit.bic - 0.5 * POLICY.swap)
+    better = replace(fit, bic=fit.bic - 2.0 * POLICY.swap)
+    assert bench.space.known(near) is fit
+    assert bench.space.known(better) is better
+    assert bench.space.known(bench.fit(B)).effects == ("b",)
+
+
+# Moves that reduce.
+
+
+def test_drop_leaves_out_each_effect_and_the_needless_one_goes() -> None:
+    bench = Bench({"a": (0.4,)})
+    both = bench.fit(A, B)
+    without_a, without_b = bench.space.drop(both)
+    assert names([without_a, without_b]) == [("b",), ("a",)]
+    assert bench.space.prefers(without_b, both) and not bench.space.prefers(without_a, both)
+    assert bench.space.drop(bench.fit()) == []
+
+
+def test_simplify_takes_a_detail_back_that_is_not_there() -> None:
+    for size, back in ((0.0, True), (0.3, False)):
+        bench = Bench({"general": (0.5, size)})
+        full = bench.fit(GENERAL, A)
+        (simpler,) = bench.space.simplify(full)
+        assert set(simpler.effects) == {"level", "a"}
+        assert simpler.x[simpler.parameters.slot("level")] == pytest.approx([0.5], abs=0.01 + 0.15 * size)
+        assert bench.space.prefers(simpler, full) is back
+    assert bench.space.simplify(bench.fit(LEVEL)) == []
+    assert replace(bench.space, allowed=(A, GENERAL)).simplify(bench.fit(GENERAL)) == [], "level is not allowed here"
+
+
+def test_demote_makes_one_mass_where_the_second_explains_nothing() -> None:
+    """One mass spans the first two base signals: the truth has no more, or all six."""
+    for base, back in (((1.0, 1.0, 0.0, 0.0, 0.0, 0.0), True), ((1.0, 1.0, 0.4, 0.4, 0.4, 0.4), False)):
+        bench = Bench({"a": (0.4,)}, masses=2, base=base)
+        two = bench.fit(A)
+        (one,) = bench.space.demote(two)
+        assert one.parameters.masses == 1 and one.effects == ("a",)
+        assert bench.space.prefers(one, two) is back
+
+
+def test_demote_keeps_what_needs_two_masses() -> None:
+    bench = Bench({"a": (0.4,)}, masses=2)
+    assert bench.space.demote(bench.fit()) == [], "the linear model was chosen by the bases"
+    assert bench.space.demote(bench.fit(GAP)) == [] and bench.space.demote(bench.fit(RESONANCE)) == []
+    assert bench.space.demote(bench.fit(A, masses=1)) == []
+
+
+def test_close_shows_friction_in_its_loop_where_the_open_one_drifts_away() -> None:
+    bench = Bench({"level": (0.4,)}, extra=DRIFT, loop=True)
+    fit = ls.fit(bench.space.objective, bench.hypothesis(LEVEL), bench.start(bench.hypothesis(LEVEL)), WHITE, 10)
+    assert not bench.space.quiet(fit)
+    (closed,) = bench.space.close(fit)
+    assert closed.predictor.closed and closed.effects == fit.effects
+    assert bench.space.prefers(closed, fit), "the same effects: the score alone decides"
+    assert not bench.space.prefers(fit, closed)
+
+
+def test_close_has_nothing_to_do() -> None:
+    bench = Bench({"level": (0.4,)}, loop=True)
+    assert bench.space.close(bench.fit(LEVEL)) == [], "nothing but noise is left"
+    drifting = Bench({"level": (0.4,)}, extra=DRIFT, loop=True)
+    rough = ls.fit(drifting.space.objective, drifting.hypothesis(A), np.ones(3), WHITE, 10)
+    assert drifting.space.close(rough) == [], "no friction that would rest"
+    assert drifting.space.close(drifting.fit(LEVEL, closed=True)) == [], "closed already"
+    for other in (Bench({"level": (0.4,)}, extra=DRIFT), Bench({"level": (0.4,)}, extra=DRIFT, loop=True, plain=True)):
+        assert other.space.close(other.fit(LEVEL)) == [], "no loop to be closed, or output errors"
+
+
+def test_exchange_tries_an_equivalent_effect_beside_a_harmonic() -> None:
+    bench = Bench({"seen": (0.4,), "ripple": (0.5, 0.2)})
+    fit = bench.fit(LAG, RIPPLE)
+    (other,) = bench.space.exchange(fit)
+    assert set(other.effects) == {"seen", "ripple"}
+    assert bench.space.prefers(other, fit) and not bench.space.prefers(fit, other)
+    assert bench.space.exchange(bench.fit(LAG)) == [], "alone they are the same"
+    logged = Bench({"seen": (0.4,), "ripple": (0.5, 0.2)}, angle=True)
+    assert logged.space.exchange(logged.fit(LAG, RIPPLE)) == [], "a logged angle tells"
+    assert replace(bench.space, allowed=(LAG, RIPPLE)).exchange(fit) == []
+
+
+def test_one_mass_with_a_resonance_is_two_masses() -> None:
+    bench = Bench({"resonance": (70.0, 0.3, 40.0, 0.1)})
+    fit = bench.space.canonical(bench.fit(RESONANCE, A))
+    assert fit.parameters.masses == 2 and fit.effects == ("a",)
+    assert bench.space.canonical(bench.fit(A)).parameters.masses == 1
+
+
+def test_resettled_puts_the_resonance_into_the_two_masses_alone_and_with_a_simple_effect() -> None:
+    actuator = toy("c", [(0.5,)], place="actuator")
+    bench = Bench({"c": (0.4,)}, masses=2, allowed=(A, actuator, GENERAL, RESONANCE))
+    tries = bench.space.resettled(bench.fit(RESONANCE))
+    assert names(tries) == [(), ("c",)], "neither at the shaft nor of more than one number"
+    assert all(f.parameters.masses == 2 for f in tries)
+    assert min(tries, key=bench.space.score).effects == ("c",)
+    assert bench.space.resettled(bench.fit(A)) == [] and bench.space.resettled(bench.fit(RESONANCE, masses=1)) == []
+
+
+# The same model again.
+
+
+def test_restarted_leaves_a_start_that_led_nowhere() -> None:
+    """The pulse stands at 0.52, and a fit from 0.1 does not feel it."""
+    bench = Bench({"placed": (0.52,)})
+    stuck = bench.fit(PLACED)
+    assert abs(stuck.x[-1] - 0.52) > 0.2
+    found = bench.space.restarted(stuck, PLACED)
+    assert found.x[-1] == pytest.approx(0.52, abs=2e-3) and found.bic < stuck.bic
+    assert bench.space.restarted(stuck, toy("placed", [])) is stuck, "no starts"
+
+
+def test_evolved_finds_a_valley_nearby_that_no_slope_leads_to() -> None:
+    bench = Bench({"valley": (0.52,)})
+    stuck = bench.fit(VALLEY)
+    assert abs(stuck.x[-1] - 0.52) > 0.1
+    found = bench.space.evolved(stuck)
+    assert found.x[-1] == pytest.approx(0.52, abs=2e-3)
+    assert bench.space.evolved(stuck) is found, "remembered"
+
+
+def test_search_goes_by_all_starts_and_globally_and_never_makes_worse() -> None:
+    for term, name in ((PLACED, "placed"), (VALLEY, "valley")):
+        bench = Bench({name: (0.52,)}, noise=0.02)
+        stuck = ls.fit(bench.space.objective, bench.hypothesis(term), bench.start(bench.hypothesis(term)), WHITE, 8)
+        assert not bench.space.quiet(stuck)
+        found = bench.space.search(stuck)
+        assert found.x[-1] == pytest.approx(0.52, abs=2e-3) and found.bic < stuck.bic
+        assert bench.space.search(found) is found, "nothing but noise is left"
+    beyond = Bench(extra=0.5 * np.sin(40.0 * S**2), plain=True)
+    fit = beyond.fit(VALLEY)
+    assert beyond.space.search(fit).bic <= fit.bic
+
+
+def test_valleys_are_searched_beside_a_linear_model() -> None:
+    bench = Bench({"valley": (0.52,)}, allowed=(A, VALLEY))
+    (found,) = bench.space.valleys(bench.fit())
+    assert found.effects == ("valley",) and found.x[-1] == pytest.approx(0.52, abs=2e-3)
+    assert replace(bench.space, allowed=(A, B)).valleys(bench.fit()) == []
