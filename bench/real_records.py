@@ -94,9 +94,11 @@ def emps(file: str, validation: str | None = None) -> tuple[list[ga.Record], lis
 def hsm150(channel: int) -> tuple[list[ga.Record], list[ga.Record]]:
     from scipy.io import loadmat
 
+    kind = "measured" if channel == 5 else "commanded"
+
     def one(name: str) -> ga.Record:
         log = loadmat(data_folder() / "hsm150" / f"idf_{name}.mat")["data"].T
-        return ga.Record(1e-3, velocity=log[3], torque=log[channel], position=log[2], name=name)
+        return ga.Record(1e-3, velocity=log[3], torque=log[channel], position=log[2], torque_is=kind, name=name)
 
     return [one(path.stem.removeprefix("idf_")) for path in sorted((data_folder() / "hsm150").glob("*.mat"))], []
 
@@ -104,18 +106,18 @@ def hsm150(channel: int) -> tuple[list[ga.Record], list[ga.Record]]:
 def joint(number: int) -> tuple[list[ga.Record], list[ga.Record]]:
     path = data_folder() / "robot_joints" / f"joint_{number}.csv"
     columns = {name: name for name in ("time", "position", "velocity")} | {"torque": "current"}
-    return [ga.read(path, columns, {"torque": JOINT_GAINS[number]}, resample=0.01, name=path.stem)], []
+    return [ga.read(path, columns, {"torque": JOINT_GAINS[number]}, resample=0.01, torque_is="measured", name=path.stem)], []
 
 
 def actuator(motor: int, run: int) -> tuple[list[ga.Record], list[ga.Record]]:
     """Its irregular log on the even axis of its usual step."""
     log = np.load(data_folder() / "joint_actuators" / f"motor_{motor:02d}_run_{run:02d}.npz")
-    from gaident.data.resampling import resampled
+    from gaident.data.signals.resampling import resampled
 
     dt = round(float(np.median(np.diff(log["time"]))), 4)
     channels = {"command": "velocity_cmd", "velocity": "velocity", "torque": "torque_feedback", "position": "position"}
     held = resampled("log", {name: (log["time"], log[column]) for name, column in channels.items()}, dt)
-    return [ga.Record(dt, **held, name=f"motor {motor}, run {run}")], []
+    return [ga.Record(dt, **held, torque_is="measured", name=f"motor {motor}, run {run}")], []
 
 
 def _cell(text: str) -> float:
@@ -134,7 +136,9 @@ def epos(drive: int) -> tuple[list[ga.Record], list[ga.Record]]:
         cells = [[_cell(cell) for cell in row[:3]] for row in csv.reader(lines, delimiter=";")]
         time, speed, torque = np.array(cells).T
         dt = round(float(np.median(np.diff(time))) * 1e-3, 6)
-        found.append(ga.Record(dt, velocity=speed * RPM, torque=torque / 100.0 * EPOS_TORQUE, name=path.stem))
+        found.append(
+            ga.Record(dt, velocity=speed * RPM, torque=torque / 100.0 * EPOS_TORQUE, torque_is="measured", name=path.stem)
+        )
     (usual, _), *_ = Counter(r.dt for r in found).most_common(1)
     same = [r for r in found if r.dt == usual]
     return [r for i, r in enumerate(same) if i % 3 != 2], same[2::3]

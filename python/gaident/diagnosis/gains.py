@@ -25,11 +25,12 @@ from gaident.models.simulate import initial_state
 from gaident.models.starts import noise_std, starts_moving
 from gaident.results.diagnosis import Fitness
 
-__all__ = ["Gains", "free_run_errors", "measured_gains"]
+__all__ = ["Gains", "free_run_errors", "held_from", "measured_gains"]
 
 Vector = NDArray[np.float64]
 
 SHARE = 0.7  # of a record that parameters are fitted to
+STILL = 1.0 / 3.0  # of the speed before: a held-out part below it hardly moves
 LEAST = 600  # samples of a record from which a part is held out
 BLOCKS = 200  # bootstrap draws
 IN_SAMPLE = "in-sample"
@@ -65,11 +66,14 @@ def measured_gains(
     at_controller: dict[str, dict[str, float]],
 ) -> Gains:
     """Errors of the linear model, of each stage and of the extended model."""
+    part: tuple[int, ...] | None
     if held:
         judged, words, part = [(r, 0) for r in held], "validation records", None
     elif all(len(r) >= LEAST for r in records):
-        judged = [(r, int(SHARE * len(r))) for r in records]
-        words, part = "the last 30 % of the record, parameters fitted to the first 70 %", SHARE
+        judged = [(r, held_from(r)) for r in records]
+        part = tuple(first for _, first in judged)
+        by_time = all(first == int(SHARE * len(r)) for r, first in judged)
+        words = f"the last 30 % of {'the record' if by_time else 'its path'}, parameters fitted to the first 70 %"
     else:
         judged, words, part = [(r, 0) for r in records], IN_SAMPLE, None
     stages = _stages(final, objective, part)
@@ -99,12 +103,16 @@ def measured_gains(
         rmse = float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
         return Fitness(rmse, 100.0 * (1.0 - rmse / size) if size > 0.0 else float("nan"), floor)
 
+    # Where the simulated loop is known not to be the drive's, the torque drives the models that are compared.
+    driver = controller if objective.data.loop_follows or not objective.data.torque_logged else None
+    extended = errors[-1] if driver is controller else free_run_errors(chain[-1], judged, None)
+    extended_level = float(np.sqrt(np.mean(np.concatenate(extended) ** 2)))
     harmful = []
     for effect in final.effects if words != IN_SAMPLE else ():
         less = stages[0] if len(final.effects) == 1 else _without(stages[-1], effect, _part(objective, part))
-        spared = free_run_errors(_with(less.parameters.model(less.x), at_controller), judged, controller)
+        spared = free_run_errors(_with(less.parameters.model(less.x), at_controller), judged, driver)
         level = float(np.sqrt(np.mean(np.concatenate(spared) ** 2)))
-        if level < (1.0 - POLICY.harm) * levels[-1] and _interval(spared, errors[-1])[1] < 0.0:
+        if level < (1.0 - POLICY.harm) * extended_level and _interval(spared, extended)[1] < 0.0:
             harmful.append(effect)
     return Gains(fitness(errors[0]), fitness(errors[-1]), _interval(errors[0], errors[-1]), words, steps, tuple(harmful))
 
@@ -113,14 +121,24 @@ def _without(found: Fit, effect: str, objective: Objective) -> Fit:
     return fit(objective, found.hypothesis.without(effect), found.parameters.removed(found.x, effect), found.noise, 10)
 
 
-def _part(objective: Objective, part: float | None) -> Objective:
-    """The objective with the last of each record left out."""
+def held_from(rec: Record) -> int:
+    """The first sample that is held out: of the last 30 % of the time or, where these hardly move, of the path."""
+    at = int(SHARE * len(rec))
+    before, after = (float(np.sqrt(np.mean(w**2))) for w in (rec.velocity[:at], rec.velocity[at:]))
+    if after < STILL * before:
+        path = np.cumsum(np.abs(rec.velocity))
+        at = int(np.searchsorted(path, SHARE * path[-1]))
+    return at
+
+
+def _part(objective: Objective, part: tuple[int, ...] | None) -> Objective:
+    """The objective with the last of each record left out, from these samples on."""
     if part is None:
         return objective
     weight = objective.weight.copy()
     at = 0
-    for n in objective.lengths:
-        weight[at + int(part * n) : at + n] = 0.0
+    for n, first in zip(objective.lengths, part, strict=True):
+        weight[at + first : at + n] = 0.0
         at += n
     return objective.weighted(weight)
 
@@ -131,7 +149,7 @@ def _with(model: Model, effects: dict[str, dict[str, float]]) -> Model:
     return model
 
 
-def _stages(final: Fit, objective: Objective, part: float | None) -> list[Fit]:
+def _stages(final: Fit, objective: Objective, part: tuple[int, ...] | None) -> list[Fit]:
     """The final model without its effects, with the first, the first two, ...; each refitted to the part that is not held out."""
     objective = _part(objective, part)
     fits = []

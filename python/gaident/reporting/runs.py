@@ -13,7 +13,7 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.experiments.excitation import position_of
 from gaident.diagnosis.explain.missing_torque import missing_torque
-from gaident.diagnosis.gains import IN_SAMPLE, SHARE, free_run_errors
+from gaident.diagnosis.gains import IN_SAMPLE, free_run_errors
 from gaident.diagnosis.records.hygiene import cleaned, outliers
 from gaident.errors import GaidentError
 from gaident.models.drive_torque import torque_of
@@ -33,12 +33,12 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
     linear: Model = result.model.linear if isinstance(result, Diagnosis) else result.model
     used = "fitted" if rec.digest in result.digests else "new"
     notes: list[str] = []
-    extended = held_from = None
+    extended = first_held = None
     if isinstance(result, Diagnosis):
         if rec.digest in result.validation_digests:
-            used, held_from = "held out", 0
+            used, first_held = "held out", 0
         elif used == "fitted" and not result.validation_digests and result.held_out != IN_SAMPLE:
-            held_from = int(SHARE * len(rec))
+            first_held = held_from(rec)
         before = _free_run(result.identification.model, rec, controller, "linear", notes)
         if result.model.effects:
             extended = _free_run(result.model, rec, controller, "extended", notes)
@@ -66,7 +66,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
         extended=extended,
         dhat=dhat,
         std=std,
-        held_from=held_from,
+        held_from=first_held,
         notes=tuple(notes),
     )
 
