@@ -124,6 +124,7 @@ class _Work:
     def __post_init__(self) -> None:
         order = sorted(range(len(self.records)), key=lambda i: (self.records[i].digest, self.records[i].name))
         self.records = tuple(self.records[i] for i in order)  # sums must not depend on the order given
+        self.held = tuple(sorted(self.held, key=lambda r: (r.digest, r.name)))
         hit = [self._spikes(r) for r in self.records]
         clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
         self.clean = tuple(clean)
@@ -136,7 +137,7 @@ class _Work:
         # Limits that the log shows act in every loop that is closed for a fit.
         known = {t: np.array(list(self.at_controller.effects[t.name].values())) for t in IN_CONTROLLER if self._shown(t.name)}
         shown = self.at_controller.controller or self.controller
-        data = replace(data, controller=shown, loop_follows=self.at_controller.follows)
+        data = replace(data, controller=shown, loop_follows=self.at_controller.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         weight = np.ones(sum(self.data.lengths))
         at = 0
@@ -198,7 +199,7 @@ class _Work:
         gains = self._accepted_gains()
         driver = self.left.driver if self.adequate else self.left.strongest
         after = gains.after
-        if driver is None and after.rmse > POLICY.free_run_ratio * after.noise_floor:
+        if driver is None and after.rmse > POLICY.free_run_ratio * after.noise_floor > 0.0:
             # A noise filter takes a slow misfit whole; the free run does not.
             driver = self.left.strongest or "time"
             times = f"The free run misses the velocity by {after.rmse / after.noise_floor:.0f} times its noise. "
@@ -372,7 +373,10 @@ class _Work:
 def _scales(data: DataSet) -> Scales:
     w, u, angle = data.velocity, data.torque, data.angle
     command, dt = data.command, data.dt
-    steps = 0.0 if command is None else float(np.abs(np.diff(command, prepend=0.0)).max()) / dt
+    borders = np.cumsum(data.lengths)[:-1]
+    steps = 0.0
+    if command is not None:
+        steps = max(float(np.abs(np.diff(part, prepend=0.0)).max()) for part in np.split(command, borders)) / dt
     integral = float(np.abs(u).max())
     torque = max(float(np.abs(u).max()), 1e-300)
     return Scales(
@@ -381,7 +385,7 @@ def _scales(data: DataSet) -> Scales:
         speed=max(float(np.abs(w).max()), 1e-300),
         torque=torque,
         acceleration=steps or float("inf"),
-        travel=float(np.ptp(angle)),
+        travel=max(float(np.ptp(part)) for part in np.split(angle, borders)),
         friction=0.02 * torque,
         stiffness=float("nan"),
         resonance=float("nan"),

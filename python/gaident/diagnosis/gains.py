@@ -30,7 +30,6 @@ __all__ = ["Gains", "free_run_errors", "held_from", "measured_gains"]
 Vector = NDArray[np.float64]
 
 SHARE = 0.7  # of a record that parameters are fitted to
-STILL = 1.0 / 3.0  # of the speed before: a held-out part below it hardly moves
 LEAST = 600  # samples of a record from which a part is held out
 BLOCKS = 200  # bootstrap draws
 IN_SAMPLE = "in-sample"
@@ -78,8 +77,9 @@ def measured_gains(
         judged, words, part = [(r, 0) for r in records], IN_SAMPLE, None
     stages = _stages(final, objective, part)
     chain = [linear]
-    if at_controller:
-        chain.append(_with(stages[0].parameters.model(stages[0].x), at_controller))
+    named = list(at_controller.items())
+    bare = stages[0].parameters.model(stages[0].x)
+    chain += [_with(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
     chain += [_with(f.parameters.model(f.x), at_controller) for f in stages[1:]]
     errors = [free_run_errors(m, judged, controller) for m in chain]
     levels = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in errors]
@@ -125,9 +125,9 @@ def held_from(rec: Record) -> int:
     """The first sample that is held out: of the last 30 % of the time or, where these hardly move, of the path."""
     at = int(SHARE * len(rec))
     before, after = (float(np.sqrt(np.mean(w**2))) for w in (rec.velocity[:at], rec.velocity[at:]))
-    if after < STILL * before:
+    if after < POLICY.held_motion * before:
         path = np.cumsum(np.abs(rec.velocity))
-        at = int(np.searchsorted(path, SHARE * path[-1]))
+        at = int(np.clip(np.searchsorted(path, SHARE * path[-1]), len(rec) // 4, at))
     return at
 
 
@@ -166,13 +166,34 @@ def free_run_errors(model: Model, judged: Sequence[tuple[Record, int]], controll
     """Measured minus simulated velocity of each record from a sample on [rad/s]; 1e150 where a simulation diverges."""
     errors = []
     for r, first in judged:
-        state = None
-        if starts_moving(r, controller) and not model.effects and not (controller is not None and controller.limited):
-            state = initial_state(model, r, controller)
+        state = start_state(model, r, controller)
         with np.errstate(over="ignore", invalid="ignore"):
             e = (r.velocity - simulate(model, r, controller, state))[first:]
         errors.append(np.where(np.isfinite(e), e, 1e150))
     return errors
+
+
+def start_state(model: Model, rec: Record, controller: PI | None) -> Vector | None:
+    """State in which the record found the model; None where it starts at rest, or a limited loop does not tell.
+
+    A model with effects is not linear in it: two steps of Gauss and Newton over the record's head, from the first velocity.
+    """
+    if not starts_moving(rec, controller) or (controller is not None and (controller.limited or model.effects)):
+        return None
+    if not model.effects:
+        return np.asarray(initial_state(model, rec, controller))
+    head = rec[: min(len(rec), POLICY.head)]
+    state = np.zeros(model.order)
+    state[0] = rec.velocity[0]
+    step = 1e-3 * float(np.abs(head.velocity).max())
+    for _ in range(2):
+        with np.errstate(over="ignore", invalid="ignore"):
+            here = simulate(model, head, None, state)
+            slopes = np.array([simulate(model, head, None, state + d) - here for d in step * np.eye(len(state))]) / step
+        if not (np.all(np.isfinite(here)) and np.all(np.isfinite(slopes))):
+            break
+        state = state + np.linalg.lstsq(slopes.T, head.velocity - here, rcond=1e-9)[0]
+    return state
 
 
 def _interval(before: list[Vector], after: list[Vector]) -> tuple[float, float]:

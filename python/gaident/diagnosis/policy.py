@@ -54,6 +54,7 @@ class Policy:
     hint: float = _row(8.0, "BIC units", "of likelihood, from which a generalisation is not ruled out by what it contains", SIZES)
     swap: float = _row(2.0, "BIC units", "by which a rival has to be better to take a place", SIZES)
     harm: float = _row(0.02, "1", "of the held-out error that an effect may add before it is refused", REAL)
+    held_motion: float = _row(0.33, "1", "rms speed of a held-out part over that before: below, it is cut by path", REAL)
 
     # Is this noise? One variance ratio, one specification test, one test for dependence.
     noise_ratio: float = _row(1.5, "1", "rms of whitened errors over the noise of the velocity, coloured torques included", CLEAN)
@@ -90,6 +91,7 @@ class Policy:
     enough_samples: int = _row(3500, "samples", "of a search on a coarser grid")
     near_mass: float = _row(0.05, "BIC units per sample", "by which one mass with an effect may be behind two, to be looked at")
     seen_resonance: float = _row(0.8, "1", "of half the sampling frequency: how far up a coarser grid shows a resonance")
+    head: int = _row(200, "samples", "from whose velocity the start of a model in motion is fitted")
     evolution: int = _row(50, "generations", "of a global search beside stops and impacts")
 
 

@@ -35,7 +35,7 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
             break
         A, g = J @ J.T, J @ v
         diagonal = np.diag(A).copy()
-        usable = (diagonal > 0.0) & (steps > 0.0) & np.isfinite(diagonal)
+        usable = (diagonal > 0.0) & (steps > 0.0) & (diagonal < WORST)
         # At a bound with the descent pointing outward: not moved in this step.
         usable &= ~(((x <= limits[0]) & (g > 0.0)) | ((x >= limits[1]) & (g < 0.0)))
         if not usable.any():

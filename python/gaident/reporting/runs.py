@@ -13,7 +13,7 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.experiments.excitation import position_of
 from gaident.diagnosis.explain.missing_torque import missing_torque
-from gaident.diagnosis.gains import IN_SAMPLE, free_run_errors
+from gaident.diagnosis.gains import IN_SAMPLE, free_run_errors, held_from
 from gaident.diagnosis.records.hygiene import cleaned, outliers
 from gaident.errors import GaidentError
 from gaident.models.drive_torque import torque_of

@@ -133,7 +133,8 @@ def _hats_by_sign(w: Vector) -> Matrix:
     knots = top * np.array([0.0, 0.01, 0.04, 0.12, 0.3, 0.6, 1.0])
     hats = np.array([np.interp(np.abs(w), knots, np.eye(len(knots))[i]) for i in range(len(knots))])
     rows = np.vstack([hats * (w > 0.0), hats * (w < 0.0)])
-    return np.asarray(rows[np.abs(rows).sum(axis=1) > 0.0])
+    rows = rows[np.abs(rows).sum(axis=1) > 0.0]
+    return rows if len(rows) else np.ones((1, len(w)))
 
 
 def _of_position(angle: Vector, w: Vector) -> Matrix:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gaident.diagnosis.library.terms import RESONANCE
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
-from gaident.estimation.objective import Fit, Hypothesis, Objective
+from gaident.estimation.objective import LOST, Fit, Hypothesis, Objective
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.projection import project_out
 from gaident.estimation.term import Term
@@ -85,7 +85,7 @@ def resonant(objective: Objective, one: Fit) -> list[Model]:
     X = np.vstack([one.parameters.inserted(one.x, z) for z in rows])
     _, J, _ = objective.linearised(one.hypothesis, one.x, WHITE)
     E = objective.errors(longer, X)
-    finite = np.all(np.isfinite(E), axis=1)
+    finite = np.all(np.abs(E) < LOST, axis=1)
     rest = project_out(J, np.where(finite[:, None], E, 0.0))
     costs = np.where(finite, np.einsum("ij,ij->i", rest, rest), np.inf)
     return [_two_masses(longer.parameters, X[i]) for i in np.argsort(costs)[:3]]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from gaident.diagnosis.selection.mechanisms import evenly_damped
 from gaident.estimation.least_squares import fit
 from gaident.estimation.noise_model import WHITE, NoiseFilter
-from gaident.estimation.objective import Hypothesis, Objective
+from gaident.estimation.objective import LOST, Hypothesis, Objective
 from gaident.estimation.prediction import ClosedLoop
 from gaident.estimation.projection import orthonormal_rows, project_out
 from gaident.estimation.term import Term
@@ -156,7 +156,7 @@ class ScoreTest:
                 best = np.argsort(_pair_worth(project_out(base.J, t.errors), rest))[::-1][:2]
                 directions += [t.errors[2 * i : 2 * i + 2] for i in best]
             else:
-                finite = np.all(np.isfinite(t.errors), axis=1)
+                finite = np.all(np.abs(t.errors) < LOST, axis=1)
                 if finite.any():
                     nearest = np.argmin(_along(project_out(base.J, t.errors[finite]) - rest, rest))
                     directions.append((t.errors[finite][nearest] - base.error)[None, :])
@@ -199,6 +199,8 @@ class ScoreTest:
         n, rest = self.objective.information, view.rest
         V = self.objective.whitened(t.errors, view.noise)
         finite = np.all(np.isfinite(V), axis=1)
+        if not t.columns:
+            finite &= np.all(np.abs(t.errors) < LOST, axis=1)
         V[~finite] = 0.0
         V -= (V @ view.basis.T) @ view.basis
         power = float(rest @ rest)
@@ -213,16 +215,17 @@ class ScoreTest:
             starts = tuple(t.base.hypothesis.parameters.inserted(t.base.x, row) for row in _start_rows(t, V, rest, order[:3]))
             costs = costs[order]
         cost, size = max(float(costs[0]), 1e-300), t.term.size
+        if not np.isfinite(cost):  # every start diverges
+            return Screened(t.term, t.hypothesis, starts, view.noise, -np.inf, -np.inf)
         fall = n * np.log(max(power, 1e-300) / cost) - size * np.log(n)
-        bic = n * np.log(cost / n) + (t.base.hypothesis.parameters.size + size + view.noise.size) * np.log(n)
+        bic = self.objective.bic(cost, view.noise, t.base.hypothesis.parameters.size + size)
         return Screened(t.term, t.hypothesis, starts, view.noise, float(fall), float(view.own - bic))
 
     def _without(self, base: _Base, noise: NoiseFilter | None) -> float:
         """BIC of the model that is extended, under a filter or that of its own errors."""
-        n = self.objective.information
         f = noise or self.objective.noise_of(base.error, base.hypothesis.predictor.closed)
         v = self.objective.whitened(base.error[None, :], f)[0]
-        return float(n * np.log(max(float(v @ v), 1e-300) / n) + (base.hypothesis.parameters.size + f.size) * np.log(n))
+        return self.objective.bic(float(v @ v), f, base.hypothesis.parameters.size)
 
 
 def _harmonics(angle: Vector, orders: Vector) -> NDArray[np.complex128]:
