@@ -240,6 +240,7 @@ class _Work:
         for name, values in self.at_controller.effects.items():
             model = model.with_effect(name, **values)
         real = [f for f in findings if not f.is_noise]
+        answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
         if driver is None:
             verdict = "explained" if real else "adequate"
         else:
@@ -273,6 +274,7 @@ class _Work:
             base_shift=self._base_shift(),
             left=self.left.gains,
             line=self.left.line if driver == "time" else None,
+            one_sided={e: sizes for e, sizes in self.excited.one_sided.items() if e not in answered},
             mechanics=mechanics_of(self.objective, self.final),
             notes=tuple(self.notes),
             identification=self.idn,
