@@ -41,6 +41,7 @@ def hostile(dia: ga.Diagnosis) -> ga.Diagnosis:
         findings=(evil, replace(found, effect=HOSTILE, is_noise=True, evidence=HOSTILE)),
         notes=(HOSTILE,),
         not_testable={HOSTILE: HOSTILE},
+        one_sided={HOSTILE: HOSTILE},
         held_out=HOSTILE,
         version=HOSTILE,
         digests=(*dia.digests, HOSTILE),

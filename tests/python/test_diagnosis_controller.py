@@ -9,7 +9,7 @@ import pytest
 
 import gaident as ga
 from gaident.control.pi_torque import held_torque
-from gaident.diagnosis.controller.replay import replay
+from gaident.diagnosis.controller.replay import Replay, replay
 from gaident.diagnosis.records.hygiene import outliers
 from test_diagnosis_result import CONTROLLER, DRIVE, DT, drive_record
 
@@ -180,3 +180,23 @@ def test_a_hum_gets_its_frequency_and_size_and_a_lattice_its_noise() -> None:
     assert frequency == pytest.approx(37.0, abs=0.3) and torque == pytest.approx(0.03, rel=0.1)
     assert "like a torque of 37 Hz and 0.03" in " ".join(found.summary().split())
     assert found.before.noise_floor >= 0.1 / math.sqrt(12.0)
+
+
+def test_a_record_is_replayed_once_with_the_same_controller(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its replay is passed on; only other gains, or a record cleaned of outliers, ask for another."""
+    from gaident.diagnosis.controller import controller_place
+
+    done = []
+
+    def counted(rec: ga.Record, controller: ga.PI | None) -> Replay:
+        done.append((rec.digest, controller))
+        return replay(rec, controller)
+
+    monkeypatch.setattr(controller_place, "replay", counted)
+    first, second = limited_drive(1.0), limited_drive(1.0, seed=1)
+    assert "torque_saturation" in {f.effect for f in ga.diagnose([second, first], CONTROLLER).causes}
+    assert sorted(digest for digest, _ in done) == sorted([first.digest, second.digest])
+    done.clear()
+    used = ga.diagnose(drive_record(), ga.PI(kp=0.06, ki=1.5)).controller
+    assert used is not None and used.kp == pytest.approx(CONTROLLER.kp, rel=1e-3)
+    assert done == [(drive_record().digest, ga.PI(kp=0.06, ki=1.5)), (drive_record().digest, used)]

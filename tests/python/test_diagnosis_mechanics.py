@@ -62,3 +62,11 @@ def test_even_damping_leaves_a_drive_of_even_bearings_alone_and_mends_one_that_i
     spoiled = x.copy()
     spoiled[4] *= 3.0
     assert evenly_damped(parameters, spoiled) == pytest.approx(x, rel=1e-4)
+
+
+def test_poles_below_the_zeros_are_no_two_masses() -> None:
+    """e0 + a e1 < f0: an undamped shaft between them would push."""
+    below = ga.Model(2000.0, [-1.0, -2.0 + 60.0j, -2.0 - 60.0j], [-2.0 + 90.0j, -2.0 - 90.0j])
+    found = moved(fit(below), fit(below))
+    assert list(found) == ["inertia", "viscous_friction"]
+    assert found["viscous_friction"][1] == pytest.approx(1.0 * (60.0**2 + 4.0) / (2000.0 * (90.0**2 + 4.0)))

@@ -84,6 +84,10 @@ def fake() -> Any:
             ),
         ),
         not_testable={"backlash": "the torque never changes its sign: the coupling stays on one flank"},
+        one_sided={
+            "torque_saturation": "a limit above 1.25 N m would not have shown: no more torque was asked for",
+            "command_rate_limit": "a limit above 2e+04 rad/s^2 would not have shown: no command rises faster",
+        },
         model=SimpleNamespace(effects=("coulomb_friction", "cogging"), poles=(-1.0, -1.0 + 2.0j, -1.0 - 2.0j)),
         before=Fitness(0.5, 97.1, 0.1),
         after=Fitness(0.2, 98.84, 0.1),
@@ -140,6 +144,8 @@ def test_a_linear_axis_is_spoken_of_in_metres_and_newtons() -> None:
     text = summary(fake(), "linear")
     assert "0.1 m/s at 0.02 N." in text and "motor mass" in text and " kg\n" in text and "N s/m" in text
     assert "rad/s" not in text and "N m" not in text and "turn " not in text.replace("per turn", "")
+    assert "torque saturation: a limit above 1.25 N would not have shown: no more force was asked for" in text
+    assert "a limit above 2e+04 m/s^2 would not have shown" in text
     assert f"{12.0 / math.tau:.5g}" in text  # 12 per turn are 12/(2 pi) per metre
 
 
@@ -222,6 +228,9 @@ def test_sentences_of_a_linear_axis() -> None:
     assert sentence("torque saturation or load torque", "linear") == "torque saturation or load torque"
     assert sentence("the axis turns forwards only", "linear") == "the axis moves forwards only"
     assert sentence("57.3 degrees of travel", "linear") == "1 m of travel"
+    assert sentence("orders below 3 need more than the 0.5 turns travelled", "linear") == (
+        "orders below 0.48 1/m need more than the 3.1 m travelled"
+    )
     assert sentence("57.3 degrees of travel", "rotary") == "57.3 degrees of travel"
 
 
@@ -233,6 +242,10 @@ def test_the_file_holds_the_whole_result(dia: ga.Diagnosis, tmp_path: Path) -> N
     assert back == dia and back.to_dict() == dia.to_dict() and back.summary() == dia.summary()
     assert back.validation_digests == (drive_record(1).digest,) and back.torque_logged and back.loop_follows
     assert (back.noise, back.bootstrap) == (None, 0)
+    highest = np.abs(drive_record().torque).max()
+    assert back.one_sided["torque_saturation"].startswith(f"a limit above {highest:.3g} N m would not have shown")
+    assert {"integrator_clamp", "command_rate_limit"} <= set(back.one_sided)
+    assert not {"coulomb_friction", *back.not_testable} & set(back.one_sided)
     inertia = back.mechanics["inertia"]
     assert abs(inertia.value - 5e-4) < 5.0 * inertia.std < 5e-6 and inertia.unit == "kg m^2"
     assert back.seed == dia.seed and back.digests == (drive_record().digest,) and back.model.effects == dia.model.effects
@@ -240,6 +253,15 @@ def test_the_file_holds_the_whole_result(dia: ga.Diagnosis, tmp_path: Path) -> N
         ga.simulate(back.model, drive_record(), CONTROLLER), ga.simulate(dia.model, drive_record(), CONTROLLER)
     )
     assert list(tmp_path.iterdir()) == [tmp_path / "dia.json"]
+
+
+def test_what_was_found_or_not_tested_is_no_size_that_could_not_show(rec: ga.Record) -> None:
+    done = ga.run(DRIVE.with_effect("torque_saturation", limit=1.0), rec, CONTROLLER)
+    limited = ga.diagnose(ga.Record(DT, command=rec.command, velocity=done.velocity, torque=done.torque), CONTROLLER)
+    assert "torque_saturation" in {f.effect for f in limited.causes} and "torque_saturation" not in limited.one_sided
+    assert "integrator_clamp" in limited.one_sided
+    open_loop = ga.diagnose(ga.Record(DT, velocity=rec.velocity, torque=rec.torque))
+    assert "integrator_clamp" in open_loop.not_testable and set(open_loop.one_sided) == {"torque_saturation"}
 
 
 def test_a_proposal_survives_the_file() -> None:

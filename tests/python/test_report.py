@@ -104,7 +104,11 @@ def test_a_diagnosis_reads_from_verdict_to_how_it_was_computed(dia: ga.Diagnosis
     assert label == ["accelerating", "decelerating", "mean ± sd", "coulomb friction (not told apart from others)"]
     stills = [a for a in seen.found("img") if a.get("class") == "still"]
     assert len(stills) == len(charts) and all(a["alt"] for a in stills)
+    sizes = dia.one_sided["torque_saturation"]
+    assert "Tested up to what these records asked for" in seen.text and sizes in seen.text
+    assert "Tested up to" not in Reader(report_page(replace(dia, one_sided={}))).text
     linear = report_page(dia, axis="linear")
+    assert sizes.replace("N m", "N").replace("torque", "force") in Reader(linear).text
     assert "velocity [m/s]" in linear and "rad/s" not in json.dumps(charts_of(linear)["charts"]["run-0"])
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.controller.controller_place import as_logged, as_read, controller_findings
+from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.wording import evidence_of
 from gaident.diagnosis.gains import Gains, measured_gains
@@ -76,8 +76,8 @@ def diagnose(
     held = () if validation is None else records_of(validation, "validation")
     checked(records, held, controller, identification, bootstrap, seed, progress)
     noise_std = noise_std_of(noise)
-    controller, notes = as_logged(records, controller)
-    notes += open_loop_notes(records, controller)
+    logged = as_logged(records, controller)
+    controller = logged.controller
     import scipy.linalg  # noqa: F401  brings a BLAS of its own, to be limited too
     from threadpoolctl import threadpool_limits
 
@@ -85,7 +85,7 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.02, "identifying the linear model")
         idn = identification if identification is not None else identify(list(records), controller, seed=seed)
-        work = _Work(records, held, controller, idn, noise_std, note, notes)
+        work = _Work(records, held, logged, idn, noise_std, note)
         work.search()
         result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap)
         if bootstrap:
@@ -115,13 +115,14 @@ class _Work:
 
     records: tuple[Record, ...]
     held: tuple[Record, ...]
-    controller: PI | None
+    logged: AsLogged
     idn: Identification
     noise: float | None
     note: _Note
-    notes: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        self.controller = self.logged.controller
+        self.notes = [*self.logged.notes, *open_loop_notes(self.records, self.controller)]
         order = sorted(range(len(self.records)), key=lambda i: (self.records[i].digest, self.records[i].name))
         self.records = tuple(self.records[i] for i in order)  # sums must not depend on the order given
         self.held = tuple(sorted(self.held, key=lambda r: (r.digest, r.name)))
@@ -132,7 +133,7 @@ class _Work:
         read = as_read(self.records, clean, self.controller)
         data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step)
         self.scales = _scales(data)
-        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales)
+        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.logged.replays)
         self.notes += notes
         # Limits that the log shows act in every loop that is closed for a fit.
         known = {t: np.array(list(self.at_controller.effects[t.name].values())) for t in IN_CONTROLLER if self._shown(t.name)}
@@ -241,6 +242,7 @@ class _Work:
         for name, values in self.at_controller.effects.items():
             model = model.with_effect(name, **values)
         real = [f for f in findings if not f.is_noise]
+        answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
         if driver is None:
             verdict = "explained" if real else "adequate"
         else:
@@ -274,6 +276,7 @@ class _Work:
             base_shift=self._base_shift(),
             left=self.left.gains,
             line=self.left.line if driver == "time" else None,
+            one_sided={e: sizes for e, sizes in self.excited.one_sided.items() if e not in answered},
             mechanics=mechanics_of(self.objective, self.final),
             notes=tuple(self.notes),
             identification=self.idn,

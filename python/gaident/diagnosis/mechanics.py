@@ -1,11 +1,10 @@
 """The linear part of an extended model as a mechanic calls it, with standard deviations.
 
-One mass: J = 1/|K|, D = a/|K|. Two masses, motor and load on a damped shaft, with c2, c1, c0 of (s + a)(s^2 + e1 s + e0):
+One mass: J = 1/|K|, D = a/|K|. Two masses, motor and load on a damped shaft, with the numerator s^2 + f1 s + f0 and
 
-    JM = 1/|K|,   KG = f0 JL,   DL + DG = f1 JL,   DM + DG = (c2 - f1) JM,   DM + DL = c0 JM / f0,
-    c1 = KG/JM + f0 + (DM DL + DG (DM + DL)) / (JM JL)
+    (s + a)(s^2 + e1 s + e0) = s^3 + (a + e1) s^2 + (e0 + a e1) s + a e0
 
-are six equations for six numbers; the last one is solved for JL by iteration, its damping products being small.
+are six equations for six numbers, which `gaident.models.two_mass` solves. The whole axis has D = a e0/(f0 |K|).
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.uncertainty import covariance_of
+from gaident.models.two_mass import mechanics_with_shaft_damping
 from gaident.results.estimate import Estimate
 
 __all__ = ["MECHANICS", "mechanics_of", "moved"]
@@ -39,8 +39,8 @@ WHOLE = 2  # of these, what every axis has
 def mechanics_of(objective: Objective, fit: Fit) -> dict[str, Estimate]:
     """Name -> Estimate, fitted together with the effects; deviations to first order.
 
-    Of a pair of poles or zeros that does not swing (damping ratio 1 or more), or where a mass or the stiffness would be
-    negative, only inertia and viscous friction of the whole are given.
+    Of a pair of poles or zeros that does not swing (damping ratio 1 or more), or where an undamped shaft would need a negative
+    stiffness, e0 + a e1 <= f0, only inertia and viscous friction of the whole are given.
     """
     parameters = fit.parameters
     cov = covariance_of(objective, fit)[: parameters.base, : parameters.base]
@@ -76,19 +76,14 @@ def _numbers(values: Vector) -> Vector:
     none = np.full(len(MECHANICS), np.nan)
     if f0 == 0.0:
         return none
-    D, q = a * e0 * JM / f0, (a + e1 - f1) * JM
+    D = a * e0 * JM / f0
     none[:WHOLE] = abs(e0 * JM / f0), D
-    if not (e1 * e1 < 4.0 * e0 and f1 * f1 < 4.0 * f0):
+    swings = e1 * e1 < 4.0 * e0 and f1 * f1 < 4.0 * f0
+    if not (swings and e0 + a * e1 > f0):
         return none
-    stiff = JM * (e0 + a * e1 - f0)
-    JL = stiff / f0
-    for _ in range(30):
-        if not JL > 0.0:
-            return none
-        p = f1 * JL
-        DG, DL, DM = 0.5 * (p + q - D), 0.5 * (p + D - q), 0.5 * (q + D - p)
-        JL = (stiff - (DM * DL + DG * D) / JL) / f0
-    if not JL > 0.0:
+    mechanics = mechanics_with_shaft_damping(np.array([abs(K), a + e1, e0 + a * e1, a * e0, f1, f0]))
+    if mechanics is None or not mechanics[2] > 0.0:
         return none
+    _, _, JL, _, KG, _ = mechanics
     wp, wz, turn = np.sqrt(e0), np.sqrt(f0), 2.0 * np.pi
-    return np.array([JM + JL, D, JM, JL, f0 * JL, wp / turn, 0.5 * e1 / wp, wz / turn, 0.5 * f1 / wz])
+    return np.array([JM + JL, D, JM, JL, KG, wp / turn, 0.5 * e1 / wp, wz / turn, 0.5 * f1 / wz])

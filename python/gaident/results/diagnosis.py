@@ -70,6 +70,8 @@ class Diagnosis:
     linear part. left: gain in BIC units of each driver of what is left; line: where that is time and one frequency, (frequency
     [Hz], amplitude of the torque [N m]). mechanics: name -> Estimate of the linear part, fitted together with the effects.
     noise [rad/s] and bootstrap as they were asked for; controller as it was used: with the gains that the logged torque shows.
+    not_testable: effect -> why the records say nothing about it.
+    one_sided: effect that was tested and not found -> which sizes of it would not have shown in these records.
     torque_logged: whether all records hold the torque; loop_follows: False where it does not follow from command and velocity
     through the simulated controller, whose free runs are then not the drive's. notes: what to keep in mind, in plain sentences.
     records and validation_records: the data, empty where the diagnosis was loaded from a file.
@@ -102,6 +104,7 @@ class Diagnosis:
     torque_logged: bool = False
     loop_follows: bool = True
     line: tuple[float, float] | None = None
+    one_sided: Mapping[str, str] = field(default_factory=dict, hash=False)
     mechanics: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
@@ -191,6 +194,7 @@ class Diagnosis:
             "torque_logged": self.torque_logged,
             "loop_follows": self.loop_follows,
             "line": None if self.line is None else list(self.line),
+            "one_sided": dict(self.one_sided),
             "mechanics": {n: asdict(e) for n, e in self.mechanics.items()},
         }
 
@@ -237,6 +241,7 @@ class Diagnosis:
                 torque_logged=data.get("torque_logged", False),
                 loop_follows=data.get("loop_follows", True),
                 line=None if data.get("line") is None else (data["line"][0], data["line"][1]),
+                one_sided=data.get("one_sided", {}),
                 mechanics={n: Estimate(**e) for n, e in data.get("mechanics", {}).items()},
             )
         except (KeyError, TypeError, AttributeError, IndexError) as error:

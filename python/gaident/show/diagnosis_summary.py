@@ -11,6 +11,7 @@ from gaident.results.experiment import Proposal
 from gaident.show.wording import certainty, number, sentence, table, unit, velocity_unit, with_std
 
 __all__ = [
+    "TESTED_UP_TO",
     "chance_words",
     "diagnosis_summary",
     "either",
@@ -24,6 +25,7 @@ __all__ = [
 ]
 
 WIDTH = 100
+TESTED_UP_TO = "Tested up to what these records asked for"
 LINEAR = {"N m s^2/rad^2": "N s^2/m^2", "N m/rad^3": "N/m^3", "rad/s": "m/s", "rad": "m"}
 DRIVERS = {
     "velocity": "on the velocity",
@@ -49,6 +51,7 @@ def diagnosis_summary(dia: Diagnosis, axis: str = "rotary") -> str:
         _base(dia, axis),
         _record(dia, axis),
         _untested(dia, axis),
+        _tested_up_to(dia, axis),
         _how(dia),
     ]
     return "\n\n".join("\n".join(lines) for lines in sections if lines)
@@ -236,6 +239,13 @@ def _untested(dia: Diagnosis, axis: str) -> list[str]:
     for effect, reason in dia.not_testable.items():
         lines += _wrapped(f"{words(effect)}: {sentence(reason, axis)}", "  ", "  ")
     return ["Not testable with this record", *lines] if lines else []
+
+
+def _tested_up_to(dia: Diagnosis, axis: str) -> list[str]:
+    lines = []
+    for effect, sizes in dia.one_sided.items():
+        lines += _wrapped(f"{words(effect)}: {sentence(sizes, axis)}", "  ", "  ")
+    return [TESTED_UP_TO, *lines] if lines else []
 
 
 def _next(dia: Diagnosis, axis: str) -> list[str]:

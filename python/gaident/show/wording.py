@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from gaident.errors import SettingsError
 
@@ -29,6 +29,14 @@ _LINEAR_WORDS = (
     (r"\bturns (forwards|backwards|slower)", r"moves \1"),
     (r"\baxis turns\b", "axis moves"),
     (r"\binertia\b", "mass"),
+)
+# (an angle in words, metres or 1/m for each, how it is then written); a turn of a linear axis is 2 pi m
+_LINEAR_ANGLES = (
+    (r"(?P<value>[\d.e+-]+) degrees of travel", math.radians(1.0), "{:.2g} m of travel"),
+    (r"(?P<value>[\d.e+-]+) turns travelled", math.tau, "{:.2g} m travelled"),
+    (r"\borders below (?P<value>\d+)", 1.0 / math.tau, "orders below {:.2g} 1/m"),
+    (r"\borders above (?P<value>\d+)", 1.0 / math.tau, "orders above {:.2g} 1/m"),
+    (r"\bperiod of order (?P<value>\d+) or less", 1.0 / math.tau, "period of order {:.2g} 1/m or less"),
 )
 
 
@@ -60,7 +68,13 @@ def sentence(text: str, axis: str = "rotary") -> str:
         return text
     for rotary, linear in _LINEAR_WORDS:
         text = re.sub(rotary, linear, text)
-    return re.sub(r"([\d.e+-]+) degrees of travel", lambda m: f"{math.radians(float(m[1])):.2g} m of travel", text)
+    for pattern, factor, of_metres in _LINEAR_ANGLES:
+        text = re.sub(pattern, _in_metres(factor, of_metres), text)
+    return text
+
+
+def _in_metres(factor: float, written: str) -> Callable[[re.Match[str]], str]:
+    return lambda found: written.format(float(found["value"]) * factor)
 
 
 def certainty(bic: float) -> str:

@@ -6,7 +6,7 @@ only with other gains, these are used; where only with a limit, that is a findin
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,7 +25,7 @@ from gaident.models.effects import table
 from gaident.results.diagnosis import Finding
 from gaident.results.estimate import Estimate
 
-__all__ = ["AtController", "as_logged", "as_read", "controller_findings"]
+__all__ = ["AsLogged", "AtController", "as_logged", "as_read", "controller_findings"]
 
 Vector = NDArray[np.float64]
 
@@ -49,20 +49,34 @@ class AtController:
     follows: bool = True
 
 
-def as_logged(records: Sequence[Record], controller: PI | None) -> tuple[PI | None, list[str]]:
-    """(the controller with the gains that all logged torques show where they do not follow from the given ones, notes).
+@dataclass(frozen=True)
+class AsLogged:
+    """The controller as the logged torques show it; notes on what differs; digest of a record -> its replay with this controller.
+
+    replays: empty where there was nothing to compare, or where the controller is not the given one any more.
+    """
+
+    controller: PI | None
+    notes: tuple[str, ...] = ()
+    replays: Mapping[str, Replay] = field(default_factory=dict)
+
+
+def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
+    """The controller with the gains that all logged torques show where they do not follow from the given ones.
 
     A rectangular integral is a trapezoidal one with kp + ki dt/2, or kp - ki dt/2 where it lacks the newest error.
     """
     if controller is None or any(r.torque is None or r.command is None for r in records):
-        return controller, []
-    off = [r for r in (replay(r, controller) for r in records) if r.follows is False]
+        return AsLogged(controller)
+    replays = {r.digest: replay(r, controller) for r in records}
+    as_given = AsLogged(controller, (), replays)
+    off = [r for r in replays.values() if r.follows is False]
     found = [r.controller for r in off if r.controller is not None and r.cause in ("gains", "scale", "integration_rule")]
-    if not found or len(found) < len(records):
-        return controller, []
+    if not found or len(found) < len(replays):
+        return as_given
     gains = np.array([[c.kp, c.ki] for c in found])
     if np.any(np.ptp(gains, axis=0) > SAME_GAINS * gains.max(axis=0)):
-        return controller, []
+        return as_given
     kp, ki = (float(g) for g in gains.mean(axis=0))
     if all(r.cause == "integration_rule" for r in off):
         used = f"All simulations use kp = {kp:.4g} N m s/rad, with which a trapezoidal integral makes the same torque."
@@ -71,7 +85,7 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> tuple[PI | No
             f"All simulations use these (kp = {kp:.4g} N m s/rad, ki = {ki:.4g} N m/rad, trapezoidal integral) instead of the "
             f"given ones ({controller.kp:.4g} and {controller.ki:.4g})."
         )
-    return replace(controller, kp=kp, ki=ki), [off[0].sentence, used]
+    return AsLogged(replace(controller, kp=kp, ki=ki), (off[0].sentence, used))
 
 
 def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: PI | None) -> tuple[Record, ...]:
@@ -91,12 +105,17 @@ def _replay_error(rec: Record, controller: PI) -> float:
     return float(np.mean((rec.torque - pi_torque(rec.command, rec.velocity, rec.dt, controller)) ** 2))
 
 
-def controller_findings(data: DataSet, scales: Scales) -> tuple[list[Finding], AtController, list[str]]:
-    """(findings, what is decided, notes). Without a logged torque nothing is decided here."""
+def controller_findings(
+    data: DataSet, scales: Scales, known: Mapping[str, Replay]
+) -> tuple[list[Finding], AtController, list[str]]:
+    """(findings, what is decided, notes). Without a logged torque nothing is decided here.
+
+    known: digest of a record -> its replay with the controller of `data`; records that are not in it are replayed.
+    """
     controller = data.controller
     if controller is None or not data.torque_logged or data.command is None:
         return [], AtController(), []
-    replays = [replay(r, controller) for r in data.read]
+    replays = [known.get(r.digest) or replay(r, controller) for r in data.read]
     off = [r for r in replays if not r.follows]
     if not off:
         return [], AtController(DECIDED), []

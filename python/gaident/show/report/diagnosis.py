@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.show.diagnosis_summary import (
     DRIVERS,
+    TESTED_UP_TO,
     chance_words,
     either,
     fall_words,
@@ -240,14 +241,22 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
 
 
 def _untested(dia: Diagnosis, view: View) -> Section:
-    if not dia.not_testable:
-        text = "Every effect of the library could have shown itself in this record."
-        return Section("untested", "What could not be tested", tag("p", text))
-    rows: list[Row] = [(words(effect), typeset(sentence(reason, view.axis))) for effect, reason in dia.not_testable.items()]
-    text = "Of these the record says nothing, neither for nor against: it never went where they act."
-    return Section(
-        "untested", "What could not be tested", tag("p", text), tag("div", table(("effect", "why"), [rows]), class_="text")
-    )
+    parts = []
+    if dia.not_testable:
+        text = "Of these the record says nothing, neither for nor against: it never went where they act."
+        parts += [tag("p", text), _reasons(dia.not_testable, "why", view.axis)]
+    else:
+        parts.append(tag("p", "Every effect of the library could have shown itself in this record."))
+    if dia.one_sided:
+        text = "These were looked for and not found, but of some sizes they would not have shown."
+        parts += [tag("h3", TESTED_UP_TO), tag("p", text), _reasons(dia.one_sided, "what would not have shown", view.axis)]
+    return Section("untested", "What could not be tested", *parts)
+
+
+def _reasons(why: Mapping[str, str], head: str, axis: str) -> Html:
+    """A table of effects with a sentence on each."""
+    rows: list[Row] = [(words(effect), typeset(sentence(reason, axis))) for effect, reason in why.items()]
+    return tag("div", table(("effect", head), [rows]), class_="text")
 
 
 def _next(dia: Diagnosis, view: View, drawn: Charts) -> Section:
