@@ -75,9 +75,7 @@ def noise_std_of(noise: float | Record | None) -> float | None:
         return None
     if isinstance(noise, Record):
         if not float(np.std(noise.velocity)) > 0.0:
-            raise SettingsError(
-                "noise is a record whose velocity never changes: give its standard deviation in rad/s, or None"
-            )
+            raise SettingsError("noise is a record whose velocity never changes: give its standard deviation in rad/s, or None")
         return float(np.std(noise.velocity))
     if isinstance(noise, bool) or not isinstance(noise, (int, float)) or not 0.0 < float(noise) < float("inf"):
         raise SettingsError(f"noise is {noise!r}: give its standard deviation in rad/s, above 0, or a Record at standstill")
