@@ -40,7 +40,7 @@ class Scales:
     stiffness: float  # N m/rad of the shaft; nan where the model has one mass
     resonance: float  # rad/s of the model's fastest pole pair; nan where it has none
     two_masses: bool
-    integral: float  # N m, largest integrator state of the controller's replay; nan without a controller
+    integral: float  # N m, largest torque: no integrator state is larger
     blocks: int = 1  # samples of the log in one of dt: a long record is searched on a coarser grid first
 
     @property

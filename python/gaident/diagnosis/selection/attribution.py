@@ -56,7 +56,7 @@ def simplified(space: Moves, final: Fit, left: Dependence) -> Fit:
 
 
 def share(space: Moves, without: Fit, final: Fit, left: Dependence) -> float:
-    """The part that `final` explains of what it and a free function of the strongest driver explain together."""
+    """The part that `final` explains of what it and a free function of the best driver explain together."""
     objective = space.objective
     less = fitted(objective, without.hypothesis, without.x, WHITE, 8)
     before, after = (objective.plain(J, e) for _, J, e in (objective.linearised(f.hypothesis, f.x, WHITE) for f in (less, final)))

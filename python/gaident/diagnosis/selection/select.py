@@ -102,7 +102,6 @@ class _Found:
     final: Fit
     statistic: float
     bound: float
-    scales: Scales
     whitened: _Found | None = None
 
 
@@ -112,14 +111,14 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     space = task.space()
     if task.data.torque_measured:
         # Noise on the input makes a whitened inertia too large, whatever the noise model; at the slow end there is little of it.
-        return _Found(*_plainly(task, bases, note), np.inf, 0.0, task.scales)
+        return _Found(*_plainly(task, bases, note), np.inf, 0.0)
     plainly: tuple[Moves, Fit, Fit] | None = None
     if min(space.ratio(b) for b in bases) > POLICY.misfit_ratio:
         plainly = _plainly(task, bases, note)
         as_whitened = _as_innovations(space, plainly[2])
         statistic, bound = _specification(space, as_whitened, plainly[2])
         if statistic > bound:
-            return _Found(*plainly, statistic, bound, task.scales)
+            return _Found(*plainly, statistic, bound)
     base, final = _explored(task, space, bases)
     statistic, bound = _specification(space, final)
     if plainly is None and (statistic > bound or not space.runs_free(final)):
@@ -129,9 +128,9 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
         if again is not final:
             base, final = _bare(space, again), again
         statistic, bound = _specification(space, final, plainly[2])
-    whitened = _Found(space, base, final, statistic, bound, task.scales)
+    whitened = _Found(space, base, final, statistic, bound)
     if plainly is not None and statistic > bound:
-        return _Found(*plainly, statistic, bound, task.scales, whitened)
+        return _Found(*plainly, statistic, bound, whitened)
     return whitened
 
 
@@ -258,7 +257,7 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     if base.parameters.masses != final.parameters.masses:
         base = _bare(space, final)
     statistic, bound = _specification(space, final) if space.whitens else (outline.statistic, outline.bound)
-    return _Found(space, base, final, statistic, bound, task.scales)
+    return _Found(space, base, final, statistic, bound)
 
 
 def _moved(space: Moves, scales: Scales, fit: Fit) -> Fit:
