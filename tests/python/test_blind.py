@@ -20,7 +20,7 @@ from gaident.estimation.dataset import DataSet
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import OpenLoop
 from gaident.estimation.term import Scales
-from gaident.models.simulate import simulate_values
+from gaident.models.simulate_many import simulate_values
 
 if not hasattr(ga, "diagnose"):
     pytest.skip("this gaident has no diagnose()", allow_module_level=True)

@@ -14,8 +14,9 @@ import pytest
 
 import gaident as ga
 from gaident.errors import ModelError
+from gaident.models.factors import Structure
 from gaident.models.own_effects import OWN, Parameter, starts
-from gaident.models.simulate import Structure, simulate_values
+from gaident.models.simulate_many import simulate_values
 
 effects = ga.effects
 DT = 1e-3

@@ -29,7 +29,7 @@ from gaident.models.effects import place_of
 from gaident.models.model import Model
 from gaident.models.own_effects import OWN
 from gaident.models.roots import quadratic_roots
-from gaident.models.simulate import simulate_values
+from gaident.models.simulate_many import simulate_values
 
 __all__ = ["ClosedLoop", "OpenLoop", "Predictor", "coupling_response", "twist"]
 

@@ -25,7 +25,7 @@ from gaident.control.pi import PI
 from gaident.errors import ModelError
 from gaident.files import write_whole
 from gaident.models.model import Model, require_strictly_proper
-from gaident.models.simulate import checked_substeps
+from gaident.models.simulation_input import checked_substeps
 from gaident.version import version
 
 __all__ = ["c_source", "write_c"]

@@ -28,9 +28,10 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.identification.plant_of_discrete import plant_of_discrete
+from gaident.models.discrete import Discrete
 from gaident.models.factors import Structure, factor_parameters
 from gaident.models.mechanics import Mechanics, mechanics_from_model
-from gaident.models.model import Discrete, Model
+from gaident.models.model import Model
 
 __all__ = ["LeastSquares", "least_squares"]
 

@@ -50,10 +50,30 @@ class Structure(NamedTuple):
 
 
 def factor_parameters(model: Model) -> tuple[tuple[str, ...], NDArray[np.float64], tuple[str, ...]]:
-    """(names, values, units) of x, each of length Structure.of(model).size.
+    """Return the natural parameters of a model with their names and units; smooth where roots merge.
 
-    Names: "gain", "pole_1", "pole_pair_1_e1", "pole_pair_1_e0", "zero_1", "zero_pair_1_e1", ...; counted
-    from 1 within their kind. Note the sign: the value of "pole_1" is a = -pole, the paper's A.
+        x = (gain, a of each real pole (s + a), e1 and e0 of each pole pair (s^2 + e1 s + e0), the same for zeros)
+
+    Parameters
+    ----------
+    model : Model
+        The model; its effects are left out.
+
+    Returns
+    -------
+    names : tuple of str
+        "gain", "pole_1", "pole_pair_1_e1", "pole_pair_1_e0", "zero_1", "zero_pair_1_e1", ...; counted from 1 within their kind.
+    values : ndarray, shape (n,)
+        The vector x. Note the sign: the value of "pole_1" is a = -pole, the paper's A.
+    units : tuple of str
+        The unit of each value.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> names, values, units = ga.factor_parameters(ga.Model(500.0, [-5.0]))
+    >>> list(zip(names, values.tolist(), units))
+    [('gain', 500.0, 'rad/s^2/(N m)'), ('pole_1', 5.0, 'rad/s')]
     """
     names, values, units = ["gain"], [model.gain], [gain_unit(model.p)]
     for kind, roots in (("pole", model.poles), ("zero", model.zeros)):
@@ -69,10 +89,35 @@ def factor_parameters(model: Model) -> tuple[tuple[str, ...], NDArray[np.float64
 
 
 def model_from_factor_parameters(values: ArrayLike, structure: Structure) -> Model:
-    """The model of the vector x; the inverse of `factor_parameters`.
+    """Return the model of natural parameters; the inverse of `factor_parameters`.
 
-    A pair with e1^2 >= 4 e0 has two real roots: the model then has another Structure than the one given.
-    Raises ModelError for a vector of the wrong length or a value that is not finite.
+    A pair with e1^2 >= 4 e0 has two real roots: the model then has another structure than the one given.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        The vector x in the order and units of `factor_parameters`.
+    structure : gaident.models.Structure
+        How many real roots and pairs the model has.
+
+    Returns
+    -------
+    Model
+        The model, without effects.
+
+    Raises
+    ------
+    ModelError
+        For a vector of the wrong length, or a value that is not finite.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> from gaident.models import Structure
+    >>> model = ga.Model(500.0, [-5.0])
+    >>> names, values, units = ga.factor_parameters(model)
+    >>> ga.model_from_factor_parameters(values, Structure.of(model))
+    Model(gain=500.0, poles=[-5.0], zeros=[])
     """
     x = np.asarray(values, dtype=np.float64)
     if x.shape != (structure.size,):

@@ -23,12 +23,28 @@ from gaident.models.two_mass_fit import deviations, fit_two_masses
 class OneMass:
     """A rigid drive: J dw/dt = torque - D w.
 
-    J  moment of inertia [kg m^2], > 0
-    D  viscous damping [N m s/rad], >= 0
+    Parameters
+    ----------
+    J : float
+        Moment of inertia [kg m^2], > 0.
+    D : float
+        Viscous damping [N m s/rad], >= 0.
+    inconsistency : float, optional
+        Of a result of an identification: 0, because two numbers of the model determine two parameters.
+        Such a result may be unphysical, see `notes`.
+    std : mapping of str to float
+        Standard deviations by field name, in the field's unit, where a covariance was known.
 
-    Results of an identification carry `inconsistency` (0: two numbers, two parameters) and, where a
-    covariance was known, the standard deviations `std` by field name. They may be unphysical:
-    see `notes`. Raises ModelError.
+    Raises
+    ------
+    ModelError
+        For a value that is no finite number, or out of its range.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> ga.OneMass(J=2e-3, D=0.01).model()
+    Model(gain=500.0, poles=[-5.0], zeros=[])
     """
 
     UNITS: ClassVar[Mapping[str, str]] = {"J": "kg m^2", "D": "N m s/rad"}
@@ -42,12 +58,12 @@ class OneMass:
         _check(self, positive=("J",), not_negative=("D",))
 
     def model(self) -> Model:
-        """K = 1/J, A11 = D/J (equation 4)."""
+        """Return the factored model: K = 1/J, A11 = D/J (equation 4)."""
         return Model(1.0 / self.J, [-self.D / self.J])
 
     @classmethod
     def from_model(cls, model: Model) -> OneMass:
-        """The mechanism of a model with p = 1, q = 0; raises ModelError for any other structure."""
+        """Return the mechanism of a model with p = 1, q = 0; raise ModelError for any other structure."""
         _require(model, 1, 0, "one-mass")
         return _one_mass(model, None)
 
@@ -62,7 +78,7 @@ class OneMass:
         return not self.notes
 
     def to_dict(self) -> dict[str, Any]:
-        """The mechanism for JSON; `mechanics_from_dict` is the inverse."""
+        """Return the mechanism for JSON."""
         return {"structure": "one mass", **asdict(self)}
 
 
@@ -70,14 +86,38 @@ class OneMass:
 class TwoMass:
     """Motor and load on a shaft (Fig. 1b of the paper), torque and measured velocity at the motor.
 
-    JM, JL  moments of inertia of motor and load [kg m^2], > 0
-    DM, DL  their viscous damping [N m s/rad], >= 0
-    KG      stiffness of the shaft [N m/rad], > 0
-    DG      damping in the shaft [N m s/rad], >= 0; the paper has 0
+    Parameters
+    ----------
+    JM : float
+        Moment of inertia of the motor [kg m^2], > 0.
+    DM : float
+        Viscous damping of the motor [N m s/rad], >= 0.
+    JL : float
+        Moment of inertia of the load [kg m^2], > 0.
+    DL : float
+        Viscous damping of the load [N m s/rad], >= 0.
+    KG : float
+        Stiffness of the shaft [N m/rad], > 0.
+    DG : float
+        Damping in the shaft [N m s/rad], >= 0; the paper has 0.
+    inconsistency : float, optional
+        Of a result of an identification, see `mechanics_from_model`. Such a result may be unphysical, see `notes`.
+    std : mapping of str to float
+        Standard deviations by field name, and of "J", "D" and "inconsistency", where a covariance was known.
+    with_shaft_damping : TwoMass, optional
+        Of a result of an identification: the mechanism with DG free.
 
-    Results of an identification carry `inconsistency` (see `mechanics_from_model`), where a covariance was
-    known the standard deviations `std` (by field name, and "J", "D", "inconsistency"), and
-    `with_shaft_damping`, the mechanism with DG free. They may be unphysical: see `notes`. Raises ModelError.
+    Raises
+    ------
+    ModelError
+        For a value that is no finite number, or out of its range.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> drive = ga.TwoMass(JM=1e-4, DM=0.003, JL=6e-4, DL=0.008, KG=2.6)
+    >>> round(drive.antiresonance, 1), round(drive.resonance, 1), (drive.model().p, drive.model().q)
+    (65.8, 174.2, (1, 2))
     """
 
     UNITS: ClassVar[Mapping[str, str]] = {
@@ -105,7 +145,7 @@ class TwoMass:
         _check(self, positive=("JM", "JL", "KG"), not_negative=("DM", "DL", "DG"))
 
     def model(self) -> Model:
-        """The factored model (equation 5), p = 1 and q = 2."""
+        """Return the factored model (equation 5), p = 1 and q = 2; raise ModelError where a mass has no inertia."""
         if self.JM == 0.0 or self.JL == 0.0:
             raise ModelError(f"JM is {self.JM:g} and JL is {self.JL:g}: without inertia there is no two-mass model")
         c = two_mass.coefficients_of_mechanics(self._vector())
@@ -113,10 +153,24 @@ class TwoMass:
 
     @classmethod
     def from_model(cls, model: Model, free_shaft_damping: bool = False) -> TwoMass:
-        """The mechanism of a model with p = 1, q = 2.
+        """Return the mechanism of a model with p = 1, q = 2.
 
-        At DG = 0 (least squares in relative deviations), or with DG free, which meets all six numbers.
-        Raises ModelError for any other structure and where no such mechanism exists.
+        Parameters
+        ----------
+        model : Model
+            The factored model.
+        free_shaft_damping : bool
+            False: at DG = 0, by least squares in relative deviations. True: with DG free, which meets all six numbers.
+
+        Returns
+        -------
+        TwoMass
+            The mechanism; it may be unphysical, see `notes`.
+
+        Raises
+        ------
+        ModelError
+            For any other structure, and where no such mechanism exists.
         """
         _require(model, 1, 2, "two-mass")
         found = _two_masses(model, None)
@@ -163,7 +217,7 @@ class TwoMass:
         return not self.notes
 
     def to_dict(self) -> dict[str, Any]:
-        """The mechanism for JSON; `mechanics_from_dict` is the inverse."""
+        """Return the mechanism for JSON."""
         data = {"structure": "two masses", **asdict(self)}
         if self.with_shaft_damping is not None:
             data["with_shaft_damping"] = self.with_shaft_damping.to_dict()
@@ -177,17 +231,40 @@ Mechanics = OneMass | TwoMass
 
 
 def mechanics_from_model(model: Model, covariance: ArrayLike | None = None) -> Mechanics | None:
-    """The mechanism behind a model: OneMass for p = 1, q = 0; TwoMass for p = 1, q = 2; otherwise None.
+    """Return the mechanism behind a model: OneMass for p = 1, q = 0; TwoMass for p = 1, q = 2; otherwise None.
 
-    covariance: of the natural parameters x of the model, n x n in the order of `factor_parameters(model)`.
-    With it the result carries standard deviations, to first order. Raises ModelError if it is not such a
-    matrix.
+    The six numbers of a two-mass model over-determine its five parameters at DG = 0.
+    The result is their least squares, weighted with the covariance (without one: in relative deviations).
 
-    The six numbers of a two-mass model over-determine its five parameters at DG = 0. The result is their
-    least squares, weighted with the covariance (without one: in relative deviations). Its `inconsistency` is
-    abs(1 - K_G by product / K_G by pairwise): how far the two equations for the stiffness are apart; compare
-    it with std["inconsistency"]. Its `with_shaft_damping` meets all six numbers. What comes out unphysical is
-    data: see `notes`. With a zero at 0 there is no two-mass mechanism: None.
+    Parameters
+    ----------
+    model : Model
+        The factored model.
+    covariance : array_like, shape (n, n), optional
+        Covariance of the natural parameters of the model, in the order and units of `factor_parameters(model)`.
+        With it the result carries standard deviations, to first order.
+
+    Returns
+    -------
+    OneMass, TwoMass or None
+        The mechanism; None also for two masses with a zero at 0, which no stiffness gives.
+        Its `inconsistency` is abs(1 - K_G by product / K_G by pairwise): how far the two equations for the stiffness are apart;
+        compare it with std["inconsistency"].
+        Its `with_shaft_damping` meets all six numbers.
+        What comes out unphysical is data: see `notes`.
+
+    Raises
+    ------
+    ModelError
+        Where `covariance` is no such matrix.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> drive = ga.TwoMass(JM=1e-4, DM=0.003, JL=6e-4, DL=0.008, KG=2.6)
+    >>> found = ga.mechanics_from_model(drive.model())
+    >>> round(found.JL, 6), round(found.KG, 3), found.physical
+    (0.0006, 2.6, True)
     """
     cov = _checked_covariance(model, covariance)
     if (model.p, model.q) == (1, 0):

@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,36 +17,12 @@ from gaident.checks import known_keys, real_number
 from gaident.control import core
 from gaident.control.pi import PI
 from gaident.errors import ModelError
+from gaident.models.discrete import Discrete
 from gaident.models.effects import Effect, ordered
-from gaident.models.roots import canonical_roots, quadratic_roots
+from gaident.models.roots import Mode, canonical_roots, modes_of, quadratic_roots, roots_of, text_of
 from gaident.providers import provided
 
 Roots = Sequence[complex] | NDArray[np.complex128] | NDArray[np.float64]
-
-
-class Mode(NamedTuple):
-    """One real root or one conjugate pair, as a row of a table."""
-
-    kind: str  # "pole" or "zero"
-    root: complex  # rad/s; of a pair the member with positive imaginary part
-    natural_frequency: float  # abs(root), rad/s
-    damping: float  # -Re(root)/abs(root); 1 for a stable real root, nan for a root at 0
-
-    @property
-    def frequency_hz(self) -> float:
-        """Natural frequency in Hz."""
-        return self.natural_frequency / (2.0 * math.pi)
-
-
-@dataclass(frozen=True, eq=False)
-class Discrete:
-    """Equation (7): w(n) = sum_{i=0..N} alpha_i r(n-i) + sum_{i=1..N} beta_i w(n-i).
-
-    alpha: N+1 numbers for the command (without a controller: the torque); beta: N numbers, beta[0] is beta_1.
-    """
-
-    alpha: NDArray[np.float64]
-    beta: NDArray[np.float64]
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -55,14 +31,34 @@ class Model:
 
         G(s) = gain * prod(s - zeros) / prod(s - poles)
 
-    gain    real, not 0; for p = 1 it is 1/J_M [1/(kg m^2)]
-    poles   roots of the denominator [rad/s] (the paper's -A: a stable pole has a negative real part)
-    zeros   roots of the numerator [rad/s] (the paper's -B), at most as many as poles
-    effects what the drive does beyond that, in the order of `gaident.effects.table()`; see `with_effect`
-
     Complex roots come in conjugate pairs, in any order; asymmetry by rounding (1e-9 relative) is repaired.
-    They are kept in one order: real roots by ascending magnitude, then pairs by ascending magnitude, positive
-    imaginary part first. So equal models compare equal. Raises ModelError.
+    They are kept in one order, so that equal models compare equal: real roots by ascending magnitude, then pairs by ascending
+    magnitude, positive imaginary part first.
+
+    Parameters
+    ----------
+    gain : float
+        Gain K [(rad/s)^(p+1)/(N m)], not 0; for p = 1 it is 1/J_M [1/(kg m^2)].
+    poles : sequence of complex
+        Roots of the denominator [rad/s], the paper's -A: a stable pole has a negative real part.
+    zeros : sequence of complex
+        Roots of the numerator [rad/s], the paper's -B, at most as many as poles.
+    effects : iterable of Effect
+        What the drive does beyond that; kept in the order of `gaident.effects.table()`. See `with_effect`.
+
+    Raises
+    ------
+    ModelError
+        For a gain of 0, roots without their conjugates, more zeros than poles, and effects that the model cannot carry.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> model = ga.Model(gain=6545.0, poles=[-15.0, -10.0 + 151.0j, -10.0 - 151.0j], zeros=[-4.0 + 94.0j, -4.0 - 94.0j])
+    >>> model.p, model.q, model.stable, round(model.static_gain, 1)
+    (1, 2, True, 168.7)
+    >>> model.with_effect("coulomb_friction", torque=0.05).effects
+    (Effect('coulomb_friction', {'torque': 0.05}),)
     """
 
     gain: float
@@ -85,16 +81,31 @@ class Model:
         object.__setattr__(self, "effects", self._checked(effects))
 
     def with_effect(self, name: str, **parameters: float) -> Model:
-        """The same drive with one more effect, in place of one of the same name; see `gaident.effects.table()`.
+        """Return the same drive with one more effect, in place of one of the same name.
 
-        Parameters by name, SI units. Raises ModelError for an unknown effect, unknown or missing parameters,
-        values outside their physical bounds, and where the model cannot carry it: p = 0; backlash and
-        hardening_stiffness without the structure of two masses (p = 1, q = 2) or together with extra_resonance.
+        Parameters
+        ----------
+        name : str
+            Name of the effect, see `gaident.effects.table()`.
+        **parameters : float
+            All its parameters by name, SI units.
+
+        Returns
+        -------
+        Model
+            A new model; this one stays as it is.
+
+        Raises
+        ------
+        ModelError
+            For an unknown effect, unknown or missing parameters, values outside their physical bounds, and where the model cannot
+            carry it: p = 0; backlash and hardening_stiffness without the structure of two masses (p = 1, q = 2) or together with
+            extra_resonance.
         """
         return self._with((*self.effects, Effect(name, parameters)))
 
     def without_effect(self, name: str) -> Model:
-        """The same drive without this effect; raises ModelError where it has none of that name."""
+        """Return the same drive without this effect; raise ModelError where it has none of that name."""
         rest = tuple(effect for effect in self.effects if effect.name != name)
         if len(rest) == len(self.effects):
             names = ", ".join(effect.name for effect in self.effects) or "none"
@@ -185,17 +196,13 @@ class Model:
     @property
     def modes(self) -> tuple[Mode, ...]:
         """Natural frequency and damping, one row per real root and per pair; poles first."""
-        rows = []
-        for kind, roots in (("pole", self.poles), ("zero", self.zeros)):
-            for root in roots:
-                if root.imag >= 0.0:
-                    magnitude = abs(root)
-                    damping = -root.real / magnitude if magnitude else math.nan
-                    rows.append(Mode(kind, root, magnitude, damping))
-        return tuple(rows)
+        return (*modes_of("pole", self.poles), *modes_of("zero", self.zeros))
 
     def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
-        """G(j omega), complex, of the shape of `omega` [rad/s]; not finite where j omega is a pole."""
+        """Return G(j omega), complex, of the shape of `omega` [rad/s]; not finite where j omega is a pole.
+
+        Raises ModelError for a model with effects.
+        """
         self._require_linear("frequency_response")
         s = 1j * np.asarray(omega, dtype=np.float64)
         response = np.full(s.shape, complex(self.gain))
@@ -208,11 +215,25 @@ class Model:
         return response
 
     def discrete(self, dt: float, controller: PI | None = None) -> Discrete:
-        """The difference equation (7) from command to velocity at sample time `dt` [s].
+        """Return the difference equation (7) from command to velocity; without a controller from torque to velocity.
 
-        Bilinear or held as the controller's loop says, its limits left out (the equation is linear); without
-        a controller from torque to velocity by zero-order hold. Raises ModelError (dt; p = 0 in a sampled
-        loop; a model with effects).
+        Parameters
+        ----------
+        dt : float
+            Sample time [s].
+        controller : PI, optional
+            The loop: bilinear or held as its `loop` says, its limits left out (the equation is linear).
+            None: the drive alone, by zero-order hold.
+
+        Returns
+        -------
+        Discrete
+            The coefficients alpha and beta.
+
+        Raises
+        ------
+        ModelError
+            For dt <= 0, p = 0 in a sampled loop, and a model with effects.
         """
         self._require_linear("discrete")
         sample_time = real_number(dt, "dt", ModelError, "give the sample time in s, > 0")
@@ -224,21 +245,51 @@ class Model:
         return Discrete(alpha, beta)
 
     def to_scipy(self, dt: float | None = None, *, pade: int | None = None) -> Any:
-        """The same as a linear system of scipy.signal, torque [N m] to velocity [rad/s].
+        """Return the same as a linear system of scipy.signal, torque [N m] to velocity [rad/s].
 
-        dt    None: continuous, scipy.signal.ZerosPolesGain; a sample time [s]: sampled behind a zero-order hold,
-              scipy.signal.StateSpace, exact with a delay of any fraction of a sample
-        pade  order, 1 to 10, of the Pade approximation of a transport_delay in the continuous system
+        The linear effects (extra_resonance, transport_delay, torque_lag, velocity_filter) are part of it.
 
-        The linear effects (extra_resonance, transport_delay, torque_lag, velocity_filter) are part of it. Raises ModelError
-        for other effects, for a delay with neither dt nor pade, and for p = 0 with dt.
+        Parameters
+        ----------
+        dt : float, optional
+            None: continuous, scipy.signal.ZerosPolesGain. A sample time [s]: sampled behind a zero-order hold,
+            scipy.signal.StateSpace, exact with a delay of any fraction of a sample.
+        pade : int, optional
+            Order, 1 to 10, of the Pade approximation of a transport_delay in the continuous system.
+
+        Returns
+        -------
+        scipy.signal.ZerosPolesGain or scipy.signal.StateSpace
+            The system.
+
+        Raises
+        ------
+        ModelError
+            For other effects, a delay with neither dt nor pade, and p = 0 with dt.
         """
         return provided("to_scipy")(self, dt, pade)
 
     def to_control(self, dt: float | None = None, *, pade: int | None = None) -> Any:
-        """The same as a system of python-control: control.TransferFunction, with a sample time dt [s] control.StateSpace.
+        """Return the same as a system of python-control, torque [N m] to velocity [rad/s].
 
-        As `to_scipy`. Raises ImportError with the way to get python-control, and ModelError.
+        Parameters
+        ----------
+        dt : float, optional
+            None: control.TransferFunction. A sample time [s]: control.StateSpace, behind a zero-order hold.
+        pade : int, optional
+            As `to_scipy` takes it.
+
+        Returns
+        -------
+        control.TransferFunction or control.StateSpace
+            The system.
+
+        Raises
+        ------
+        ImportError
+            Where python-control is missing; with the way to get it.
+        ModelError
+            As `to_scipy`.
         """
         return provided("to_control")(self, dt, pade)
 
@@ -251,24 +302,40 @@ class Model:
         name: str | None = None,
         substeps: int | None = None,
     ) -> str:
-        """Writes the model as one C99 file without dependencies, a recurrence of fixed step; returns its text.
+        """Write the model as one C99 file without dependencies, a recurrence of fixed step.
 
-        path        file to write; None: none is written
-        dt          sample time [s]
-        controller  with one the file is the closed loop, command [rad/s] to velocity; None: the drive alone, torque [N m]
-                    (held over each sample) to velocity
-        name        beginning of every C name; None: that of the file
-        substeps    per sample, of a model with effects; None: as many as it needs
+        From rest it gives what `gaident.simulate` gives for a record without position, up to rounding.
+        All effects of the library are part of it.
 
-        From rest it gives what `gaident.simulate` gives for a record without position, up to rounding, all effects of the
-        library included. Raises ModelError for effects of one's own, for effects in the continuous loop, for p = 0 outside
-        it, and for a dt, name or substeps that are none.
+        Parameters
+        ----------
+        path : str or path-like, or None
+            File to write; None: none is written.
+        dt : float
+            Sample time [s].
+        controller : PI, optional
+            With one the file is the closed loop, command [rad/s] to velocity [rad/s].
+            None: the drive alone, torque [N m] (held over each sample) to velocity.
+        name : str, optional
+            Beginning of every C name; None: that of the file.
+        substeps : int, optional
+            Steps per sample of a model with effects; None: as many as it needs.
+
+        Returns
+        -------
+        str
+            The text of the file.
+
+        Raises
+        ------
+        ModelError
+            For effects of your own, effects in the continuous loop, p = 0 outside it, and a dt, name or substeps that are none.
         """
         text: str = provided("write_c")(self, path, dt, controller, name, substeps)
         return text
 
     def to_dict(self) -> dict[str, Any]:
-        """The model for JSON: {"gain": K, "poles": [[re, im], ...], "zeros": [[re, im], ...], "effects": [...]}.
+        """Return the model for JSON: {"gain": K, "poles": [[re, im], ...], "zeros": [[re, im], ...], "effects": [...]}.
 
         A model without effects has no key "effects".
         """
@@ -283,21 +350,21 @@ class Model:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Model:
-        """The inverse of `to_dict`; a real root may be written as one number."""
+        """Return the model of what `to_dict` gave; a real root may be written as one number. Raises ModelError."""
         names = ("gain", "poles", "zeros", "effects")
         values: dict[str, Any] = known_keys(data, "the model", names, ("gain",), ModelError)
         effects = values.get("effects", ())
         if not isinstance(effects, (list, tuple)):
             raise ModelError(f"effects is {effects!r}: give a list of {{'name': ..., 'parameters': {{...}}}}")
         found = [Effect.from_dict(entry) for entry in effects]
-        return cls(values["gain"], _roots_of(values, "poles"), _roots_of(values, "zeros"), found)
+        return cls(values["gain"], roots_of(values, "poles"), roots_of(values, "zeros"), found)
 
     def __repr__(self) -> str:
         effects = f", effects={list(self.effects)!r}" if self.effects else ""
-        return f"Model(gain={self.gain!r}, poles={_list(self.poles)}, zeros={_list(self.zeros)}{effects})"
+        return f"Model(gain={self.gain!r}, poles={text_of(self.poles)}, zeros={text_of(self.zeros)}{effects})"
 
     def own_effects(self) -> tuple[Effect, ...]:
-        """Those of one's own that act; raises ModelError where one is no longer registered."""
+        """Return the user-defined effects that are not neutral; raise ModelError where one is no longer registered."""
         own: tuple[Effect, ...] | None = self.__dict__.get("_own")
         if own is None:
             own = tuple(effect for effect in self.effects if effect.own)
@@ -305,7 +372,7 @@ class Model:
         return tuple(effect for effect in own if not effect.neutral) if own else own
 
     def core(self) -> _core.EffectModel:
-        """The model as the core takes it, without effects of one's own; made once."""
+        """Return the model as the core takes it, without user-defined effects; made once."""
         made: _core.EffectModel | None = self.__dict__.get("_core_model")
         if made is None:
             poles, zeros = (np.array(roots, dtype=np.complex128) for roots in (self.poles, self.zeros))
@@ -323,15 +390,3 @@ def require_strictly_proper(p: int, controller: PI | None) -> None:
             f"the model has p = 0 (as many zeros as poles), which does not exist in {where}: "
             f"use a model with more poles than zeros, or {CONTINUOUS_LOOP}"
         )
-
-
-def _list(roots: tuple[complex, ...]) -> str:
-    return "[" + ", ".join(repr(r.real) if r.imag == 0.0 else repr(r).strip("()") for r in roots) + "]"
-
-
-def _roots_of(values: Mapping[str, Any], name: str) -> list[complex]:
-    entries = values.get(name, ())
-    try:
-        return [complex(*e) if isinstance(e, (list, tuple)) else complex(e) for e in entries]
-    except (TypeError, ValueError):
-        raise ModelError(f"{name} is {entries!r}: give a list of [real, imaginary] pairs in rad/s") from None

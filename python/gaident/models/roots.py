@@ -1,9 +1,10 @@
-"""Roots of real polynomials: their one order, their conjugate symmetry, and finding them."""
+"""Roots of real polynomials: their one order, their conjugate symmetry, finding them, and their frequency and damping."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,20 @@ from gaident.errors import ModelError
 ASYMMETRY = 1e-9
 # An imaginary part this small cannot be told from rounding of the root itself.
 NO_IMAGINARY_PART = 1e-13
+
+
+class Mode(NamedTuple):
+    """One real root or one conjugate pair, as a row of a table."""
+
+    kind: str  # "pole" or "zero"
+    root: complex  # rad/s; of a pair the member with positive imaginary part
+    natural_frequency: float  # abs(root), rad/s
+    damping: float  # -Re(root)/abs(root); 1 for a stable real root, nan for a root at 0
+
+    @property
+    def frequency_hz(self) -> float:
+        """Natural frequency in Hz."""
+        return self.natural_frequency / (2.0 * math.pi)
 
 
 def canonical_roots(roots: object, name: str) -> tuple[complex, ...]:
@@ -119,3 +134,26 @@ def quadratic_roots(e1: float, e0: float) -> list[complex]:
 
 def _rank(root: complex) -> tuple[float, float]:
     return math.hypot(root.real, root.imag), root.real
+
+
+def modes_of(kind: str, roots: Iterable[complex]) -> Iterator[Mode]:
+    """A row for each real root and for each pair."""
+    for root in roots:
+        if root.imag >= 0.0:
+            magnitude = abs(root)
+            damping = -root.real / magnitude if magnitude else math.nan
+            yield Mode(kind, root, magnitude, damping)
+
+
+def text_of(roots: tuple[complex, ...]) -> str:
+    """The roots as Python writes a list, real ones without an imaginary part."""
+    return "[" + ", ".join(repr(r.real) if r.imag == 0.0 else repr(r).strip("()") for r in roots) + "]"
+
+
+def roots_of(values: Mapping[str, Any], name: str) -> list[complex]:
+    """The roots [rad/s] of saved data, each a number or a pair [real, imaginary]; raises ModelError."""
+    entries = values.get(name, ())
+    try:
+        return [complex(*e) if isinstance(e, (list, tuple)) else complex(e) for e in entries]
+    except (TypeError, ValueError):
+        raise ModelError(f"{name} is {entries!r}: give a list of [real, imaginary] pairs in rad/s") from None

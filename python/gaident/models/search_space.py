@@ -22,17 +22,40 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """Search ranges; a pole or zero is -(real part) +- i (imaginary part).
+    """Search ranges of an identification; a pole or zero is -(real part) +- i (imaginary part).
 
-    gain: range of K at p = 1, 1/J [rad/s^2 per N m], both ends positive.
-    real: negated real parts, rad/s (negative lower end: unstable roots are allowed). imaginary: rad/s.
-    p, q: ranges of the structural numbers, 0..7. bits: per number, 2..16.
-    gain_scale: K counts in units of gain_scale^(p-1) at other p, rad/s; None: sqrt(real[1]*imaginary[1])/10, and 1 (the same
-    range
-    for every p, as in the paper) with Settings.paper().
-    source: where the ranges come from, shown in the summary.
+    Parameters
+    ----------
+    gain : tuple of float
+        Range of the gain K at p = 1, 1/J [rad/s^2/(N m)], both ends positive.
+    real : tuple of float
+        Range of the negated real parts [rad/s]; a negative lower end allows unstable roots.
+    imaginary : tuple of float
+        Range of the imaginary parts [rad/s], both ends >= 0.
+    p : tuple of int
+        Range of the number of poles in excess of zeros, 0 to 7.
+    q : tuple of int
+        Range of the number of zeros, 0 to 7.
+    bits : int
+        Bits per number of the genetic code, 2 to 16.
+    gain_scale : float, optional
+        K counts in units of gain_scale^(p-1) at other p [rad/s].
+        None: sqrt(real[1]*imaginary[1])/10, and 1 (the same range for every p, as in the paper) with `Settings.paper()`.
+    source : str
+        Where the ranges come from, shown in the summary.
 
-    Raises SpaceError naming the range and the remedy.
+    Raises
+    ------
+    SpaceError
+        For a range that is empty or out of what is allowed; with the remedy.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> ga.SearchSpace(gain=(1e3, 2e4), real=(0, 60), imaginary=(0, 250), p=(1, 2)).q
+    (0, 3)
+    >>> ga.SearchSpace.from_mechanics(inertia=(1e-4, 1e-3), resonance_hz=(10, 100)).gain
+    (1000.0, 100000.0)
     """
 
     gain: Range = (1e3, 2e4)
@@ -86,12 +109,31 @@ class SearchSpace:
         q: tuple[int, int] = (0, 3),
         bits: int = 10,
     ) -> SearchSpace:
-        """Ranges as an engineer knows them.
+        """Return the ranges of an axis as an engineer knows it.
 
-        inertia: total inertia at the motor shaft [kg m^2] (or mass [kg]); the motor's own may be down to a tenth of it.
-        resonance_hz: lowest and highest frequency at which the mechanism may resonate, Hz; antiresonances are looked for
-            from half the lowest on.
-        damping: total viscous damping [N m s/rad]; None: up to where a pole is as fast as the highest resonance.
+        Parameters
+        ----------
+        inertia : tuple of float
+            Total inertia at the motor shaft [kg m^2] (or mass [kg]); the motor's own may be down to a tenth of it.
+        resonance_hz : tuple of float
+            Lowest and highest frequency at which the mechanism may resonate [Hz].
+            Antiresonances are looked for from half the lowest on.
+        damping : tuple of float, optional
+            Total viscous damping [N m s/rad]; None: up to where a pole is as fast as the highest resonance.
+        p, q : tuple of int
+            Ranges of the structural numbers, see `SearchSpace`.
+        bits : int
+            Bits per number of the genetic code.
+
+        Returns
+        -------
+        SearchSpace
+            The ranges.
+
+        Raises
+        ------
+        SpaceError
+            For a pair that is no range.
         """
         inertia = _pair("inertia", inertia, above_zero=True)
         resonance_hz = _pair("resonance_hz", resonance_hz, above_zero=True)
@@ -109,7 +151,7 @@ class SearchSpace:
         )
 
     def ranges(self, paper: bool = False) -> _core.SearchRanges:
-        """The same for the core."""
+        """Return the same for the core; `paper`: with the same range of K for every p."""
         from gaident import _core
 
         scale = self.gain_scale
@@ -120,12 +162,12 @@ class SearchSpace:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
+        """Return plain data for JSON."""
         return asdict(self)
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> SearchSpace:
-        """The inverse of to_dict. Raises SpaceError for unknown keys."""
+        """Return the space of what `to_dict` gave; raise SpaceError for unknown keys."""
         unknown = set(data) - {f.name for f in fields(cls)}
         if unknown:
             raise SpaceError(f"space holds unknown keys: {', '.join(sorted(unknown))}")

@@ -13,8 +13,8 @@ from gaident.data.record import Record
 from gaident.identification.identify import identify
 from gaident.identification.least_squares import least_squares
 from gaident.identification.m_sequence import m_sequence
+from gaident.models.discrete import Discrete
 from gaident.models.mechanics import Mechanics, mechanics_from_model
-from gaident.models.model import Discrete
 from gaident.paper.experiment import rig_of
 from gaident.paper.facts import STEP, Mechanism
 from gaident.paper.rig import NO_FRICTION, Friction, Rig, Run, side_by_side

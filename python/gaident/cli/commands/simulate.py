@@ -17,7 +17,8 @@ from gaident.data.record import Record
 from gaident.errors import GaidentError, SettingsError
 from gaident.models.mechanics import mechanics_from_dict
 from gaident.models.model import Model
-from gaident.models.simulate import AnyModel, Run, initial_state, run
+from gaident.models.simulate import Run, initial_state, run
+from gaident.models.simulation_input import AnyModel
 from gaident.models.starts import starts_moving
 from gaident.results.identification import Identification
 from gaident.results.store import load

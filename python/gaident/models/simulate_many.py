@@ -1,0 +1,190 @@
+"""Many models against one record at once, side by side in the core."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gaident import _core
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.errors import GaidentError, ModelError
+from gaident.models.effects import table as effect_table
+from gaident.models.factors import Structure
+from gaident.models.model import Model
+from gaident.models.own_effects import OWN
+from gaident.models.simulation_input import (
+    AnyModel,
+    Signal,
+    as_model,
+    check_start,
+    checked_substeps,
+    core_record,
+    input_for,
+    input_of,
+)
+
+OwnList = list[tuple[str, Callable[..., Any], Signal]]
+
+
+def simulate_many(
+    models: Sequence[AnyModel],
+    rec: Record,
+    controller: PI | None = None,
+    *,
+    initial_states: ArrayLike | None = None,
+    substeps: int | None = None,
+    workers: int = 1,
+) -> Signal:
+    """Return the velocities of many models for one record.
+
+    Each row is what `simulate` gives for its model; models of one structure with the same effects run side by side.
+
+    Parameters
+    ----------
+    models : sequence of Model, OneMass or TwoMass
+        The drives.
+    rec : Record
+        With a controller its command drives the loop, without one its torque drives the models.
+    controller : PI, optional
+        The velocity loop; None: open loop.
+    initial_states : array_like, shape (len(models), states), optional
+        See `run`; then all models have the same number of states. None: at rest.
+    substeps : int, optional
+        See `run`.
+    workers : int
+        Threads; the result does not depend on it.
+
+    Returns
+    -------
+    ndarray, shape (len(models), len(rec))
+        Velocities [rad/s].
+
+    Raises
+    ------
+    RecordError, ModelError
+        As `run`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> rec = ga.Record(1e-3, torque=np.full(100, 0.2), velocity=np.zeros(100))
+    >>> ga.simulate_many([ga.OneMass(J, 0.0) for J in (1e-3, 2e-3)], rec)[:, -1].round(6).tolist()
+    [19.8, 9.9]
+    """
+    plants = [as_model(model) for model in models]
+    source, starts = None, np.zeros((0, 0))
+    for structure in {(plant.p, plant.q): plant for plant in plants}.values():
+        source, _ = input_of(structure, rec, controller)
+    if source is None:
+        return np.zeros((0, len(rec)))
+    if initial_states is not None:
+        starts = np.array(initial_states, dtype=np.float64)
+        if starts.ndim != 2 or len(starts) != len(plants):
+            raise ModelError(f"initial_states has the shape {starts.shape}: give one row per model, {len(plants)}")
+        for i, plant in enumerate(plants):
+            check_start(plant, controller, starts[i], "command" if controller is not None else "torque")
+    record = core_record(rec, source, controller)
+    return simulated_with_effects(record, plants, starts, checked_substeps(substeps), workers, False)[0]
+
+
+def simulate_values(
+    structure: Structure,
+    effects: Sequence[str],
+    values: ArrayLike,
+    rec: Record,
+    controller: PI | None = None,
+    *,
+    initial_states: ArrayLike | None = None,
+    substeps: int | None = None,
+    workers: int = 1,
+) -> Signal:
+    """Return the velocities of models given as numbers: the inner loop of a fit.
+
+    Values are not checked against their bounds: what makes no drive gives undefined numbers.
+
+    Parameters
+    ----------
+    structure : Structure
+        That of the linear part.
+    effects : sequence of str
+        Names of effects.
+    values : array_like, shape (m, k)
+        A row per model: the natural parameters of the linear part in the order of `factor_parameters`, then those of each effect
+        named, in the order of `gaident.effects.table()`.
+    rec, controller, initial_states, substeps, workers
+        As `simulate_many` takes them.
+
+    Returns
+    -------
+    ndarray, shape (m, len(rec))
+        Velocities [rad/s].
+
+    Raises
+    ------
+    ModelError
+        For a wrong shape or unknown names.
+    """
+    table = np.ascontiguousarray(values, dtype=np.float64)
+    source, _ = input_for(structure.p, rec, controller)
+    starts = np.zeros((0, 0)) if initial_states is None else np.ascontiguousarray(initial_states, dtype=np.float64)
+    record = core_record(rec, source, controller)
+    built_in, own = _parted(structure, effects, table)
+    try:
+        with np.errstate(all="ignore"):
+            return record.simulate_values(
+                built_in, tuple(structure), [e for e in effects if e not in OWN], starts, checked_substeps(substeps), workers, own
+            )
+    except GaidentError:
+        raise
+    except ValueError as reason:
+        raise ModelError(str(reason)) from None
+
+
+def simulated_with_effects(
+    record: _core.EffectRecord, plants: Sequence[Model], starts: Signal, steps: int, workers: int, every: bool
+) -> tuple[Signal, Signal, Signal]:
+    """The core's simulation of models, those with the same effects of one's own at once."""
+    acting = [tuple(e.name for e in plant.own_effects()) for plant in plants]
+    if not any(acting):
+        return record.simulate([plant.core() for plant in plants], starts, steps, workers, every)
+    found: list[Signal] | None = None
+    for names in dict.fromkeys(acting):
+        index = [i for i, mine in enumerate(acting) if mine == names]
+        own: OwnList = []
+        for name in names:
+            rows = [next(e.values for e in plants[i].effects if e.name == name) for i in index]
+            own.append((OWN[name].acts, OWN[name].ask, np.array(rows, dtype=np.float64)))
+        some = starts[index] if starts.size else starts
+        with np.errstate(all="ignore"):
+            parts = record.simulate([plants[i].core() for i in index], some, steps, workers, every, own=own)
+        if found is None:
+            found = [np.empty((len(plants) if part.size else 0, part.shape[1])) for part in parts]
+        for whole, part in zip(found, parts, strict=True):
+            if part.size:
+                whole[index] = part
+    assert found is not None
+    return found[0], found[1], found[2]
+
+
+def _parted(structure: Structure, effects: Sequence[str], values: Signal) -> tuple[Signal, OwnList]:
+    """Rows of values of `simulate_values` without the columns of effects of one's own, and these."""
+    if not any(e in OWN for e in effects):
+        return values, []
+    sizes = {row.name: len(row.parameters) for row in effect_table()}
+    at = 1 + structure.real_poles + 2 * structure.pole_pairs + structure.real_zeros + 2 * structure.zero_pairs
+    kept, own = [values[:, :at]], []
+    for e in effects:
+        columns = values[:, at : at + sizes.get(e, 0)]
+        at += sizes.get(e, 0)
+        if e in OWN:
+            own.append((OWN[e].acts, OWN[e].ask, np.ascontiguousarray(columns)))
+        else:
+            kept.append(columns)
+    if values.shape[1] != at:
+        raise ModelError(f"values has {values.shape[1]} columns: {at} are needed for {structure} with {', '.join(effects)}")
+    return np.ascontiguousarray(np.hstack(kept)), own

@@ -1,0 +1,78 @@
+"""What a simulation takes, checked: the model, what drives it, its start and its substeps."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident import _core
+from gaident.arguments import A_CONTROLLER, COMMAND, NO_CONTROLLER, TORQUE
+from gaident.control import core
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.errors import ModelError, RecordError
+from gaident.models.mechanics import OneMass, TwoMass
+from gaident.models.model import Model, require_strictly_proper
+
+Signal = NDArray[np.float64]
+AnyModel = Model | OneMass | TwoMass
+MAX_SUBSTEPS = 64
+
+
+def as_model(model: AnyModel) -> Model:
+    if isinstance(model, (OneMass, TwoMass)):
+        return model.model()
+    if not isinstance(model, Model):
+        raise ModelError(f"model is a {type(model).__name__}: give a Model, OneMass or TwoMass")
+    return model
+
+
+def input_of(plant: Model, rec: Record, controller: PI | None) -> tuple[Signal, str]:
+    """What drives the simulation, and its name; raises where record, model and loop do not fit together."""
+    return input_for(plant.p, rec, controller)
+
+
+def input_for(p: int, rec: Record, controller: PI | None) -> tuple[Signal, str]:
+    if not isinstance(rec, Record):
+        raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record")
+    require_strictly_proper(p, controller)
+    if controller is not None:
+        if rec.command is None:
+            raise RecordError(
+                "the record has no command, which drives the loop with a controller: give "
+                f"{COMMAND}, or {NO_CONTROLLER} to drive the model with the torque"
+            )
+        return np.ascontiguousarray(rec.command, dtype=np.float64), "command"
+    if rec.torque is None:
+        raise RecordError(
+            "the record has no torque, which drives the model without a controller: give "
+            f"{TORQUE}, or {A_CONTROLLER} to drive the loop with the command"
+        )
+    return np.ascontiguousarray(rec.torque, dtype=np.float64), "torque"
+
+
+def check_start(plant: Model, controller: PI | None, start: Signal, what: str) -> None:
+    extra = 2 * any(effect.name == "extra_resonance" for effect in plant.effects)
+    size = plant.order + extra + (controller is not None)
+    if start.shape != (size,):
+        raise ModelError(
+            f"initial_state has the shape {start.shape}: this model driven by the {what} has "
+            f"{size} states; use gaident.models.initial_state(model, rec, controller)"
+        )
+    if not np.all(np.isfinite(start)):
+        raise ModelError(f"initial_state is {start}: every number must be finite")
+
+
+def checked_substeps(substeps: int | None) -> int:
+    """Substeps per sample as the core takes them, 0 for as many as needed; raises ModelError."""
+    if substeps is None:
+        return 0
+    if isinstance(substeps, bool) or not isinstance(substeps, int) or not 1 <= substeps <= MAX_SUBSTEPS:
+        raise ModelError(f"substeps is {substeps!r}: give a whole number from 1 to {MAX_SUBSTEPS}, or None for as many as needed")
+    return substeps
+
+
+def core_record(rec: Record, source: Signal, controller: PI | None) -> _core.EffectRecord:
+    position = np.zeros(0) if rec.position is None else rec.position
+    start = 0.0 if rec.position is None else float(rec.position[0])
+    return core.effect_record(rec.dt, source, position, rec.velocity, start, controller)
