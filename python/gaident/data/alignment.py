@@ -35,14 +35,32 @@ _ORDER = ("velocity", "position", "command", "torque")
 
 @dataclass(frozen=True)
 class Alignment:
-    """What align found. `t = offset + (1 + rate) t'` leads from the second log's clock to the first's.
+    """What `align` found: `t = offset + (1 + rate) t'` leads from the second log's clock t' to the first's t.
 
-    record       the first record, cut to what both cover, with the channels taken over from the second
-    offset       t0 [s] with offset_std [s], its standard deviation
-    rate         rho [1] with rate_std [1]; rate is 0 where the logs show no difference of the clocks (rate_seen False)
-    gain         scale of the second log's channel against the first's (1 where both have the same unit)
-    correlation  between the two, aligned
-    uncertainty  [s] largest error of the time axis within the record, two standard deviations
+    Attributes
+    ----------
+    record : Record
+        The first record, cut to what both cover, with the channels taken over from the second.
+    offset : float
+        Offset t0 [s].
+    offset_std : float
+        Its standard deviation [s].
+    rate : float
+        Difference of the clocks' rates rho [1]; 0 where the logs show none.
+    rate_std : float
+        Standard deviation of the difference of the rates [1].
+    rate_seen : bool
+        Whether the logs show a difference of the clocks' rates.
+    gain : float
+        Scale of the second log's channel against the first's [1] (1 where both have the same unit).
+    correlation : float
+        Correlation of the two channels, aligned [1].
+    uncertainty : float
+        Largest error of the time axis within the record, two standard deviations [s].
+
+    See Also
+    --------
+    align : Makes it, with an example.
     """
 
     record: Record
@@ -56,7 +74,7 @@ class Alignment:
     uncertainty: float
 
     def summary(self) -> str:
-        """The same in words."""
+        """Return the result as text, a few lines."""
         rate = f"{self.rate * 1e6:+.1f} +- {self.rate_std * 1e6:.1f} ppm"
         if not self.rate_seen:
             rate = f"no difference seen (to +- {2e6 * self.rate_std:.3g} ppm)"
@@ -81,19 +99,55 @@ def align(
     within: tuple[float, float] | None = None,
     max_rate: float = 1e-3,
 ) -> Alignment:
-    """Brings the channels of a second log, which has a clock of its own, onto the first record's time axis.
+    """Bring the channels of a second log, which has a clock of its own, onto the first record's time axis.
 
-    rec      the record whose clock stays
-    other    a Record, or channel -> values of a log that makes none, with its sample time `dt` [s]
-    on       the channel in which both show the same motion, or (rec's, other's); None: the first that both have of
-             velocity, position, command, torque. Its unit and sign may differ: the scale is estimated too
-    take     channels of `other` that go into the result; None: those that rec lacks
-    within   (lowest, highest) offset [s] that is possible, where the motion repeats itself
-    max_rate largest difference of the clocks' rates to look for (quartz against quartz stays below 2e-4)
+    The channels taken over are low-passed where `rec` samples more slowly, then interpolated (monotone cubic).
 
-    The channels taken over are low-passed where rec samples more slowly, then interpolated (monotone cubic). Raises
-    RecordError where the logs cannot tell: no motion, no resemblance, two offsets that fit equally well, or a rate beyond
-    max_rate.
+    Parameters
+    ----------
+    rec : Record
+        The record whose clock stays.
+    other : Record, or mapping of str to array_like, shape (m,)
+        The second log: a record, or channel -> values of a log that makes none.
+    dt : float, optional
+        Sample time of `other` [s], where it is no record.
+    on : str or tuple of str, optional
+        The channel in which both show the same motion, or (rec's, other's).
+        Its unit and sign may differ: the scale is estimated too.
+        None: the first that both have of velocity, position, command, torque.
+    take : sequence of str, optional
+        Channels of `other` that go into the result; None: those that `rec` lacks.
+    within : tuple of float, optional
+        (lowest, highest) offset [s] that is possible, where the motion repeats itself.
+    max_rate : float
+        Largest difference of the clocks' rates to look for [1] (quartz against quartz stays below 2e-4).
+
+    Returns
+    -------
+    Alignment
+        The joined record, the offset and the difference of the rates with standard deviations.
+
+    Raises
+    ------
+    RecordError
+        Where the logs cannot tell: no motion, no resemblance, two offsets that fit equally well, or a rate beyond `max_rate`.
+
+    References
+    ----------
+    W. K. Newey, K. D. West, "A simple, positive semi-definite, heteroskedasticity and autocorrelation consistent covariance
+    matrix", Econometrica 55, 1987 (the standard deviations).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> def velocity(t):
+    ...     return 10.0 * np.tanh(40.0 * (t - 0.5)) + 3.0 * np.tanh(30.0 * (t - 1.1))
+    >>> rec = ga.Record(1e-3, command=velocity(1e-3 * np.arange(2000)), velocity=velocity(1e-3 * np.arange(2000)))
+    >>> later = 0.25 + 2e-3 * np.arange(800)  # the second log begins 0.25 s after the first
+    >>> found = ga.align(rec, {"velocity": velocity(later), "torque": np.cos(later)}, dt=2e-3)
+    >>> round(found.offset, 3), [name for name, values in found.record.channels()]
+    (0.25, ['command', 'velocity', 'torque'])
     """
     theirs, their_dt = _channels(other, dt)
     mine = dict(rec.channels())

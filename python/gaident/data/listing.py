@@ -98,9 +98,36 @@ def columns(
     skip: int | None = None,
     encoding: str | None = None,
 ) -> Listing:
-    """Names, units, ranges and sample times of what a log (or DataFrame) holds; options and errors as of read.
+    """List the columns of a log: names, units, ranges and sample times.
 
     The values pass through block by block, none is kept.
+
+    Parameters
+    ----------
+    path : str, path-like or pandas.DataFrame
+        The log, as `read` takes it.
+    delimiter, decimal, skip, encoding : optional
+        Of a text table, as `read` takes them.
+
+    Returns
+    -------
+    Listing
+        Its `columns` are one `ColumnInfo` each; `print` shows a table of them.
+
+    Raises
+    ------
+    ReadError
+        Where the log cannot be read.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> with open("run1.csv", "w") as log:
+    ...     print("t [ms],w [rpm]", file=log)
+    ...     for i in range(30):
+    ...         print(f"{i},{3 * i}", file=log)
+    >>> [(c.name, c.unit, c.highest, c.is_time) for c in ga.columns("run1.csv").columns]
+    [('t [ms]', 'ms', 29.0, True), ('w [rpm]', 'rpm', 87.0, False)]
     """
     with open_log(path, TextOptions(delimiter, decimal, skip, encoding)) as table:
         real = [column for column in table.columns if column.values.dtype.kind in "iufb"]

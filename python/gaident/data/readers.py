@@ -97,42 +97,89 @@ def read(
 ) -> Record:
     """Read a log to a Record in SI units: text tables, MAT, HDF5, NPZ, Parquet, TDMS, MDF, a pandas DataFrame.
 
-    path     str or Path, or a DataFrame. MAT 7.3 and HDF5 need h5py, Parquet pyarrow, TDMS nptdms, MDF asammdf: the
-             extras hdf5, parquet, tdms and mdf of this package. Text longer than 32 MB, HDF5, Parquet, TDMS and MDF
-             are read block by block.
-    columns  channel -> column of the file; channels are command, velocity, torque, position and time. A
-             column is its name (or the name without a unit: `w` for `w [rpm]`), its number '#3' or 3 (zero
-             based), or, in MAT and NPZ, a column of a two-dimensional array, 'data[:,3]' (zero based). None:
-             columns that bear the channels' own names. {"time": None} ignores a time column.
-    units    channel -> unit ("rpm", "deg/s", "counts", "%", "A", "ms", ...) or the factor to SI as a number.
-             What is not given is taken from the file (`w [rpm]`, or a line of units below the names), else it
-             is SI; time stamps that are a date name their unit by their size.
-    dt       sample time [s]. None: from the column named for time, or one called as time is (time, t, __time,
-             timestamp, /topic/header/stamp, ...), which must be regular, or what the file states. With dt and such a
-             column, both must agree within 1 %.
-    name     of the record; None: the file's name without its ending
-    counts_per_turn, torque_constant [N m/A], rated_torque [N m], torque_per_volt [N m/V]
-             constants of the drive, for the units counts, A, %, V
-    velocity_cutoff_hz
-             a log with a position and no velocity gets differentiate(position, dt, velocity_cutoff_hz). None, the plain
-             difference, suits identification: a velocity that is filtered alone biases the inertia of a fast axis
-    decimate 10: every tenth sample behind a linear-phase low-pass whose delay is compensated, see
-             Record.decimate; the log is decimated as it is read, whatever its length
-    resample [s] put channels with irregular time stamps, or of several rates, on one even axis, by linear
-             interpolation; never done unasked
-    gear_ratio, load_side
-             turns of the motor per turn of the load, and the channels that were measured behind the gear: their
-             motion is multiplied by it, their torque divided
-    measured False: a log without velocity and position will do, as a proposed command that is to be simulated; its velocity
-             is 0 then
-    torque_is "commanded": the torque is the controller's command; "measured": a measured current times a constant, behind the
-             actuator and with the sensor's noise. None: measured where the column's name says so (`Actual current`, `I_q`,
-             `M_ist`, `torque feedback`), else commanded; the record's repr shows which it is
-    delimiter, decimal, skip, encoding
-             of a text table, where they cannot be found out: what separates columns (a character, "tab" or
-             "space"), decimal mark ("." or ","), lines to leave out at the top, encoding as Python calls it
+    Text longer than 32 MB, HDF5, Parquet, TDMS and MDF are read block by block.
 
-    Raises ReadError (or RecordError) with file, line or index, and remedy.
+    Parameters
+    ----------
+    path : str, path-like or pandas.DataFrame
+        The log. MAT 7.3 and HDF5 need h5py, Parquet pyarrow, TDMS nptdms, MDF asammdf: the extras hdf5, parquet, tdms and mdf
+        of this package.
+    columns : mapping of str to str, int or None, optional
+        Channel -> column of the file; channels are command, velocity, torque, position and time.
+        A column is its name (or the name without a unit: `w` for `w [rpm]`), its number '#3' or 3 (zero based), or, in MAT and
+        NPZ, a column of a two-dimensional array, 'data[:,3]' (zero based).
+        None: columns that bear the channels' own names. {"time": None} ignores a time column.
+    units : mapping of str to str or float, optional
+        Channel -> unit ("rpm", "deg/s", "counts", "%", "A", "ms", ...) or the factor to SI as a number.
+        What is not given is taken from the file (`w [rpm]`, or a line of units below the names), else it is SI.
+        Time stamps that are a date name their unit by their size.
+    dt : float, optional
+        Sample time [s].
+        None: from the column named for time, or one called as time is (time, t, __time, timestamp, /topic/header/stamp, ...),
+        which must be regular, or what the file states. With dt and such a column, both must agree within 1 %.
+    name : str, optional
+        Name of the record; None: the file's name without its ending.
+    counts_per_turn : float, optional
+        Counts of the encoder in a turn [1], for the unit counts.
+    torque_constant : float, optional
+        Torque of a current [N m/A], for the unit A.
+    rated_torque : float, optional
+        Torque that is 100 % [N m], for the unit %.
+    torque_per_volt : float, optional
+        Torque of a voltage [N m/V], for the unit V.
+    velocity_cutoff_hz : float, optional
+        Corner [Hz] of `differentiate`, which gives the velocity of a log that has a position and none.
+        None, the plain difference, suits identification: a velocity that is filtered alone biases the inertia of a fast axis.
+    decimate : int
+        10: every tenth sample behind a low-pass of linear phase whose delay is compensated, see `Record.decimate`.
+        The log is decimated as it is read, whatever its length.
+    resample : float, optional
+        Sample time [s] to which channels with irregular time stamps, or of several rates, are interpolated linearly.
+        Never done unasked.
+    gear_ratio : float, optional
+        Turns of the motor per turn of the load [1].
+    load_side : str or sequence of str
+        Channels that were measured behind the gear: their motion is multiplied by `gear_ratio`, their torque divided.
+    measured : bool
+        False: a log without velocity and position will do, as a proposed command that is to be simulated; its velocity is 0 then.
+    torque_is : {"commanded", "measured"}, optional
+        Whether the torque is the controller's command, or a measured current times a constant, with the sensor's noise.
+        None: measured where the column's name says so (`Actual current`, `I_q`, `M_ist`, `torque feedback`), else commanded.
+        The record's repr shows which it is.
+    delimiter : str, optional
+        Of a text table, where it cannot be found out: a character, "tab" or "space".
+    decimal : {".", ","}, optional
+        Decimal mark of a text table, where it cannot be found out.
+    skip : int, optional
+        Lines to leave out at the top of a text table, where this cannot be found out.
+    encoding : str, optional
+        Encoding of a text table as Python calls it, where it cannot be found out.
+
+    Returns
+    -------
+    Record
+        The channels in SI units.
+
+    Raises
+    ------
+    ReadError
+        Where the log cannot be read as asked; with file, line, and remedy.
+    RecordError
+        Where its values make no record; with index and remedy.
+
+    See Also
+    --------
+    columns : What a log holds, before its columns are named.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> with open("run1.csv", "w") as log:
+    ...     print("t [ms];w_ref [rpm];w [rpm]", file=log)
+    ...     for i in range(30):
+    ...         print(f"{i};{60 + i};{i}", file=log)
+    >>> ga.read("run1.csv", columns={"time": "t", "command": "w_ref", "velocity": "w"})
+    Record('run1', 30 samples, dt=0.001 s, 0.03 s; command 6.283..9.32, velocity 0..3.037)
     """
     wanted = Wanted(
         columns=columns,
@@ -160,10 +207,36 @@ def read_columns(
     skip: int | None = None,
     encoding: str | None = None,
 ) -> dict[str, NDArray[np.float64]]:
-    """What a log file holds: column name -> values (n,), in the file's own units and order.
+    """Read all columns of a log as they stand in it, in its own units and order.
 
-    Every key can be used in the `columns` of read. Columns without a name, or with one that others have too,
-    end in #k, their number counted from 0. Cells that are no number are NaN; complex columns are left out.
+    Parameters
+    ----------
+    path : str, path-like or pandas.DataFrame
+        The log, as `read` takes it.
+    delimiter, decimal, skip, encoding : optional
+        Of a text table, as `read` takes them.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n,)
+        Column -> values. Every key can be used in the `columns` of `read`.
+        Columns without a name, or with one that others have too, end in #k, their number counted from 0.
+        Cells that are no number are NaN; complex columns are left out.
+
+    Raises
+    ------
+    ReadError
+        Where the log cannot be read.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> with open("gains.csv", "w") as log:
+    ...     print("kp,ki", file=log)
+    ...     print("0.5,5", file=log)
+    ...     print("0.6,6", file=log)
+    >>> ga.read_columns("gains.csv")["ki"]
+    array([5., 6.])
     """
     with open_log(path, TextOptions(delimiter, decimal, skip, encoding)) as table:
         real = [column for column in table.columns if column.values.dtype.kind != "c"]

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gaident.arguments import arg
 from gaident.checks import one_of
-from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number
+from gaident.data.record_checks import equally_long, sample_time, torque_kind
+from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel
 from gaident.data.signals.decimation import decimated, factor_of
-from gaident.data.torque_kind import COMMANDED, MEASURED, TORQUE_KINDS
+from gaident.data.torque_kind import COMMANDED, MEASURED
 from gaident.errors import RecordError, check_schema
 from gaident.files import write_whole
 from gaident.providers import provided
@@ -40,21 +40,37 @@ _TIME_SLACK = 1e-6
 class Record:
     """One measured run, sampled every `dt` seconds; immutable.
 
-    dt        sample time [s]
-    command   velocity command r [rad/s], shape (n,), or None
-    velocity  measured motor velocity w [rad/s], shape (n,): the output that models are judged on
-    torque    motor torque u [N m], shape (n,), or None
-    position  measured motor angle theta [rad], shape (n,), or None
-    name      what reports call it
-    torque_is what the torque is: "commanded", as the controller issued it, before the actuator's limits, dead band, delay and
-              lag; or "measured", a measured current times a constant: behind the actuator, with the sensor's noise on it
+    The arrays are copied once to read-only float64; yours are never changed.
+    `rec[a:b]` and `rec.between` share memory with the record they were cut from; their time starts at 0 again.
 
-    At least one of command and torque is given, and n >= 20. A linear axis has m, m/s, N in the same places.
-    The arrays are copied once to read-only float64; yours are never changed. `rec[a:b]` and `rec.between`
-    share memory with the record they were cut from; their time starts at 0 again.
+    Parameters
+    ----------
+    dt : float
+        Sample time [s], > 0.
+    command : array_like, shape (n,), optional
+        Velocity command r [rad/s]. At least one of `command` and `torque` is given, and n >= 20.
+    velocity : array_like, shape (n,)
+        Measured motor velocity w [rad/s], the output that models are judged on.
+    torque : array_like, shape (n,), optional
+        Motor torque u [N m].
+    position : array_like, shape (n,), optional
+        Measured motor angle theta [rad].
+    name : str
+        What reports call the record.
+    torque_is : {"commanded", "measured"}
+        What the torque is.
+        "commanded": as the controller issued it, before the actuator's limits, dead band, delay and lag.
+        "measured": a measured current times a constant, behind the actuator, with the sensor's noise on it.
 
-    Raises RecordError for NaN, infinities, unequal lengths, fewer than 20 samples, dt <= 0, for arrays
-    that are not one-dimensional real numbers, and for a torque_is that is none of the two, or "measured" without a torque.
+    Raises
+    ------
+    RecordError
+        NaN, infinities, unequal lengths, fewer than 20 samples, dt <= 0, arrays that are not one-dimensional real numbers,
+        another `torque_is`, or "measured" without a torque.
+
+    Notes
+    -----
+    A linear axis has m, m/s and N in the same places.
 
     Examples
     --------
@@ -64,8 +80,8 @@ class Record:
     >>> rec = ga.Record(1e-3, velocity=np.sin(0.1 * n), torque=np.cos(0.1 * n), torque_is="measured", name="run 1")
     >>> rec
     Record('run 1', 100 samples, dt=0.001 s, 0.1 s; velocity -0.9999..0.9996, torque -0.9997..1 (measured))
-    >>> rec.with_channels(velocity=rec.velocity + 1.0).torque_is
-    'measured'
+    >>> len(rec[20:60]), len(rec.between(0.0, 0.05))
+    (40, 50)
     """
 
     dt: float
@@ -98,8 +114,8 @@ class Record:
             raise RecordError(f"name={name!r} is no text; give a str")
         given = {"command": command, "velocity": velocity, "torque": torque, "position": position}
         channels = {key: None if values is None else channel(values, key) for key, values in given.items()}
-        kind = _torque_kind(torque_is, channels["torque"])
-        self._fill(_sample_time(dt), _equally_long(channels), str(name), kind)
+        kind = torque_kind(torque_is, channels["torque"])
+        self._fill(sample_time(dt), equally_long(channels), str(name), kind)
 
     def _fill(self, dt: float, channels: Mapping[str, NDArray[np.float64] | None], name: str, torque_is: str) -> None:
         """Set the fields of this frozen object, unchecked."""
@@ -107,13 +123,37 @@ class Record:
             object.__setattr__(self, key, value)
 
     def with_channels(self, *, dt: float | None = None, torque_is: str | None = None, **changed: ArrayLike | None) -> Record:
-        """The record with other channels and all else as it is: `rec.with_channels(velocity=w)`.
+        """Return the record with other channels and all else as it is.
 
-        changed  channel -> values, shape (n,), or None to leave the channel out; where the length changes, give all channels
-        dt       another sample time [s]; None: as it is. torque_is: what another torque is; None: as it is
+        Channels that are not named share memory with this record.
+        A record that has lost its torque is "commanded", as one that never had any.
 
-        Channels that are not named share memory with this record. A record that has lost its torque is "commanded", as one
-        that never had any. Raises RecordError as the constructor does, and for what is no channel.
+        Parameters
+        ----------
+        dt : float, optional
+            Another sample time [s].
+        torque_is : {"commanded", "measured"}, optional
+            What another torque is.
+        **changed : array_like, shape (n,), or None
+            Channel -> values, or None to leave the channel out. Where the length changes, give all channels.
+
+        Returns
+        -------
+        Record
+            A new record; this one stays as it is.
+
+        Raises
+        ------
+        RecordError
+            As the constructor does, and for a name that is no channel.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import gaident as ga
+        >>> rec = ga.Record(1e-3, velocity=np.zeros(50), torque=np.ones(50))
+        >>> float(rec.with_channels(velocity=rec.velocity + 1.0).velocity[0])
+        1.0
         """
         for key in changed:
             one_of(key, "with_channels: the channel", CHANNELS, RecordError)
@@ -126,14 +166,14 @@ class Record:
                 "the motor did and what drove it"
             )
         made = object.__new__(type(self))
-        sample_time = self.dt if dt is None else _sample_time(dt)
+        period = self.dt if dt is None else sample_time(dt)
         kept = COMMANDED if channels["torque"] is None else self.torque_is
-        kind = kept if torque_is is None else _torque_kind(torque_is, channels["torque"])
-        made._fill(sample_time, _equally_long(channels), self.name, kind)
+        kind = kept if torque_is is None else torque_kind(torque_is, channels["torque"])
+        made._fill(period, equally_long(channels), self.name, kind)
         return made
 
     def channels(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
-        """The channels that are there, as (name, array (n,)), in the order of the arguments."""
+        """Yield the channels that are there, as (name, array (n,)), in the order of the arguments."""
         for key in CHANNELS:
             values = getattr(self, key)
             if values is not None:
@@ -152,15 +192,15 @@ class Record:
 
     @property
     def duration(self) -> float:
-        """n*dt [s]: each sample stands for one sample time, between(0, duration) is the whole record."""
+        """Duration n*dt [s]: each sample stands for one sample time, `between(0, duration)` is the whole record."""
         return len(self) * self.dt
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the sample time, the channels and a torque that is measured, hexadecimal; the name does not count.
+        """SHA-256 of the data, hexadecimal: of the sample time, the channels, and "measured" for such a torque.
 
-        Equal data give equal digests on every machine: a canonical order for records, a fingerprint for
-        reports.
+        Equal data give equal digests on every machine; the name does not count.
+        It gives records an order that does not depend on how they were passed, and reports a fingerprint.
         """
         sha = hashlib.sha256(f"gaident record 1 {self.dt.hex()} {len(self)}".encode())
         for key, values in self.channels():
@@ -190,7 +230,23 @@ class Record:
         return self._cut(start, stop, text)
 
     def between(self, t0: float, t1: float) -> Record:
-        """The samples with t0 <= time < t1 [s], t from the record's start, bounds beyond its ends allowed."""
+        """Return the samples with t0 <= time < t1.
+
+        Parameters
+        ----------
+        t0, t1 : float
+            Bounds [s] from the record's start; bounds beyond its ends are allowed.
+
+        Returns
+        -------
+        Record
+            The part, sharing memory with this record; its time starts at 0.
+
+        Raises
+        ------
+        RecordError
+            Where a bound is no number, t0 >= t1, or fewer than 20 samples are left.
+        """
         for key, value in (("t0", t0), ("t1", t1)):
             if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
                 raise RecordError(f"between({t0!r}, {t1!r}): {key} is no number; give seconds")
@@ -202,12 +258,28 @@ class Record:
         return self._cut(start, stop, f"between({t0!r}, {t1!r})")
 
     def decimate(self, factor: int) -> Record:
-        """Every `factor`-th sample behind a low-pass: linear phase, its delay compensated, 50 * factor + 1 taps.
+        """Return every `factor`-th sample behind a low-pass of linear phase, whose delay is compensated.
 
-        Up to 80 % of the new Nyquist frequency 1/(2 factor dt) all channels pass to within 0.03 %, in phase; from that
-        frequency on they are damped by 72 dB and more. What a digital controller does between the new samples is no
-        longer in the record: identify a decimated record in open loop, or with a continuous controller. At least 20
-        samples remain. Raises RecordError.
+        The filter has 50 * factor + 1 taps.
+        Up to 80 % of the new Nyquist frequency 1/(2 factor dt) all channels pass to within 0.03 %, in phase; from that frequency
+        on they are damped by 72 dB and more.
+        What a digital controller does between the new samples is no longer in the record.
+        Identify a decimated record in open loop, or with a continuous controller.
+
+        Parameters
+        ----------
+        factor : int
+            Samples that become one, >= 1.
+
+        Returns
+        -------
+        Record
+            The record with the sample time factor*dt and ceil(n/factor) samples.
+
+        Raises
+        ------
+        RecordError
+            Where the factor is no whole number >= 1, or fewer than 20 samples are left.
         """
         factor = factor_of(factor, "decimate", "({!r})")
         count = -(-len(self) // factor)
@@ -233,14 +305,22 @@ class Record:
         return part
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON: dt, name, torque_is, and the channels as lists, None for those that are not there."""
+        """Return plain data for JSON: dt, name, torque_is, and the channels as lists, None for those that are not there."""
         held = {key: None if (v := getattr(self, key)) is None else v.tolist() for key in CHANNELS}
         about = {"name": self.name, "dt": self.dt, "torque_is": self.torque_is}
         return {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **about, **held}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Record:
-        """The inverse of to_dict. Raises RecordError, and GaidentError where the data are something else or of a newer schema."""
+        """Return the record of what `to_dict` gave.
+
+        Raises
+        ------
+        RecordError
+            Where a key is missing, or the data make no record.
+        GaidentError
+            Where the data are something else or of a newer schema.
+        """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
         missing = [key for key in ("dt", "name", *CHANNELS) if key not in data]
         if missing:
@@ -250,7 +330,7 @@ class Record:
         return cls(data["dt"], command, velocity, torque, position, data["name"], torque_is=kind)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes JSON, all digits, for `gaident.load`; the file appears whole or not at all."""
+        """Write the record as JSON, all digits, for `gaident.load`; the file appears whole or not at all."""
         write_whole(path, json.dumps({**self.to_dict(), "gaident_version": version()}).encode())
 
     def __eq__(self, other: object) -> bool:
@@ -282,30 +362,6 @@ class Record:
 
 def _rebuilt(kind: type[Record], held: dict[str, Any]) -> Record:
     return kind(**held)
-
-
-def _sample_time(dt: object) -> float:
-    return positive_number(dt, "dt", "s", f"give the sample time in seconds, for example {arg('dt', '1e-3')}")
-
-
-def _torque_kind(torque_is: object, torque: NDArray[np.float64] | None) -> str:
-    """What the torque is, once it is one of the two and there is a torque. Raises RecordError."""
-    kind = one_of(torque_is, "torque_is", TORQUE_KINDS, RecordError)
-    if kind != COMMANDED and torque is None:
-        raise RecordError(f"torque_is={kind!r}, but the record has no torque; give torque=, or leave torque_is out")
-    return kind
-
-
-def _equally_long(channels: dict[str, NDArray[np.float64] | None]) -> dict[str, NDArray[np.float64] | None]:
-    """The channels, once they are. Raises RecordError."""
-    lengths = {key: len(values) for key, values in channels.items() if values is not None}
-    if len(set(lengths.values())) > 1:
-        listed = ", ".join(f"{key} {length}" for key, length in lengths.items())
-        raise RecordError(
-            f"the channels have unequal lengths ({listed} samples); cut them to the same samples, "
-            "or, where they come from two clocks, bring two records together with align"
-        )
-    return channels
 
 
 def _bound(value: object) -> str:

@@ -18,19 +18,41 @@ _SHORTEST_EXTENSION = 15
 
 
 def differentiate(position: ArrayLike, dt: float, cutoff_hz: float | None = None) -> NDArray[np.float64]:
-    """Velocity from position by a zero-phase low-pass and central differences.
+    """Return the velocity of a position: a zero-phase low-pass, then central differences.
 
         w(n) = (x(n+1) - x(n-1)) / (2 dt),   x = position, low-pass filtered if cutoff_hz is given
 
-    position   [rad] or [m], shape (n,), n >= 20
-    dt         sample time [s]
-    cutoff_hz  corner of a Butterworth filter of order 4 [Hz], run forward and backward (no phase, -6 dB at
-               the corner), below the Nyquist frequency; None: no filter
-    returns    velocity [rad/s] or [m/s], shape (n,); the two ends are one-sided differences
+    Parameters
+    ----------
+    position : array_like, shape (n,)
+        Position [rad] or [m], n >= 20.
+    dt : float
+        Sample time [s].
+    cutoff_hz : float, optional
+        Corner of a Butterworth filter of order 4 [Hz], below the Nyquist frequency 1/(2 dt).
+        It runs forward and backward: no phase, -6 dB at the corner. None: no filter.
 
-    Raises RecordError for a position that Record would refuse, dt <= 0 and a cutoff not below 1/(2 dt).
-    Source: the inverse-model practice of A. Janot, M. Gautier, M. Brunot, "Data Set and Reference Models of
-    EMPS", 2019.
+    Returns
+    -------
+    ndarray, shape (n,)
+        Velocity [rad/s] or [m/s]; the two ends are one-sided differences.
+
+    Raises
+    ------
+    RecordError
+        For a position that `Record` would refuse, dt <= 0, and a cutoff not below 1/(2 dt).
+
+    References
+    ----------
+    A. Janot, M. Gautier, M. Brunot, "Data Set and Reference Models of EMPS", 2019 (filter and differences of its inverse model).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> w = ga.differentiate(0.02 * np.arange(100), dt=1e-3)
+    >>> bool(np.allclose(w, 20.0))
+    True
     """
     x = channel(position, "position")
     dt = positive_number(dt, "dt", "s", f"give the sample time in seconds, for example {arg('dt', '1e-3')}")
