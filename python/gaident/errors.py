@@ -23,9 +23,26 @@ __all__ = [
 
 
 class GaidentError(ValueError):
-    """Base of everything gaident raises on wrong use.
+    """Base of everything gaident raises on wrong use; a ValueError.
 
-    marked: the message with its references to arguments, to be built into another one; parts: texts and `Argument`s.
+    Parameters
+    ----------
+    message : object
+        The message; it may hold references to arguments, see gaident/arguments.py.
+
+    Attributes
+    ----------
+    marked : str
+        The message with its references to arguments, to be built into another one.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> try:
+    ...     ga.PI(kp=-1.0, ki=5.0)
+    ... except ga.GaidentError as error:
+    ...     print(str(error)[:24])
+    kp is -1: give a gain >=
     """
 
     def __init__(self, message: object = "") -> None:
@@ -34,7 +51,7 @@ class GaidentError(ValueError):
 
     @property
     def parts(self) -> tuple[str | Argument, ...]:
-        """The message as texts and arguments."""
+        """The message as texts and `Argument`s."""
         return parts_of(self.marked)
 
     def __reduce__(self) -> tuple[type[GaidentError], tuple[str]]:
@@ -42,7 +59,7 @@ class GaidentError(ValueError):
 
 
 def check_schema(data: Mapping[str, object], schema: str, version: int) -> None:
-    """Raises GaidentError where saved data are not of this schema and version, saying which they are."""
+    """Raise GaidentError where saved data are not of this schema and version; says which they are."""
     if data.get("schema") != schema:
         raise GaidentError(f"schema is {data.get('schema')!r}: this is not a saved {schema.removeprefix('gaident/')}")
     found = data.get("schema_version")

@@ -17,7 +17,8 @@ import gaident as ga
 from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.diagnosis.explain.wording import evidence_of
 from gaident.errors import GaidentError, RecordError, SettingsError
-from gaident.results.diagnosis import Finding, Fitness
+from gaident.results.diagnosis import Fitness
+from gaident.results.finding import Finding
 from gaident.show.wording import certainty, sentence
 
 GOLDEN = Path(__file__).parent / "golden" / "diagnosis.txt"

@@ -20,17 +20,38 @@ _NOT_GIVEN = float("nan")  # told from a given nan by identity
 class PI:
     """PI velocity controller, C(s) = kp + ki/s.
 
-    kp                proportional gain [N m s/rad], >= 0
-    ki                integral gain [N m/rad], >= 0; kp and ki are not both zero
-    loop              "sampled": the digital controller
-                          I(n) = I(n-1) + ki dt (e(n) + e(n-1))/2,  u(n) = kp e(n) + I(n),  e(-1) = 0,
-                      whose torque is held until the next sample (zero-order hold, plant discretised exactly);
-                      "continuous": controller and plant by the bilinear transformation, the algebraic loop
-                      between them solved exactly, as in the paper
-    torque_limit      u is clamped to +-torque_limit [N m]; None: no limit
-    integrator_limit  I is clamped to +-integrator_limit [N m] after each update; None: no limit
+    Parameters
+    ----------
+    kp : float
+        Proportional gain [N m s/rad], >= 0; kp and ki are not both zero.
+    ki : float
+        Integral gain [N m/rad], >= 0.
+    loop : {"sampled", "continuous"}
+        "sampled": the digital controller
+        I(n) = I(n-1) + ki dt (e(n) + e(n-1))/2, u(n) = kp e(n) + I(n), e(-1) = 0, with e = command - velocity.
+        Its torque is held until the next sample (zero-order hold, plant discretised exactly).
+        "continuous": controller and plant by the bilinear transformation, the algebraic loop between them solved exactly, as in
+        the paper.
+    torque_limit : float, optional
+        u is clamped to +-torque_limit [N m]; None: no limit.
+    integrator_limit : float, optional
+        I is clamped to +-integrator_limit [N m] after each update; None: no limit.
 
-    For a linear axis read N for N m and m for rad. Raises ControllerError.
+    Raises
+    ------
+    ControllerError
+        For a missing or negative gain, two gains of 0, another loop, and a limit that is not above 0.
+
+    Notes
+    -----
+    For a linear axis read N for N m and m for rad.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> controller = ga.PI(kp=0.0232, ki=1.367, torque_limit=2.4)
+    >>> controller.limited
+    True
     """
 
     kp: float = _NOT_GIVEN
@@ -75,18 +96,18 @@ class PI:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """(torque limit, integrator limit) [N m], infinity for none: as the core takes them."""
+        """(Torque limit, integrator limit) [N m], infinity for none: as the core takes them."""
         torque = math.inf if self.torque_limit is None else self.torque_limit
         integrator = math.inf if self.integrator_limit is None else self.integrator_limit
         return torque, integrator
 
     def to_dict(self) -> dict[str, float | str | None]:
-        """The fields as a dictionary for JSON or TOML; `from_dict` is its inverse."""
+        """Return the fields as a dictionary for JSON or TOML."""
         return asdict(self)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, object]) -> PI:
-        """A controller from the dictionary that `to_dict` gives; keys with a default may be left out."""
+        """Return the controller of what `to_dict` gave; keys with a default may be left out. Raises ControllerError."""
         allowed = ("kp", "ki", "loop", "torque_limit", "integrator_limit")
         values: dict[str, Any] = known_keys(data, "the controller", allowed, ("kp", "ki"), ControllerError)
         return cls(**values)

@@ -25,13 +25,32 @@ __all__ = ["ColumnInfo", "Listing", "columns", "printable"]
 class ColumnInfo:
     """One column of a log.
 
-    name         what the file calls it, as the `columns` of read take it; names: other names it answers to
-    unit         as the file says, None if it does not
-    samples      number of values; lowest, highest: their range in the file's unit, None where there is no number
-    sample_time  [s], None where nothing tells it or the time stamps are irregular
-    is_time      whether it is taken for the time of the others; rises_evenly: whether it could be
-    note         what stands in the way of its use, "" if nothing does
-    torque_is    "commanded" or "measured" where its name speaks of a torque or current and says which, else None
+    Attributes
+    ----------
+    name : str
+        What the file calls it, as the `columns` of `read` take it.
+    names : tuple of str
+        Other names that `read` takes for it.
+    unit : str or None
+        Unit as the file says it; None if it does not.
+    samples : int
+        Number of values.
+    lowest, highest : float or None
+        Range of the values in the file's unit; None where there is no number.
+    sample_time : float or None
+        Sample time [s]; None where nothing tells it or the time stamps are irregular.
+    is_time : bool
+        Whether it is taken for the time of the others.
+    rises_evenly : bool
+        Whether it could be a time.
+    note : str
+        What stands in the way of its use; "" if nothing does.
+    torque_is : {"commanded", "measured"} or None
+        What kind of torque it is, where its name speaks of a torque or current and says which.
+
+    See Also
+    --------
+    columns : Lists them, with an example.
     """
 
     name: str
@@ -49,7 +68,23 @@ class ColumnInfo:
 
 @dataclass(frozen=True)
 class Listing:
-    """A log's format and columns; `str()` is a table of them. others: what it holds besides, no columns of numbers."""
+    """Format and columns of a log; `str()` is a table of them.
+
+    Attributes
+    ----------
+    path : str
+        The log.
+    form : str
+        Its format.
+    columns : tuple of ColumnInfo
+        Its columns of numbers.
+    others : tuple of str
+        What it holds besides.
+
+    See Also
+    --------
+    columns : Makes it, with an example.
+    """
 
     path: str
     form: str
@@ -57,7 +92,7 @@ class Listing:
     others: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """Return plain data for JSON."""
         return {"schema": "gaident/columns", "schema_version": 1, **asdict(self)}
 
     def __str__(self) -> str:

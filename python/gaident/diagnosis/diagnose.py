@@ -18,10 +18,12 @@ from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
 from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, TWO_LEVELS, conditional_classes
 from gaident.diagnosis.mechanics import mechanics_of, moved
+from gaident.diagnosis.note import Note
 from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.records.arguments import ProgressCallback, checked, noise_std_of, records_of
 from gaident.diagnosis.records.folded import ADVICE, FOLDED, folded
 from gaident.diagnosis.records.hygiene import cleaned, outliers, quantisation
+from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection.attribution import only_describes, simplified
 from gaident.diagnosis.selection.dependence import dependence
 from gaident.diagnosis.selection.offset import offset_of
@@ -29,19 +31,17 @@ from gaident.diagnosis.selection.rivals import Rival
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.objective import Fit, Objective
-from gaident.estimation.term import Scales
 from gaident.estimation.uncertainty import estimates_of
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
 from gaident.models.simulate import simulate
-from gaident.results.diagnosis import Diagnosis, Finding
+from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
+from gaident.results.finding import Finding
 from gaident.results.identification import Identification
 from gaident.version import version
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
-
-Vector = NDArray[np.float64]
 
 
 def diagnose(
@@ -54,24 +54,60 @@ def diagnose(
     seed: int = 0,
     progress: ProgressCallback | None = None,
 ) -> Diagnosis:
-    """Shows what the model of an axis gets wrong, names the physical cause where the data allow it, and measures the gain.
+    """Show what the model of an axis gets wrong, name the physical cause where the data allow it, and measure the gain.
 
-    rec: a Record or a list. controller: the velocity loop's PI; None: open loop, the record's torque drives the model.
-    identification: what identify() found; without it, it is run first. validation: Record or list that no fit sees; without it
-        the last 30 % of each record are held out where they are long enough (see `held_out`).
-    noise: standard deviation of the velocity noise [rad/s], or a Record at standstill; None: from the record itself.
-    bootstrap: simulated records without any effect to calibrate the p-value of the first finding; 0: none.
-    progress: called now and then with (fraction done, message).
-
-    The method: a beam search over mechanisms with effects of `gaident.effects.table()`, all refitted together on whitened errors
-    of a torque-driven simulation, or on plain ones where these are no stationary noise, decided by BIC; rivals within 10 units
-    and equivalent effects make a finding ambiguous; what no effect explains is reported by its driver and not named.
+    A beam search over mechanisms with effects of `gaident.effects.table()`, all refitted together and decided by BIC.
+    The errors are whitened ones of a torque-driven simulation, or plain ones where these are no stationary noise.
+    Rivals within 10 units and equivalent effects make a finding ambiguous.
+    What no effect explains is reported by its driver and not named.
     See docs/diagnosis.md.
 
-    Raises GaidentError (a ValueError) that names the argument, its value and the remedy.
+    Parameters
+    ----------
+    rec : Record or sequence of Record
+        The data.
+    controller : PI, optional
+        The velocity loop; None: open loop, the record's torque drives the model.
+    identification : Identification, optional
+        What `identify` found; None: it is run first.
+    validation : Record or sequence of Record, optional
+        Records that no fit sees.
+        None: the last 30 % of each record are held out where they are long enough, see `Diagnosis.held_out`.
+    noise : float or Record, optional
+        Standard deviation of the velocity noise [rad/s], or a Record at standstill; None: from the record itself.
+    bootstrap : int
+        Simulated records without any effect that calibrate the p-value of the first finding; 0: none.
+    seed : int
+        Seed of the random numbers; the same seed gives the same result.
+    progress : callable, optional
+        Called now and then with (fraction done, message), see `gaident.progress`.
+
+    Returns
+    -------
+    Diagnosis
+        Verdict, findings, extended model, gain, and the experiment to make next.
+
+    Raises
+    ------
+    GaidentError
+        Names the argument, its value and the remedy.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> controller = ga.PI(kp=0.5, ki=5.0)
+    >>> command = np.repeat([20.0, -30.0, 10.0, -5.0], 100)
+    >>> noise = 0.02 * np.random.default_rng(1).standard_normal(400)
+    >>> drive = ga.OneMass(J=0.01, D=0.05).model().with_effect("coulomb_friction", torque=0.3)
+    >>> run = ga.run(drive, ga.Record(1e-3, command=command - noise, velocity=noise), controller)
+    >>> rec = ga.Record(1e-3, command=command, velocity=run.velocity + noise, torque=run.torque)
+    >>> dia = ga.diagnose(rec, controller, seed=1)
+    >>> dia.verdict, [(f.effect, round(f.parameters["torque"].value, 2)) for f in dia.causes]
+    ('explained', [('coulomb_friction', 0.3)])
     """
     began = time.perf_counter()
-    note = _Note(progress)
+    note = Note(progress)
     records = records_of(rec, "rec")
     held = () if validation is None else records_of(validation, "validation")
     checked(records, held, controller, identification, bootstrap, seed, progress)
@@ -97,18 +133,6 @@ def diagnose(
     return result
 
 
-class _Note:
-    """Progress that goes on by itself: each message without a fraction takes a fifth of what is left."""
-
-    def __init__(self, callback: ProgressCallback | None) -> None:
-        self.callback, self.fraction = callback, 0.0
-
-    def __call__(self, fraction: float | None, message: str) -> None:
-        self.fraction = fraction if fraction is not None else self.fraction + 0.2 * (1.0 - self.fraction)
-        if self.callback is not None:
-            self.callback(min(self.fraction, 1.0), message)
-
-
 @dataclass
 class _Work:
     """One diagnosis on its way."""
@@ -118,7 +142,7 @@ class _Work:
     logged: AsLogged
     idn: Identification
     noise: float | None
-    note: _Note
+    note: Note
 
     def __post_init__(self) -> None:
         self.controller = self.logged.controller
@@ -132,7 +156,7 @@ class _Work:
         self.step = quantisation(self.records)
         read = as_read(self.records, clean, self.controller)
         data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step)
-        self.scales = _scales(data)
+        self.scales = scales_of(data)
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.logged.replays)
         self.notes += notes
         # Limits that the log shows act in every loop that is closed for a fit.
@@ -371,27 +395,3 @@ class _Work:
         after = self.final.parameters.base_values(self.final.x[None, :])[0]
         coefficients = {n: (float(b), float(a)) for n, b, a in zip(names, before, after, strict=False)}
         return coefficients | moved(self.base, self.final)
-
-
-def _scales(data: DataSet) -> Scales:
-    w, u, angle = data.velocity, data.torque, data.angle
-    command, dt = data.command, data.dt
-    borders = np.cumsum(data.lengths)[:-1]
-    steps = 0.0
-    if command is not None:
-        steps = max(float(np.abs(np.diff(part, prepend=0.0)).max()) for part in np.split(command, borders)) / dt
-    integral = float(np.abs(u).max())
-    torque = max(float(np.abs(u).max()), 1e-300)
-    return Scales(
-        dt=dt,
-        duration=max(r.duration for r in data.records),
-        speed=max(float(np.abs(w).max()), 1e-300),
-        torque=torque,
-        acceleration=steps or float("inf"),
-        travel=max(float(np.ptp(part)) for part in np.split(angle, borders)),
-        friction=0.02 * torque,
-        stiffness=float("nan"),
-        resonance=float("nan"),
-        two_masses=False,
-        integral=integral,
-    )

@@ -6,19 +6,19 @@ import math
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
-from gaident.arguments import A_CONTROLLER, COMMAND, CONTINUOUS_LOOP, NO_CONTROLLER, TORQUE, arg
 from gaident.control import core
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.errors import RecordError, SettingsError, SpaceError
+from gaident.errors import SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
+from gaident.identification.arguments import check_arithmetic, check_numbers, checked_records, checked_space, distinct
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.identification.notes import record_notes, warnings_of
 from gaident.identification.parts import search_parts
@@ -29,8 +29,9 @@ from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
 from gaident.models.starts import noise_std, starts_moving
 from gaident.results.adequacy import Adequacy
-from gaident.results.identification import Identification, Rival, Structure, TrialOutcome
+from gaident.results.identification import Identification
 from gaident.results.settings import Settings
+from gaident.results.structures import Rival, Structure, TrialOutcome
 from gaident.version import version
 
 __all__ = ["identify"]
@@ -54,43 +55,77 @@ def identify(
     workers: int | None = None,
     progress: ProgressCallback | None = None,
 ) -> Identification:
-    """Finds structure (p, q) and parameters of the model behind one or several records.
+    """Find structure (p, q) and parameters of the model behind one or several records.
 
-    rec: a Record or a list (one model for all, each with its own initial state). controller: the velocity loop's PI, driven by
-    the
-        record's command; None: open loop, the record's torque drives the model.
-    space: search ranges; None: derived from the data, see `Identification.space`. settings: Settings() unless given.
-    trials: independent genetic runs, the best of each structure is kept. workers: threads, None: as many as the machine has;
-        the result does not depend on it, nor on the order of records.
-    progress: called now and then with (fraction done, message). Ctrl-C raises KeyboardInterrupt within 0.2 s.
+    A genetic search per structure with local fits; the structures are compared by the BIC of whitened errors.
+    See docs/identification.md.
 
-    Raises GaidentError (a ValueError) that names the argument, its value and the remedy. Bad luck is data: see `warnings`,
-    `adequacy`, `rivals` and the flags of `parameters`.
+    Parameters
+    ----------
+    rec : Record or sequence of Record
+        The data; one model for all, each record with its own initial state.
+    controller : PI, optional
+        The velocity loop, driven by the record's command; None: open loop, the record's torque drives the model.
+    space : SearchSpace, optional
+        Search ranges; None: derived from the data, see `Identification.space`.
+    settings : Settings, optional
+        Settings of the search; None: `Settings()`.
+    trials : int
+        Independent genetic runs; the best of each structure is kept.
+    seed : int
+        Seed of the random numbers; the same seed gives the same result.
+    workers : int, optional
+        Threads; None: as many as the machine has. The result does not depend on it, nor on the order of records.
+    progress : callable, optional
+        Called now and then with (fraction done, message), see `gaident.progress`. Ctrl-C raises KeyboardInterrupt within 0.2 s.
+
+    Returns
+    -------
+    Identification
+        Model, parameters with standard deviations, and what they are worth.
+        Bad luck is data: see `warnings`, `adequacy`, `rivals` and the flags of `parameters`.
+
+    Raises
+    ------
+    GaidentError
+        Names the argument, its value and the remedy.
+
+    See Also
+    --------
+    diagnose : What the model misses, and why.
+
+    References
+    ----------
+    The paper of docs/paper.md (the genetic search).
+    G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978 (the BIC).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> torque = np.repeat([1.0, -1.0, 0.5, -0.5], 100)
+    >>> noise = 0.02 * np.random.default_rng(1).standard_normal(400)
+    >>> drive = ga.OneMass(J=0.01, D=0.05)
+    >>> still = ga.Record(1e-3, torque=torque, velocity=0.0 * torque)
+    >>> rec = ga.Record(1e-3, torque=torque, velocity=ga.simulate(drive, still) + noise)
+    >>> idn = ga.identify(rec, seed=1)
+    >>> idn.p, idn.q, round(idn.mechanics.J, 3), round(idn.mechanics.D, 2), idn.falsified
+    (1, 0, 0.01, 0.05, False)
     """
     began = time.perf_counter()
-    given = _checked_records(rec, controller)
+    given = checked_records(rec, controller)
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
-    for name, value, low, high in (("trials", trials, 1, 10**6), ("seed", seed, 0, 2**63 - 1), ("workers", workers, 1, 1024)):
-        if value is None and name == "workers":
-            continue
-        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
-            raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
-    if settings.in_drive and (
-        controller is None or controller.loop != "continuous" or any(map(math.isfinite, controller.limits))
-    ):
-        raise SettingsError(
-            f"settings.arithmetic is {settings.arithmetic!r}: a drive's search knows the paper's loop only, continuous and "
-            'without limits; give such a controller, or arithmetic="double"'
-        )
+    check_numbers(trials, seed, workers)
+    check_arithmetic(settings, controller)
     threads = _processors() if workers is None else int(workers)
-    digests = _distinct(given)
+    digests = distinct(given)
     # Sums must not depend on the order given.
     order = sorted(range(len(given)), key=lambda i: (digests[i], given[i].name))
     records, digests = [given[i] for i in order], [digests[i] for i in order]
     derived = space is None
-    space = _checked_space(derive_space(records, controller) if space is None else space, controller)
+    space = checked_space(derive_space(records, controller) if space is None else space, controller)
 
     moving = [
         settings.initial_state == "free" or (settings.initial_state == "auto" and starts_moving(r, controller)) for r in records
@@ -332,58 +367,11 @@ class _Work:
         )
 
 
-def _checked_records(rec: Record | Sequence[Record], controller: PI | None) -> list[Record]:
-    records = [rec] if isinstance(rec, Record) else list(rec) if isinstance(rec, Sequence) else None
-    if not records or not all(isinstance(r, Record) for r in records):
-        raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record or a list of them, at least one")
-    if controller is not None and not isinstance(controller, PI):
-        raise SettingsError(f"controller is {controller!r}: give a gaident.PI, or None for open loop")
-    for i, r in enumerate(records):
-        where = f"record {i} ({r.name})" if r.name else f"record {i}"
-        if controller is not None and r.command is None:
-            raise RecordError(
-                f"{where} has no command, which drives the loop with a controller: give {COMMAND}, or "
-                f"{NO_CONTROLLER} to identify from torque to velocity"
-            )
-        if controller is None and r.torque is None:
-            raise RecordError(
-                f"{where} has no torque, which drives the model in open loop: give {TORQUE}, or "
-                f"{A_CONTROLLER} to identify in closed loop"
-            )
-    return records
-
-
-def _distinct(records: Sequence[Record]) -> list[str]:
-    """The records' digests; a RecordError where two are the same."""
-    digests = [r.digest for r in records]
-    for i, digest in enumerate(digests):
-        first = digests.index(digest)
-        if first < i:
-            names = [f"record {k} ({records[k].name})" if records[k].name else f"record {k}" for k in (i, first)]
-            raise RecordError(
-                f"{names[0]} holds the same data as {names[1]}: counted twice it would halve every variance; leave one out"
-            )
-    return digests
-
-
 def _spread(records: Sequence[Record], block: int = 1 << 18) -> float:
     """Sum of squares of the velocity about its mean, a block at a time."""
     mean = sum(float(r.velocity.sum()) for r in records) / sum(len(r) for r in records)
     parts = (r.velocity[i : i + block] - mean for r in records for i in range(0, len(r), block))
     return sum(float(np.einsum("i,i", w, w)) for w in parts)  # in one thread, unlike w @ w
-
-
-def _checked_space(space: SearchSpace, controller: PI | None) -> SearchSpace:
-    if not isinstance(space, SearchSpace):
-        raise SpaceError(f"space is {space!r}: give a gaident.SearchSpace, or None to derive it from the data")
-    if (controller is None or controller.loop == "sampled") and space.p[0] < 1:
-        if space.p[1] < 1:
-            raise SpaceError(
-                f"p is {space.p!r}: with a held torque the plant needs at least one pole more than zeros; "
-                f"use {arg('p', '(1, 3)')}, or {CONTINUOUS_LOOP}"
-            )
-        return replace(space, p=(1, space.p[1]))
-    return space
 
 
 def _input(r: Record, controller: PI | None) -> Vector:

@@ -44,13 +44,34 @@ CONVERGED = 1e-9
 class LeastSquares:
     """What a regression in equation (7) found.
 
-    alpha, beta       N + 1 and N coefficients, see `Discrete`
-    covariance        (2N+1, 2N+1) of (alpha, beta), as the regression itself sees it: without the bias that noise brings to
-                      plain least squares
-    noise_std         of the equation error v, with whitening of e [rad/s]
-    rounds, converged of the iteration (plain least squares needs one round)
-    model             the plant behind the polynomial, p = 1, or None where there is none; `note` says why
-    mechanics         OneMass or TwoMass of the model with standard deviations, or None
+    Attributes
+    ----------
+    alpha : ndarray, shape (N+1,)
+        Coefficients of the input, see `Discrete`.
+    beta : ndarray, shape (N,)
+        Coefficients of the earlier velocities.
+    covariance : ndarray, shape (2N+1, 2N+1)
+        Covariance of (alpha, beta) as the regression itself sees it: without the bias that noise brings to plain least squares.
+    noise_std : float
+        Standard deviation of the equation error v [rad/s]; with whitening, of the white noise e.
+    rounds : int
+        Rounds of the iteration (plain least squares needs one).
+    converged : bool
+        Whether the iteration converged.
+    dt : float
+        Sample time [s].
+    controller : PI or None
+        The loop that the command went through.
+    model : Model or None
+        The plant behind the polynomial, p = 1; None where there is none.
+    note : str
+        Why there is none.
+    mechanics : OneMass, TwoMass or None
+        Mechanism of the model with standard deviations.
+
+    See Also
+    --------
+    least_squares : Makes it, with an example.
     """
 
     alpha: Vector
@@ -72,16 +93,19 @@ class LeastSquares:
 
     @property
     def discrete(self) -> Discrete:
-        """The same as `Model.discrete` gives it."""
+        """The same coefficients as `Model.discrete` gives them."""
         return Discrete(self.alpha, self.beta)
 
     @property
     def stable(self) -> bool:
-        """Whether equation (7) forgets its beginning: all roots of its polynomial inside the unit circle."""
+        """Whether equation (7) is stable: all roots of its polynomial inside the unit circle."""
         return bool(np.all(np.abs(np.roots(np.r_[1.0, -self.beta])) < 1.0))
 
     def simulate(self, rec: Record) -> Vector:
-        """Free run of equation (7) from rest on a record's command, without a controller on its torque [rad/s]."""
+        """Return the free run of equation (7) from rest on a record [rad/s], shape (n,).
+
+        Its command is the input, without a controller its torque.
+        """
         with np.errstate(over="ignore", invalid="ignore"):
             return _from_rest(self.alpha, np.r_[1.0, -self.beta], _source(rec, self.controller))
 
@@ -89,17 +113,52 @@ class LeastSquares:
 def least_squares(
     rec: Record, order: int, controller: PI | None = None, *, instruments: bool = False, whitening: bool = False
 ) -> LeastSquares:
-    """Coefficients of equation (7) by linear regression on one record, and the plant and mechanics behind them.
+    """Fit equation (7) to one record by linear regression, and find the plant and mechanics behind it.
 
-    rec          with a controller its command is r, without one its torque. The first equation is that of sample N: what lies
-                 before the record is not assumed to be rest, but instruments and whitening start there
-    order        N: 2 for one mass and 4 for two in the velocity loop, one less from torque to velocity
-    controller   the loop that r went through; only the way back to the plant uses its values (limits are left out)
-    instruments  noise-free answers of the last estimate as instruments, instead of phi itself
-    whitening    filter by the last estimate's 1/D
+    The module's docstring has the equations.
+    An iteration that does not settle and a polynomial without a plant behind it are data of the result.
 
-    The module's docstring has the equations and sources. An iteration that does not settle and a polynomial without a plant
-    behind it are data of the result. Raises SettingsError and RecordError.
+    Parameters
+    ----------
+    rec : Record
+        With a controller its command is the input r, without one its torque.
+        The first equation is that of sample N: what lies before the record is not assumed to be rest, but instruments and
+        whitening start there.
+    order : int
+        Order N: 2 for one mass and 4 for two in the velocity loop, one less from torque to velocity.
+    controller : PI, optional
+        The loop that r went through; only the way back to the plant uses its values (limits are left out).
+    instruments : bool
+        Noise-free answers of the last estimate as instruments, instead of the measured ones.
+    whitening : bool
+        Filter by the last estimate's 1/D.
+
+    Returns
+    -------
+    LeastSquares
+        Coefficients with covariance, plant and mechanics.
+
+    Raises
+    ------
+    SettingsError
+        For an order that is no whole number, or too low.
+    RecordError
+        Where the record lacks the input, or is too short or too poor for the order.
+
+    References
+    ----------
+    K. Steiglitz, L. E. McBride, IEEE Transactions on Automatic Control 10, 1965 (whitening). P. C. Young, A. J. Jakeman,
+    International Journal of Control 29, 1979 (refined instrumental variables: both).
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> torque = ga.m_sequence(7, amplitude=1.0)
+    >>> still = ga.Record(1e-3, torque=torque, velocity=0.0 * torque)
+    >>> rec = ga.Record(1e-3, torque=torque, velocity=ga.simulate(ga.OneMass(J=0.01, D=0.05), still))
+    >>> found = ga.least_squares(rec, order=1)
+    >>> round(found.mechanics.J, 4), round(found.mechanics.D, 4)
+    (0.01, 0.05)
     """
     if not isinstance(rec, Record):
         raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record")

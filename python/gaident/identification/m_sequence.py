@@ -22,18 +22,44 @@ TAPS: dict[int, tuple[int, ...]] = {
 
 
 def m_sequence(register: int, amplitude: float = 1.0, hold: int = 1, offset: float = 0.0, seed: int = 1) -> NDArray[np.float64]:
-    """One period of an M-sequence, hold * (2^register - 1) samples of offset +- amplitude.
+    """Return one period of an M-sequence, hold * (2^register - 1) samples of offset +- amplitude.
 
         b(k) = b(k - n) xor b(k - n + t) xor ... for the taps t;   r(m) = offset + amplitude (1 - 2 b(m // hold))
 
-    register   length n of the shift register, 2..24
-    amplitude  [rad/s] (of a torque [N m]), > 0
-    hold       samples for which each bit stays, >= 1: the spectrum is flat up to about 0.4/(hold dt)
-    offset     mean level, in the unit of the amplitude
-    seed       what stands in the register at first, 1..2^n - 1: shifts the sequence
+    Within one period each run of n bits but the one of zeros occurs once, so the sequence is white up to its period.
 
-    Returns a float array. Within one period each run of n bits but the one of zeros occurs once, so the sequence is white up to
-    its period. Raises SettingsError.
+    Parameters
+    ----------
+    register : int
+        Length n of the shift register, 2 to 24.
+    amplitude : float
+        Amplitude [rad/s] (of a torque [N m]), > 0.
+    hold : int
+        Samples for which each bit stays, >= 1: the spectrum is flat up to about 0.4/(hold dt) [Hz].
+    offset : float
+        Mean level, in the unit of the amplitude.
+    seed : int
+        What stands in the register at first, 1 to 2^n - 1: shifts the sequence.
+
+    Returns
+    -------
+    ndarray, shape (hold * (2^n - 1),)
+        The sequence, in the unit of the amplitude.
+
+    Raises
+    ------
+    SettingsError
+        For a value out of its range.
+
+    References
+    ----------
+    E. J. Watson, "Primitive polynomials (mod 2)", Mathematics of Computation 16, 1962 (the taps).
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> ga.m_sequence(3, amplitude=2.0).tolist()
+    [-2.0, 2.0, 2.0, -2.0, 2.0, -2.0, -2.0]
     """
     lengths = f"{min(TAPS)} to {max(TAPS)}"
     if isinstance(register, bool) or not isinstance(register, Integral) or int(register) not in TAPS:

@@ -12,7 +12,7 @@ from gaident.models.model import Model
 from gaident.models.starts import doubtful_start
 from gaident.results.adequacy import Adequacy
 from gaident.results.estimate import Estimate
-from gaident.results.identification import Rival
+from gaident.results.structures import Rival
 
 __all__ = ["open_loop_notes", "record_notes", "warnings_of"]
 

@@ -23,7 +23,31 @@ __all__ = ["Effect", "Parameter", "Row", "Signals", "Table", "register", "table"
 
 
 class Row(NamedTuple):
-    """One effect of the table."""
+    """One effect of the table.
+
+    Attributes
+    ----------
+    name : str
+        Name of the effect.
+    place : {"shaft", "coupling", "actuator", "controller", "sensor", "plant", "record"}
+        Where it acts.
+    parameters : tuple of Parameter
+        Its parameters with units and bounds.
+    meaning : str
+        What it does, one line.
+    simulated : bool
+        False: found in records, but not part of a model.
+    needs_two_masses : bool
+        Whether it acts between two masses, p = 1 and q = 2.
+    relation : str
+        What the parameters have to meet among themselves; empty if nothing.
+    own : bool
+        Whether it is user-defined, registered from Python.
+
+    See Also
+    --------
+    table : All rows, with an example.
+    """
 
     name: str
     place: str  # shaft, coupling, actuator, controller, sensor, plant or record
@@ -35,13 +59,18 @@ class Row(NamedTuple):
     own: bool = False  # registered from Python
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the row for JSON."""
         parameters = [p.to_dict() for p in self.parameters]
         return {"name": self.name, "place": self.place, "parameters": parameters, "meaning": self.meaning}
 
 
 class Table(tuple[Row, ...]):
-    """All effects, in the order of the documentation; prints as a table."""
+    """All effects, in the order of the documentation; prints as a table.
+
+    See Also
+    --------
+    table : Makes it, with an example.
+    """
 
     __slots__ = ()
 
@@ -73,9 +102,19 @@ def _built_in() -> tuple[Row, ...]:
 
 @lru_cache(maxsize=1)
 def table() -> Table:
-    """Name, place, parameters with units and meaning of every effect; `print(ga.effects.table())` shows it.
+    """Return all effects with name, place, parameters with units, and meaning.
 
-    Effects of one's own stand behind the others.
+    Returns
+    -------
+    Table
+        A tuple of `Row`, user-defined effects last; `print` shows it as a table.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> row = next(row for row in ga.effects.table() if row.name == "coulomb_friction")
+    >>> row.place, [(p.name, p.unit, p.bounds) for p in row.parameters]
+    ('shaft', [('torque', 'N m', '>= 0')])
     """
     own = (Row(o.name, PLACES[o.acts], o.parameters, o.meaning, True, False, "", own=True) for o in OWN.values())
     return Table((*_built_in(), *own))
@@ -102,29 +141,62 @@ def register(
     sensor: Function | None = None,
     replace: bool = False,
 ) -> Row:
-    """Adds an effect of one's own to the table, for this Python session; returns its row.
+    """Add a user-defined effect to the table, for this Python session.
 
-    name        as of a variable, not that of a built-in effect
-    parameters  Parameter(name, unit, neutral=, lowest=, highest=, logarithmic=, starts=); bounds are needed, between them
-                `gaident.diagnose` looks, from `starts` or values spread between the bounds; with the neutral values the effect
-                has to do nothing
-    meaning     one line, for tables and reports
-    replace     in place of an effect of one's own that has this name
+    Exactly one of the four functions says what it does.
+    Each takes (signals, one keyword per parameter), see `Signals`; arguments and answer are arrays, an entry per drive simulated
+    side by side.
+    It is called at every (sub)step, may be asked about anything that a search tries, and keeps nothing from call to call.
+    A torque is stable where it changes with the velocity by less than the drive's inertia J over a substep h allows:
+    abs(d torque/d velocity) < J/h.
 
-    Exactly one of these functions of (signals, one keyword per parameter), see `Signals`, says what it does:
+    Parameters
+    ----------
+    name : str
+        Name of the effect, as of a variable, not that of a built-in effect. Saved results name it and load only where it is
+        registered.
+    parameters : sequence of Parameter
+        Their bounds are needed: between them `gaident.diagnose` looks, from `starts` or values spread between the bounds.
+        With the neutral values the effect has to do nothing.
+    meaning : str
+        One line for tables and reports.
+    torque : callable, optional
+        What is added to the motor's torque [N m]; a brake is negative for positive velocity.
+    friction : callable, optional
+        Level >= 0 of a dry friction [N m], which stops the motor and keeps it at standstill.
+        (A torque that jumps with the direction of the velocity would oscillate about standstill instead.)
+    actuator : callable, optional
+        The torque that acts [N m] in place of signals.torque, before saturation, dead band, delay and lag.
+    sensor : callable, optional
+        The velocity that is measured [rad/s] in place of signals.velocity, before ripple, filter and quantisation.
+    replace : bool
+        Whether a user-defined effect of this name is replaced.
 
-    torque    what is added to the motor's torque [N m] (so that a brake is negative for positive velocity)
-    friction  level >= 0 of a dry friction [N m], which stops the motor and holds it (a torque that jumps with the direction of
-              the velocity would ring about standstill instead)
-    actuator  the torque that acts [N m] in place of signals.torque, before saturation, dead band, delay and lag
-    sensor    the velocity that is seen [rad/s] in place of signals.velocity, before ripple, filter and quantisation
+    Returns
+    -------
+    Row
+        The effect's row of the table.
 
-    Arguments and answer are arrays: an entry per drive simulated side by side. The function is called at every (sub)step, may be
-    asked about anything that a search tries, and keeps nothing from call to call. A torque is stable where it changes with the
-    velocity by less than the drive's inertia over a substep allows: abs(d torque/d velocity) < J/h.
+    Raises
+    ------
+    ModelError
+        For a name in use, bounds or neutral values that contradict each other, and a function that does not answer as it has to.
 
-    Raises ModelError for a name in use, bounds or neutral values that contradict each other, and a function that does not answer
-    as it has to. `unregister` takes it out again. Saved results name it and load only where it is registered.
+    See Also
+    --------
+    unregister : Takes it out again.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> def fan(signals, coefficient):
+    ...     return -coefficient * signals.velocity**3
+    >>> parameter = ga.effects.Parameter("coefficient", "N m s^3/rad^3", neutral=0.0, lowest=0.0, highest=1e-3)
+    >>> ga.effects.register("fan", [parameter], meaning="air drag of a fan", torque=fan).place
+    'shaft'
+    >>> ga.OneMass(J=1e-3, D=0.01).model().with_effect("fan", coefficient=1e-6).effects
+    (Effect('fan', {'coefficient': 1e-06}),)
+    >>> ga.effects.unregister("fan")
     """
     given = {"torque": torque, "friction": friction, "actuator": actuator, "sensor": sensor}
     chosen = {acts: function for acts, function in given.items() if function is not None}
@@ -141,7 +213,27 @@ def register(
 
 
 def unregister(name: str) -> None:
-    """Takes an effect of one's own out of the table; raises ModelError where there is none of that name."""
+    """Take a user-defined effect out of the table.
+
+    Parameters
+    ----------
+    name : str
+        Name of the effect.
+
+    Raises
+    ------
+    ModelError
+        Where there is no user-defined effect of that name.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> def push(signals, size):
+    ...     return size + 0.0 * signals.velocity
+    >>> parameter = ga.effects.Parameter("size", "N m", neutral=0.0, lowest=-1.0, highest=1.0)
+    >>> row = ga.effects.register("push", [parameter], meaning="a constant push", torque=push)
+    >>> ga.effects.unregister("push")
+    """
     if name not in OWN:
         raise ModelError(f"{name!r} is no effect of your own: those are {', '.join(OWN) or 'none'}; built-in ones stay")
     del OWN[name]
@@ -155,9 +247,31 @@ def _forget() -> None:
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """One effect with its parameters (name -> value in SI units), checked; equal where both are equal.
+    """One effect with its parameters, checked; equal where name and parameters are.
 
-    Raises ModelError for an unknown name, unknown or missing parameters and values outside the physical bounds.
+    Parameters
+    ----------
+    name : str
+        Name of the effect in `gaident.effects.table()`.
+    parameters : mapping of str to float
+        All its parameters, name -> value in SI units.
+
+    Attributes
+    ----------
+    own : bool
+        Whether the effect is user-defined, registered from Python.
+
+    Raises
+    ------
+    ModelError
+        For an unknown name, unknown or missing parameters and values outside the physical bounds.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> effect = ga.Effect("transport_delay", {"delay": 2e-3})
+    >>> effect.row.place, effect.values
+    ('actuator', (0.002,))
     """
 
     name: str
@@ -185,29 +299,32 @@ class Effect:
 
     @property
     def row(self) -> Row:
-        """The effect's row in the table; raises ModelError for an effect of one's own that is no longer registered."""
+        """The effect's row in the table; raises ModelError for a user-defined effect that is no longer registered."""
         if self.name not in _by_name():
             raise ModelError(_unknown(self.name))
         return _by_name()[self.name][1]
 
     @property
     def neutral(self) -> bool:
-        """Of an effect of one's own: whether its parameters make it the identity."""
+        """Whether a user-defined effect has parameters with which it does nothing; False for a built-in effect."""
         return self.row.own and OWN[self.name].neutral(self.values)
 
     @property
     def values(self) -> tuple[float, ...]:
-        """The parameters in the order of the table."""
+        """The parameters in the order of the table, SI units."""
         return tuple(self.parameters.values())
 
     def to_dict(self) -> dict[str, Any]:
-        """{"name": ..., "parameters": {...}} for JSON; an infinite limit is None, an effect of one's own has "own": true."""
+        """Return {"name": ..., "parameters": {...}} for JSON.
+
+        An infinite limit is None, a user-defined effect has "own": true.
+        """
         data = {"name": self.name, "parameters": {k: v if math.isfinite(v) else None for k, v in self.parameters.items()}}
         return {**data, "own": True} if self.own else data
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Effect:
-        """The inverse of `to_dict`; raises ModelError for an effect of one's own that is not registered."""
+        """Return the effect of what `to_dict` gave; raise ModelError for a user-defined effect that is not registered."""
         keys = ("name", "parameters")
         values: dict[str, Any] = known_keys(data, "an effect", (*keys, "own"), keys, ModelError)
         if values.get("own") and values["name"] not in OWN:

@@ -19,7 +19,26 @@ from gaident.models.roots import quadratic_roots
 
 
 class Structure(NamedTuple):
-    """How many real roots and conjugate pairs a model has."""
+    """How many real roots and conjugate pairs a model has.
+
+    Attributes
+    ----------
+    real_poles : int
+        Real poles.
+    pole_pairs : int
+        Pairs of poles.
+    real_zeros : int
+        Real zeros.
+    zero_pairs : int
+        Pairs of zeros.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> from gaident.models import Structure
+    >>> Structure.of(ga.TwoMass(JM=1e-4, DM=0.003, JL=6e-4, DL=0.008, KG=2.6).model())
+    Structure(real_poles=1, pole_pairs=1, real_zeros=0, zero_pairs=1)
+    """
 
     real_poles: int
     pole_pairs: int
@@ -28,14 +47,14 @@ class Structure(NamedTuple):
 
     @classmethod
     def of(cls, model: Model) -> Structure:
-        """The structure of `model`."""
+        """Return the structure of a model."""
         pole_pairs = sum(r.imag > 0.0 for r in model.poles)
         zero_pairs = sum(r.imag > 0.0 for r in model.zeros)
         return cls(len(model.poles) - 2 * pole_pairs, pole_pairs, len(model.zeros) - 2 * zero_pairs, zero_pairs)
 
     @property
     def size(self) -> int:
-        """Length of x."""
+        """Number n of natural parameters."""
         return 1 + self.real_poles + 2 * self.pole_pairs + self.real_zeros + 2 * self.zero_pairs
 
     @property

@@ -31,13 +31,23 @@ PLACES = {"torque": "shaft", "friction": "shaft", "actuator": "actuator", "senso
 
 
 class Signals(NamedTuple):
-    """What an effect of one's own may look at; arrays of one number per drive that is simulated beside others, read only.
+    """What a user-defined effect may look at: arrays (m,), one number per drive that is simulated beside others, read only.
 
-    velocity  of the motor [rad/s]; at the shaft that in the middle of the substep
-    angle     of the motor [rad]
-    torque    [N m]: at the shaft what saturation, dead band, delay and lag left of the command, at the actuator the command, at
-              the sensor the torque held
-    time      since the record's start [s], one number
+    Attributes
+    ----------
+    velocity : ndarray, shape (m,)
+        Velocity of the motor [rad/s]; at the shaft that in the middle of the substep.
+    angle : ndarray, shape (m,)
+        Angle of the motor [rad].
+    torque : ndarray, shape (m,)
+        Torque [N m]. At the shaft: what saturation, dead band, delay and lag left of the command. At the actuator: the command.
+        At the sensor: the torque that is held over the sample.
+    time : float
+        Time since the record's start [s].
+
+    See Also
+    --------
+    register : Has an example.
     """
 
     velocity: Signal
@@ -49,12 +59,30 @@ class Signals(NamedTuple):
 class Parameter(NamedTuple):
     """One parameter of an effect.
 
-    name, unit       SI, rad; "1" for none
-    neutral          with every neutral value the effect is the identity; nan: any value is
-    lowest, highest  physical bounds; of effects of one's own they are finite, and a diagnosis looks between them
-    above_lowest     the lowest value itself is not allowed
-    logarithmic      of effects of one's own: a diagnosis moves it by its logarithm
-    starts           of effects of one's own: where a diagnosis begins; (): values spread between the bounds
+    Parameters
+    ----------
+    name : str
+        Name of the parameter.
+    unit : str
+        SI, angles in rad; "1" for none.
+    neutral : float
+        With every neutral value the effect does nothing; nan: with any value.
+    lowest : float
+        Lowest physical value; finite for a user-defined effect.
+    highest : float
+        Highest physical value; finite for a user-defined effect. A diagnosis looks between both.
+    above_lowest : bool
+        Whether the lowest value itself is excluded.
+    logarithmic : bool
+        Whether a diagnosis moves the parameter of a user-defined effect by its logarithm.
+    starts : tuple of float
+        Where a diagnosis begins with a user-defined effect; (): at values spread between the bounds.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> ga.effects.Parameter("coefficient", "N m s^3/rad^3", neutral=0.0, lowest=0.0, highest=1e-3).bounds
+    '>= 0 and <= 0.001'
     """
 
     name: str
@@ -77,7 +105,7 @@ class Parameter(NamedTuple):
         return " and ".join(parts)
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON: what is not finite (any value, no bound, no limit) is None."""
+        """Return the parameter for JSON; what is not finite (any value, no bound, no limit) is None."""
         numbers = {"neutral": self.neutral, "lowest": self.lowest, "highest": self.highest}
         return {"name": self.name, "unit": self.unit, **{k: v if math.isfinite(v) else None for k, v in numbers.items()}}
 

@@ -18,7 +18,26 @@ NO_IMAGINARY_PART = 1e-13
 
 
 class Mode(NamedTuple):
-    """One real root or one conjugate pair, as a row of a table."""
+    """One real root or one conjugate pair of a model.
+
+    Attributes
+    ----------
+    kind : {"pole", "zero"}
+        What the root is.
+    root : complex
+        The root [rad/s]; of a pair the member with positive imaginary part.
+    natural_frequency : float
+        abs(root) [rad/s].
+    damping : float
+        -Re(root)/abs(root) [1]; 1 for a stable real root, nan for a root at 0.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> pole = ga.Model(100.0, [-10.0 + 99.5j, -10.0 - 99.5j]).modes[0]
+    >>> round(pole.natural_frequency), round(pole.damping, 2)
+    (100, 0.1)
+    """
 
     kind: str  # "pole" or "zero"
     root: complex  # rad/s; of a pair the member with positive imaginary part
@@ -27,7 +46,7 @@ class Mode(NamedTuple):
 
     @property
     def frequency_hz(self) -> float:
-        """Natural frequency in Hz."""
+        """Natural frequency [Hz]."""
         return self.natural_frequency / (2.0 * math.pi)
 
 

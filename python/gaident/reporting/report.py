@@ -35,16 +35,47 @@ def report(
     validation: Records = None,
     axis: str = "rotary",
 ) -> None:
-    """Writes the result as one HTML page that needs nothing else: no network, no other file, no Python.
+    """Write a result as one HTML page that needs nothing else: no network, no other file, no Python.
 
     From top to bottom: the verdict, measured against simulated, what is wrong, cause and evidence, parameters, before and after,
-    what could not be tested, the next experiment with its command as CSV, how it was computed. About 5 MB, most of it plotly.js.
+    what could not be tested, the next experiment with its command as CSV, how it was computed.
+    About 5 MB, most of it plotly.js.
+    The file appears whole or not at all.
 
-    records: as used, unless given; a loaded result holds none, and its page says what is left out for that. validation: the
-        records that were held out, likewise. axis: "rotary", or "linear" for units of m and N.
+    Parameters
+    ----------
+    result : Diagnosis or Identification
+        The result.
+    path : str or path-like
+        The file to write.
+    records : Record or sequence of Record, optional
+        None: as used. A loaded result holds none, and its page says what is left out for that.
+    validation : Record or sequence of Record, optional
+        The records that were held out, likewise.
+    axis : {"rotary", "linear"}
+        "linear": units of m and N.
 
-    The file appears whole or not at all. Raises GaidentError where result or records are something else, SettingsError for
-    another axis, OSError where the file cannot be written.
+    Raises
+    ------
+    GaidentError
+        Where result or records are something else.
+    SettingsError
+        For another axis.
+    OSError
+        Where the file cannot be written.
+
+    Examples
+    --------
+    >>> import pathlib
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> torque = np.repeat([1.0, -1.0, 0.5, -0.5], 100)
+    >>> noise = 0.02 * np.random.default_rng(1).standard_normal(400)
+    >>> still = ga.Record(1e-3, torque=torque, velocity=0.0 * torque)
+    >>> velocity = ga.simulate(ga.OneMass(J=0.01, D=0.05), still) + noise
+    >>> ga.report(ga.identify(ga.Record(1e-3, torque=torque, velocity=velocity)), "report.html")
+    >>> "<html" in pathlib.Path("report.html").read_text(encoding="utf-8")
+    True
     """
     write_whole(path, report_page(result, records, validation, axis).encode())
 

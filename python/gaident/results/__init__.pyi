@@ -1,7 +1,8 @@
 from .adequacy import Adequacy
-from .diagnosis import Diagnosis, Finding, Fitness
+from .diagnosis import Diagnosis, Fitness
 from .estimate import Estimate
 from .experiment import Limits, Proposal
+from .finding import Finding
 from .frequency import FrequencyResponse, Responses
 from .identification import Identification
 from .settings import Settings

@@ -13,14 +13,30 @@ LEVEL = 1e-4  # p-value below which the linear model counts as falsified
 
 @dataclass(frozen=True)
 class Adequacy:
-    """What the residual says about the model.
+    """What the residual says about a linear model.
 
-    white_p: Ljung-Box p-value of the residual; ar_order: order of the noise model; noise_std: standard deviation of the whitened
-    residual [rad/s]; predictable: share of the residual's power that its own past predicts (0: white); excess: rms of the
-    residual over
-    the noise as the measured velocity's own third differences show it;
-    independence_p: p-value of the test that the residual no longer depends on input and motion; falsified: it does;
-    undecided: it does not, but the residual is coloured and more than twice the noise, so that dynamics may be missing.
+    Attributes
+    ----------
+    white_p : float
+        Ljung-Box p-value of the residual.
+    ar_order : int
+        Order of the autoregressive noise model.
+    noise_std : float
+        Standard deviation of the whitened residual [rad/s].
+    predictable : float
+        Share of the residual's power that its own past predicts [1]; 0: white.
+    excess : float
+        Root mean square of the residual over that of the noise, which the measured velocity's third differences show [1].
+    independence_p : float
+        p-value of the test that the residual does not depend on input and motion.
+    falsified : bool
+        Whether it does.
+    undecided : bool
+        Whether it does not, but is coloured and more than twice the noise, so that dynamics may be missing.
+
+    See Also
+    --------
+    identify : Makes it.
     """
 
     white_p: float
@@ -34,7 +50,7 @@ class Adequacy:
 
     @property
     def sentence(self) -> str:
-        """The verdict in words."""
+        """What it means, in words."""
         if self.falsified:
             return (
                 "The linear model is falsified: the residual still depends on the input or the motion "

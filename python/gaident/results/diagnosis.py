@@ -15,46 +15,36 @@ from gaident.models.model import Model
 from gaident.providers import provided
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
+from gaident.results.finding import Finding
 from gaident.results.identification import Identification
 from gaident.results.json_text import json_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Diagnosis", "Finding", "Fitness"]
+__all__ = ["Diagnosis", "Fitness"]
 
 SCHEMA = "gaident/diagnosis"
 SCHEMA_VERSION = 1
 
 
 @dataclass(frozen=True)
-class Finding:
-    """One thing that was found.
-
-    effect: its name in the effects table; parameters: name -> Estimate. alternatives: effects that these data cannot tell from
-    it, by statistics or by nature; empty: the cause is named. gain: fall of the held-out error that it brought, a fraction of
-    the error before; delta_bic: what it is worth on whitened errors; p_value: of the bootstrap, else None; evidence: one
-    sentence. is_noise: it describes the record rather than the drive.
-    """
-
-    effect: str
-    parameters: Mapping[str, Estimate] = field(hash=False)
-    alternatives: tuple[str, ...] = ()
-    gain: float = 0.0
-    delta_bic: float = 0.0
-    p_value: float | None = None
-    evidence: str = ""
-    is_noise: bool = False
-
-    @property
-    def named(self) -> bool:
-        """Whether the cause is named, without an alternative."""
-        return not self.alternatives
-
-
-@dataclass(frozen=True)
 class Fitness:
-    """Free-run simulation against the measured velocity: rmse [rad/s], fit [%], rms that the noise alone leaves [rad/s]."""
+    """Free-run simulation against the measured velocity.
+
+    Attributes
+    ----------
+    rmse : float
+        Root mean square of the error [rad/s].
+    fit_percent : float
+        100 (1 - norm(error)/norm(velocity - mean velocity)) [%].
+    noise_floor : float
+        Root mean square that the noise of the measured velocity alone leaves [rad/s].
+
+    See Also
+    --------
+    diagnose : Makes it.
+    """
 
     rmse: float
     fit_percent: float
@@ -65,16 +55,71 @@ class Fitness:
 class Diagnosis:
     """What the simulation gets wrong, why, and what the extended model gains. Made by `diagnose`.
 
-    gain_interval: 95 % interval of the fall of the error from before to after, a fraction. held_out: how the figures of
-    `before` and `after` were held out ("in-sample" where they could not be). base_shift: parameter -> (before, after) of the
-    linear part. left: gain in BIC units of each driver of what is left; line: where that is time and one frequency, (frequency
-    [Hz], amplitude of the torque [N m]). mechanics: name -> Estimate of the linear part, fitted together with the effects.
-    noise [rad/s] and bootstrap as they were asked for; controller as it was used: with the gains that the logged torque shows.
-    not_testable: effect -> why the records say nothing about it.
-    one_sided: effect that was tested and not found -> which sizes of it would not have shown in these records.
-    torque_logged: whether all records hold the torque; loop_follows: False where it does not follow from command and velocity
-    through the simulated controller, whose free runs are then not the drive's. notes: what to keep in mind, in plain sentences.
-    records and validation_records: the data, empty where the diagnosis was loaded from a file.
+    Attributes
+    ----------
+    verdict : {"adequate", "explained", "partly explained", "unexplained"}
+        Whether something significant was found, and whether something significant is left.
+    findings : tuple of Finding
+        What was found, in the order in which it was added.
+    not_testable : mapping of str to str
+        Effect -> why the records say nothing about it.
+    model : Model
+        The extended model.
+    before, after : Fitness
+        The linear and the extended model on held-out data.
+    driver : str or None
+        What the error still depends on: "velocity", "position", "torque", "command", "time", "past" or None.
+    next_experiment : Proposal or None
+        The experiment that would tell apart what these data cannot.
+    gain_interval : tuple of float
+        95 % interval of the fall of the error from `before` to `after`, as a fraction [1].
+    held_out : str
+        How the figures of `before` and `after` were held out ("in-sample" where they could not be).
+    base_shift : mapping of str to tuple of float
+        Parameter of the linear part -> (before, after).
+    left : mapping of str to float
+        Gain of each driver of what is left [BIC units].
+    notes : tuple of str
+        What to keep in mind, in plain sentences.
+    identification : Identification
+        The linear model that the diagnosis began with.
+    controller : PI or None
+        The controller as it was used: with the gains that the logged torque shows.
+    seed : int
+        The seed.
+    seconds : float
+        Time that the diagnosis took [s].
+    simulations : int
+        Simulations that the search made.
+    samples : int
+        Samples of all records.
+    digests : tuple of str
+        Digests of the records, see `Record.digest`.
+    version : str
+        Version of gaident.
+    validation_digests : tuple of str
+        Digests of the validation records.
+    noise : float or None
+        Standard deviation of the velocity noise as it was given [rad/s].
+    bootstrap : int
+        Simulated records of the bootstrap as they were asked for.
+    torque_logged : bool
+        Whether all records hold the torque.
+    loop_follows : bool
+        False where the torque does not follow from command and velocity through the simulated controller; its free runs are then
+        not the drive's.
+    line : tuple of float or None
+        Where what is left depends on time and has one frequency: (frequency [Hz], amplitude of the torque [N m]).
+    one_sided : mapping of str to str
+        Effect that was tested and not found -> which sizes of it would not have shown in these records.
+    mechanics : mapping of str to Estimate
+        Mechanical parameters of the linear part, fitted together with the effects.
+    records, validation_records : tuple of Record
+        The data; empty where the diagnosis was loaded from a file.
+
+    See Also
+    --------
+    diagnose : Makes it, with an example.
     """
 
     verdict: str
@@ -119,14 +164,31 @@ class Diagnosis:
         return tuple(f for f in self.findings if not f.is_noise)
 
     def summary(self, axis: str = "rotary") -> str:
-        """The result as text; axis="linear" for units of m and N."""
+        """Return the result as text; axis="linear" for units of m and N."""
         text: str = provided("diagnosis_summary")(self, axis)
         return text
 
     def plot(self, records: Record | Sequence[Record] | None = None, axis: str = "rotary") -> Figure:
-        """What is wrong and what is left, as a matplotlib Figure; `records` as used unless given; axis="linear" for m and N.
+        """Draw what is wrong and what is left.
 
-        Raises GaidentError where a loaded diagnosis is given no records, SettingsError for another axis.
+        Parameters
+        ----------
+        records : Record or sequence of Record, optional
+            What to draw; None: the records used.
+        axis : {"rotary", "linear"}
+            "linear": units of m and N.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The picture; `savefig` writes it.
+
+        Raises
+        ------
+        GaidentError
+            Where a loaded diagnosis is given no records.
+        SettingsError
+            For another axis.
         """
         given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
         if not given:
@@ -135,10 +197,30 @@ class Diagnosis:
         return figure
 
     def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str = "rotary") -> Figure:
-        """The extended model against the frequency response of the longest record, with coherence; see Identification.plot_bode.
+        """Draw the extended model against the frequency response of the longest record, with coherence.
 
         Friction and other effects bend the record's response; the model, simulated and estimated the same way, has them too.
-        Raises GaidentError where a loaded diagnosis is given no records, RecordError where they show no frequency response.
+
+        Parameters
+        ----------
+        records : Record or sequence of Record, optional
+            What the longest is taken of; None: the records used.
+        hz : bool
+            Frequencies in Hz instead of rad/s.
+        axis : {"rotary", "linear"}
+            "linear": units of m and N.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The picture; see `Identification.plot_bode`.
+
+        Raises
+        ------
+        GaidentError
+            Where a loaded diagnosis is given no records.
+        RecordError
+            Where they show no frequency response.
         """
         given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
         if not given:
@@ -152,14 +234,14 @@ class Diagnosis:
         return html
 
     def to_pandas(self) -> Any:
-        """The findings as a pandas DataFrame: a row per (effect, parameter), with what speaks for it.
+        """Return the findings as a pandas DataFrame: a row per (effect, parameter), with what speaks for it.
 
         Raises ImportError with the way to get pandas.
         """
         return provided("diagnosis_table")(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON, without the records."""
+        """Return plain data for JSON, without the records."""
         proposal = self.next_experiment
         return {
             "schema": SCHEMA,
@@ -200,7 +282,10 @@ class Diagnosis:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Diagnosis:
-        """The inverse of to_dict. Raises GaidentError where the data are something else or of a newer schema."""
+        """Return the diagnosis of what `to_dict` gave.
+
+        Raises GaidentError where the data are something else or of a newer schema.
+        """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
         try:
             return cls(
@@ -248,9 +333,9 @@ class Diagnosis:
             raise GaidentError(f"the saved diagnosis is damaged: {error!r}; save it again") from error
 
     def to_json(self) -> str:
-        """What `save` writes."""
+        """Return what `save` writes."""
         return json_text(self.to_dict())
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes JSON; the file appears whole or not at all."""
+        """Write JSON for `gaident.load`; the file appears whole or not at all."""
         write_whole(path, self.to_json().encode())

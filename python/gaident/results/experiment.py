@@ -23,11 +23,29 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Limits:
-    """What an experiment may do. Raises SettingsError.
+    """What an experiment may do.
 
-    speed     highest speed [rad/s]; torque: highest torque [N m]
-    travel    highest minus lowest position [rad]; inf: it may turn freely
-    duration  longest record [s]
+    Parameters
+    ----------
+    speed : float
+        Highest speed [rad/s], > 0.
+    torque : float
+        Highest torque [N m], > 0.
+    travel : float
+        Highest minus lowest position [rad], > 0; inf: it may turn freely.
+    duration : float
+        Longest record [s], > 0.
+
+    Raises
+    ------
+    SettingsError
+        For a value that is no number above 0.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> ga.Limits(speed=80.0, torque=2.4, travel=20.0)
+    Limits(speed=80.0, torque=2.4, travel=20.0, duration=5.0)
     """
 
     speed: float
@@ -47,10 +65,25 @@ class Limits:
 
     @classmethod
     def of(cls, records: Record | Sequence[Record], controller: PI | None = None) -> Limits:
-        """What records show to be allowed: their highest speed, torque (the controller's limit, if it has one) and duration.
+        """Return what records show to be allowed.
 
-        Their travel too, but for an axis that has gone through a turn or more, which is taken to turn freely. Raises
-        SettingsError where nothing moves.
+        Parameters
+        ----------
+        records : Record or sequence of Record
+            Records of the axis.
+        controller : PI, optional
+            The velocity loop; its torque limit, if it has one, is the limit of the torque.
+
+        Returns
+        -------
+        Limits
+            Highest speed, torque and duration of the records.
+            Their travel too, but for an axis that has gone through a turn or more, which is taken to turn freely.
+
+        Raises
+        ------
+        SettingsError
+            Where nothing moves.
         """
         found: Limits = provided("limits_of")(records, controller)
         return found
@@ -60,10 +93,23 @@ class Limits:
 class Proposal:
     """An experiment to make.
 
-    command    velocity command [rad/s], shape (n,), one value every dt [s]
-    separates  names of effects that it tells apart, or makes visible where there is no record yet
-    margin     BIC units by which the wrong one of two rivals would be worse (10 tell them apart); nan where nothing was compared
-    reason     one plain sentence
+    Attributes
+    ----------
+    command : ndarray, shape (n,)
+        Velocity command [rad/s].
+    dt : float
+        Time from value to value [s].
+    separates : tuple of str
+        Names of effects that it tells apart, or makes visible where there is no record yet.
+    margin : float
+        BIC units by which the wrong one of two rivals would be worse (10 tell them apart); nan where nothing was compared.
+    reason : str
+        Why this experiment, in plain sentences.
+
+    See Also
+    --------
+    first_experiment : Makes one, with an example.
+    diagnose : Proposes one as `next_experiment`.
     """
 
     command: Vector
@@ -74,11 +120,11 @@ class Proposal:
 
     @property
     def duration(self) -> float:
-        """[s]."""
+        """Duration of the command [s]."""
         return len(self.command) * self.dt
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
+        """Return plain data for JSON."""
         return {
             "command": self.command.tolist(),
             "dt": self.dt,
@@ -89,7 +135,7 @@ class Proposal:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Proposal:
-        """The inverse of to_dict."""
+        """Return the proposal of what `to_dict` gave."""
         command = np.asarray(data["command"], dtype=np.float64)
         return cls(command, float(data["dt"]), tuple(data["separates"]), float(data["margin"]), str(data["reason"]))
 

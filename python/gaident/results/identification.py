@@ -24,56 +24,69 @@ from gaident.results.adequacy import Adequacy
 from gaident.results.estimate import Estimate
 from gaident.results.json_text import json_text
 from gaident.results.settings import Settings
+from gaident.results.structures import Rival, Structure, TrialOutcome
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Identification", "Rival", "Structure", "TrialOutcome"]
+__all__ = ["Identification"]
 
 SCHEMA = "gaident/identification"
 SCHEMA_VERSION = 1
-
-
-@dataclass(frozen=True)
-class Rival:
-    """A structure whose whitened BIC is within 10 units of the winner's (negative delta_bic: it fits better but is larger)."""
-
-    p: int
-    q: int
-    delta_bic: float
-    model: Model
-
-
-@dataclass(frozen=True)
-class TrialOutcome:
-    """One independent genetic run: its best fitness (6), structure, generations and candidates simulated."""
-
-    p: int
-    q: int
-    fitness: float
-    generations: int
-    best_generation: int
-    evaluations: int
-    history: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Structure:
-    """One row of the structure comparison: error sum of the plain fit, whitened BIC relative to the best."""
-
-    p: int
-    q: int
-    error_sum: float
-    delta_bic: float
 
 
 @dataclass(frozen=True, repr=False)
 class Identification:
     """Structure, parameters and what they are worth. Made by `identify`.
 
-    rmse [rad/s] and fit_percent are of the free-run simulation of all records used; `adequacy` says whether the linear model
-    holds,
-    `warnings` what to keep in mind, in plain sentences. `structures` compares every structure that was fitted.
+    Attributes
+    ----------
+    model : Model
+        The model that was found.
+    controller : PI or None
+        The velocity loop; None: open loop.
+    parameters : mapping of str to Estimate
+        Natural parameters of the model by name, see `factor_parameters`.
+    mechanics : OneMass, TwoMass or None
+        The mechanism, where the structure is that of one.
+    fitness : float
+        Fitness of the model, equation (6).
+    rmse : float
+        Root mean square of the error of the free-run simulation of all records used [rad/s].
+    fit_percent : float
+        100 (1 - norm(error)/norm(velocity - mean velocity)) of the same simulation [%].
+    rivals : tuple of Rival
+        Structures within 10 BIC units.
+    structures : tuple of Structure
+        Every structure that was fitted, compared.
+    trials : tuple of TrialOutcome
+        The independent genetic runs.
+    adequacy : Adequacy
+        Whether the linear model holds.
+    warnings : tuple of str
+        What to keep in mind, in plain sentences.
+    space : SearchSpace
+        The search ranges as they were used.
+    settings : Settings
+        The settings of the search.
+    seed : int
+        The seed.
+    seconds : float
+        Time that the identification took [s].
+    samples : int
+        Samples of all records.
+    digests : tuple of str
+        Digests of the records, see `Record.digest`.
+    initial_states : mapping of str to tuple of float
+        Digest -> initial state of a record that did not start at rest.
+    version : str
+        Version of gaident.
+    records : tuple of Record
+        The data; empty where the identification was loaded from a file.
+
+    See Also
+    --------
+    identify : Makes it, with an example.
     """
 
     model: Model
@@ -114,7 +127,7 @@ class Identification:
 
     @property
     def history(self) -> tuple[float, ...]:
-        """Best fitness (6) per generation of the genetic search, of the best trial."""
+        """Best fitness per generation of the genetic search, equation (6), of the best trial."""
         return min(self.trials, key=lambda t: t.fitness).history
 
     @property
@@ -123,10 +136,11 @@ class Identification:
         return self.adequacy.falsified
 
     def simulate(self, rec: Record) -> NDArray[np.float64]:
-        """Free-run velocity of the model on a record [rad/s].
+        """Return the free-run velocity of the model on a record [rad/s], shape (n,).
 
-        A record that does not start at rest gets its initial state estimated (one that was used in the identification, the one
-        found there).
+        A record that was used in the identification starts from the state found there.
+        Another one that does not start at rest gets its initial state estimated.
+        Raises GaidentError where that is impossible, because the controller has limits.
         """
         if not isinstance(rec, Record):
             raise GaidentError(f"rec is {type(rec).__name__}: give a gaident.Record")
@@ -142,16 +156,34 @@ class Identification:
         return simulate(self.model, rec, self.controller, state)
 
     def residual(self, rec: Record) -> NDArray[np.float64]:
-        """Measured minus simulated velocity [rad/s]."""
+        """Return measured minus simulated velocity [rad/s], shape (n,)."""
         return rec.velocity - self.simulate(rec)
 
     def summary(self, axis: str = "rotary") -> str:
-        """The result as text; axis="linear" for units of m and N."""
+        """Return the result as text; axis="linear" for units of m and N."""
         text: str = provided("identification_summary")(self, axis)
         return text
 
     def plot(self, records: Record | Sequence[Record] | None = None, axis: str = "rotary") -> Figure:
-        """Measured against simulated velocity and the residual, as a matplotlib Figure; `records` as used unless given."""
+        """Draw measured against simulated velocity and the residual.
+
+        Parameters
+        ----------
+        records : Record or sequence of Record, optional
+            What to draw; None: the records used.
+        axis : {"rotary", "linear"}
+            "linear": units of m and N.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The picture; `savefig` writes it.
+
+        Raises
+        ------
+        GaidentError
+            Where a loaded identification is given no records.
+        """
         given = self.records if records is None else (records,) if isinstance(records, Record) else records
         if not isinstance(given, Sequence) or not all(isinstance(r, Record) for r in given):
             raise GaidentError(f"records is {type(records).__name__}: give a gaident.Record or a list of them")
@@ -162,28 +194,46 @@ class Identification:
         return figure
 
     def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str = "rotary") -> Figure:
-        """The model against the frequency response of the longest record (`records` as used unless given), with coherence.
+        """Draw the model against the frequency response of the longest record, with coherence.
 
-        In a loop with a command it is estimated by the command (joint input-output), else torque to velocity (H1). A loaded
-        identification without records shows the model alone. hz: frequencies in Hz instead of rad/s. Raises RecordError where
-        the record shows no frequency response.
+        In a loop with a command it is estimated by the command (joint input-output), else from torque to velocity (H1).
+        A loaded identification without records shows the model alone.
+
+        Parameters
+        ----------
+        records : Record or sequence of Record, optional
+            What the longest is taken of; None: the records used.
+        hz : bool
+            Frequencies in Hz instead of rad/s.
+        axis : {"rotary", "linear"}
+            "linear": units of m and N.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The picture.
+
+        Raises
+        ------
+        RecordError
+            Where the record shows no frequency response.
         """
         given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
         figure: Figure = provided("plot_bode")(self.model, self.controller, given, hz, axis)
         return figure
 
     def plot_poles(self, hz: bool = False) -> Figure:
-        """Poles and zeros in the s-plane with bars of 2 standard deviations; [rad/s], or divided by 2 pi [Hz]."""
+        """Draw poles and zeros in the s-plane with bars of 2 standard deviations [rad/s]; hz: divided by 2 pi [Hz]."""
         figure: Figure = provided("plot_poles_zeros")(self, hz)
         return figure
 
     def plot_convergence(self) -> Figure:
-        """Best fitness (6) per generation of every trial."""
+        """Draw the best fitness per generation of every trial, equation (6)."""
         figure: Figure = provided("plot_convergence")(self)
         return figure
 
     def plot_structures(self) -> Figure:
-        """BIC of every structure (p,q) above the lowest."""
+        """Draw the BIC of every structure (p, q) above the lowest."""
         figure: Figure = provided("plot_structures")(self)
         return figure
 
@@ -193,14 +243,14 @@ class Identification:
         return html
 
     def to_pandas(self) -> Any:
-        """The parameters as a pandas DataFrame: rows (model or mechanics, parameter), columns value, std, unit, ...
+        """Return the parameters as a pandas DataFrame: rows (model or mechanics, parameter), columns value, std, unit, ...
 
         Raises ImportError with the way to get pandas.
         """
         return provided("identification_table")(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON, without the records."""
+        """Return plain data for JSON, without the records."""
         return {
             "schema": SCHEMA,
             "schema_version": SCHEMA_VERSION,
@@ -231,7 +281,10 @@ class Identification:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Identification:
-        """The inverse of to_dict. Raises GaidentError where the data are something else or of a newer schema."""
+        """Return the identification of what `to_dict` gave.
+
+        Raises GaidentError where the data are something else or of a newer schema.
+        """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
         try:
             return cls(
@@ -260,9 +313,9 @@ class Identification:
             raise GaidentError(f"the saved identification is damaged: {error!r}; save it again") from error
 
     def to_json(self) -> str:
-        """What `save` writes, see `json_text`."""
+        """Return what `save` writes."""
         return json_text(self.to_dict())
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes JSON; the file appears whole or not at all."""
+        """Write JSON for `gaident.load`; the file appears whole or not at all."""
         write_whole(path, self.to_json().encode())

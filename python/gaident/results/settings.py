@@ -29,20 +29,53 @@ INITIAL_STATES = ("auto", "rest", "free")
 class Settings:
     """Settings of the genetic search; `Settings()` is the best engine, `Settings.paper()` Table II to the letter.
 
-    population: individuals in all; the species engine keeps at least three per structure.
-    tournament: contestants; crossover, mutation: rates, per pair and per bit.
-    generations: of the plain engine; at most so many of the species engine, which works in rounds of `round` generations, fits
-        every species' best locally after each, and stops after `quiet_rounds` rounds without a better optimum close to the best.
-    elites: survivors of the plain engine (species always keep one each).
-    code: "gray" or "binary"; scale: "logarithmic" or "linear" coding of real and imaginary parts (K is always logarithmic).
-    error_weight, order_weight: Wf1, Wf2 of fitness (6).
-    arithmetic: "double" or "float", of the genetic search; local fits are always double. Or that of a drive (docs/dsp.md), in
-        which the run is the drive's bit for bit: "drive_double", "drive_float" (64 and 32 bits throughout), "c30" (the paper's
-        processor), "fixed" (32-bit fixed point; "fixed_tight", "fixed_wide": less and more headroom). Those know the continuous
-        loop without limits.
-    initial_state: "rest", "free" (estimated for every record) or "auto": estimated for records that do not start at rest.
+    Parameters
+    ----------
+    population : int
+        Individuals in all; the species engine keeps at least three per structure.
+    tournament : int
+        Individuals that compete in a selection.
+    crossover : float
+        Rate of crossover per pair [1].
+    mutation : float
+        Rate of mutation per bit [1].
+    generations : int
+        Generations of the plain engine; at most so many of the species engine.
+    elites : int
+        Survivors of the plain engine (species always keep one each).
+    code : {"gray", "binary"}
+        Code of a number.
+    scale : {"logarithmic", "linear"}
+        Scale of real and imaginary parts (K is always logarithmic).
+    error_weight : float
+        Weight Wf1 of the error in fitness (6).
+    order_weight : float
+        Weight Wf2 of the order in fitness (6).
+    engine : {"species", "plain"}
+        "species": a species per structure (p, q), local fits, structures compared afterwards by whitened BIC.
+        "plain": one population with every structure in it; fitness (6) alone decides, as in the paper.
+    round : int
+        Generations after which the species engine fits every species' best locally.
+    quiet_rounds : int
+        Rounds without a better optimum close to the best, after which the species engine stops.
+    arithmetic : str
+        Arithmetic of the genetic search, "double" or "float"; local fits are always double.
+        Or that of a drive (docs/dsp.md), in which the run is the drive's bit for bit: "drive_double", "drive_float" (64 and 32
+        bits throughout), "c30" (the paper's processor), "fixed" (32-bit fixed point; "fixed_tight", "fixed_wide": less and more
+        headroom). Those know the continuous loop without limits.
+    initial_state : {"auto", "rest", "free"}
+        "free": estimated for every record. "auto": estimated for records that do not start at rest.
 
-    Raises SettingsError naming the field, its value and what it may be.
+    Raises
+    ------
+    SettingsError
+        For a value out of its range; names the field, the value and what it may be.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> ga.Settings(population=80).species, ga.Settings.paper().code
+    (True, 'binary')
     """
 
     population: int = 50
@@ -99,8 +132,11 @@ class Settings:
 
     @classmethod
     def paper(cls) -> Settings:
-        """Table II: population 50, tournament, multi-point crossover 0.9, bit mutation 0.01, binary code, 1000 generations,
-        Wf1 = 1, Wf2 = 2, no elitism; the best candidate ever seen is reported, without a local fit."""
+        """Return the settings of Table II of the paper.
+
+        Population 50, tournament, multi-point crossover 0.9, bit mutation 0.01, binary code, 1000 generations, Wf1 = 1, Wf2 = 2.
+        No elitism; the best candidate ever seen is reported, without a local fit.
+        """
         return cls(code="binary", scale="linear", engine="plain")
 
     @property
@@ -114,7 +150,7 @@ class Settings:
         return self.engine == "species"
 
     def engine_settings(self) -> _core.EngineSettings:
-        """The same for the core."""
+        """Return the same for the core."""
         from gaident import _core
 
         return _core.EngineSettings(
@@ -136,12 +172,12 @@ class Settings:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
+        """Return plain data for JSON."""
         return asdict(self)
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Settings:
-        """The inverse of to_dict. Raises SettingsError for unknown keys."""
+        """Return the settings of what `to_dict` gave; raise SettingsError for unknown keys."""
         unknown = set(data) - {f.name for f in fields(cls)}
         if unknown:
             raise SettingsError(f"settings hold unknown keys: {', '.join(sorted(unknown))}")

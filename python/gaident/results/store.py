@@ -29,10 +29,32 @@ READERS: dict[str, Callable[[Mapping[str, Any]], Saved]] = {
 
 
 def load(path: str | os.PathLike[str]) -> Saved:
-    """Reads what `Identification.save`, `Diagnosis.save` or `Record.save` wrote.
+    """Read what `Identification.save`, `Diagnosis.save` or `Record.save` wrote.
 
-    Raises GaidentError naming the file where it is missing, no JSON, none of them, of a newer schema, or names an effect of
-    your own that is not registered.
+    Parameters
+    ----------
+    path : str or path-like
+        The JSON file.
+
+    Returns
+    -------
+    Identification, Diagnosis or Record
+        What was saved; an identification and a diagnosis without their records.
+
+    Raises
+    ------
+    GaidentError
+        Where the file is missing, no JSON, none of them, of a newer schema, or names a user-defined effect that is not
+        registered.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> rec = ga.Record(1e-3, torque=np.ones(20), velocity=np.zeros(20))
+    >>> rec.save("run.json")
+    >>> ga.load("run.json") == rec
+    True
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -58,6 +80,18 @@ def load(path: str | os.PathLike[str]) -> Saved:
 
 
 def schema() -> dict[str, Any]:
-    """The JSON Schema (draft 2020-12) of the files that `load` reads; it stands in the package as results.schema.json."""
+    """Return the JSON Schema (draft 2020-12) of the files that `load` reads; it stands in the package as results.schema.json.
+
+    Returns
+    -------
+    dict
+        The schema.
+
+    Examples
+    --------
+    >>> from gaident.results import schema
+    >>> schema()["$schema"]
+    'https://json-schema.org/draft/2020-12/schema'
+    """
     data: dict[str, Any] = json.loads(Path(__file__).with_name("results.schema.json").read_text(encoding="utf-8"))
     return data

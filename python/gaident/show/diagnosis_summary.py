@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import textwrap
 
-from gaident.results.diagnosis import Diagnosis, Finding
+from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
+from gaident.results.finding import Finding
 from gaident.show.wording import certainty, number, sentence, table, unit, velocity_unit, with_std
 
 __all__ = [

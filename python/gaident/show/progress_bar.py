@@ -113,12 +113,24 @@ class _NotebookBar:
 
 
 def progress() -> Progress:
-    """For the `progress` of identify and diagnose, in a script or a notebook.
-
-        with ga.progress() as shown:
-            idn = ga.identify(rec, controller=ctl, progress=shown)
+    """Show how far `identify` or `diagnose` have come, in a script or a notebook.
 
     Draws on standard error, in a notebook below the cell; nothing in a pipe.
+
+    Returns
+    -------
+    Progress
+        A context that gives the function for the argument `progress`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> torque = np.repeat([1.0, -1.0, 0.5, -0.5], 100)
+    >>> still = ga.Record(1e-3, torque=torque, velocity=0.0 * torque)
+    >>> rec = ga.Record(1e-3, torque=torque, velocity=ga.simulate(ga.OneMass(J=0.01, D=0.05), still))
+    >>> with ga.progress() as shown:
+    ...     idn = ga.identify(rec, progress=shown)
     """
     return Progress(sys.stderr)
 

@@ -22,8 +22,8 @@ from gaident.diagnosis.library.terms import IN_CONTROLLER
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.term import Scales, Term
 from gaident.models.effects import table
-from gaident.results.diagnosis import Finding
 from gaident.results.estimate import Estimate
+from gaident.results.finding import Finding
 
 __all__ = ["AsLogged", "AtController", "as_logged", "as_read", "controller_findings"]
 

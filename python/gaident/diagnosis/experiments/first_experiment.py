@@ -56,15 +56,39 @@ class MenuItem:
 
 
 def first_experiment(dt: float, limits: Limits, inertia: float | None = None, kp: float | None = None) -> Proposal:
-    """A command for the first record of a drive: it triggers every effect of the library within the limits.
-
-    dt       sample time [s]
-    inertia  total inertia [kg m^2]: ramps then use at most 60 % of the torque; None: gentle ramps
-    kp       proportional gain of the controller [N m s/rad]: no jump of the command then asks for more torque than there is, and
-             none shows torque_saturation; None: jumps are sized by the speed alone, `reason` says what they ask for
+    """Propose a command for the first record of a drive: it shows every effect of the library within the limits.
 
     Levels with reversals and dither, slow stairs with rests, reversals with small and large torque, steps of three sizes, and
-    the first levels once more at the end. Raises SettingsError for a duration of fewer than 400 samples.
+    the first levels once more at the end.
+
+    Parameters
+    ----------
+    dt : float
+        Sample time [s].
+    limits : Limits
+        What the experiment may do.
+    inertia : float, optional
+        Total inertia [kg m^2]: ramps then use at most 60 % of the torque; None: gentle ramps.
+    kp : float, optional
+        Proportional gain of the controller [N m s/rad]: no jump of the command then asks for more torque than there is, and none
+        shows torque_saturation. None: jumps are sized by the speed alone, `reason` says what they ask for.
+
+    Returns
+    -------
+    Proposal
+        The command [rad/s] and what it is for.
+
+    Raises
+    ------
+    SettingsError
+        For a duration of fewer than 400 samples.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> first = ga.first_experiment(dt=1e-3, limits=ga.Limits(speed=80.0, torque=2.4, duration=4.0))
+    >>> len(first.command), bool(abs(first.command).max() < 80.0), "backlash" in first.separates
+    (3776, True, True)
     """
     bench = _bench(dt, limits, inertia, kp)
     course: tuple[tuple[Builder, float], ...] = (

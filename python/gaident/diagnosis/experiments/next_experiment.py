@@ -32,8 +32,8 @@ from gaident.estimation.objective import Fit, Hypothesis, Objective
 from gaident.estimation.prediction import ClosedLoop, OpenLoop
 from gaident.estimation.projection import WORST, project_out
 from gaident.models.simulate import run
-from gaident.results.diagnosis import Finding
 from gaident.results.experiment import Limits, Proposal
+from gaident.results.finding import Finding
 
 __all__ = ["propose"]
 

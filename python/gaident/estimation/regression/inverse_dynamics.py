@@ -43,7 +43,7 @@ def inverse_dynamics(
     validation: Record | Sequence[Record] | None = None,
     axis: str = "rotary",
 ) -> InverseDynamics:
-    """The torque of an axis as a sum of inertia, friction, load, gravity and spring, by least squares.
+    """Write the torque of an axis as a sum of inertia, friction, load, gravity and spring, by least squares.
 
         u = J a + B w + C sign(w) + T + A sin(theta + phase) + K theta
 
@@ -57,24 +57,24 @@ def inverse_dynamics(
 
     Parameters
     ----------
-    rec
+    rec : Record or sequence of Record
         One Record or several of one sample time; one set of parameters for all. Each needs its torque.
-    terms
+    terms : sequence of str, optional
         Names of terms, or None to let the criterion choose: "inertia", "viscous" or "viscous_by_direction", "coulomb" or
         "coulomb_by_direction", "offset", "gravity", "spring".
-    cutoff_hz
+    cutoff_hz : float, optional
         Corner of the filter [Hz]. None: the highest at which noise is at most 0.1 % of the acceleration's power, at
         most a tenth of the sample rate.
-    order
+    order : int
         Order of the Butterworth filter, 1 to 10; it runs forward and backward.
-    decimation
+    decimation : int, optional
         Every so many samples one row. None: one row for each 1/cutoff_hz.
-    standstill
+    standstill : float, optional
         Velocity up to which the axis stands [rad/s]. None: the rule above. 0.0: nothing is left out, as in the literature.
-    validation
+    validation : Record or sequence of Record, optional
         Records that are not fitted, for the held-out force error. None: the last 30 % of the samples in motion of each
         record are held out from a second fit of the same terms.
-    axis
+    axis : {"rotary", "linear"}
         "rotary" or "linear" (m, m/s, N). Gravity depends on the angle of a rotary axis only.
 
     Returns

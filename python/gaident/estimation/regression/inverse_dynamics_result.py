@@ -22,24 +22,53 @@ __all__ = ["InverseDynamics"]
 
 @dataclass(frozen=True, eq=False)
 class InverseDynamics:
-    """The result of `ga.inverse_dynamics`: what the torque of an axis is made of.
+    """The result of `inverse_dynamics`: what the torque of an axis is made of.
 
-    parameters            name -> Estimate in the axis' units: inertia, viscous or viscous_positive and viscous_negative,
-                          coulomb or coulomb_positive and coulomb_negative, offset, gravity_amplitude and
-                          gravity_phase, spring
-    terms                 the terms that belong, by the criterion or as asked for
-    coefficients          of the columns of these terms, in their order
-    cutoff_hz, order, decimation   the filter [Hz] and the samples that became one row
-    axis, dt              "rotary" or "linear"; sample time of the records [s]
-    standstill            the velocity of standstill as asked for [rad/s], None by the rule
-    slowest               samples with a velocity up to this are left out [rad/s], the largest of the records
-    samples, effective_samples     rows of the regression, and how many independent ones they are worth
-    noise_share           of the acceleration's power: so much the inertia may be too small by noise
-    force_error           |u - u_model|/|u| over the rows, 0.04 for 4 %
-    force_error_held_out, held_out the same on data that were not fitted, and which data these are
-    rivals                (terms, BIC units worse) of the choices within 10 units
-    not_tried             terms that these records cannot show, with the reason
-    digests               of the records
+    Attributes
+    ----------
+    parameters : dict of str to Estimate
+        In the axis' units: inertia, viscous or viscous_positive and viscous_negative, coulomb or coulomb_positive and
+        coulomb_negative, offset, gravity_amplitude and gravity_phase, spring.
+    terms : tuple of str
+        The terms that belong, by the criterion or as asked for.
+    coefficients : tuple of float
+        Coefficients of the columns of these terms, in their order, SI units.
+    cutoff_hz : float
+        Corner of the filter [Hz].
+    order : int
+        Order of the filter.
+    decimation : int
+        Samples that became one row.
+    axis : {"rotary", "linear"}
+        Kind of the axis.
+    dt : float
+        Sample time of the records [s].
+    standstill : float or None
+        Velocity of standstill as asked for [rad/s]; None: by the rule.
+    slowest : float
+        Samples with a velocity up to this are left out [rad/s]; the largest of the records.
+    samples : int
+        Rows of the regression.
+    effective_samples : float
+        How many independent rows they are worth.
+    noise_share : float
+        Share of noise in the acceleration's power [1]: so much the inertia may be too small.
+    force_error : float
+        norm(u - u_model)/norm(u) over the rows [1], 0.04 for 4 %.
+    force_error_held_out : float
+        The same on data that were not fitted [1].
+    held_out : str
+        Which data these are.
+    rivals : tuple of (tuple of str, float)
+        (terms, BIC units worse) of the choices within 10 units.
+    not_tried : tuple of str
+        Terms that these records cannot show, with the reason.
+    digests : tuple of str
+        Digests of the records, see `Record.digest`.
+
+    See Also
+    --------
+    inverse_dynamics : Makes it, with an example.
     """
 
     parameters: dict[str, Estimate]
@@ -63,18 +92,18 @@ class InverseDynamics:
     digests: tuple[str, ...]
 
     def torque(self, record: Record) -> NDArray[np.float64]:
-        """The torque [N m] that this motion needs, an array (n,) like `record.velocity`.
+        """Return the torque that this motion needs [N m], shape (n,) like `record.velocity`.
 
-        The motion passes the filter of the regression, so the torque has its band. Below the velocity of standstill dry
-        friction is a straight line through zero: what it is at rest, the motion does not say. Raises SettingsError where
-        the filter's corner is not below half of the record's sample rate.
+        The motion passes the filter of the regression, so the torque has its band.
+        Below the velocity of standstill dry friction is a straight line through zero: the motion does not say what it is at rest.
+        Raises SettingsError where the filter's corner is not below half of the record's sample rate.
         """
         self._fits(record)
         motion = motion_of(record, self.cutoff_hz, self.order, self.standstill)
         return np.asarray(columns_of(self.terms, motion) @ np.array(self.coefficients))
 
     def error(self, records: Record | Sequence[Record]) -> float:
-        """The relative force error |u - u_model|/|u| on records with a torque, samples at standstill left out.
+        """Return the relative force error norm(u - u_model)/norm(u) on records with a torque, samples at standstill left out.
 
         Raises RecordError where a record has no torque or does not move, SettingsError as `torque` does.
         """
@@ -92,11 +121,11 @@ class InverseDynamics:
         return float(np.sqrt(squares / whole))
 
     def summary(self) -> str:
-        """What was found and what it is worth; plain text, no line break at the end."""
+        """Return what was found and what it is worth; plain text, no line break at the end."""
         return str(provided("inverse_dynamics_summary")(self))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
+        """Return plain data for JSON."""
         own = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "parameters"}
         return {**own, "parameters": {name: vars(e) for name, e in self.parameters.items()}}
 

@@ -1,0 +1,56 @@
+"""One thing that a diagnosis found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from gaident.results.estimate import Estimate
+
+__all__ = ["Finding"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that a diagnosis found.
+
+    Attributes
+    ----------
+    effect : str
+        Name of the effect in `gaident.effects.table()`.
+    parameters : mapping of str to Estimate
+        Its parameters.
+    alternatives : tuple of str
+        Effects that these data cannot tell from it, by statistics or by nature; empty: the cause is named.
+    gain : float
+        Fall of the held-out error that it brought, as a fraction of the error before [1].
+    delta_bic : float
+        BIC units on whitened errors by which the model without it is worse.
+    p_value : float or None
+        p-value of the bootstrap; None where none was asked for.
+    evidence : str
+        What speaks for it, one sentence.
+    is_noise : bool
+        Whether it describes the record rather than the drive.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> friction = ga.Finding("coulomb_friction", {"torque": ga.Estimate(0.04, 0.001, "N m")}, alternatives=("load_torque",))
+    >>> friction.named
+    False
+    """
+
+    effect: str
+    parameters: Mapping[str, Estimate] = field(hash=False)
+    alternatives: tuple[str, ...] = ()
+    gain: float = 0.0
+    delta_bic: float = 0.0
+    p_value: float | None = None
+    evidence: str = ""
+    is_noise: bool = False
+
+    @property
+    def named(self) -> bool:
+        """Whether the cause is named, without an alternative."""
+        return not self.alternatives
