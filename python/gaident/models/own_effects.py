@@ -59,7 +59,7 @@ class Signals(NamedTuple):
 class Parameter(NamedTuple):
     """One parameter of an effect.
 
-    Parameters
+    Attributes
     ----------
     name : str
         Name of the parameter.
