@@ -1,4 +1,4 @@
-// The linear closed loop as ONE difference equation (equation 7), in delta form: where a genetic run spends its life.
+// The linear closed loop as ONE difference equation (equation 7), in delta form: nearly all of the time of a genetic run is spent here.
 //
 // With the plant B/A and the controller ((kp + ki Ts/2) delta + ki Ts)/delta,
 //

@@ -15,7 +15,7 @@ namespace gaident {
 
 enum class Effect : std::uint8_t {};
 
-// One type for each effect, so that none of them takes room.
+// One type for each effect, so that none of them takes memory.
 template <class E>
 struct Nothing {};
 

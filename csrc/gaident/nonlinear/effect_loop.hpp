@@ -95,7 +95,7 @@ public:
         own_w_before_ = plant_.velocity();
         if (looking_back_)
             for (std::size_t i = 0; i <= run.history_mask; ++i) Pack<R>::store(c_.before, run.history + i * width);
-        // Friction that would push is no friction: such a candidate is as good as diverged.
+        // Friction that drives the shaft is none: such a candidate counts as diverged.
         if (dry_) plant_.x[0] = greater(plant_.beta(), R(0.0), plant_.x[0], R(any_value));
         per_beta_ = R(1.0) / plant_.beta();
     }
@@ -180,7 +180,7 @@ private:
             theta_ = R(here + (next - here) * share);
             return;
         }
-        // Foreseen a substep ahead (second order), so that its sine need not be waited for.
+        // Predicted a substep ahead (second order), so that the sine is computed in time.
         theta_ = theta_middle_;
         theta_middle_ = angle_ + plant_.velocity() * R(1.5 * h_);
     }
@@ -294,7 +294,8 @@ private:
         angle_ = angle_ + (w + w_next) * R(0.5 * h_);
     }
 
-    // The torque with effects of one's own, asked at the mean velocity, which is foreseen. Apart, because it is seldom there.
+    // The torque with user-defined effects, evaluated at the predicted mean velocity.
+    // A function of its own, because few models have them.
     [[gnu::noinline]] R with_own(R w, R T, double t) {
         const R middle = w + (w - own_w_before_) * R(0.5);
         own_w_before_ = w;

@@ -86,7 +86,7 @@ void two_masses(const EffectModel& model, double h, double sample_time, const De
                 EffectConstants<double>& c) {
     TwoMasses m{};
     if (!two_masses_of(model.linear, m)) {
-        c.x[0] = any_value;  // no such mechanism: as good as diverged
+        c.x[0] = any_value;  // no such mechanism: counts as diverged
         return;
     }
     const TwoMassStep step = two_mass_step(m, h);

@@ -2,7 +2,7 @@
 //
 //     H(delta) = (b[0] delta^N + b[1] delta^(N-1) + ... + b[N]) / (delta^N + a[0] delta^(N-1) + ... + a[N-1]).
 //
-// In powers of z the poles of a fast-sampled loop crowd at z = 1 and cancellation destroys the coefficients (more than half of
+// In powers of z the poles of a fast-sampled loop lie close together at z = 1 and cancellation destroys the coefficients (more than half of
 // random order-7 models are wrong by over 1 % in 32 bits). In delta, with every polynomial *built* in delta, nothing cancels.
 #pragma once
 

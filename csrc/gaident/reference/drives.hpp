@@ -135,7 +135,7 @@ inline Drive random_drive(Random& random, LoopKind kind, std::size_t p, std::siz
             const std::vector<double> zero(samples, 0.0), velocity = d.respond<double>().velocity;
             double largest = 0.0;
             for (const double r : d.input) largest = std::max(largest, std::abs(r));
-            // A response can be tiny as well, where the loop is nearly open: let it be seen.
+            // A response can be very small as well, where the loop is nearly open: it is scaled up.
             const double size = deviation(velocity, zero);
             if (kind == LoopKind::open) {
                 if (size > 0.0 && size < 1e12) return d;

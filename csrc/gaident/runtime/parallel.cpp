@@ -53,14 +53,14 @@ void Workers::share_strands(std::size_t strands, std::size_t steps, const std::f
     std::vector<std::size_t> done(strands, 0);
     std::vector<char> busy(strands, 0);
     std::mutex lock;
-    // The strand that is furthest behind, of those that nobody is at.
+    // The strand with the fewest steps done, of those that no thread works on.
     const auto next = [&] {
         std::size_t found = none;
         for (std::size_t s = 0; s < strands; ++s)
             if (busy[s] == 0 && done[s] < steps && (found == none || done[s] < done[found])) found = s;
         return found;
     };
-    // Whoever finds no strand may go: those there are have each a worker already, and it stays to the end.
+    // A thread that finds no strand ends: each strand has a worker already, which stays to the end.
     share(std::min(strands, count_), [&](std::size_t) {
         std::unique_lock<std::mutex> guard(lock);
         for (std::size_t s = next(); s != none; s = next()) {
@@ -123,7 +123,7 @@ void Workers::announce() {
     news_.notify_all();
 }
 
-// Looks around for some ten microseconds, in which a generation's serial part is over, before it sleeps: to be woken takes longer.
+// Polls for some ten microseconds, in which a generation's serial part is over, before it sleeps: waking a thread takes longer.
 void Workers::await_news(std::unique_lock<std::mutex>& lock) {
     constexpr int glances = 64;
     const unsigned seen = edition_;

@@ -23,7 +23,7 @@ struct Experiment {
     Loop loop;
     const Kernels* kernels = &best_kernels();
     const std::atomic<bool>* stop = nullptr;
-    Workers* workers = nullptr;  // among whom the work on long records is shared; null: nobody
+    Workers* workers = nullptr;  // threads that share the work on long records; null: none
 
     void check() const;  // throws std::invalid_argument, naming what is wrong
     std::size_t samples() const;

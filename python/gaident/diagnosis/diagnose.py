@@ -225,7 +225,7 @@ class _Work:
         driver = self.left.driver if self.adequate else self.left.strongest
         after = gains.after
         if driver is None and after.rmse > POLICY.free_run_ratio * after.noise_floor > 0.0:
-            # A noise filter takes a slow misfit whole; the free run does not.
+            # A noise filter removes a slow misfit completely; the free run shows it.
             driver = self.left.strongest or "time"
             times = f"The free run misses the velocity by {after.rmse / after.noise_floor:.0f} times its noise. "
             self.notes.append(

@@ -1,7 +1,7 @@
 """Before and after: the free-run simulation, linear and extended, on data that no parameter was fitted to.
 
 With validation records these are used whole. Without, parameters are fitted again to the first 70 % of each record and judged
-on the rest of one continuous run, never started anew; where a record is too short for that, the figures are in-sample and say
+on the rest of one continuous run, which is not restarted; where a record is too short for that, the figures are in-sample and say
 so.
 """
 
@@ -174,7 +174,7 @@ def free_run_errors(model: Model, judged: Sequence[tuple[Record, int]], controll
 
 
 def start_state(model: Model, rec: Record, controller: PI | None) -> Vector | None:
-    """State in which the record found the model; None where it starts at rest, or a limited loop does not tell.
+    """Initial state of the model at the record's start; None where it starts at rest, or the loop has limits.
 
     A model with effects is not linear in it: two steps of Gauss and Newton over the record's head, from the first velocity.
     """
@@ -197,7 +197,7 @@ def start_state(model: Model, rec: Record, controller: PI | None) -> Vector | No
 
 
 def _interval(before: list[Vector], after: list[Vector]) -> tuple[float, float]:
-    """95 % interval of 1 - rmse_after/rmse_before by a paired block bootstrap (blocks beyond the errors' memory)."""
+    """95 % interval of 1 - rmse_after/rmse_before by a paired block bootstrap (blocks longer than the errors stay correlated)."""
     b, a = np.concatenate(before), np.concatenate(after)
     n = len(b)
     block = max(min(n // 8, 3 * _memory(a)), 1)

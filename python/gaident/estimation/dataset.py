@@ -1,8 +1,9 @@
 """The records as an estimation sees them: what drove the motor, where it stood, how it began, how noisy the velocity is.
 
 A model is driven by the torque that the controller issued: as logged or, without a log, as the controller makes it from the
-command and the *measured* velocity. Noise inside the loop then acts in the model as it did on the drive, and what is left at
-the truth is the noise of the sensor and torques that nobody commanded.
+command and the *measured* velocity.
+Noise inside the loop then acts in the model as it did on the drive, and what is left with the true parameters is the noise of the
+sensor and disturbance torques.
 """
 
 from __future__ import annotations
@@ -90,7 +91,7 @@ class DataSet:
 
     @property
     def loop_only(self) -> bool:
-        """Whether a torque is not to be had: a replay keeps what one wrong velocity adds to its integral for ever."""
+        """Whether no torque is available: a replayed one keeps the error that one wrong velocity adds to its integral."""
         return self.spoiled and not self.torque_logged and self.loopable
 
     @cached_property

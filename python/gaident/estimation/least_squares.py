@@ -1,4 +1,4 @@
-"""Fits of one hypothesis: least squares from a start, noise re-estimated, and a global search where there are valleys."""
+"""Fits of one hypothesis: least squares from a start, noise re-estimated, and a global search where the cost is multimodal."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def _reestimated(objective: Objective, found: Fit, iterations: int) -> Fit:
 
 
 def evolved(objective: Objective, found: Fit, iterations: int) -> Fit:
-    """Differential evolution around a fit (Storn and Price 1997): a stop or an impact more or less makes valleys."""
+    """Differential evolution around a fit (Storn and Price 1997): a stop or an impact more or less makes the cost multimodal."""
     from scipy.optimize import differential_evolution
 
     hypothesis, parameters = found.hypothesis, found.parameters

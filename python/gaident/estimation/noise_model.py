@@ -2,9 +2,9 @@
 
     v(n) = B(q)/A(q) e(n),   B and A monic
 
-Two families. An autoregression (A = 1) knows nothing of the drive. Where torques that nobody commanded turn the shaft and the
-sensor adds white noise, the error of a torque-driven model is e = n + G d; a long autoregression takes hundreds of BIC units to
-say what two numbers say:
+Two families. An autoregression (A = 1) knows nothing of the drive.
+Where disturbance torques turn the shaft and the sensor adds white noise, the error of a torque-driven model is e = n + G d; a
+long autoregression takes hundreds of BIC units to say what two numbers say:
 
     d(n+1) = phi d(n) + w(n),   e(n) = n(n) + G(q) d(n),   phi = exp(-dt/tau)
 

@@ -4,11 +4,12 @@
 
 What becomes of e is the choice of a noise family:
 
-*Innovations*: every hypothesis has a noise filter H^-1 of its own, which is part of it and charged for, so that no effect is
-whitened away by a filter that was estimated without it, and none is favoured by one estimated with it. A velocity of next to no
-noise would let the filter judge by what is of no account: the exact instant of a reversal, the corner that a jump of friction
-makes there. White noise of a variance f (`floor`) is then added to the account of every hypothesis alike, as if it had been on
-the velocity: H is that of e plus this noise, and V/N becomes V/N + f |h|^2, h the impulse response of H^-1.
+*Innovations*: every hypothesis has a noise filter H^-1 of its own, which is part of it and counts in its criterion, so that no
+effect is whitened away by a filter that was estimated without it, and none is favoured by one estimated with it.
+With almost no noise on the velocity, the filter would give most weight to what does not matter: the exact instant of a reversal,
+the corner that a jump of friction makes there.
+White noise of a variance f (`floor`) is then added to the error of every hypothesis alike, as if it had been on the velocity: H
+is that of e plus this noise, and V/N becomes V/N + f |h|^2, h the impulse response of H^-1.
 
 *Output errors*: the plain errors count (H = 1), with the information of their independent samples (see `criterion.py`). That is
 what is left where the errors are a misfit and no stationary noise.

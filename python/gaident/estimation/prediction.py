@@ -3,9 +3,10 @@
     open loop    w = model(u),            u the torque that the controller issued, from the measured velocity
     closed loop  w = loop(r; model, PI),  r the command; the simulated controller reads the simulated velocity
 
-The open loop shows everything that the torque does not explain; what nobody commanded adds up there between the stops of dry
-friction. The closed loop holds a simulation to the record: what happens in a gap is so sensitive to its start that an open-loop
-simulation of the true drive loses its way.
+The open loop shows everything that the torque does not explain; it integrates disturbance torques between the stops of dry
+friction.
+The closed loop keeps a simulation near the record: motion in a gap is so sensitive to its start that even the true drive,
+simulated in open loop, departs from it.
 
 The angle that effects depend on is the logged one (or the measured velocity, integrated), or that of the simulation itself.
 """
@@ -54,7 +55,7 @@ class Predictor(Protocol):
 
     @property
     def difference(self) -> float:
-        """Step of a forward difference, in parts of what makes a difference: stops and impacts roughen the error."""
+        """Step of a forward difference, in parts of what makes a difference: stops and impacts make the error not smooth."""
         ...
 
     def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
@@ -135,9 +136,9 @@ class ClosedLoop:
 
 
 def substeps(data: DataSet, terms: Sequence[Term]) -> int | None:
-    """As many for every model with effects, so that no candidate is ahead for being simulated more finely."""
+    """As many for every model with effects, so that no candidate has an advantage by finer simulation."""
     acting = [t for t in terms if not t.resonates]
-    if not acting or all(t.name in OWN for t in acting):  # user-defined effects are smooth, and dear to ask
+    if not acting or all(t.name in OWN for t in acting):  # user-defined effects are smooth, and take long to evaluate
         return None
     return int(2 ** np.clip(np.ceil(np.log2(data.dt / data.finest)), 0.0, MOST_SUBSTEPS))
 

@@ -1,4 +1,4 @@
-"""The effects a model can carry beyond its linear part: the core's registry (csrc/gaident/effects), and those of one's own.
+"""The effects a model can carry beyond its linear part: the core's registry (csrc/gaident/effects), and user-defined ones.
 
 ga.effects.table() lists them: place in the loop, parameters with units, one line of meaning. ga.effects.register(...) adds one
 that is a Python function; it then takes part in simulation, diagnosis and report like the others.

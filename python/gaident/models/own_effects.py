@@ -1,4 +1,4 @@
-"""Effects of one's own: a Python function of the loop's signals, with parameters and units, asked by the core at its place.
+"""User-defined effects: a Python function of the loop's signals, with parameters and units, called by the core at its place.
 
     shaft      torque     T + torque(s)                      added to the motor's torque
                friction   abs(friction torque) <= level(s)   dry friction, which stops the motor and holds it

@@ -148,7 +148,7 @@ def simulate_values(
 def simulated_with_effects(
     record: _core.EffectRecord, plants: Sequence[Model], starts: Signal, steps: int, workers: int, every: bool
 ) -> tuple[Signal, Signal, Signal]:
-    """The core's simulation of models, those with the same effects of one's own at once."""
+    """The core's simulation of models, those with the same user-defined effects at once."""
     acting = [tuple(e.name for e in plant.own_effects()) for plant in plants]
     if not any(acting):
         return record.simulate([plant.core() for plant in plants], starts, steps, workers, every)
@@ -172,7 +172,7 @@ def simulated_with_effects(
 
 
 def _parted(structure: Structure, effects: Sequence[str], values: Signal) -> tuple[Signal, OwnList]:
-    """Rows of values of `simulate_values` without the columns of effects of one's own, and these."""
+    """Rows of values of `simulate_values` without the columns of user-defined effects, and these."""
     if not any(e in OWN for e in effects):
         return values, []
     sizes = {row.name: len(row.parameters) for row in effect_table()}

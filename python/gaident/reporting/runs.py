@@ -77,7 +77,7 @@ def _free_run(model: Model, rec: Record, controller: PI | None, what: str, notes
 
 
 def _finite(velocity: Vector, rec: Record, what: str, notes: list[str]) -> Vector:
-    """Without what would leave every picture: from where a simulation runs away it is a gap."""
+    """Values beyond what a picture can show are left out: a diverging simulation ends in a gap."""
     limit = 1e3 * float(np.abs(rec.velocity).max() or 1.0)
     with np.errstate(invalid="ignore"):
         away = ~(np.abs(velocity) <= limit)

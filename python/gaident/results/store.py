@@ -1,4 +1,4 @@
-"""Saved results back from their files."""
+"""Saved results, read from their files."""
 
 from __future__ import annotations
 

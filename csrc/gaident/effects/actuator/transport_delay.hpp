@@ -45,7 +45,7 @@ struct TransportDelay {
         const double over = (x - static_cast<double>(k)) * m + 1.0 - m;
         back = -k;
         share = over > 0.0 ? over : 0.0;
-        // Rounding may put the present substep a hair before the present value, or ask for one that is not there yet.
+        // Rounding may put the present substep slightly before the present value, or ask for one that is not there yet.
         if (back <= 0) {
             back = 0;
             share = 0.0;

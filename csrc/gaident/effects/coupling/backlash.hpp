@@ -46,7 +46,7 @@ struct Backlash {
         const R c0 = clamp(x0, -c.half_gap, c.half_gap), c1 = clamp(x1, -c.half_gap, c.half_gap), step = x1 - x0;
         // S = c (x - c/2)
         const R S = c1 * (x1 - R(0.5) * c1) - c0 * (x0 - R(0.5) * c0);
-        // Next to no movement, next to no difference: there the mean of both ends serves.
+        // With almost no movement the quotient has no digits: there the mean of both ends is taken.
         const R shortest = R(1e-6) * c.half_gap;
         const R moves = absolute(step), per_step = R(1.0) / greater(moves, shortest, step, R(1.0));
         const R inside = greater(c.half_gap, absolute(x0), R(1.0), R(0.0));

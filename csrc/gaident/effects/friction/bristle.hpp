@@ -2,7 +2,7 @@
 //
 //     dz/dt = w - abs(w) z/zc
 //
-// over one substep h, solved jointly with the velocity (with the old one it would ring). With W and zm the mean velocity and deflection,
+// over one substep h, solved jointly with the velocity (with the velocity of the substep before, the solution would oscillate). With W and zm the mean velocity and deflection,
 //
 //     zm = (z + e W)/(1 + e abs(W)/zc),  e = theta h,     W = w + theta (w+ - w),     w+ = w_free - beta k zm
 //

@@ -1,4 +1,4 @@
-// Torque ripple tied to the angle: -A sin(n theta + phase).
+// Torque ripple that depends on the angle: -A sin(n theta + phase).
 #pragma once
 
 #include "../effect.hpp"

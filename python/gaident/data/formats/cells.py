@@ -23,7 +23,7 @@ def numbers_of(
 ) -> tuple[NDArray[np.float64], _Bad]:
     """Values (n, width), NaN where no number stands, and per column the first such cell as (row, text).
 
-    Block by block: numpy's own parser is fast but says little of a flaw, so a block that it does not like is
+    Block by block: numpy's own parser is fast but says little of a flaw, so a block that it refuses is
     read again cell by cell.
     """
     values = np.full((len(body), dialect.width), np.nan)

@@ -83,7 +83,7 @@ def detect(path: str, lines: Sequence[Line], delimiter: str | None, decimal: str
     for mark in _DELIMITERS if delimiter is None else (delimiter,):
         rows = [split(text, mark) for text in sample]
         for point in (".", ",") if decimal is None else (decimal,):
-            # An unquoted decimal comma cannot live between commas.
+            # An unquoted decimal comma cannot be told from a separating comma.
             if mark == "," and point == "," and not any('"' in text for text in sample):
                 continue
             candidate, score = _weigh(rows, mark, point)

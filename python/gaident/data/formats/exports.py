@@ -1,4 +1,4 @@
-"""The manners of drive tools that the general look at a header cannot guess: one function each, in one table.
+"""What some drive tools write in a way of their own, which a header does not show: one function each, in one table.
 
 Sources: Beckhoff Infosys, "TwinCAT Scope: Export in csv" (TE13xx) and "Scope Settings" (TcScope2); Mitsubishi Electric,
 MR Configurator2, waveform saved as CSV; National Instruments, exported logs with a header block per channel.

@@ -71,7 +71,7 @@ def _is_plain(kind: Any) -> bool:
 
 
 def is_frame(source: object) -> bool:
-    """Whether `source` is a DataFrame: pandas' own, or one that looks like it (`columns`, `index`, `iloc`)."""
+    """Whether `source` is a DataFrame: pandas' own, or one with its attributes (`columns`, `index`, `iloc`)."""
     return all(hasattr(source, name) for name in ("columns", "index", "iloc"))
 
 

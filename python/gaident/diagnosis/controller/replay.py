@@ -1,6 +1,6 @@
 """Controller replay: the PI run again on the measured velocity; does the logged torque follow from it?
 
-No plant is needed: what the controller does is decided before any mechanism is blamed. The rule stands in `pi_torque`; where
+No plant is needed: what the controller does is decided before any mechanism is considered. The rule stands in `pi_torque`; where
 the logged torque does not follow, `replay_causes` looks for the simple reasons.
 """
 

@@ -22,7 +22,7 @@ Vector = NDArray[np.float64]
 SHIFTS = (0, 1, -1, 2, -2)  # samples by which what the controller saw may be older (+) than the log's
 # By how much of ki dt the newest error counts more than half, and the one before less: the rule of integration in words.
 RULES = {0.0: "", 0.5: "a rectangular integral", -0.5: "a rectangular integral that lacks the newest error"}
-PLATEAU = 5  # samples at a limit from which it is one that an integrator is held at
+PLATEAU = 5  # samples at a limit from which the integrator may have been stopped there
 SAME = 2e-3  # relative difference below which a fitted gain is the configured one
 RPM = 30.0 / np.pi  # rpm in 1 rad/s
 ROUNDED = 5e-5  # part of the largest command, that a command may be off in a log of few decimals
@@ -40,7 +40,7 @@ class Explanation:
     value: float
     sentence: str
     edge: int = 0
-    changes: int = 1  # how much of the configured controller is given up; the fewer the better
+    changes: int = 1  # how many settings differ from the configured controller; the fewer the better
     controller: PI | None = None
 
     def off(self, logged: Vector) -> Vector:
@@ -56,7 +56,7 @@ class _Gains(NamedTuple):
 
 
 class _Case(NamedTuple):
-    """What every reason is tried on."""
+    """The data that every reason is checked against."""
 
     command: Vector
     velocity: Vector
@@ -119,7 +119,7 @@ def white_noise(off: Vector, logged: Vector) -> float:
 
 
 def _start(case: _Case) -> Iterator[Explanation]:
-    """A record that starts under load: the integrator held something before it."""
+    """A record that starts under load: the integral is not 0 where it begins."""
     start = float(np.median(case.logged - case.torque(case.controller)))
     sentence = f"with {start:.4g} N m in the integrator at the record's start: the record begins under load."
     yield Explanation(case.torque(case.controller, start), "initial_integral", start, sentence)

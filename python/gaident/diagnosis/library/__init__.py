@@ -1,1 +1,1 @@
-"""The library of effects as a diagnosis sees them: terms, kin, equivalence classes. No other room names an effect."""
+"""The library of effects as a diagnosis sees them: terms, families, equivalence classes. No other room names an effect."""

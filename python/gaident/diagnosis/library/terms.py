@@ -1,7 +1,8 @@
-"""The library of effects as the diagnosis sees them: coordinates that a fit can move, with bounds, starts, kin and classes.
+"""The library of effects as the diagnosis sees them: coordinates that a fit can move, with bounds, starts, families and classes.
 
 This room is the only place outside the effects themselves that names one: what another room has to know of an effect is data of
-its `Term`. The bounds are part of each definition: a Stribeck friction of any speed and any ratio imitates half of the library.
+its `Term`. The bounds are part of each definition: a Stribeck friction of any speed and any ratio
+comes close to the data of many other effects.
 Coordinates are chosen so that a fit moves smoothly: logarithms of positive numbers whose size is unknown, the two components
 a cos(phase), a sin(phase) of a harmonic, ratios instead of differences.
 """
@@ -273,7 +274,7 @@ LIBRARY = Library({name: replace(term, **_METADATA.get(name, {})) for name, term
 """Every effect that a diagnosis can name, in the order of a report's tables; user-defined ones last."""
 
 RESONANCE = LIBRARY["extra_resonance"]
-"""The resonance in series that is a second mass in disguise."""
+"""The resonance in series that is equivalent to a second mass."""
 EVEN_FRICTION, LOAD, TWO_LEVELS = LIBRARY["coulomb_friction"], LIBRARY["load_torque"], LIBRARY["asymmetric_friction"]
 """Even dry friction with a constant load is the same torque, while the shaft turns, as friction of two levels."""
 IN_CONTROLLER = tuple(t for t in LIBRARY.values() if t.in_controller)

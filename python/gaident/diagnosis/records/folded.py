@@ -1,7 +1,8 @@
-"""A sensor that shows the speed without its sign: the velocity turns back at zero, as if from a wall.
+"""A sensor that shows the speed without its sign: the velocity is reflected at zero.
 
-An axis that passes zero with a slope a shows |w|: -a before, +a after, while the torque stays as it is. No axis can do that: its
-acceleration would have to jump with nothing to make it jump. Turned over, the slope just goes on.
+An axis that passes zero with a slope a shows |w|: -a before, +a after, while the torque stays as it is.
+No axis can do that: its acceleration would have to jump while the torque does not.
+With the sign of what follows reversed, the slope is continuous.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ ADVICE = (
 )
 
 STEEP = 0.15  # of the slopes that are common: what is no rest
-SMOOTHER = 0.8  # of the curvature around a turning point: less is left when what follows is turned over; far from zero far more
+SMOOTHER = 0.8  # of the curvature at a turning point: less is left once the sign behind it is reversed
 LEAST = 3  # turning points; one or two may be chance
 
 

@@ -28,7 +28,7 @@ def outliers(velocity: Vector, error: Vector | None = None) -> NDArray[np.intp]:
     """
     w, e = velocity.copy(), None if error is None else error.copy()
     hit = np.zeros(0, dtype=np.intp)
-    for _ in range(PASSES):  # neighbours hide each other
+    for _ in range(PASSES):  # neighbouring outliers mask each other
         more = np.union1d(hit, _leaving(w, e))
         if len(more) == len(hit):
             break
@@ -54,7 +54,7 @@ def _leaving(w: Vector, error: Vector | None) -> NDArray[np.intp]:
     around = np.lib.stride_tricks.sliding_window_view(np.pad(size, NEAR), 2 * NEAR + 1)[found]
     beside = np.abs(np.arange(-NEAR, NEAR + 1)) <= 2  # where the outlier itself shows
     largest = size[found] >= around[:, beside].max(axis=1)
-    alone = np.sum(around[:, ~beside] > 0.5 * size[found, None], axis=1) < 2  # where much is as rough it rings
+    alone = np.sum(around[:, ~beside] > 0.5 * size[found, None], axis=1) < 2  # with many beside it, it is an oscillation
     kept: NDArray[np.intp] = found[largest & alone] + 2
     return kept
 

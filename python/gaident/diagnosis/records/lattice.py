@@ -1,4 +1,4 @@
-"""The lattice that a signal lives on: encoder steps, converter bits, decimals of a text log."""
+"""The lattice of a signal's values: encoder steps, converter bits, decimals of a text log."""
 
 from __future__ import annotations
 

@@ -1,10 +1,11 @@
-"""Attribution: is a finding a cause, or does it only describe what the library does not hold?
+"""Attribution: is a finding a cause, or does it only describe what the library does not contain?
 
 A finding is withdrawn where a free function of one signal in its place explains more, and where what is left, in the finding's
-own domain, is of the finding's size. But whitened gains judge by what is fast, and in a record of next to no noise a small misfit
-of the true cause is as significant as the cause itself. So a finding stands where it leaves next to nothing of the free-run error
-that there is to explain. With V the sum of squared plain errors, all linear parts refitted: without the finding, with it, and
-with any function of the driver beside it,
+own domain, is of the finding's size.
+But whitened gains judge by what is fast, and in a record with almost no noise a small misfit of the true cause is as significant
+as the cause itself. So a finding stands where it leaves next to nothing of the free-run error that there is to explain.
+With V the sum of squared plain errors, all linear parts refitted: without the finding, with it, and with any function of the
+driver beside it,
 
     share = (V_without - V_with) / (V_without - V_free)
 

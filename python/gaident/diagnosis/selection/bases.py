@@ -49,7 +49,7 @@ class Task:
         return replace(self, objective=self.objective.under(family))
 
     def predictor(self) -> Predictor:
-        """Of linear models: the loop only where a torque is not to be had."""
+        """Of linear models: the closed loop only where no torque is available."""
         return ClosedLoop(self.data) if self.data.loop_only else OpenLoop(self.data)
 
     def start(self, model: Model, iterations: int = 20) -> Fit:
@@ -71,9 +71,9 @@ class Task:
 def linear_bases(task: Task) -> tuple[Task, list[Fit]]:
     """(the task with torques at the shaft in its noise family, linear fits that the search starts from).
 
-    One mass, two masses, or both where only the effects can decide. Two alone where they resonate as on a shaft and nothing on
-    one mass comes near, else one mass first: a delay or a lag looks like a resonance as long as nothing else is tried, and a load
-    or a saturation hides one.
+    One mass, two masses, or both where only the effects can decide.
+    Two masses alone where their resonance is that of a shaft and no model of one mass leaves an error as small, else one mass
+    first. Without other effects a delay or a lag is fitted as a resonance, and a load or a saturation can mask one.
     """
     one = task.one_mass()
     known, others = task.two_masses(one)
@@ -108,8 +108,8 @@ def linear_bases(task: Task) -> tuple[Task, list[Fit]]:
 def plain_bases(task: Task, bases: Sequence[Fit]) -> list[Fit]:
     """The best linear fit of one mass and of two to the plain errors: from the bases, and from the identified mechanism.
 
-    In the loop where the log shows that the loop is the drive's: a replayed torque that a limit of the controller spoils leads
-    the bases astray, and the model was identified in the loop.
+    In closed loop where the log shows that the simulated loop is the drive's.
+    A replayed torque that ignores a limit of the controller biases these fits, and the model was identified in closed loop.
     """
     looped = task.data.loopable and task.data.loop_follows
     view: Predictor = ClosedLoop(task.data) if looped else OpenLoop(task.data)
@@ -133,7 +133,7 @@ def noise_floor(task: Task, one: Fit) -> float:
     floor = beyond(float(np.mean(objective.error(one)[used] ** 2)))
     if not np.isfinite(floor):
         return 0.0
-    if floor > 0.0 and data.loopable:  # what the loop does not let through is none either, as a load that adds up without it
+    if floor > 0.0 and data.loopable:  # what the loop suppresses is no noise either: without it a load is integrated
         inside = np.concatenate([r.velocity - simulate(task.model, r, data.controller) for r in data.records])
         floor = min(floor, beyond(float(np.mean(inside[used] ** 2))))
     if floor > 0.0:  # a shaft that resonates is no misfit
@@ -145,7 +145,7 @@ def noise_floor(task: Task, one: Fit) -> float:
 def regressed(task: Task, predictor: Predictor) -> Fit | None:
     """The rigid axis of the inverse-dynamics regression, fitted to the plain errors; None where the records do not show one.
 
-    The regression needs no start: where a simulation has valleys, as with gravity, it says where to begin.
+    The regression needs no start: where the cost of a simulation is multimodal, as with gravity, it gives the start.
     """
     data = task.data
     if not data.torque_logged:

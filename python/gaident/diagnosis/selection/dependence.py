@@ -1,8 +1,8 @@
 """Unexplained dependence: what the error still depends on, named by its driver and never by a cause.
 
-Each driver is a handful of torques that some function of it could make, without saying which: hats over velocity, torque and
-position, harmonics of the angle, elasto-plastic elements (what depends on the past path), drifts and single frequencies in
-time. The linear part of the model answers to each; what the answers explain of the whitened error, beyond what the model's own
+Each driver is a family of torques that span the functions of it: piecewise linear ones of velocity, torque and position,
+harmonics of the angle, elasto-plastic elements (what depends on the past path), drifts and single frequencies in time.
+The linear part of the model answers to each; what the answers explain of the whitened error, beyond what the model's own
 parameters could, is the driver's gain in BIC units. All share one noise filter, estimated on what all together leave.
 """
 
@@ -148,7 +148,7 @@ def _of_position(angle: Vector, w: Vector) -> Matrix:
 
 
 def _of_path(angle: Vector, lengths: tuple[int, ...]) -> Matrix:
-    """Elasto-plastic elements: each follows the angle until it yields at its own width, and remembers."""
+    """Elasto-plastic elements: each follows the angle until it yields at a width of its own, and so depends on the past."""
     travel = float(np.ptp(angle)) or 1.0
     widths = travel * np.geomspace(3e-4, 0.3, 6)
     rows = np.empty((len(widths), len(angle)))

@@ -130,9 +130,11 @@ class ModelSpace:
     def material(self, simpler: Fit, fuller: Fit) -> bool:
         """Whether a model explains a fair part of what a simpler one leaves beyond the noise, or leaves noise.
 
-        Significant alone is not enough where a model is wrong: anything that moves a little helps a little. The part counts
-        whitened, or in the plain error of the free run: a noise filter may take the larger misfit for noise and whiten it. Beside
-        impacts the part is larger: one impact more or less leaves something at the truth, too, for other effects to describe.
+        Significance is not enough where a model is wrong: many effects then reduce the error a little.
+        The part counts whitened, or in the plain error of the free run: a noise filter may take the larger misfit for noise and
+        whiten it.
+        Beside impacts the part is larger: one impact more or less leaves an error even with the true parameters, which other
+        effects can fit.
         """
         impacts = any(t.multimodal and t.in_coupling for t in simpler.parameters.terms)
         if self.quiet(fuller) and not impacts:
@@ -150,11 +152,11 @@ class ModelSpace:
         return ls.fit(self.objective, fit.hypothesis.driven_by(view), fit.x, WHITE, 8).cost
 
     def in_both_views(self, simpler: Fit, fuller: Fit) -> bool:
-        """Whether a generalisation is worth its place in its loop, too, and not for its finer simulation.
+        """Whether a generalisation is worth its cost in closed loop too, and not only because it is simulated with more substeps.
 
-        Driven by the torque, a model with dry friction comes to rest a little before or after the drive wherever a torque that
-        nobody commanded has turned the shaft, and two levels of friction may describe that better than one. Where a model leaves
-        white noise there was no such torque.
+        Driven by the torque, a model with dry friction comes to rest a little before or after the drive wherever a disturbance
+        torque has turned the shaft, and two levels of friction may describe that better than one.
+        Where a model leaves white noise, there was no such torque.
         """
         if self.neutral_score(simpler, fuller) <= self.score(fuller):
             return False
@@ -214,7 +216,7 @@ class ModelSpace:
         fit = ls.reestimated(self.objective, fit)
         views: list[Predictor] = []
         if fit.predictor.closed and self.whitens and not self.data.loop_only:
-            # Found in the loop's grip, the parameters may be good enough for a view that sees more.
+            # Parameters found in closed loop may be a good start for the open loop, whose errors show more.
             views.append(OpenLoop(self.data, fit.predictor.own_angle))
         if not fit.predictor.own_angle and not self.data.angle_logged and any(t.harmonic for t in fit.parameters.terms):
             views.append(replace(fit.predictor, own_angle=True))  # type: ignore[type-var]

@@ -133,8 +133,8 @@ class Moves(ModelSpace):
     def resettled(self, fit: Fit) -> list[Fit]:
         """The two masses with the resonance that was found as their own, alone or with a simple effect beside it.
 
-        What delays the torque or blocks the shaft pulls the resonance of two masses out of its place, where a fit finds no way
-        back, and the true one is then found as an extra.
+        What delays the torque or blocks the shaft biases the resonance of two masses so far that a local fit does not return.
+        The true one is then found as an extra resonance.
         """
         if fit.parameters.masses == 1 or not fit.parameters.terms[-1:] or not fit.parameters.terms[-1].resonates:
             return []
@@ -191,9 +191,9 @@ class Moves(ModelSpace):
         return [self.continued(hypothesis, fit, x, 20)]
 
     def close(self, fit: Fit) -> list[Fit]:
-        """The closed loop's view of a model with dry friction, which holds a simulation to the record between its stops.
+        """A model with dry friction in closed loop, whose controller keeps the simulation near the record between its stops.
 
-        Driven by the torque, what nobody commanded adds up between the stops, for other effects to describe.
+        In open loop disturbance torques are integrated between the stops, and other effects fit the result.
         """
         rests = any(t.levels for t in fit.parameters.terms)
         if not self.whitens or fit.predictor.closed or not self.data.loopable or not rests or self.quiet(fit):
@@ -228,7 +228,7 @@ class Moves(ModelSpace):
     # The same model again.
 
     def search(self, fit: Fit) -> Fit:
-        """Where more than noise is left: every effect from all of its starts, those of valleys by a global search nearby."""
+        """Where more than noise is left: every effect from all of its starts, multimodal ones by a global search nearby."""
         for term in fit.parameters.terms[::-1]:
             if self.quiet(fit):
                 break
@@ -258,7 +258,7 @@ class Moves(ModelSpace):
         return self.objective.once(key, lambda: self.finished(ls.evolved(self.objective, start, self.policy.evolution)))
 
     def valleys(self, base: Fit) -> list[Fit]:
-        """Each effect of valleys alone beside a base, by a global search."""
+        """Each multimodal effect alone beside a base, by a global search."""
         found = []
         for t in [t for t in self.candidates(base) if t.multimodal]:
             hypothesis = base.hypothesis.extended(t)

@@ -96,7 +96,7 @@ class ScoreTest:
         """Candidates as extensions of the model x."""
         valleys = [t for t in terms if t.multimodal]
         if valleys and self.data.loopable and not hypothesis.predictor.closed:
-            # A replayed torque that a limit inside the controller spoils has led the mechanism astray; the loop holds it.
+            # A replayed torque that ignores a limit of the controller has biased the mechanism; the closed loop has not.
             inside = hypothesis.driven_by(ClosedLoop(self.data, hypothesis.predictor.own_angle))
             held = x if self.data.torque_logged else fit(self.objective, inside, x, WHITE, 8).x
             self.add(inside, held, valleys)

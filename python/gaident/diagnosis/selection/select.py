@@ -159,8 +159,8 @@ def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]
     ends: list[tuple[Fit, Fit]] = []
     for base in bases:
         end = _searched(space, base)
-        # On a coarse grid a resonance beyond what it shows is some other thing of short times: all samples will tell.
-        # Two masses that do not swing describe something else, which one mass leaves for all to see.
+        # On a coarse grid a resonance beyond what it shows stands for another fast effect: the fit to all samples decides.
+        # Two overdamped masses describe some other effect, which one mass leaves in the error.
         seen = task.scales.blocks == 1 or resonance(end) < POLICY.seen_resonance * np.pi / task.scales.dt
         if not ends or (swings(end) and seen):
             ends.append((base, end))
