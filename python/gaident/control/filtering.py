@@ -19,8 +19,8 @@ Complex = NDArray[np.complex128]
 def filtered(b: Vector, a: Vector, rows: Matrix, lengths: Sequence[int]) -> Matrix:
     """v(n) = sum_i b_i e(n-i) - sum_{i>=1} a_i v(n-i), a_0 = 1, from rest at the start of each record.
 
-    rows: (n, samples) of e, records of these `lengths` one after the other -> (n, samples) of v. Raises ValueError where the
-    lengths are not those of the rows, and for more than 16 numbers a_i behind a_0.
+    rows: (n, samples) of e, records of these `lengths` one after the other -> (n, samples) of v.
+    Raises ValueError where the lengths are not those of the rows, and for more than 16 numbers a_i behind a_0.
     """
     return _core.filtered(b, a, rows, lengths)
 

@@ -2,11 +2,11 @@
 
     y(t') = g x(t) + c + e,   t = t0 + (1 + rho) t'
 
-x: a channel of the first log over its clock t; y: the same motion in the second over its clock t'; t0: offset, rho:
-difference of the clocks' rates, g and c: scale and zero of the second sensor. Coarsely by the cross-correlation over the
-lag for a range of rho, then by least squares in (t0, rho, g, c). The covariance is the sandwich (J'J)^-1 S (J'J)^-1 with
-the autocorrelation of e in S (Newey, West, "A simple, positive semi-definite, heteroskedasticity and autocorrelation
-consistent covariance matrix", Econometrica 55, 1987).
+x: a channel of the first log over its clock t; y: the same motion in the second over its clock t'; t0: offset, rho: difference of
+the clocks' rates, g and c: scale and zero of the second sensor.
+Coarsely by the cross-correlation over the lag for a range of rho, then by least squares in (t0, rho, g, c).
+The covariance is the sandwich (J'J)^-1 S (J'J)^-1 with the autocorrelation of e in S (Newey, West, "A simple, positive
+semi-definite, heteroskedasticity and autocorrelation consistent covariance matrix", Econometrica 55, 1987).
 """
 
 from __future__ import annotations

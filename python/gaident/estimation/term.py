@@ -1,7 +1,7 @@
 """An effect as an estimation sees it: coordinates that a fit can move, with bounds, starts and kinship.
 
-The estimation knows no effect by name. What it has to know of one is data of its `Term`; the terms themselves stand in the
-library of the diagnosis.
+The estimation knows no effect by name.
+What it has to know of one is data of its `Term`; the terms themselves stand in the library of the diagnosis.
 """
 
 from __future__ import annotations

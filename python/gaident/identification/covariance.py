@@ -4,9 +4,9 @@ The estimate minimises the plain simulation error e; its covariance to first ord
 
     cov = (J'J)^-1 J' S J (J'J)^-1,    S = s^2 (F'F)^-1
 
-with J = de/dx, F the whitening filter of the residual and s the standard deviation of F e; S is that of stationary noise, so
-that the first samples have their share of it too. For white residuals this is s^2 (J'J)^-1. J itself is never held: the core
-sums its products.
+with J = de/dx, F the whitening filter of the residual and s the standard deviation of F e; S is that of stationary noise, so that
+the first samples have their share of it too. For white residuals this is s^2 (J'J)^-1.
+J itself is never held: the core sums its products.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ def covariance_of_factors(model: Model, plain: Matrix, coloured: Matrix, std: fl
     """Covariance of factor_parameters(model).
 
     plain, coloured: J'J and J'S J for s = 1, in the core's order of parameters, start states last; std: s. at_bound: per
-    parameter of the model, core order. Rows and columns of parameters at a bound are nan; directions that the record does not
-    determine have infinite variance.
+    parameter of the model, core order.
+    Rows and columns of parameters at a bound are nan; directions that the record does not determine have infinite variance.
     """
     count = len(at_bound)
     bound = np.array([*at_bound, *[False] * (len(plain) - count)])

@@ -4,8 +4,9 @@ With z^N - sum beta_i z^(N-i) = D(z) and sum alpha_i z^(N-i) = A(z), controller 
 
     A = Cn b,    D = Cd a + Cn b                                                          (the loop w/r = Cn b/(Cd a + Cn b))
 
-are *linear* in the plant's coefficients. They are more equations than unknowns (the loop adds nothing that is unknown), so noisy
-coefficients meet them by least squares, weighted with their covariance. Then to s, exactly:
+are *linear* in the plant's coefficients.
+They are more equations than unknowns (the loop adds nothing that is unknown), so noisy coefficients meet them by least squares,
+weighted with their covariance. Then to s, exactly:
 
     continuous loop   b = (z+1)^p b_q, and z = (2 + s Ts)/(2 - s Ts) root by root (bilinear transformation)
     held torque       b/a = sum_i r_i/(z - z_i),  s_i = ln(z_i)/Ts,  G = sum_i r_i s_i/(z_i - 1) / (s - s_i)  (zero-order hold)

@@ -27,11 +27,11 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
         w(t) = K int u dt - A int w dt + w(0),
 
     and of the motor alone, from the steps of the velocity, w(n+1) - w(n) = K u(n) Ts, which weighs the moments of high torque.
-    u is the record's
-    torque or, without one, what the controller makes of command and velocity. Searched is from thirty times less to a thousand
-    times more: behind resonances the motor alone may be far lighter than the whole drive. Roots go up to where the sampling
-    still shows them: real parts to 1/dt, imaginary parts to 0.8 of the Nyquist frequency. Raises SpaceError
-    where nothing moves, and where command and velocity are in different units or of opposite sign.
+    u is the record's torque or, without one, what the controller makes of command and velocity.
+    Searched is from thirty times less to a thousand times more: behind resonances the motor alone may be far lighter than the
+    whole drive.
+    Roots go up to where the sampling still shows them: real parts to 1/dt, imaginary parts to 0.8 of the Nyquist frequency.
+    Raises SpaceError where nothing moves, and where command and velocity are in different units or of opposite sign.
     """
     _check_scales(records, controller, only_certain=True)
     gram, right = np.zeros((2, 2)), np.zeros(2)
@@ -91,8 +91,9 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
 def _check_scales(records: Sequence[Record], controller: PI | None, only_certain: bool) -> None:
     """Raises SpaceError where command and velocity of a loop go together, but in another unit or against one another.
 
-    r = factor w by least squares. A loop may lag far behind its command (a short record, no integral part), so that a factor
-    above 3 is certain only where it is that of rpm; a velocity far above the command is no loop's.
+    r = factor w by least squares.
+    A loop may lag far behind its command (a short record, no integral part), so that a factor above 3 is certain only where it is
+    that of rpm; a velocity far above the command is no loop's.
     """
     if controller is None:
         return

@@ -96,9 +96,9 @@ def canonical_roots(roots: object, name: str) -> tuple[complex, ...]:
 def polynomial_roots(coefficients: Sequence[float] | NDArray[np.float64]) -> NDArray[np.complex128]:
     """Roots of s^n + c[0] s^(n-1) + ... + c[n-1], in conjugate pairs.
 
-    Companion matrix of the polynomial in s/scale; each root is then polished by Newton steps as long as they help. Of a
-    cubic only the best separated real root is found so; the other two are those of the quadratic that is left, so that together
-    they give back the coefficients even where two nearly coincide.
+    Companion matrix of the polynomial in s/scale; each root is then polished by Newton steps as long as they help.
+    Of a cubic only the best separated real root is found so; the other two are those of the quadratic that is left, so that
+    together they give back the coefficients even where two nearly coincide.
     """
     c = np.asarray(coefficients, dtype=np.float64)
     n = len(c)

@@ -111,8 +111,9 @@ def run(
     controller : PI, optional
         The velocity loop; None: open loop.
     initial_state : array_like, optional
-        None: at rest. Otherwise what `gaident.initial_state` gives: p + q numbers of the plant, the first of them the velocity
-        [rad/s] before the first input acts; with a controller one more, its stored torque [N m].
+        None: at rest.
+        Otherwise what `gaident.initial_state` gives: p + q numbers of the plant, the first of them the velocity [rad/s] before
+        the first input acts; with a controller one more, its stored torque [N m].
     arithmetic : str
         "double", or "float" for 32-bit arithmetic (within 1e-4 of the response; models without effects).
         Or a drive's (docs/dsp.md): from rest, in the continuous loop without limits; NaN once it has left its range.

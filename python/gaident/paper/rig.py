@@ -6,8 +6,9 @@
     T(w) = T_c + (T_s - T_c) exp(-(w/v_s)^2)     (Stribeck)
 
 The velocity loop is digital (the paper: "digitally performed", Ts = 444 us): it reads the noisy velocity, computes the PI's
-torque and holds it for a sample. In between, leapfrog steps of Ts/SUBSTEPS; friction clips the velocity that the other torques
-would bring (Moreau's time stepping), so that it sticks without a threshold. None of this uses the package's simulation.
+torque and holds it for a sample.
+In between, leapfrog steps of Ts/SUBSTEPS; friction clips the velocity that the other torques would bring (Moreau's time
+stepping), so that it sticks without a threshold. None of this uses the package's simulation.
 """
 
 from __future__ import annotations

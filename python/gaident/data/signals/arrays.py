@@ -32,8 +32,8 @@ _REFUSED_KINDS = {
 def channel(values: ArrayLike, argument: str) -> NDArray[np.float64]:
     """Copy `values` to a read-only float64 array, shape (n,), n >= 20, all finite; units are the caller's.
 
-    Exactly one copy is made. The result is a view of a read-only array, so that not even its write flag can
-    be set again. Raises RecordError naming `argument`.
+    Exactly one copy is made. The result is a view of a read-only array, so that not even its write flag can be set again.
+    Raises RecordError naming `argument`.
     """
     array = _as_array(values, argument)
     if array.ndim != 1:

@@ -32,11 +32,12 @@ class Decimator:
         y(k) = sum_j h(j) x(k M - j),   j = -L..L,   M = factor, L = 25 M
         h(j) = sinc(0.9 j / M) kaiser(j; beta = 8), normalised to a sum of 1
 
-    Linear phase, and as the sum runs from -L to L its delay of L samples is compensated: y(k) belongs to the time of
-    x(k M), and all channels keep their phase against each other. Up to 80 % of the new Nyquist frequency 1/(2 M dt)
-    a signal passes to within 0.03 %, from that frequency on it is damped by 72 dB and more. At both ends the signal is
-    continued by its reflection about its end point. What comes out does not depend on how the samples are divided
-    between calls of `push`. It is symmetric: an edge shows a little before it comes, by less than 25 new samples.
+    Linear phase, and as the sum runs from -L to L its delay of L samples is compensated: y(k) belongs to the time of x(k M), and
+    all channels keep their phase against each other.
+    Up to 80 % of the new Nyquist frequency 1/(2 M dt) a signal passes to within 0.03 %, from that frequency on it is damped by 72
+    dB and more. At both ends the signal is continued by its reflection about its end point.
+    What comes out does not depend on how the samples are divided between calls of `push`.
+    It is symmetric: an edge shows a little before it comes, by less than 25 new samples.
     """
 
     def __init__(self, factor: int) -> None:

@@ -63,8 +63,8 @@ def triangles(tops: Sequence[float], period: float, travel: float, dt: float) ->
 def dithered(command: Vector, amplitude: float, clock: int, seed: int = 0) -> Vector:
     """`command` with a pseudo-random binary signal of `amplitude` [rad/s] and `clock` samples a bit where it holds a speed.
 
-    Ramps stay as they are: their torque leaves less for the signal's. A command at rest throughout gets it throughout, but for
-    the last sample. The signal's mean is zero.
+    Ramps stay as they are: their torque leaves less for the signal's.
+    A command at rest throughout gets it throughout, but for the last sample. The signal's mean is zero.
     """
     held = (command != 0.0) & (np.diff(command, prepend=0.0) == 0.0)
     moving = held if np.any(command != 0.0) else np.arange(len(command)) < len(command) - 1

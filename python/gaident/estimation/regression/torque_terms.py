@@ -85,8 +85,9 @@ angle needs the constant."""
 
 
 def columns_of(terms: tuple[str, ...], motion: Motion) -> Matrix:
-    """The columns of the terms (n, k). Below the threshold of standstill the sign runs as a straight line from -1 to 1: such
-    samples are no rows of a regression, and a predicted torque shall not jump with the noise."""
+    """The columns of the terms (n, k).
+    Below the threshold of standstill the sign runs as a straight line from -1 to 1: such samples are no rows of a regression, and
+    a predicted torque shall not jump with the noise."""
     sign = np.clip(motion.velocity / motion.threshold, -1.0, 1.0) if motion.threshold > 0.0 else np.sign(motion.velocity)
     return np.column_stack([column for name in terms for column in TERMS[name].columns(motion, sign)])
 
