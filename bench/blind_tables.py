@@ -112,7 +112,7 @@ def effect_table(lines: list[Line]) -> str:
         "extra findings",
         "median parameter errors [%]",
         "gain / oracle",
-        "twins together",
+        "equivalents together",
     ]
     return table(head, rows) + "\n\n" + "\n".join(f"- {each}" for each in total)
 

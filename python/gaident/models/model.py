@@ -329,7 +329,7 @@ class Model:
         Raises
         ------
         ModelError
-            For effects of your own, effects in the continuous loop, p = 0 outside it, and a dt, name or substeps that are none.
+            For user-defined effects, effects in the continuous loop, p = 0 outside it, and a dt, name or substeps that are none.
         """
         text: str = provided("write_c")(self, path, dt, controller, name, substeps)
         return text

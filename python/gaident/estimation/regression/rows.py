@@ -63,8 +63,8 @@ def rows_of(rec: Record, terms: tuple[str, ...], cutoff_hz: float, order: int, d
     torque = motion.torque
     assert torque is not None  # checked by the caller
     columns = columns_of(terms, motion)
-    thinned = np.column_stack([decimated(np.ascontiguousarray(c), decimation) for c in columns.T])
+    regressor = np.column_stack([decimated(np.ascontiguousarray(c), decimation) for c in columns.T])
     kept = ~motion.still[::decimation]
     kept[:2] = kept[-2:] = False
     travel = float(np.ptp(motion.position))
-    return Rows(terms, thinned[kept], decimated(torque, decimation)[kept], motion.threshold, travel)
+    return Rows(terms, regressor[kept], decimated(torque, decimation)[kept], motion.threshold, travel)
