@@ -2,8 +2,8 @@
 //
 //     minimise  J(x) = sum_records sum_n v(n)^2,   v = the error e = w - wm, or e filtered by 1 - sum phi_i z^-i
 //
-// over the parameters x of parameters.hpp and the start states of records that do not begin at rest. Derivatives are forward differences, one
-// parameter per lane (sweep.hpp); eight damping factors are tried at once, one per lane.
+// over the parameters x of parameters.hpp and the start states of records that do not begin at rest.
+// Derivatives are forward differences, one parameter per lane (sweep.hpp); eight damping factors are tried at once, one per lane.
 #pragma once
 
 #include "../plant/ranges.hpp"
@@ -42,8 +42,9 @@ public:
     // J at many points at once.
     std::vector<double> costs(std::span<const Factors<double>> candidates) const;
 
-    // Error v and its derivatives dv/dx, column by column, over all records. `columns` is parameters x samples: for records that
-    // leave room for that; statistics.hpp gathers what a covariance needs without.
+    // Error v and its derivatives dv/dx, column by column, over all records.
+    // `columns` is parameters x samples: for records that leave room for that; statistics.hpp gathers what a covariance needs
+    // without.
     void sensitivities(const Factors<double>& g, const std::vector<double>& starts, std::vector<double>& error,
                        std::vector<double>& columns) const;
 

@@ -23,8 +23,9 @@ struct FitSums {
     std::vector<double> white;  // X'X of X = F [e | J | regressors], samples without their past left out
 };
 
-// F = 1 - sum phi_i z^-i. S is that of stationary noise: since J'S J is the same forwards and backwards in time, it is the sum of squares of
-// J coloured forwards, z(n) = J(n) + sum phi_i z(n-i), beyond the end of the record until it has died away.
+// F = 1 - sum phi_i z^-i.
+// S is that of stationary noise: since J'S J is the same forwards and backwards in time, it is the sum of squares of J coloured
+// forwards, z(n) = J(n) + sum phi_i z(n-i), beyond the end of the record until it has died away.
 //
 // Regressors: the input at lags[0], then its change from each lag to the next; 1; sign(wm) where |wm| > threshold; wm |wm|.
 FitSums fit_sums(const Experiment& experiment, const Factors<double>& g, const std::vector<double>& starts,

@@ -1,9 +1,11 @@
 // Chromosome + genome -> factors.
 //
-// A and B are complex numbers but the model must be real. The paper leaves open which pair up (docs/paper.md): pairs are taken within a group first, (A11,A12), (A21,A22),
-// (B21,B22), ...; where both pole groups have a member left over, those two form a pair; what is still left is real. A pair is a conjugate
-// pair (real and imaginary gene of its first member) or two real factors (both real genes): the top bit of the second member's
-// imaginary gene, otherwise latent, decides (1: conjugate). Genes of inactive modules are latent: carried, not decoded.
+// A and B are complex numbers but the model must be real.
+// The paper leaves open which pair up (docs/paper.md): pairs are taken within a group first, (A11,A12), (A21,A22), (B21,B22),
+// ...; where both pole groups have a member left over, those two form a pair; what is still left is real.
+// A pair is a conjugate pair (real and imaginary gene of its first member) or two real factors (both real genes): the top bit of
+// the second member's imaginary gene, otherwise latent, decides (1: conjugate).
+// Genes of inactive modules are latent: carried, not decoded.
 #pragma once
 
 #include "../plant/factors.hpp"

@@ -25,8 +25,8 @@ public:
     const Genome& genome() const { return *genome_; }
     Structure structure(const Word* c) const { return plans_[code(c)].structure; }
 
-    // Writes chromosomes all[index[first]], ..., all[index[last - 1]], of one structure, into lanes first..last-1. `most` counts the group's
-    // factors; those that these lanes lack are set to zero.
+    // Writes chromosomes all[index[first]], ..., all[index[last - 1]], of one structure, into lanes first..last-1.
+    // `most` counts the group's factors; those that these lanes lack are set to zero.
     template <class Group>
     void place(const Population& all, const std::size_t* index, std::size_t first, std::size_t last, Group& group,
                const Counts& most) const {

@@ -1,6 +1,7 @@
-// The genetic operators, as functions on words. They do not know what the bits mean; the table hands them the
-// first bit of every field. Which random words each one draws is part of its definition: the referee in reference/ draws the
-// same words and does the same work bit by bit.
+// The genetic operators, as functions on words.
+// They do not know what the bits mean; the table hands them the first bit of every field.
+// Which random words each one draws is part of its definition: the referee in reference/ draws the same words and does the same
+// work bit by bit.
 #pragma once
 
 #include "chromosome.hpp"
@@ -29,8 +30,9 @@ constexpr Word running_parity(Word x) {
 }
 
 // Multi-point crossover, each field on its own: between any two bits of a field is a cut with probability 1/4, and each field
-// starts from either parent with probability 1/2. One child takes its bits from a until a cut, from b until the next, and so on; the
-// other child takes the rest. Draws two words r1, r2 per word: cut = r1 & (r2 | start of field).
+// starts from either parent with probability 1/2.
+// One child takes its bits from a until a cut, from b until the next, and so on; the other child takes the rest.
+// Draws two words r1, r2 per word: cut = r1 & (r2 | start of field).
 template <class Source>
 void crossover(Source& random, const Word* starts, int words, const Word* a, const Word* b, Word* child_a, Word* child_b) {
     Word carried = 0;  // all ones while the segment that reaches over the word's edge comes from the other parent
@@ -44,8 +46,9 @@ void crossover(Source& random, const Word* starts, int words, const Word* a, con
     }
 }
 
-// Bit mutation: every bit flips with probability m, independently. Drawn by the gaps between flips, which are geometric,
-// P(gap >= k) = (1-m)^k: one word per flip instead of one per bit. The gap runs on from one chromosome to the next.
+// Bit mutation: every bit flips with probability m, independently.
+// Drawn by the gaps between flips, which are geometric, P(gap >= k) = (1-m)^k: one word per flip instead of one per bit.
+// The gap runs on from one chromosome to the next.
 class Mutation {
 public:
     template <class Source>

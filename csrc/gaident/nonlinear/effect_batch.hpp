@@ -1,7 +1,7 @@
 // One model or many against one record, with effects or without.
 //
-// Without effects all loops are the linear ones of batch.hpp. With effects the sampled and the open loop are effect_loop.hpp; in the
-// continuous loop the answer is
+// Without effects all loops are the linear ones of batch.hpp.
+// With effects the sampled and the open loop are effect_loop.hpp; in the continuous loop the answer is
 //
 //     bilinear loop of the linear part + (fine loop with effects - fine loop without),
 //

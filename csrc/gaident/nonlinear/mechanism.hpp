@@ -37,8 +37,9 @@ struct ObserverPlant {
     }
 };
 
-// Two masses with a nonlinear coupling. Its correction over the substep is the mean along a twist that goes evenly to where the
-// correction at the substep's start, and the friction of the substep before, would bring it (second order). An effect of the coupling has
+// Two masses with a nonlinear coupling.
+// Its correction over the substep is the mean along a twist that goes evenly to where the correction at the substep's start, and
+// the friction of the substep before, would bring it (second order). An effect of the coupling has
 //
 //     coupling(c, K, D, x, dx)               its correction at the twist x [rad] that goes at dx [rad/s]
 //     mean_coupling(c, K, D, x0, x1, dx)     its mean along a twist that goes evenly from x0 to x1

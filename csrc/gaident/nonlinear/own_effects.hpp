@@ -1,5 +1,5 @@
-// Effects that the core does not know: a user's own functions of the loop's signals, asked at their places in the loop. Slower than the
-// core's own by the call, and without a memory; the caller needs no knowledge of what they are.
+// Effects that the core does not know: a user's own functions of the loop's signals, asked at their places in the loop.
+// Slower than the core's own by the call, and without a memory; the caller needs no knowledge of what they are.
 #pragma once
 
 #include <cstddef>

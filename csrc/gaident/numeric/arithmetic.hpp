@@ -1,6 +1,6 @@
-// What a number must do so that the recurrences can be run in it: add, subtract, multiply, divide, start from a
-// double, and be clamped. double and float are here; SIMD lanes are in lanes.hpp. A fixed-point or DSP number joins
-// by providing the same operations; nothing in the recurrences asks for more.
+// What a number must do so that the recurrences can be run in it: add, subtract, multiply, divide, start from a double, and be
+// clamped. double and float are here; SIMD lanes are in lanes.hpp.
+// A fixed-point or DSP number joins by providing the same operations; nothing in the recurrences asks for more.
 #pragma once
 
 #include <concepts>

@@ -1,5 +1,6 @@
-// Long decays are full of denormal numbers, which cost up to 75 times an ordinary one. While a FlushDenormals exists,
-// the thread that made it treats them as zero; its destructor restores what the caller had, also after a throw.
+// Long decays are full of denormal numbers, which cost up to 75 times an ordinary one.
+// While a FlushDenormals exists, the thread that made it treats them as zero; its destructor restores what the caller had, also
+// after a throw.
 #pragma once
 
 #if defined(__SSE2__)

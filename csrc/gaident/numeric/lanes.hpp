@@ -1,6 +1,7 @@
-// W candidates side by side, one per SIMD lane, by the compiler's vector extension: as many registers of the machine's own
-// width as it takes, so the same source becomes one AVX-512 register, two of AVX or four of SSE per eight doubles. Each lane computes
-// what a scalar would (the build forbids contraction to fused multiply-add), so results are equal bit for bit whatever the width.
+// W candidates side by side, one per SIMD lane, by the compiler's vector extension: as many registers of the machine's own width
+// as it takes, so the same source becomes one AVX-512 register, two of AVX or four of SSE per eight doubles.
+// Each lane computes what a scalar would (the build forbids contraction to fused multiply-add), so results are equal bit for bit
+// whatever the width.
 //
 // `Isa` is a tag with the register width in bytes. Kernels are compiled once per instruction set; the tag keeps their template
 // instantiations apart, so that the linker never takes AVX-512 code for a machine that has none.

@@ -27,9 +27,9 @@ struct Delta {
 //
 //     k = 1 + sum_i |a[i]| 2^-(i+1)        (1 with all poles at z = 1, 2^N with all at z = -1)
 //
-// Over 500,000 random loops up to order 7, roots up to 1.6 times the Nyquist frequency, stable and unstable, k <= 1.6 kept float within
-// 1e-4 of the response but for one (5e-3: an unstable pole hidden under a zero); beyond k = 4 one in ten is off by more. A servo axis sampled
-// as it should be has k below 1.6.
+// Over 500,000 random loops up to order 7, roots up to 1.6 times the Nyquist frequency, stable and unstable, k <= 1.6 kept float
+// within 1e-4 of the response but for one (5e-3: an unstable pole hidden under a zero); beyond k = 4 one in ten is off by more.
+// A servo axis sampled as it should be has k below 1.6.
 template <class A>
 bool float_suffices(int order, A&& a) {
     double k = 1.0, scale = 0.5;
@@ -37,8 +37,8 @@ bool float_suffices(int order, A&& a) {
     return k <= 1.6;
 }
 
-// The leading coefficients c[0] x^n + c[1] x^(n-1) + ... + c[terms - 1] ... of a product, factor by factor. (Those beyond are not
-// needed: a numerator of lanes of different structures has more.)
+// The leading coefficients c[0] x^n + c[1] x^(n-1) + ... + c[terms - 1] ... of a product, factor by factor.
+// (Those beyond are not needed: a numerator of lanes of different structures has more.)
 template <class R, int N = -1>
 struct Polynomial {
     int terms;

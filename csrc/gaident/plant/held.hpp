@@ -1,12 +1,14 @@
 // The plant behind a zero-order hold, exactly, built in delta = z - 1 with additions and multiplications only.
 //
-// Time in units of Ts: s' = s Ts, G = K Ts^p prod (s'+b')/prod (s'+a'). The factors form a cascade of sections of order two (one of
-// order one if the number of poles is odd); with the held torque as state 0 the whole is dx/dt = M x, M block lower triangular, and
+// Time in units of Ts: s' = s Ts, G = K Ts^p prod (s'+b')/prod (s'+a').
+// The factors form a cascade of sections of order two (one of order one if the number of poles is odd); with the held torque as
+// state 0 the whole is dx/dt = M x, M block lower triangular, and
 //
 //     F = e^M - 1 = [ 0 0 ; Gamma Phi-1 ]    by its Taylor series for M/2^k and k doublings F(2X) = 2 F(X) + F(X)^2.
 //
-// Computing e^M - 1 and not e^M loses no digits of slow poles. The denominator is the product of the characteristic polynomials of F's
-// diagonal blocks; the numerator follows from the delta-Markov numbers h_k = C (Phi-1)^k Gamma: B(delta) = A(delta) * sum_k h_k delta^(-k-1).
+// Computing e^M - 1 and not e^M loses no digits of slow poles.
+// The denominator is the product of the characteristic polynomials of F's diagonal blocks; the numerator follows from the
+// delta-Markov numbers h_k = C (Phi-1)^k Gamma: B(delta) = A(delta) * sum_k h_k delta^(-k-1).
 #pragma once
 
 #include "delta.hpp"
@@ -98,8 +100,8 @@ inline double largest_root(const Factors<double>& g) {
     return r;
 }
 
-// Needs p >= 1: a plant that passes its torque straight through has no held form. `N`: the plant's order when known at compile time, so that
-// the loops over its states unroll; -1 otherwise.
+// Needs p >= 1: a plant that passes its torque straight through has no held form.
+// `N`: the plant's order when known at compile time, so that the loops over its states unroll; -1 otherwise.
 template <class R, int N, class Plant>
 Delta<R, N> held_plant(const Plant& g, double sample_time, int doublings) {
     using Matrix = detail::Hessenberg<R, N + 1>;

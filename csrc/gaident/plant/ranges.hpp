@@ -14,8 +14,9 @@ struct SearchRanges {
     Range imaginary{0.0, 250.0};
     int p_min = 0, p_max = 3, q_min = 0, q_max = 3;
     int bits = 10;  // per number
-    // K has the dimension of 1/J times (rad/s)^(p-1). `gain` is the range at p = 1; at other p it counts in units of
-    // gain_scale^(p-1) [rad/s]. 1 is the paper: one range whatever p.
+    // K has the dimension of 1/J times (rad/s)^(p-1).
+    // `gain` is the range at p = 1; at other p it counts in units of gain_scale^(p-1) [rad/s].
+    // 1 is the paper: one range whatever p.
     double gain_scale = 1.0;
 
     constexpr double gain_unit(int p) const {

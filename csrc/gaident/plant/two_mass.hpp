@@ -3,8 +3,8 @@
 //
 //     J_M dw_M/dt = T - c - D_M w_M,   J_L dw_L/dt = c - D_L w_L,   dx/dt = w_M - w_L,   c = K_G x + D_G dx/dt + correction
 //
-// with motor torque T and correction held over the substep, exactly. The twist is kept as psi = x scale, scale = resonance [rad/s], so
-// that the numbers are of one size.
+// with motor torque T and correction held over the substep, exactly.
+// The twist is kept as psi = x scale, scale = resonance [rad/s], so that the numbers are of one size.
 #pragma once
 
 #include "factors.hpp"

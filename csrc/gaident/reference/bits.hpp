@@ -1,7 +1,8 @@
 // The referee of the genetic side: a chromosome as a row of single bits, every operator a walk over them.
 //
-// Slow and obvious. It shares with the fast operators only the random generator, the rows of the genome's table and, by
-// definition, which random word is drawn when; operators.hpp, decode.hpp and chromosome.hpp must come to the same bits.
+// Slow and obvious.
+// It shares with the fast operators only the random generator, the rows of the genome's table and, by definition, which random
+// word is drawn when; operators.hpp, decode.hpp and chromosome.hpp must come to the same bits.
 #pragma once
 
 #include "../genetic/genome.hpp"
@@ -72,8 +73,9 @@ inline std::size_t tournament(Random& random, const std::vector<double>& cost, s
     return winner;
 }
 
-// Multi-point crossover, field by field. Two words are drawn when the walk enters a new word of 64 bits: a bit of the
-// first word says "cut here" where a field begins, and elsewhere where the second word says so too.
+// Multi-point crossover, field by field.
+// Two words are drawn when the walk enters a new word of 64 bits: a bit of the first word says "cut here" where a field begins,
+// and elsewhere where the second word says so too.
 inline void crossover(Random& random, std::span<const Field> fields, const Bits& a, const Bits& b, Bits& child_a, Bits& child_b) {
     child_a = a;
     child_b = b;
@@ -95,9 +97,10 @@ inline void crossover(Random& random, std::span<const Field> fields, const Bits&
     }
 }
 
-// Bit mutation: a gap is drawn, counted down bit by bit over one chromosome after the other, and the bit where it
-// ends is flipped. The gap is at least k with probability (1-m)^k: a word u stands for the smallest gap k with u >=
-// (1-m)^(k+1) 2^64; a word below the 256th power stands for "256 bits without a flip, draw again".
+// Bit mutation: a gap is drawn, counted down bit by bit over one chromosome after the other, and the bit where it ends is
+// flipped.
+// The gap is at least k with probability (1-m)^k: a word u stands for the smallest gap k with u >= (1-m)^(k+1) 2^64; a word below
+// the 256th power stands for "256 bits without a flip, draw again".
 class Mutation {
 public:
     Mutation(double probability, Random& random) : probability_(probability) { draw(random); }
@@ -159,9 +162,10 @@ inline double value(const Bits& c, const Field& f, Code code) {
                                     : f.range.lo * std::exp(t * std::log(f.range.hi / f.range.lo));
 }
 
-// As docs/paper.md has it: pairs within a group first, (A11,A12), (A21,A22), (B21,B22); where both pole groups have a
-// member left over, those two; what is still left is real. The top bit of the second member's imaginary gene says
-// whether a pair is a conjugate pair, from the first member's genes, or two real numbers.
+// As docs/paper.md has it: pairs within a group first, (A11,A12), (A21,A22), (B21,B22); where both pole groups have a member left
+// over, those two; what is still left is real.
+// The top bit of the second member's imaginary gene says whether a pair is a conjugate pair, from the first member's genes, or
+// two real numbers.
 inline Plant decode(const Bits& c, std::span<const Field> fields, Code code, const SearchRanges& ranges) {
     const auto order = [&](Role role, int lo, int hi) {
         const Field& f = find(fields, role, Part::whole, 0);

@@ -21,8 +21,9 @@ public:
     ~Workers();
     Workers(const Workers&) = delete;
 
-    // Calls work(0) ... work(n-1), denormals flushed; the first exception is thrown again here. The last is begun first: callers list
-    // small structures before large ones, and long work begun late leaves the other threads idle. A piece may share work itself.
+    // Calls work(0) ... work(n-1), denormals flushed; the first exception is thrown again here.
+    // The last is begun first: callers list small structures before large ones, and long work begun late leaves the other threads
+    // idle. A piece may share work itself.
     using Work = std::function<void(std::size_t)>;
     void share(std::size_t n, const Work& work);
 

@@ -1,5 +1,5 @@
-// Sums of products over rows of lanes, for the normal equations of a local fit; instantiated beside the sample loops. A row is one
-// sample, double_lanes numbers: the error and its derivatives, or regressors.
+// Sums of products over rows of lanes, for the normal equations of a local fit; instantiated beside the sample loops.
+// A row is one sample, double_lanes numbers: the error and its derivatives, or regressors.
 #pragma once
 
 #include "../../numeric/lanes.hpp"
