@@ -198,6 +198,7 @@ def test_it_shares_nothing_with_the_core() -> None:
         "arguments",
         "control.pi",
         "models.model",
+        "models.discrete",
         "models.mechanics",
         "models.factors",
         "checks",
