@@ -143,7 +143,8 @@ def align(
     >>> import gaident as ga
     >>> def velocity(t):
     ...     return 10.0 * np.tanh(40.0 * (t - 0.5)) + 3.0 * np.tanh(30.0 * (t - 1.1))
-    >>> rec = ga.Record(1e-3, command=velocity(1e-3 * np.arange(2000)), velocity=velocity(1e-3 * np.arange(2000)))
+    >>> w = velocity(1e-3 * np.arange(2000))
+    >>> rec = ga.Record(1e-3, command=w, velocity=w)
     >>> later = 0.25 + 2e-3 * np.arange(800)  # the second log begins 0.25 s after the first
     >>> found = ga.align(rec, {"velocity": velocity(later), "torque": np.cos(later)}, dt=2e-3)
     >>> round(found.offset, 3), [name for name, values in found.record.channels()]

@@ -77,7 +77,8 @@ class Record:
     >>> import numpy as np
     >>> import gaident as ga
     >>> n = np.arange(100)
-    >>> rec = ga.Record(1e-3, velocity=np.sin(0.1 * n), torque=np.cos(0.1 * n), torque_is="measured", name="run 1")
+    >>> w, current = np.sin(0.1 * n), np.cos(0.1 * n)
+    >>> rec = ga.Record(1e-3, velocity=w, torque=current, torque_is="measured", name="run 1")
     >>> rec
     Record('run 1', 100 samples, dt=0.001 s, 0.1 s; velocity -0.9999..0.9996, torque -0.9997..1 (measured))
     >>> len(rec[20:60]), len(rec.between(0.0, 0.05))

@@ -54,7 +54,8 @@ class Model:
     Examples
     --------
     >>> import gaident as ga
-    >>> model = ga.Model(gain=6545.0, poles=[-15.0, -10.0 + 151.0j, -10.0 - 151.0j], zeros=[-4.0 + 94.0j, -4.0 - 94.0j])
+    >>> zeros = [-4.0 + 94.0j, -4.0 - 94.0j]
+    >>> model = ga.Model(gain=6545.0, poles=[-15.0, -10.0 + 151.0j, -10.0 - 151.0j], zeros=zeros)
     >>> model.p, model.q, model.stable, round(model.static_gain, 1)
     (1, 2, True, 168.7)
     >>> model.with_effect("coulomb_friction", torque=0.05).effects

@@ -36,7 +36,8 @@ class Finding:
     Examples
     --------
     >>> import gaident as ga
-    >>> friction = ga.Finding("coulomb_friction", {"torque": ga.Estimate(0.04, 0.001, "N m")}, alternatives=("load_torque",))
+    >>> torque = ga.Estimate(0.04, 0.001, "N m")
+    >>> friction = ga.Finding("coulomb_friction", {"torque": torque}, alternatives=("load_torque",))
     >>> friction.named
     False
     """
