@@ -22,7 +22,7 @@ Vector = NDArray[np.float64]
 SHIFTS = (0, 1, -1, 2, -2)  # samples by which what the controller saw may be older (+) than the log's
 # By how much of ki dt the newest error counts more than half, and the one before less: the rule of integration in words.
 RULES = {0.0: "", 0.5: "a rectangular integral", -0.5: "a rectangular integral that lacks the newest error"}
-PLATEAU = 5  # samples at a limit from which the integrator may have been stopped there
+PLATEAU = 5  # samples at a limit from which it is one that an integrator is held at
 SAME = 2e-3  # relative difference below which a fitted gain is the configured one
 RPM = 30.0 / np.pi  # rpm in 1 rad/s
 ROUNDED = 5e-5  # part of the largest command, that a command may be off in a log of few decimals

@@ -26,7 +26,7 @@ ADVICE = (
 )
 
 STEEP = 0.15  # of the slopes that are common: what is no rest
-SMOOTHER = 0.8  # of the curvature at a turning point: less is left once the sign behind it is reversed
+SMOOTHER = 0.8  # of the curvature around a turning point: less is left when what follows is turned over; far from zero far more
 LEAST = 3  # turning points; one or two may be chance
 
 

@@ -54,7 +54,7 @@ def _leaving(w: Vector, error: Vector | None) -> NDArray[np.intp]:
     around = np.lib.stride_tricks.sliding_window_view(np.pad(size, NEAR), 2 * NEAR + 1)[found]
     beside = np.abs(np.arange(-NEAR, NEAR + 1)) <= 2  # where the outlier itself shows
     largest = size[found] >= around[:, beside].max(axis=1)
-    alone = np.sum(around[:, ~beside] > 0.5 * size[found, None], axis=1) < 2  # with many beside it, it is an oscillation
+    alone = np.sum(around[:, ~beside] > 0.5 * size[found, None], axis=1) < 2  # where much is as rough it rings
     kept: NDArray[np.intp] = found[largest & alone] + 2
     return kept
 
