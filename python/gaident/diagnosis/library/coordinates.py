@@ -90,7 +90,7 @@ def harmonic(effect: str, place: str, first: int, with_order: bool, kind: str) -
         return s.torque if kind == "torque" else 0.2
 
     def limits(s: Scales) -> Rows:
-        a = (10.0 if kind == "torque" else 1.0) * amplitude(s)  # gravity on a pendulum that swings may exceed the motor's torque
+        a = (10.0 if kind == "torque" else 1.0) * amplitude(s)  # a swung pendulum has more torque than drives it
         rows: Rows = [(-a, a), (-a, a), (float(first), 1000.0)]
         return rows[: 3 if with_order else 2]
 
