@@ -3,6 +3,7 @@
 // of this process's own processor time, which on a shared machine is steadier than the clock on the wall. `--quick`: fewer repetitions.
 #include "../csrc/gaident/genetic/decode.hpp"
 #include "../csrc/gaident/numeric/denormals.hpp"
+#include "../csrc/gaident/identification/velocity_objective.hpp"
 #include "../csrc/gaident/search/breeder.hpp"
 #include "../csrc/gaident/reference/cascade.hpp"
 #include "../csrc/gaident/simulation/simulate.hpp"
@@ -186,9 +187,10 @@ struct Work {
     double bound(const IssueRate& r) const { return std::max({add / r.add, multiply / r.multiply, (add + multiply) / r.both}); }
 };
 
-Work work_of(const Breeder& breeder, const Data& data, std::size_t lanes, bool constant) {
+Work work_of(const VelocityObjective& objective, const Breeder& breeder, const Data& data, std::size_t lanes, bool constant) {
     std::vector<int> orders;
-    for (std::size_t i = 0; i < breeder.population().size(); ++i) orders.push_back(1 + breeder.candidate(i).structure.poles());
+    for (std::size_t i = 0; i < breeder.population().size(); ++i)
+        orders.push_back(1 + objective.factors(breeder[i]).structure.poles());
     std::sort(orders.begin(), orders.end());
     Work w;
     const double numbers = static_cast<double>(lanes * data.input.size());
@@ -225,14 +227,14 @@ void generation_row(const Instructions& set, bool in_float, int population, std:
     data.experiment.kernels = set.kernels;
     SearchRanges ranges = paper_ranges();
     if (kind != LoopKind::continuous) ranges.p_min = 1;
-    const Genome genome(ranges, Code::binary, Scale::linear);
-    Settings settings;
+    PlantSettings settings;
     settings.population = population;
     settings.in_float = in_float;
+    const VelocityObjective objective(data.experiment, ranges, settings);
     const auto n = static_cast<std::size_t>(population);
     const Breeder::Group all[] = {{0, static_cast<std::uint32_t>(population), 0, false}};
     const auto start = [&](int run) {
-        Breeder breeder(data.experiment, genome, settings, Random(static_cast<std::uint64_t>(3 + run)));
+        Breeder breeder(objective, settings, Random(static_cast<std::uint64_t>(3 + run)), set.kernels->words);
         breeder.randomise(0, n);
         breeder.evaluate();
         return breeder;
@@ -243,7 +245,7 @@ void generation_row(const Instructions& set, bool in_float, int population, std:
     std::vector<Factors<double>> now;
     std::vector<double> sums(n);
     for (std::size_t i = 0; i < n; ++i) {
-        now.push_back(first.candidate(i));
+        now.push_back(objective.factors(first[i]));
         sums[i] = first.cost(i) - 2.0 * now[i].structure.poles();
     }
     check_batch(data, now, sums, in_float ? 1e-4 : 1e-9, "generation");
@@ -251,10 +253,10 @@ void generation_row(const Instructions& set, bool in_float, int population, std:
     double bound = 0.0, order = 0.0;
     for (int g = 0; g < generations; ++g) {
         first.generation(all);
-        bound +=
-            work_of(first, data, lanes, task != Task::staircase).bound(in_float ? set.in_float : set.in_double) / generations;
+        bound += work_of(objective, first, data, lanes, task != Task::staircase).bound(in_float ? set.in_float : set.in_double) /
+                 generations;
         for (std::size_t i = 0; i < n; ++i)
-            order += (1 + first.candidate(i).structure.poles()) / static_cast<double>(n) / generations;
+            order += (1 + objective.factors(first[i]).structure.poles()) / static_cast<double>(n) / generations;
     }
 
     std::vector<double> runs;

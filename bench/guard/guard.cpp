@@ -11,6 +11,7 @@
 #include "counts.hpp"
 #include "instructions.hpp"
 
+#include "../../csrc/gaident/identification/velocity_objective.hpp"
 #include "../../csrc/gaident/search/breeder.hpp"
 #include "../../csrc/gaident/genetic/decode.hpp"
 #include "../../csrc/gaident/nonlinear/effect_batch.hpp"
@@ -57,13 +58,13 @@ class Row {
 public:
     Row(const Kernels& kernels, bool in_float, LoopKind kind, Command command)
         : data_(kind, kernels, command),
-          genome_(ranges(), Code::binary, Scale::linear),
           settings_(settings(in_float)),
-          breeder_(data_.experiment, genome_, settings_, Random(3)) {
+          objective_(data_.experiment, ranges(), settings_),
+          breeder_(objective_, settings_, Random(3), kernels.words) {
         breeder_.randomise(0, population);
         // Behind a hold the structures are converted apart, eight lanes each: one structure, so that there is one conversion to count.
         fixed_ = kind == LoopKind::sampled;
-        if (fixed_) breeder_.set_structure(0, population, {.p = 1, .q = 2});
+        for (std::size_t i = 0; fixed_ && i < population; ++i) objective_.genome().set_structure(breeder_[i], 1, 2);
         breeder_.evaluate();
     }
 
@@ -75,7 +76,7 @@ public:
     double simulation() {
         Batch batch(data_.experiment, population, settings_.in_float);
         std::vector<Factors<double>> candidates;
-        for (std::size_t i = 0; i < population; ++i) candidates.push_back(breeder_.candidate(i));
+        for (std::size_t i = 0; i < population; ++i) candidates.push_back(objective_.factors(breeder_[i]));
         std::vector<double> sums(population);
         return per_sample(guard::instructions([&] { batch.errors(candidates, sums); }));
     }
@@ -86,8 +87,8 @@ private:
         r.p_min = 1;  // p = 0 does not exist in the sampled loop
         return r;
     }
-    static Settings settings(bool in_float) {
-        Settings s;
+    static PlantSettings settings(bool in_float) {
+        PlantSettings s;
         s.population = population;
         s.in_float = in_float;
         return s;
@@ -97,8 +98,8 @@ private:
     }
 
     Data data_;
-    Genome genome_;
-    Settings settings_;
+    PlantSettings settings_;
+    VelocityObjective objective_;
     Breeder breeder_;
     bool fixed_ = false;
 };

@@ -61,17 +61,16 @@ RefineOptions options_of(const std::optional<SearchRanges>& ranges, const std::v
 // (generations done, best fitness, number of species, (p, q) of the one that leads)
 using Report = std::function<void(std::size_t, double, std::size_t, std::pair<int, int>)>;
 
-std::vector<Trial> search_records(PyExperiment& e, const SearchRanges& ranges, const Settings& settings, int trials,
-                                  std::uint64_t seed, int workers, const std::optional<Report>& report) {
-    std::vector<Trial> result;
+std::vector<PlantTrial> search_records(PyExperiment& e, const SearchRanges& ranges, const PlantSettings& settings, int trials,
+                                       std::uint64_t seed, int workers, const std::optional<Report>& report) {
+    std::vector<PlantTrial> result;
     Progress progress;
     e.stop = false;
     run_interruptibly(
-        e.stop, [&] { result = search(e.experiment, ranges, settings, trials, seed, workers, progress); },
+        e.stop, [&] { result = search_plant(e.experiment, ranges, settings, trials, seed, workers, progress); },
         [&] {
-            if (report)
-                (*report)(progress.done.load(), progress.best.load(), progress.species.load(),
-                          {progress.leading_p.load(), progress.leading_q.load()});
+            const Structure leading = leading_structure(ranges, progress);
+            if (report) (*report)(progress.done.load(), progress.best.load(), progress.species.load(), {leading.p, leading.q});
         });
     return result;
 }
@@ -172,11 +171,11 @@ void bind_identify(py::module_& m) {
              py::arg("gain"), py::arg("real"), py::arg("imaginary"), py::arg("p"), py::arg("q"), py::arg("bits"),
              py::arg("gain_scale") = 1.0);
 
-    py::class_<Settings>(m, "EngineSettings")
+    py::class_<PlantSettings>(m, "EngineSettings")
         .def(py::init([](int population, int tournament, double crossover, double mutation, int generations, int elites,
                          bool gray, bool logarithmic, double error_weight, double order_weight, bool species, int round,
                          int quiet_rounds, bool in_float, const std::string& mirror) {
-                 Settings s;
+                 PlantSettings s;
                  s.population = population;
                  s.tournament = tournament;
                  s.crossover = crossover;
@@ -210,14 +209,14 @@ void bind_identify(py::module_& m) {
         .def_property_readonly("converged", [](const PyRefined& f) { return f.r.converged; })
         .def_property_readonly("at_bound", [](const PyRefined& f) { return f.r.at_bound; });
 
-    py::class_<Trial>(m, "Trial")
-        .def_property_readonly("history", [](const Trial& t) { return to_array(t.history); })
-        .def_property_readonly("best_fitness", [](const Trial& t) { return t.best_fitness; })
-        .def_property_readonly("best_generation", [](const Trial& t) { return t.best_generation; })
-        .def_property_readonly("best", [](const Trial& t) { return t.best; })
-        .def_property_readonly("evaluations", [](const Trial& t) { return t.evaluations; })
-        .def_property_readonly("overflows", [](const Trial& t) { return t.overflows; })
-        .def_property_readonly("species", [](const Trial& t) {
+    py::class_<PlantTrial>(m, "Trial")
+        .def_property_readonly("history", [](const PlantTrial& t) { return to_array(t.history); })
+        .def_property_readonly("best_fitness", [](const PlantTrial& t) { return t.best_fitness; })
+        .def_property_readonly("best_generation", [](const PlantTrial& t) { return t.best_generation; })
+        .def_property_readonly("best", [](const PlantTrial& t) { return t.best; })
+        .def_property_readonly("evaluations", [](const PlantTrial& t) { return t.evaluations; })
+        .def_property_readonly("overflows", [](const PlantTrial& t) { return t.overflows; })
+        .def_property_readonly("species", [](const PlantTrial& t) {
             std::vector<PyRefined> all;
             for (const Refined& r : t.species) all.push_back({r});
             return all;

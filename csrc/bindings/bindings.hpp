@@ -1,7 +1,7 @@
 // Shared by the binding files: array types and the way long work is run so that Ctrl-C and progress reach Python.
 #pragma once
 
-#include "../gaident/search/engine.hpp"
+#include "../gaident/identification/plant_search.hpp"
 
 #include <pybind11/complex.h>
 #include <pybind11/functional.h>

@@ -1,5 +1,6 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
+#include "gaident/identification/velocity_objective.hpp"
 #include "gaident/search/breeder.hpp"
 
 #include <cstdlib>
@@ -56,13 +57,15 @@ TEST_CASE("breeder: generations equal the referee's bit for bit; odd groups, eli
         for (const int bits : {10, 16}) {
             SearchRanges ranges;
             ranges.bits = bits;
-            const Genome genome(ranges, Code::gray, Scale::linear);
-            Settings s;
+            PlantSettings s;
+            s.code = Code::gray;
             s.population = plan.population;
             s.tournament = plan.tournament;
             s.crossover = plan.crossover;
             s.mutation = plan.mutation;
-            Breeder breeder(bench.experiment, genome, s, Random(77));
+            const VelocityObjective objective(bench.experiment, ranges, s);
+            const Genome& genome = objective.genome();
+            Breeder breeder(objective, s, Random(77), bench.experiment.kernels->words);
             const auto n = static_cast<std::size_t>(plan.population);
             breeder.randomise(0, n);
             breeder.evaluate();
@@ -104,7 +107,7 @@ TEST_CASE("breeder: generations equal the referee's bit for bit; odd groups, eli
                         next[child++] = first;
                         if (child < last) next[child++] = second;
                     }
-                    const std::size_t from = group.fixed_structure ? 4 : 0;
+                    const std::size_t from = group.one_species ? 4 : 0;
                     for (std::size_t i = first_child; i < last; ++i) mutation.apply(random, next[i], from, next[i].size());
                 }
                 now = next;
@@ -123,15 +126,17 @@ TEST_CASE("breeder: a generation allocates nothing, in any loop and arithmetic")
                 bench.experiment.records[1].start = Start::steady;
                 SearchRanges ranges;
                 ranges.p_min = 1;
-                const Genome genome(ranges, Code::gray, Scale::logarithmic);
-                Settings s;
+                PlantSettings s;
+                s.code = Code::gray;
+                s.roots = Scale::logarithmic;
                 s.population = 49;
                 s.in_float = in_float;
-                Breeder breeder(bench.experiment, genome, s, Random(5));
+                const VelocityObjective objective(bench.experiment, ranges, s);
+                Breeder breeder(objective, s, Random(5));
                 const Breeder::Group groups[] = {{0, 7, 1, true}, {7, 42, 2, false}};
                 const long before = allocations;
                 breeder.randomise(0, 49);
-                breeder.set_structure(0, 7, {1, 2});
+                for (std::size_t i = 0; i < 7; ++i) objective.genome().set_structure(breeder[i], 1, 2);
                 breeder.evaluate();
                 for (int g = 0; g < 10; ++g) breeder.generation(groups);
                 CHECK(allocations == before);

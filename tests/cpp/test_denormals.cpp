@@ -1,6 +1,6 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
-#include "gaident/search/engine.hpp"
+#include "gaident/identification/plant_search.hpp"
 #include "gaident/runtime/parallel.hpp"
 #include "gaident/simulation/simulate.hpp"
 #include "gaident/estimation/statistics.hpp"
@@ -88,7 +88,7 @@ TEST_CASE("denormals: every entry point restores the caller's state, also where 
     const Factors<double> g = bench.drive.factors();
     std::atomic<bool> stop{false};
     bench.experiment.stop = &stop;
-    Settings settings;
+    PlantSettings settings;
     settings.species = true;
     settings.generations = settings.round = 2;
     SearchRanges ranges;
@@ -100,7 +100,7 @@ TEST_CASE("denormals: every entry point restores the caller's state, also where 
     const std::function<void()> entries[] = {
         [&] {
             Progress progress;
-            search(bench.experiment, ranges, settings, 2, 1, 2, progress);
+            search_plant(bench.experiment, ranges, settings, 2, 1, 2, progress);
         },
         [&] { refiner.fit(g, {}, 2); },
         [&] { refiner.costs({&g, 1}); },

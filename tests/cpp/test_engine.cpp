@@ -1,8 +1,9 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
 #include "gaident/genetic/decode.hpp"
-#include "gaident/search/engine.hpp"
+#include "gaident/identification/plant_search.hpp"
 #include "gaident/estimation/parameters.hpp"
+#include "gaident/search/breeder.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -12,14 +13,14 @@ using namespace gaident;
 
 namespace {
 
-Settings paper(int generations) {
-    Settings s;
+PlantSettings paper(int generations) {
+    PlantSettings s;
     s.generations = generations;
     return s;
 }
 
-Settings species(int generations) {
-    Settings s;
+PlantSettings species(int generations) {
+    PlantSettings s;
     s.species = true;
     s.code = Code::gray;
     s.generations = generations;
@@ -40,7 +41,7 @@ bool same(const Refined& a, const Refined& b) {
            a.converged == b.converged && a.at_bound == b.at_bound && a.factors.structure == b.factors.structure;
 }
 
-bool same(const Trial& a, const Trial& b) {
+bool same(const PlantTrial& a, const PlantTrial& b) {
     bool equal = a.history == b.history && a.best_fitness == b.best_fitness && a.best_generation == b.best_generation &&
                  a.best == b.best && a.evaluations == b.evaluations && a.species.size() == b.species.size();
     for (std::size_t i = 0; equal && i < a.species.size(); ++i) equal = same(a.species[i], b.species[i]);
@@ -59,11 +60,11 @@ std::vector<const Kernels*> available() {
 TEST_CASE("engine: the best fitness of a plain run never rises with an elite, and its log is right") {
     const Bench bench(two_mass());
     for (const int elites : {0, 1, 3}) {
-        Settings s = paper(80);
+        PlantSettings s = paper(80);
         s.elites = elites;
         Progress progress;
-        const auto trials = search(bench.experiment, SearchRanges{}, s, 2, 3, 1, progress);
-        for (const Trial& t : trials) {
+        const auto trials = search_plant(bench.experiment, SearchRanges{}, s, 2, 3, 1, progress);
+        for (const PlantTrial& t : trials) {
             CHECK(t.history.size() == 80);
             CHECK(t.evaluations == 50 * 80);
             CHECK(t.species.empty());
@@ -90,19 +91,19 @@ TEST_CASE("engine: the best fitness of a plain run never rises with an elite, an
 TEST_CASE("engine: same seed, same result, for any number of workers; another seed, another result") {
     const Bench bench(two_mass());
     for (const bool with_species : {false, true}) {
-        const Settings s = with_species ? species(15) : paper(40);
+        const PlantSettings s = with_species ? species(15) : paper(40);
         const int trials = with_species ? 2 : 5;
-        std::vector<Trial> first;
+        std::vector<PlantTrial> first;
         for (const int workers : {1, 2, 3, 7}) {
             Progress progress;
-            const auto result = search(bench.experiment, few(), s, trials, 11, workers, progress);
+            const auto result = search_plant(bench.experiment, few(), s, trials, 11, workers, progress);
             if (first.empty()) first = result;
             for (std::size_t i = 0; i < result.size(); ++i) CHECK(same(result[i], first[i]));
         }
         // A trial does not depend on how many others there are.
         Progress progress;
-        CHECK(same(search(bench.experiment, few(), s, 1, 11, 4, progress)[0], first[0]));
-        CHECK(search(bench.experiment, few(), s, 1, 12, 1, progress)[0].history != first[0].history);
+        CHECK(same(search_plant(bench.experiment, few(), s, 1, 11, 4, progress)[0], first[0]));
+        CHECK(search_plant(bench.experiment, few(), s, 1, 12, 1, progress)[0].history != first[0].history);
     }
 }
 
@@ -114,10 +115,10 @@ TEST_CASE("engine: a long record is searched by several threads to the same resu
     bench.drive.input = bench.measured.input;
     bench.measured = reference::Measurement(bench.drive, 0.3, 18);
     bench.experiment.records[0] = bench.measured.record();
-    std::vector<Trial> results;
+    std::vector<PlantTrial> results;
     for (const int workers : {1, 2, 3, 5}) {
         Progress progress;
-        results.push_back(search(bench.experiment, few(), species(6), 1, 13, workers, progress)[0]);
+        results.push_back(search_plant(bench.experiment, few(), species(6), 1, 13, workers, progress)[0]);
         CHECK(same(results.back(), results.front()));
         CHECK(progress.done == results.back().history.size());
         CHECK(progress.best == results.back().best_fitness);
@@ -125,8 +126,7 @@ TEST_CASE("engine: a long record is searched by several threads to the same resu
         const auto least =
             std::min_element(fits.begin(), fits.end(), [](const Refined& x, const Refined& y) { return x.cost < y.cost; });
         CHECK(progress.species == fits.size());
-        CHECK(progress.leading_p == least->factors.structure.p);
-        CHECK(progress.leading_q == least->factors.structure.q);
+        CHECK(leading_structure(few(), progress) == least->factors.structure);
     }
     // The best chromosome of all islands is the one that is reported.
     const Genome genome(few(), Code::gray, Scale::linear);
@@ -138,10 +138,10 @@ TEST_CASE("engine: a long record is searched by several threads to the same resu
 
 TEST_CASE("engine: the plain engine shares the candidates of a long record, to the same result") {
     const Bench bench(two_mass(LoopKind::continuous, 12000));
-    std::vector<std::vector<Trial>> results;
+    std::vector<std::vector<PlantTrial>> results;
     for (const int workers : {1, 2, 3}) {
         Progress progress;
-        results.push_back(search(bench.experiment, SearchRanges{}, paper(4), 2, 13, workers, progress));
+        results.push_back(search_plant(bench.experiment, SearchRanges{}, paper(4), 2, 13, workers, progress));
         for (std::size_t i = 0; i < 2; ++i) CHECK(same(results.back()[i], results.front()[i]));
     }
 }
@@ -153,13 +153,14 @@ TEST_CASE("engine: every kernel set gives the identical trial, in double and in 
             for (const bool with_species : {false, true}) {
                 if (with_species && limited) continue;
                 bench.experiment.loop.torque_limit = limited ? 3.0 : std::numeric_limits<double>::infinity();
-                Settings s = with_species ? species(10) : paper(30);
+                PlantSettings s = with_species ? species(10) : paper(30);
                 s.in_float = in_float;
-                std::vector<Trial> first;
+                std::vector<PlantTrial> first;
                 for (const Kernels* k : available()) {
                     bench.experiment.kernels = k;
                     Progress progress;
-                    const auto result = search(bench.experiment, with_species ? few() : SearchRanges{}, s, 1, 21, 1, progress);
+                    const auto result =
+                        search_plant(bench.experiment, with_species ? few() : SearchRanges{}, s, 1, 21, 1, progress);
                     if (first.empty()) first = result;
                     CHECK(same(result[0], first[0]));
                 }
@@ -171,12 +172,13 @@ TEST_CASE("engine: a candidate that diverges gets the worst fitness, never NaN, 
     SearchRanges wild;
     wild.real = {-3000.0, 3000.0};
     wild.imaginary = {0.0, 3000.0};
-    const Genome genome(wild, Code::gray, Scale::linear);
     for (const bool in_float : {false, true}) {
-        Settings s;
+        PlantSettings s;
         s.in_float = in_float;
         s.elites = 1;
-        Breeder breeder(bench.experiment, genome, s, Random(6));
+        s.code = Code::gray;
+        const VelocityObjective objective(bench.experiment, wild, s);
+        Breeder breeder(objective, s, Random(6));
         breeder.randomise(0, 50);
         breeder.evaluate();
         const Breeder::Group all[] = {{0, 50, 1, false}};
@@ -190,8 +192,9 @@ TEST_CASE("engine: a candidate that diverges gets the worst fitness, never NaN, 
         }
         CHECK(diverged > 20);
         Progress progress;
+        s.code = Code::binary;
         s.generations = 60;
-        const Trial t = search(bench.experiment, wild, s, 1, 1, 1, progress)[0];
+        const PlantTrial t = search_plant(bench.experiment, wild, s, 1, 1, 1, progress)[0];
         CHECK(t.best_fitness < worst_fitness);
         for (std::size_t i = 1; i < t.history.size(); ++i) CHECK(t.history[i] <= t.history[i - 1]);
     }
@@ -200,13 +203,13 @@ TEST_CASE("engine: a candidate that diverges gets the worst fitness, never NaN, 
 TEST_CASE("engine: the stop flag ends a long run quickly") {
     using Clock = std::chrono::steady_clock;
     struct Long {
-        Settings settings;
+        PlantSettings settings;
         std::size_t samples;
         int workers;
     };
-    Settings large = paper(1000000);
+    PlantSettings large = paper(1000000);
     large.population = 2000;
-    Settings refining = species(1000000);
+    PlantSettings refining = species(1000000);
     refining.round = 20;
     refining.quiet_rounds = 1000000;
     for (const Long& run :
@@ -225,7 +228,7 @@ TEST_CASE("engine: the stop flag ends a long run quickly") {
             Progress progress;
             bool stopped = false;
             try {
-                search(bench.experiment, SearchRanges{}, run.settings, 3, 1, run.workers, progress);
+                search_plant(bench.experiment, SearchRanges{}, run.settings, 3, 1, run.workers, progress);
             } catch (const Stopped&) {
                 stopped = true;
             }

@@ -1,5 +1,5 @@
 #include "check.hpp"
-#include "gaident/genetic/fitness.hpp"
+#include "gaident/simulation/fitness.hpp"
 
 using namespace gaident;
 

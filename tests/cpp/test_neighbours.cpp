@@ -1,5 +1,5 @@
 #include "check.hpp"
-#include "gaident/search/neighbours.hpp"
+#include "gaident/identification/neighbours.hpp"
 #include "gaident/reference/drives.hpp"
 
 using namespace gaident;

@@ -1,9 +1,9 @@
 #include "check.hpp"
 #include "drive_bench.hpp"
 #include "gaident/genetic/decode.hpp"
-#include "gaident/search/engine.hpp"
+#include "gaident/identification/plant_search.hpp"
 #include "gaident/estimation/parameters.hpp"
-#include "gaident/search/species.hpp"
+#include "gaident/search/breeder.hpp"
 
 using namespace gaident;
 
@@ -17,8 +17,8 @@ SearchRanges small_ranges() {
     return r;
 }
 
-Settings quick() {
-    Settings s;
+PlantSettings quick() {
+    PlantSettings s;
     s.species = true;
     s.code = Code::gray;
     s.generations = 60;
@@ -27,8 +27,8 @@ Settings quick() {
 }
 
 // Structure and fitness of a trial's best chromosome, computed anew.
-std::pair<Structure, double> best_of(const Trial& trial, const Experiment& experiment, const SearchRanges& ranges,
-                                     const Settings& s) {
+std::pair<Structure, double> best_of(const PlantTrial& trial, const Experiment& experiment, const SearchRanges& ranges,
+                                     const PlantSettings& s) {
     const Factors<double> g = decode(trial.best.data(), Genome(ranges, s.code, s.roots));
     double sum;
     Batch(experiment, 1, false).errors({&g, 1}, {&sum, 1});
@@ -58,7 +58,7 @@ TEST_CASE("species: finds the true structure's optimum, and no smaller structure
     for (const bool two_mass : {false, true}) {
         const Bench bench(reference::paper_drive(two_mass), 0.3, 7);
         Progress progress;
-        const auto trial = search(bench.experiment, small_ranges(), quick(), 1, 5, 1, progress)[0];
+        const auto trial = search_plant(bench.experiment, small_ranges(), quick(), 1, 5, 1, progress)[0];
         const std::vector<Structure> all = structures(small_ranges());
         CHECK(trial.species.size() == all.size());
         RefineOptions o;
@@ -85,14 +85,14 @@ TEST_CASE("species: a structure asked for alone is found as well, by way of smal
     d.loop.kp = 0.0232;
     d.loop.ki = 1.367;
     SearchRanges alone{{115.0, 3.9e6}, {-90.0, 2252.0}, {4.5, 5661.0}, 1, 1, 2, 2, 10, 350.0};
-    Settings s = quick();
+    PlantSettings s = quick();
     s.roots = Scale::logarithmic;
     s.generations = 1000;
     s.round = 40;
     for (std::uint64_t seed = 0; seed < 12; ++seed) {
         const Bench bench(d, 0.2, seed);
         Progress progress;
-        const Trial trial = search(bench.experiment, alone, s, 1, seed, 1, progress)[0];
+        const PlantTrial trial = search_plant(bench.experiment, alone, s, 1, seed, 1, progress)[0];
         CHECK(trial.species.size() == 1 && (trial.species[0].factors.structure == Structure{1, 2}));
         RefineOptions o;
         o.ranges = alone;
@@ -107,10 +107,10 @@ TEST_CASE("species: a structure asked for alone is found as well, by way of smal
 TEST_CASE("species: the log of a run") {
     const Bench bench(reference::paper_drive(true), 0.3, 8);
     Progress progress;
-    Settings s = quick();
+    PlantSettings s = quick();
     s.population = 10;  // too few for six species: three each are taken
     s.quiet_rounds = 100;
-    const auto trial = search(bench.experiment, small_ranges(), s, 1, 6, 1, progress)[0];
+    const auto trial = search_plant(bench.experiment, small_ranges(), s, 1, 6, 1, progress)[0];
     CHECK(trial.history.size() == 60);
     CHECK(progress.done == 60);
     CHECK(trial.evaluations == 18 * 60);
@@ -124,24 +124,25 @@ TEST_CASE("species: the log of a run") {
 
 TEST_CASE("species: mutation and crossover leave the structure of a species alone") {
     const Bench bench(reference::paper_drive(true), 0.3, 9);
-    const Genome genome(SearchRanges{}, Code::gray, Scale::linear);
-    Settings s;
+    PlantSettings s;
+    s.code = Code::gray;
     s.population = 48;
     s.mutation = 0.2;
-    Breeder breeder(bench.experiment, genome, s, Random(3));
+    const VelocityObjective objective(bench.experiment, SearchRanges{}, s);
+    Breeder breeder(objective, s, Random(3));
     breeder.randomise(0, 48);
     std::vector<Breeder::Group> groups;
     const auto all = structures(SearchRanges{});
     for (std::size_t i = 0; i < all.size(); ++i) {
         groups.push_back({3 * i, 3, 1, true});
-        breeder.set_structure(3 * i, 3, all[i]);
+        for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) objective.set_species(breeder[k], i);
     }
     breeder.evaluate();
     for (int g = 0; g < 20; ++g) {
         std::vector<double> best;
         for (const auto& group : groups) best.push_back(breeder.cost(breeder.best_of(group.first, group.count)));
         breeder.generation(groups);
-        for (std::size_t i = 0; i < 48; ++i) CHECK(breeder.candidate(i).structure == all[i / 3]);
+        for (std::size_t i = 0; i < 48; ++i) CHECK(objective.factors(breeder[i]).structure == all[i / 3]);
         for (std::size_t i = 0; i < all.size(); ++i) CHECK(breeder.cost(breeder.best_of(3 * i, 3)) <= best[i]);
     }
 }

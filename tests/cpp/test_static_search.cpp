@@ -4,8 +4,9 @@
 #include "fixed_bound.hpp"
 #include "gaident/numeric/c30.hpp"
 #include "gaident/numeric/denormals.hpp"
-#include "gaident/search/chromosomes.hpp"
-#include "gaident/search/engine.hpp"
+#include "gaident/identification/chromosomes.hpp"
+#include "gaident/identification/plant_search.hpp"
+#include "gaident/target/mirror.hpp"
 #include "gaident/target/fixed_scaling.hpp"
 #include "gaident/target/static_search.hpp"
 
@@ -74,11 +75,11 @@ std::array<Bench, 2> records() {
 }
 
 Trial desk(const Bench& bench, const char* mirror, int generations, std::uint64_t seed) {
-    Settings s;
+    PlantSettings s;
     s.generations = generations;
     s.mirror = mirror;
     Progress progress;
-    return search(bench.experiment, SearchRanges{}, s, 1, seed, 1, progress)[0];
+    return search_plant(bench.experiment, SearchRanges{}, s, 1, seed, 1, progress)[0];
 }
 
 bool same(const Trial& a, const Trial& b) {

@@ -26,8 +26,8 @@ PACKAGE = ROOT / "python" / "gaident"
 
 # The rooms of the core, lowest first: a file includes its own room and rooms before it. Folders inside a room belong to it.
 CORE_ROOMS = [
-    *("numeric", "runtime", "plant", "control", "simulation", "effects", "nonlinear"),
-    *("estimation", "genetic", "target", "search", "reference"),
+    *("numeric", "runtime", "plant", "genetic", "search"),  # the genetic search knows no simulator
+    *("control", "simulation", "effects", "nonlinear", "estimation", "target", "identification", "reference"),
 ]
 MOST_FILES = 20  # of code in one folder
 

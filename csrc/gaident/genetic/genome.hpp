@@ -11,7 +11,7 @@
 // after the code has been read as plain binary or as reflected Gray code.
 #pragma once
 
-#include "chromosome.hpp"
+#include "layout.hpp"
 #include "../numeric/wrong_use.hpp"
 #include "../plant/ranges.hpp"
 
@@ -64,6 +64,7 @@ public:
     constexpr std::span<const Field> fields() const { return {fields_, static_cast<std::size_t>(field_count_)}; }
     // A one at the first bit of every field: where crossover starts afresh.
     constexpr const Word* starts() const { return starts_; }
+    Layout layout() const { return {bits_, 2 * structure_bits(), {starts_, static_cast<std::size_t>(words())}}; }
 
     constexpr const Field& field(Role role, Part part, int index) const { return fields_[slot(role, part, index)]; }
 

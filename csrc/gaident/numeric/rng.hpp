@@ -28,6 +28,11 @@ constexpr std::uint32_t below(std::uint64_t word, std::uint32_t n) {
     return static_cast<std::uint32_t>(((word >> 32) * n) >> 32);
 }
 
+// out[i] = mix(base + i * golden_gamma), i = 0 .. n-1.
+inline void mixed_words(std::uint64_t base, std::uint64_t* out, std::size_t n) {
+    for (std::size_t i = 0; i < n; ++i) out[i] = mix(base + i * golden_gamma);
+}
+
 class Random {
 public:
     explicit constexpr Random(std::uint64_t key) : key_(key) {}
@@ -39,10 +44,7 @@ public:
 
     constexpr std::uint64_t word() { return mix(key_ + ++count_ * golden_gamma); }
 
-    void words(std::uint64_t* out, std::size_t n) {
-        const std::uint64_t base = skip(n);
-        for (std::size_t i = 0; i < n; ++i) out[i] = mix(base + i * golden_gamma);
-    }
+    void words(std::uint64_t* out, std::size_t n) { mixed_words(skip(n), out, n); }
 
     // Leaves n words out; word i of them is mix(base + i * golden_gamma), base being returned.
     constexpr std::uint64_t skip(std::size_t n) {

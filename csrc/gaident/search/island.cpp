@@ -13,13 +13,14 @@ Settings with_room(Settings s, std::size_t species) {
 
 }  // namespace
 
-Island::Island(const Experiment& experiment, const Genome& genome, const Settings& settings, Random random,
-               std::span<const Structure> species)
-    : genome_(genome),
+Island::Island(const Objective& objective, const SetSpecies& set_species, const Settings& settings, Random random,
+               const Resources& resources, std::span<const std::size_t> species)
+    : set_species_(set_species),
       settings_(with_room(settings, species.size())),
+      stop_(resources.stop),
       species_(species.begin(), species.end()),
-      breeder_(experiment, genome_, settings_, random),
-      best_(static_cast<std::size_t>(genome.words())) {
+      breeder_(objective, settings_, random, resources.words),
+      best_(static_cast<std::size_t>(objective.layout().words())) {
     const std::size_t n = static_cast<std::size_t>(settings_.population), share = n / species.size(), extra = n % species.size();
     std::size_t first = 0;
     for (std::size_t i = 0; i < species.size(); ++i) {
@@ -33,17 +34,19 @@ void Island::breed(int generations, const std::function<void(double)>& on_genera
     const auto n = static_cast<std::size_t>(settings_.population);
     history_.clear();
     breeder_.randomise(0, n);
-    for (std::size_t i = 0; i < species_.size(); ++i) breeder_.set_structure(groups_[i].first, groups_[i].count, species_[i]);
+    for (std::size_t k = 0; k < species_.size(); ++k)
+        for (std::size_t i = 0; i < groups_[k].count; ++i) set_species_(breeder_[groups_[k].first + i], species_[k]);
     breeder_.evaluate();
     for (int g = 0;; ++g) {
         const std::size_t best = breeder_.best_of(0, n);
         history_.push_back(breeder_.cost(best));
         if (g == 0 || breeder_.cost(best) < history_[best_generation_]) {
             best_generation_ = static_cast<std::size_t>(g);
-            std::copy(breeder_[best], breeder_[best] + genome_.words(), best_.begin());
+            std::copy(breeder_[best], breeder_[best] + best_.size(), best_.begin());
         }
         on_generation(breeder_.cost(best));
         if (g + 1 == generations) return;
+        stop_if_asked(stop_);
         breeder_.generation(groups_);
     }
 }

@@ -1,10 +1,12 @@
-// What a genetic run is told, and what it reports.
+// What a genetic search is told, what it runs with, and what it reports.
 #pragma once
 
-#include "../genetic/fitness.hpp"
-#include "../genetic/genome.hpp"
-#include "../estimation/refine.hpp"
+#include "../numeric/rng.hpp"
+#include "../runtime/parallel.hpp"
+#include "../runtime/stop.hpp"
+#include "objective.hpp"
 
+#include <stdexcept>
 #include <string>
 
 namespace gaident {
@@ -16,14 +18,8 @@ struct Settings {
     double mutation = 0.01;
     int generations = 1000;  // with species: at most so many, in rounds
     int elites = 0;          // with species: one per species, always
-    Code code = Code::binary;
-    Scale roots = Scale::linear;
-    FitnessWeights weights;
-    bool species = false;  // one species per structure, local fits, comparison left to the caller
-    int round = 40;        // generations between two local fits of every species
-    int quiet_rounds = 1;  // rounds that find no better optimum, after which the search ends
-    bool in_float = false;
-    std::string mirror;  // name of a drive's arithmetic (mirror.hpp) to evaluate in; empty: none
+    int round = 40;          // with species: generations between two local searches in every species
+    int quiet_rounds = 1;    // with species: rounds that find no better optimum, after which the search ends
 
     void check() const {
         const auto bad = [](const std::string& what) { throw std::invalid_argument("Settings: " + what); };
@@ -38,41 +34,50 @@ struct Settings {
 };
 
 struct Trial {
-    std::vector<double> history;          // best fitness (equation 6) in each generation
-    double best_fitness = worst_fitness;  // ever seen by the genetic search
+    std::vector<double> history;       // least cost in each generation; with species: up to it
+    double best_fitness = worst_cost;  // ever seen by the genetic search
     int best_generation = 0;
-    std::vector<Word> best;        // its chromosome
-    std::vector<Refined> species;  // with species: the local fit of each structure, by p + q, then q
-    std::size_t evaluations = 0;   // candidates simulated by the genetic search
-    std::size_t overflows = 0;     // of them, in a drive's arithmetic, those that left its range or diverged
+    std::vector<Word> best;       // its chromosome
+    std::size_t evaluations = 0;  // candidates evaluated by the genetic search
+    std::size_t overflows = 0;    // of them, those whose evaluation left the range of its arithmetic (Evaluator::overflows)
+};
+
+template <class Fit>
+struct SpeciesTrial : Trial {
+    std::vector<Fit> species;  // the local optimum of each species that was asked for, in their order
 };
 
 struct Progress {
     std::atomic<std::size_t> done{0};  // generations, of all trials together
-    std::atomic<double> best{worst_fitness};
-    std::atomic<std::size_t> species{0};            // structures that compete; 0: none are kept apart
-    std::atomic<int> leading_p{-1}, leading_q{-1};  // the structure of the least error sum so far; -1: none yet
+    std::atomic<double> best{worst_cost};
+    std::atomic<std::size_t> species{0};  // those that compete; 0: none are kept apart
+    std::atomic<int> leading{-1};         // the species of the least local optimum so far; -1: none yet
 
-    void note(std::size_t generations, double fitness_now) {
+    void note(std::size_t generations, double cost_now) {
         done += generations;
         double seen = best.load();
-        while (fitness_now < seen && !best.compare_exchange_weak(seen, fitness_now)) {
+        while (cost_now < seen && !best.compare_exchange_weak(seen, cost_now)) {
         }
     }
 
-    // Trials that run side by side may report in the same moment; p and q are for the eye only.
-    void lead(const Structure& structure, double error_sum) {
+    // Trials that run side by side may report in the same moment; the species is for the eye only.
+    void lead(std::size_t which, double cost) {
         double seen = least_.load();
-        while (error_sum < seen && !least_.compare_exchange_weak(seen, error_sum)) {
+        while (cost < seen && !least_.compare_exchange_weak(seen, cost)) {
         }
-        if (error_sum < seen) {
-            leading_p = structure.p;
-            leading_q = structure.q;
-        }
+        if (cost < seen) leading = static_cast<int>(which);
     }
 
 private:
-    std::atomic<double> least_{worst_fitness};
+    std::atomic<double> least_{worst_cost};
+};
+
+// What the machine gives a search: none of it changes the result.
+struct Resources {
+    Workers& workers;
+    Progress& progress;
+    const std::atomic<bool>* stop = nullptr;  // where set, Stopped is thrown before the next generation
+    WordStream::Fill words = mixed_words;     // random words, by the instruction set that there is
 };
 
 }  // namespace gaident

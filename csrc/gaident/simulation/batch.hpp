@@ -5,16 +5,13 @@
 #include "candidates.hpp"
 #include "error_sum.hpp"
 #include "../control/loop.hpp"
+#include "../runtime/stop.hpp"
 #include "record.hpp"
 
-#include <atomic>
 #include <functional>
 #include <vector>
 
 namespace gaident {
-
-// Thrown inside the core when the stop flag is seen; the caller asked for it.
-struct Stopped {};
 
 class Workers;
 
@@ -36,9 +33,7 @@ struct Experiment {
         while (n > 0) work(--n);
     }
     void share_among_workers(std::size_t n, const std::function<void(std::size_t)>& work) const;
-    void stop_if_asked() const {
-        if (stop != nullptr && stop->load(std::memory_order_relaxed)) throw Stopped{};
-    }
+    void stop_if_asked() const { gaident::stop_if_asked(stop); }
 };
 
 // Number of states a record's start is described by: the plant's p + q, and the controller's stored torque in a closed loop.

@@ -14,7 +14,7 @@
 
 #include "../control/closed_loop.hpp"
 #include "../genetic/decode.hpp"
-#include "../genetic/fitness.hpp"
+#include "../simulation/fitness.hpp"
 
 #include <type_traits>
 

@@ -3,7 +3,7 @@
 // of every arithmetic.
 #pragma once
 
-#include "../genetic/fitness.hpp"
+#include "../simulation/fitness.hpp"
 #include "../genetic/genome.hpp"
 #include "../genetic/population.hpp"
 #include "../simulation/batch.hpp"

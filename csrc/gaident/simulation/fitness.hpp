@@ -1,7 +1,7 @@
 // Fitness (equation 6):  F = sum_n (Wf1 (w(n) - wm(n)))^2 + Wf2 (p + q).  Smaller is better.
 #pragma once
 
-#include "../simulation/error_sum.hpp"
+#include "error_sum.hpp"
 #include "../plant/factors.hpp"
 
 namespace gaident {
