@@ -71,8 +71,8 @@ void effect_rows(bool quick) {
     EffectJob job;
     job.record = {input, {}, 0.444e-3, 0.0, 30.0};
     job.loop.kind = LoopKind::sampled;
-    job.loop.kp = 0.08;
-    job.loop.ki = 1.5;
+    job.loop.controller.kp = 0.08;
+    job.loop.controller.ki = 1.5;
     const std::vector<EffectModel> linear = drives(false), models = drives(true);
     const std::span one(models.data(), 1);
 

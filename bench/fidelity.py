@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 import gaident as ga
 from gaident import _core
+from gaident.control.core import clock, core_controller
 
 ARITHMETICS = {
     "drive_double": "double",
@@ -47,7 +48,7 @@ class Drive:
         """(response to the step, whether it left the arithmetic's range)"""
         m = self.model
         poles, zeros = np.array(m.poles, complex), np.array(m.zeros, complex)
-        return _core.mirrored(arithmetic, in_z, m.gain, poles, zeros, DT, COMMAND, self.loop.kp, self.loop.ki)
+        return _core.mirrored(arithmetic, in_z, m.gain, poles, zeros, clock(DT), COMMAND, core_controller(self.loop))
 
     def record(self, seed: int) -> ga.Record:
         """The step's response with noise."""

@@ -79,8 +79,8 @@ struct Data {
         const std::complex<double> poles[] = {-15.41, {-10.30, 150.9}, {-10.30, -150.9}};
         const std::complex<double> zeros[] = {{-4.26, 93.98}, {-4.26, -93.98}};
         experiment.loop.kind = kind;
-        experiment.loop.kp = kp;
-        experiment.loop.ki = ki;
+        experiment.loop.controller.kp = kp;
+        experiment.loop.controller.ki = ki;
         const std::size_t parts = task == Task::two_records ? 2 : 1, n = samples / parts;
         Random random(1);
         for (std::size_t part = 0; part < parts; ++part) {

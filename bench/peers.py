@@ -27,6 +27,7 @@ from success import DT
 
 import gaident as ga
 from gaident import _core
+from gaident.control import core
 
 PACKAGES = {
     "whole GA in numba": "numba",
@@ -132,8 +133,7 @@ def bits_of(fields: np.ndarray) -> np.ndarray:
 def our_generation(p: Problem, arithmetic: str, generations: int, repeats: int) -> str:
     settings = ga.Settings(code="binary", scale="linear", engine="plain", generations=generations, arithmetic=arithmetic)
     pi = p.case.controller
-    inf = float("inf")
-    experiment = _core.Experiment([(p.case.command, p.output, DT, "rest", 0.0)], "continuous", pi.kp, pi.ki, inf, inf)
+    experiment = core.experiment([core.record(DT, p.case.command, p.output, "rest", 0.0)], pi)
     seconds = []
     for seed in range(repeats + 1):
         began = time.perf_counter()
@@ -319,8 +319,7 @@ def main() -> None:
     options.seeds = options.seeds or (2 if options.quick else 10)
     options.limit = options.limit or (2.0 if options.quick else 20.0)
     versions = ", ".join(f"{n} {importlib.metadata.version(n)}" for n in ("numpy", "scipy", "numba"))
-    pi, inf = ga.PI(1.0, 1.0), float("inf")
-    kernels = _core.Experiment([(np.ones(20), np.ones(20), DT, "rest", 0.0)], "continuous", pi.kp, pi.ki, inf, inf).kernels
+    kernels = core.experiment([core.record(DT, np.ones(20), np.ones(20), "rest", 0.0)], None).kernels
     print(f"gaident {ga.__version__} ({kernels}), {versions}; one thread")
     if options.table != "optimum":
         generation_table(options)

@@ -95,6 +95,7 @@ def measure(row: Row) -> dict[str, float]:
 
     import gaident as ga
     from gaident import _core
+    from gaident.control import core
 
     rec, pi = record(row.samples)
     before = peak()
@@ -109,8 +110,7 @@ def measure(row: Row) -> dict[str, float]:
         assert (found[0].p, found[0].q) == (1, 2), "wrong answer: structure"
         return {"seconds": min(seconds), "peak": peak(), "before": before}
 
-    inf = float("inf")
-    experiment = _core.Experiment([(rec.command, rec.velocity, rec.dt, "rest", 0.0)], "continuous", pi.kp, pi.ki, inf, inf)
+    experiment = core.experiment([core.record(rec.dt, rec.command, rec.velocity, "rest", 0.0)], pi)
     ranges = ga.SearchSpace(p=row.p, q=row.q).ranges(paper=True)
 
     def search(generations: int) -> list[_core.Trial]:

@@ -44,8 +44,8 @@ struct Data {
         const std::complex<double> poles[] = {-15.41, {-10.30, 150.9}, {-10.30, -150.9}};
         const std::complex<double> zeros[] = {{-4.26, 93.98}, {-4.26, -93.98}};
         experiment.loop.kind = kind;
-        experiment.loop.kp = kp;
-        experiment.loop.ki = ki;
+        experiment.loop.controller.kp = kp;
+        experiment.loop.controller.ki = ki;
         experiment.kernels = &kernels;
         std::vector<double> torque(samples);
         simulate<double>(factors_from_roots(6545.29, poles, zeros), input, Ts, experiment.loop, nullptr, output, torque);
@@ -156,8 +156,8 @@ double effect_instructions(const EffectKernel* lanes, const std::string& chosen)
     record.sample_time = Ts;
     EffectRun run;
     run.loop.kind = LoopKind::sampled;
-    run.loop.kp = kp;
-    run.loop.ki = ki;
+    run.loop.controller.kp = kp;
+    run.loop.controller.ki = ki;
     run.effects = models[0].effects;
     run.sample_time = Ts;
     run.substeps = 2;

@@ -89,22 +89,21 @@ Factors<double> factors_of(const double* x, int real_poles, int pole_pairs, int 
     return f;
 }
 
-struct PyRecord {
-    double dt;
+struct PyEffectRecord {
     RealArray input, position, velocity;
     EffectJob job;
 
-    PyRecord(double sample_time, RealArray in, RealArray measured_position, const RealArray& measured_velocity,
-             double start_angle, const std::string& loop, double kp, double ki, double torque_limit, double integrator_limit)
-        : dt(sample_time), input(std::move(in)), position(std::move(measured_position)), velocity(measured_velocity) {
+    PyEffectRecord(const Clock& clock, RealArray in, RealArray measured_position, const RealArray& measured_velocity,
+                   double start_angle, const Loop& loop)
+        : input(std::move(in)), position(std::move(measured_position)), velocity(measured_velocity) {
         if (position.size() != 0 && position.size() != input.size())
             throw std::invalid_argument("position: as many samples as the input are needed");
         job.record.input = view(input);
         job.record.position = view(position);
-        job.record.sample_time = dt;
+        job.record.sample_time = clock.period;
         job.record.start_angle = start_angle;
         for (const double w : view(velocity)) job.record.top_speed = std::max(job.record.top_speed, std::abs(w));
-        job.loop = make_loop(loop, kp, ki, torque_limit, integrator_limit);
+        job.loop = loop;
         if (job.loop.kind == LoopKind::open) return;
         for (const double r : job.record.input) job.record.top_speed = std::max(job.record.top_speed, std::abs(r));
     }
@@ -199,7 +198,7 @@ private:
 
 using OwnList = std::vector<std::tuple<std::string, py::function, RealArray>>;
 
-py::tuple simulate_models(const PyRecord& record, const std::vector<EffectModel>& models, const RealArray& initial_states,
+py::tuple simulate_models(const PyEffectRecord& record, const std::vector<EffectModel>& models, const RealArray& initial_states,
                           int substeps, int workers, bool all, const std::string& kernel, bool lanes, const OwnList& own) {
     EffectJob job = record.job;
     if (substeps < 0 || substeps > max_substeps) throw std::invalid_argument("substeps: 0 (as needed) to 64");
@@ -243,7 +242,7 @@ py::tuple simulate_models(const PyRecord& record, const std::vector<EffectModel>
     return py::make_tuple(velocity, torque, angle);
 }
 
-py::array simulate_values(const PyRecord& record, const RealArray& values, const std::tuple<int, int, int, int>& structure,
+py::array simulate_values(const PyEffectRecord& record, const RealArray& values, const std::tuple<int, int, int, int>& structure,
                           const std::vector<std::string>& effects, const RealArray& initial_states, int substeps, int workers,
                           const OwnList& own) {
     const auto [real_poles, pole_pairs, real_zeros, zero_pairs] = structure;
@@ -281,11 +280,10 @@ void bind_effects(py::module_& m) {
     m.def("broken_relation", &broken_relation, py::arg("name"), py::arg("values"));
     py::class_<EffectModel>(m, "EffectModel")
         .def(py::init(&make_model), py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("effects"));
-    py::class_<PyRecord>(m, "EffectRecord")
-        .def(py::init<double, RealArray, RealArray, const RealArray&, double, const std::string&, double, double, double,
-                      double>(),
-             py::arg("dt"), py::arg("input"), py::arg("position"), py::arg("velocity"), py::arg("start_angle"), py::arg("loop"),
-             py::arg("kp"), py::arg("ki"), py::arg("torque_limit"), py::arg("integrator_limit"))
+    py::class_<PyEffectRecord>(m, "EffectRecord")
+        .def(py::init<const Clock&, RealArray, RealArray, const RealArray&, double, const Loop&>(), py::kw_only(),
+             py::arg("clock"), py::arg("input"), py::arg("position"), py::arg("velocity"), py::arg("start_angle"),
+             py::arg("loop"))
         .def("simulate", &simulate_models, py::arg("models"), py::arg("initial_states"), py::arg("substeps"), py::arg("workers"),
              py::arg("all"), py::arg("kernel") = "", py::arg("lanes") = true, py::arg("own") = OwnList())
         .def("simulate_values", &simulate_values, py::arg("values"), py::arg("structure"), py::arg("effects"),

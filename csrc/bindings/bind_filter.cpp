@@ -69,15 +69,13 @@ RealArray replayed(const RealArray& values, double limit, double start) {
     return changed(values, [&](std::span<double> all) { run(all, limit, start); });
 }
 
-RealArray held(const RealArray& error, double kp, double newest, double before, double torque_limit, double integrator_limit,
-               const std::string& rule, double integral) {
+RealArray held(const RealArray& error, const Controller& controller, double newest, double before, const std::string& rule,
+               double integral) {
     constexpr const char* names[] = {"held", "held_back", "tracked"};
     const auto found = std::find(std::begin(names), std::end(names), rule);
     if (found == std::end(names)) throw std::invalid_argument("rule: held, held_back or tracked, not " + rule);
     const auto hold = static_cast<Hold>(found - std::begin(names));
-    return changed(error, [&](std::span<double> all) {
-        held_torque(all, kp, newest, before, torque_limit, integrator_limit, hold, integral);
-    });
+    return changed(error, [&](std::span<double> all) { held_torque(all, controller, newest, before, hold, integral); });
 }
 
 }  // namespace
@@ -86,8 +84,8 @@ void bind_filter(py::module_& m) {
     m.def("filtered", &filtered_rows, py::arg("b"), py::arg("a"), py::arg("rows"), py::arg("lengths"));
     m.def("state_recursion", &states, py::arg("A"), py::arg("drive"), py::arg("start"), py::arg("newest"));
     m.def("lagged_products", &products, py::arg("e"), py::arg("lags"));
-    m.def("held_torque", &held, py::arg("error"), py::arg("kp"), py::arg("newest"), py::arg("before"), py::arg("torque_limit"),
-          py::arg("integrator_limit"), py::arg("rule"), py::arg("integral"));
+    m.def("held_torque", &held, py::arg("error"), py::arg("controller"), py::arg("newest"), py::arg("before"), py::arg("rule"),
+          py::arg("integral"));
     m.def("clamped_sum", &replayed<clamped_sum>, py::arg("steps"), py::arg("limit"), py::arg("start"));
     m.def("rate_limited", &replayed<rate_limited>, py::arg("command"), py::arg("step"), py::arg("start"));
 }

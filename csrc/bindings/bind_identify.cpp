@@ -7,27 +7,15 @@ using namespace gaident;
 
 namespace {
 
-using RecordTuple = std::tuple<RealArray, RealArray, double, std::string, double>;
-
-Start start_named(const std::string& name) {
-    if (name == "rest") return Start::rest;
-    if (name == "steady") return Start::steady;
-    if (name == "free") return Start::free;
-    throw std::invalid_argument("start must be 'rest', 'steady' or 'free', not '" + name + "'");
-}
-
 // The records of an identification, with the arrays they borrow.
 struct PyExperiment {
-    std::vector<RecordTuple> arrays;
+    std::vector<PyRecord> arrays;
     Experiment experiment;
     std::atomic<bool> stop{false};
 
-    PyExperiment(std::vector<RecordTuple> records, const std::string& loop, double kp, double ki, double torque_limit,
-                 double integrator_limit, const std::string& kernels)
-        : arrays(std::move(records)) {
-        for (const auto& [input, output, dt, start, velocity0] : arrays)
-            experiment.records.push_back(Record{view(input), view(output), dt, start_named(start), velocity0});
-        experiment.loop = make_loop(loop, kp, ki, torque_limit, integrator_limit);
+    PyExperiment(std::vector<PyRecord> records, const Loop& loop, const std::string& kernels) : arrays(std::move(records)) {
+        for (const PyRecord& r : arrays) experiment.records.push_back(r.record);
+        experiment.loop = loop;
         if (!kernels.empty()) {
             experiment.kernels = kernels_named(kernels.c_str());
             if (experiment.kernels == nullptr)
@@ -223,9 +211,8 @@ void bind_identify(py::module_& m) {
         });
 
     py::class_<PyExperiment>(m, "Experiment")
-        .def(py::init<std::vector<RecordTuple>, const std::string&, double, double, double, double, const std::string&>(),
-             py::arg("records"), py::arg("loop"), py::arg("kp"), py::arg("ki"), py::arg("torque_limit"),
-             py::arg("integrator_limit"), py::arg("kernels") = "")
+        .def(py::init<std::vector<PyRecord>, const Loop&, const std::string&>(), py::arg("records"), py::arg("loop"),
+             py::arg("kernels") = "")
         .def_property_readonly("kernels", [](const PyExperiment& e) { return e.experiment.kernels->name; })
         .def("search", &search_records, py::arg("ranges"), py::arg("settings"), py::arg("trials"), py::arg("seed"),
              py::arg("workers"), py::arg("progress") = py::none())

@@ -35,21 +35,19 @@ py::dict effect_numbers(const PreparedEffects& made, EffectSet effects) {
 
 // {"a", "b"} of the linear plant at the sample time where no effect is left (substeps 0), else of the plant at the substep, or of two
 // masses, and the effects' numbers as the loop with effects uses them. substeps 0: as many as the model needs.
-py::dict recurrence(const EffectModel& model, double dt, const std::string& loop_kind, double kp, double ki, double torque_limit,
-                    double integrator_limit, int substeps, double top_speed) {
+py::dict recurrence(const EffectModel& model, const Clock& clock, const Loop& loop, int substeps, double top_speed) {
     if (substeps < 0 || substeps > max_substeps) throw std::invalid_argument("substeps: 0 (as needed) to 64");
-    const Loop loop = make_loop(loop_kind, kp, ki, torque_limit, integrator_limit);
     const EffectModel left = reduced(model, false);
     py::dict d;
     if (left.effects.bits == 0) {
-        const Delta<double> plant = plant_of(left.linear, loop, dt);
+        const Delta<double> plant = plant_of(left.linear, loop, clock.period);
         d["substeps"] = 0;
         d["a"] = numbers(plant.a, plant.order);
         d["b"] = numbers(plant.b, plant.order + 1);
         return d;
     }
     EffectRecord record;
-    record.sample_time = dt;
+    record.sample_time = clock.period;
     record.top_speed = top_speed;
     const int m = substeps > 0 ? substeps : substeps_for(left, record, loop);
     PreparedEffects made;
@@ -83,6 +81,6 @@ py::dict recurrence(const EffectModel& model, double dt, const std::string& loop
 }  // namespace
 
 void bind_recurrence(py::module_& m) {
-    m.def("recurrence", &recurrence, py::arg("model"), py::arg("dt"), py::arg("loop"), py::arg("kp"), py::arg("ki"),
-          py::arg("torque_limit"), py::arg("integrator_limit"), py::arg("substeps"), py::arg("top_speed"));
+    m.def("recurrence", &recurrence, py::arg("model"), py::arg("clock"), py::arg("loop"), py::arg("substeps"),
+          py::arg("top_speed"));
 }

@@ -18,11 +18,18 @@ using ComplexArray = py::array_t<std::complex<double>, py::array::c_style | py::
 
 inline std::span<const double> view(const RealArray& a) { return {a.data(), static_cast<std::size_t>(a.size())}; }
 
-gaident::Loop make_loop(const std::string& kind, double kp, double ki, double torque_limit, double integrator_limit);
 gaident::Factors<double> make_factors(double gain, const ComplexArray& poles, const ComplexArray& zeros);
 ComplexArray poles_of(const gaident::Factors<double>& f);
 ComplexArray zeros_of(const gaident::Factors<double>& f);
 RealArray to_array(const std::vector<double>& v);
+
+// A record with the arrays it borrows.
+struct PyRecord {
+    RealArray input, output;
+    gaident::Record record;
+
+    PyRecord(const gaident::Clock& clock, RealArray in, RealArray out, const std::string& start, double velocity0);
+};
 
 // Runs `work` on a thread of its own with the GIL released; every 50 ms looks for Ctrl-C (sets `stop`, waits for the work to end, raises
 // KeyboardInterrupt) and calls `tick`. A Python exception raised by `tick` stops the work likewise.
@@ -32,6 +39,7 @@ void run_interruptibly(std::atomic<bool>& stop, const std::function<void()>& wor
 // started, and before anyone could press Ctrl-C.
 void run_interruptibly(std::atomic<bool>& stop, std::size_t samples, const std::function<void()>& work);
 
+void bind_control(py::module_& m);
 void bind_simulate(py::module_& m);
 void bind_filter(py::module_& m);
 void bind_identify(py::module_& m);

@@ -7,19 +7,6 @@
 
 using namespace gaident;
 
-Loop make_loop(const std::string& kind, double kp, double ki, double torque_limit, double integrator_limit) {
-    Loop loop;
-    if (kind == "continuous") loop.kind = LoopKind::continuous;
-    else if (kind == "sampled") loop.kind = LoopKind::sampled;
-    else if (kind == "open") loop.kind = LoopKind::open;
-    else throw std::invalid_argument("loop must be 'continuous', 'sampled' or 'open', not '" + kind + "'");
-    loop.kp = kp;
-    loop.ki = ki;
-    loop.torque_limit = torque_limit;
-    loop.integrator_limit = integrator_limit;
-    return loop;
-}
-
 Factors<double> make_factors(double gain, const ComplexArray& poles, const ComplexArray& zeros) {
     return factors_from_roots(gain, {poles.data(), static_cast<std::size_t>(poles.size())},
                               {zeros.data(), static_cast<std::size_t>(zeros.size())});

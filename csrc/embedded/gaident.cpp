@@ -33,9 +33,9 @@ gaident_search* gaident_configure(void* memory, size_t bytes, const gaident_sett
     if (!(s->order_weight >= 0.0 && s->order_weight < 1e30)) return nullptr;
     const FlushDenormals flush;
     StaticSetup<InDrive> setup = paper_setup();
-    setup.kp = s->kp;
-    setup.ki = s->ki;
-    setup.sample_time = s->sample_time;
+    setup.controller.kp = s->kp;
+    setup.controller.ki = s->ki;
+    setup.clock.period = s->sample_time;
     setup.peak = s->peak;
     setup.tournament = s->tournament;
     setup.crossover = s->crossover;

@@ -29,9 +29,9 @@ alignas(PaperSearch) unsigned char memory[sizeof(PaperSearch)];
 // A search of the record, or of one with another command: then the recurrence has an input, and takes longest.
 PaperSearch& searching(bool constant_command) {
     StaticSetup<InDrive> setup = paper_setup();
-    setup.kp = recorded_kp;
-    setup.ki = recorded_ki;
-    setup.sample_time = recorded_sample_time;
+    setup.controller.kp = recorded_kp;
+    setup.controller.ki = recorded_ki;
+    setup.clock.period = recorded_sample_time;
     setup.peak = 50.0;
     setup.seed = 1;
     PaperSearch& search = *new (memory) PaperSearch(setup);

@@ -36,8 +36,8 @@ void record(const char* storage) {
     const reference::Measurement measured(drive, 0.3, 17);
     table(storage, "recorded_command", measured.input.size(), [&](std::size_t i) { return measured.input[i]; });
     table(storage, "recorded_velocity", measured.output.size(), [&](std::size_t i) { return measured.output[i]; });
-    std::fprintf(stdout, "%s const double recorded_kp = %a;\n%s const double recorded_ki = %a;\n", storage, drive.loop.kp,
-                 storage, drive.loop.ki);
+    std::fprintf(stdout, "%s const double recorded_kp = %a;\n%s const double recorded_ki = %a;\n", storage,
+                 drive.loop.controller.kp, storage, drive.loop.controller.ki);
     std::fprintf(stdout, "%s const double recorded_sample_time = %a;\n", storage, drive.sample_time);
 }
 

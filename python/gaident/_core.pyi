@@ -84,25 +84,40 @@ class Trial:
     @property
     def species(self) -> list[Refined]: ...
 
+class Clock:
+    """When the controller acts: period, its sample time [s], which is the record's."""
+
+    def __init__(self, *, period: float) -> None: ...
+
+class Controller:
+    """The PI velocity controller: kp [N m s/rad], ki [N m/rad], limits of |u| and of |I| [N m]."""
+
+    def __init__(self, *, kp: float, ki: float, torque_limit: float = ..., integrator_limit: float = ...) -> None: ...
+
+class Loop:
+    """How the loop is closed, "continuous", "sampled" or "open", and over which controller; "open" has none."""
+
+    def __init__(self, *, kind: str, controller: Controller = ...) -> None: ...
+
+class Record:
+    """Input (velocity command [rad/s], torque [N m] in the open loop) and measured velocity [rad/s] of an identification.
+
+    start: "rest", "steady" (velocity0 [rad/s] under constant input) or "free" (unknown, estimated from "steady" on).
+    """
+
+    def __init__(
+        self, *, clock: Clock, input: NDArray[np.float64], output: NDArray[np.float64], start: str, velocity0: float
+    ) -> None: ...
+
 class Experiment:
     """Records and their loop: what candidates are simulated against.
 
-    records: (input, velocity, dt, start, first velocity) each, start one of "rest", "steady", "free".
-    loop: "continuous", "sampled" or "open". kernels: an instruction set, "" for the machine's best.
+    kernels: an instruction set, "" for the machine's best.
     Ctrl-C ends long work, and so does an exception that `progress` raises. It gets
     (generations done, best fitness, number of species, (p, q) of the one that leads or (-1, -1)).
     """
 
-    def __init__(
-        self,
-        records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float, str, float]],
-        loop: str,
-        kp: float,
-        ki: float,
-        torque_limit: float,
-        integrator_limit: float,
-        kernels: str = "",
-    ) -> None: ...
+    def __init__(self, records: Sequence[Record], loop: Loop, kernels: str = "") -> None: ...
     @property
     def kernels(self) -> str: ...
     def search(
@@ -157,13 +172,9 @@ def simulate(
     gain: float,
     poles: NDArray[np.complex128],
     zeros: NDArray[np.complex128],
-    dt: float,
+    clock: Clock,
     input: NDArray[np.float64],
-    loop: str,
-    kp: float,
-    ki: float,
-    torque_limit: float,
-    integrator_limit: float,
+    loop: Loop,
     initial_state: NDArray[np.float64],
     arithmetic: str = "double",
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -175,10 +186,9 @@ def mirrored(
     gain: float,
     poles: NDArray[np.complex128],
     zeros: NDArray[np.complex128],
-    dt: float,
+    clock: Clock,
     input: NDArray[np.float64],
-    kp: float,
-    ki: float,
+    controller: Controller,
 ) -> tuple[NDArray[np.float64], bool]:
     """(velocity in the continuous loop in a drive's arithmetic, whether it left its range); in_z: not in delta form."""
 
@@ -186,10 +196,8 @@ def discrete(
     gain: float,
     poles: NDArray[np.complex128],
     zeros: NDArray[np.complex128],
-    dt: float,
-    loop: str,
-    kp: float,
-    ki: float,
+    clock: Clock,
+    loop: Loop,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(alpha, beta) of equation (7), powers of z^-1."""
 
@@ -215,16 +223,13 @@ class EffectRecord:
 
     def __init__(
         self,
-        dt: float,
+        *,
+        clock: Clock,
         input: NDArray[np.float64],
         position: NDArray[np.float64],
         velocity: NDArray[np.float64],
         start_angle: float,
-        loop: str,
-        kp: float,
-        ki: float,
-        torque_limit: float,
-        integrator_limit: float,
+        loop: Loop,
     ) -> None: ...
     def simulate(
         self,
@@ -272,11 +277,9 @@ def lagged_products(e: NDArray[np.float64], lags: int) -> NDArray[np.float64]:
 
 def held_torque(
     error: NDArray[np.float64],
-    kp: float,
+    controller: Controller,
     newest: float,
     before: float,
-    torque_limit: float,
-    integrator_limit: float,
     rule: str,
     integral: float,
 ) -> NDArray[np.float64]:
@@ -290,12 +293,8 @@ def rate_limited(command: NDArray[np.float64], step: float, start: float) -> NDA
 
 def recurrence(
     model: EffectModel,
-    dt: float,
-    loop: str,
-    kp: float,
-    ki: float,
-    torque_limit: float,
-    integrator_limit: float,
+    clock: Clock,
+    loop: Loop,
     substeps: int,
     top_speed: float,
 ) -> dict[str, Any]:

@@ -51,9 +51,9 @@ inline Doubtful clamp(Doubtful x, Doubtful, Doubtful) { return x; }
 inline double error_sum_bound(int headroom, const Factors<double>& exact, const Factors<Doubtful>& doubtful, const Record& r,
                               const Loop& loop, const SearchRanges& ranges, double peak) {
     constexpr double u = 1.01 / 2147483648.0;  // the hundredth more: products of errors
-    const FixedScaling scaling(Extent{peak, r.size(), &ranges, loop.kp, loop.ki, r.sample_time}, headroom);
-    const Delta<double> h = close_loop(bilinear_plant(exact, r.sample_time), loop.kp, loop.ki, r.sample_time);
-    const Delta<Doubtful> d = close_loop(bilinear_plant(doubtful, r.sample_time), loop.kp, loop.ki, r.sample_time);
+    const FixedScaling scaling(Extent{peak, r.size(), &ranges, loop.controller, Clock{r.sample_time}}, headroom);
+    const Delta<double> h = close_loop(bilinear_plant(exact, r.sample_time), loop.controller, Clock{r.sample_time});
+    const Delta<Doubtful> d = close_loop(bilinear_plant(doubtful, r.sample_time), loop.controller, Clock{r.sample_time});
     const Prepared start = prepare(exact, r, loop, nullptr);
     const double command = r.input[0], half_sample = std::exp2(-scaling.signal_point - 1);
     const auto a = [&](int k) { return d.a[k]; };

@@ -77,7 +77,7 @@ TEST_CASE("batch: error sums of a mixture of structures equal the referee's; sev
         for (const bool limited : {false, true}) {
             Random random(91);
             Loop loop = paper_loop(kind);
-            if (limited) loop.torque_limit = 2.0;
+            if (limited) loop.controller.torque_limit = 2.0;
             const Setup setup(random, loop, {130, 1100, 1, 512}, 0.444e-3);
             const auto plants = candidates(random, 43, kind == LoopKind::continuous ? 0 : 1);
             std::vector<Factors<double>> factors;
@@ -112,7 +112,7 @@ TEST_CASE("batch: eight candidates prepared side by side are the eight prepared 
         for (const LoopKind kind : {LoopKind::continuous, LoopKind::sampled, LoopKind::open})
             for (int repeat = 0; repeat < 100; ++repeat) {
                 Loop loop = paper_loop(kind);
-                if (repeat % 3 == 0) loop.torque_limit = 2.0;
+                if (repeat % 3 == 0) loop.controller.torque_limit = 2.0;
                 Setup setup(random, loop, {10}, 0.444e-3);
                 setup.experiment.kernels = kernels;
                 Record& record = setup.experiment.records[0];
@@ -184,7 +184,7 @@ TEST_CASE(
                 for (auto* roots : {&other.plant.A1, &other.plant.A2, &other.plant.B2})
                     for (auto& a : *roots) a *= time;
                 for (std::size_t k = 0; k < other.plant.A1.size(); ++k) other.plant.K *= time;
-                other.plant.K *= other.loop.kp / d.loop.kp;
+                other.plant.K *= other.loop.controller.kp / d.loop.controller.kp;
                 plants.push_back(other.plant);
                 factors.push_back(reference::factors_of(other.plant));
             }
@@ -215,7 +215,7 @@ TEST_CASE("batch: every kernel set gives the same sums, and neighbours do not ma
     for (const bool limited : {false, true})
         for (const bool in_float : {false, true}) {
             Loop loop = paper_loop(LoopKind::continuous);
-            if (limited) loop.torque_limit = 2.0;
+            if (limited) loop.controller.torque_limit = 2.0;
             Setup setup(random, loop, {250, 600}, 0.444e-3);
             std::vector<Factors<double>> factors;
             for (const auto& g : candidates(random, 50, 0)) factors.push_back(reference::factors_of(g));
@@ -242,7 +242,7 @@ TEST_CASE("batch: a long record is shared among workers to the same bits; a smal
     for (const bool limited : {false, true})
         for (const bool constant : {false, true}) {
             Loop loop = paper_loop(LoopKind::continuous);
-            if (limited) loop.torque_limit = 2.0;
+            if (limited) loop.controller.torque_limit = 2.0;
             Setup setup(random, loop, {9000, 250}, 0.444e-3);
             if (constant) std::fill(setup.inputs[0].begin(), setup.inputs[0].end(), 20.0);
             std::vector<Factors<double>> factors;
@@ -354,7 +354,7 @@ TEST_CASE("batch: a record in steady motion is the record from rest, shifted") {
             if (limited && kind == LoopKind::open) continue;
             reference::Drive d = reference::paper_drive(true);
             d.loop.kind = kind;
-            if (limited) d.loop.torque_limit = 1e6;  // never reached, but the loop is run step by step
+            if (limited) d.loop.controller.torque_limit = 1e6;  // never reached, but the loop is run step by step
             d.input = reference::random_signal(random, 400);
             const auto rest = d.respond<long double>().velocity;
             const double y0 = 25.0;

@@ -120,7 +120,7 @@ TEST_CASE("breeder: a generation allocates nothing, in any loop and arithmetic")
         for (const bool limited : {false, true})
             for (const bool in_float : {false, true}) {
                 reference::Drive d = two_mass(kind, 600);
-                if (limited) d.loop.torque_limit = 3.0;
+                if (limited) d.loop.controller.torque_limit = 3.0;
                 Bench bench(d);
                 bench.experiment.records.push_back(bench.experiment.records[0]);
                 bench.experiment.records[1].start = Start::steady;

@@ -136,7 +136,7 @@ TEST_CASE("fixed: scalings come from the ranges; wider ranges leave fewer bits, 
     const SearchRanges ranges;
     const reference::Drive d = reference::paper_drive(true);
     const auto scaling = [&](const SearchRanges& r, double peak, int headroom) {
-        return FixedScaling(Extent{peak, 250, &r, d.loop.kp, d.loop.ki, d.sample_time}, headroom);
+        return FixedScaling(Extent{peak, 250, &r, d.loop.controller, Clock{d.sample_time}}, headroom);
     };
     const FixedScaling s = scaling(ranges, 43.6, 0);
     CHECK(s.signal_point == 25);  // 43.6 < 64 = 2^6, and 31 bits
@@ -205,7 +205,7 @@ TEST_CASE("counting: the cascade of factor modules and the coefficients, per str
         Factors<CountedWord> f;
         f.structure = {static_cast<int>(k.p), static_cast<int>(k.q)};
         operations = {};
-        close_loop(bilinear_plant(f, 1e-3), 1.0, 1.0, 1e-3);
+        close_loop(bilinear_plant(f, 1e-3), Controller{1.0, 1.0}, Clock{1e-3});
         const Operations made{operations.multiplies, operations.adds, operations.divides, 0, 0};
         std::printf("(%zu,%zu): cascade {%ld, %ld, %ld}, coefficients {%ld, %ld, %ld}\n", k.p, k.q, c.multiplies, c.adds,
                     c.divides, made.multiplies, made.adds, made.divides);

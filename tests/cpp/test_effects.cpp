@@ -72,8 +72,8 @@ EffectJob job_of(std::span<const double> input, LoopKind kind) {
     job.record.sample_time = Ts;
     job.record.top_speed = 60.0;
     job.loop.kind = kind;
-    job.loop.kp = 0.08;
-    job.loop.ki = 1.5;
+    job.loop.controller.kp = 0.08;
+    job.loop.controller.ki = 1.5;
     return job;
 }
 

@@ -152,7 +152,7 @@ TEST_CASE("engine: every kernel set gives the identical trial, in double and in 
         for (const bool in_float : {false, true})
             for (const bool with_species : {false, true}) {
                 if (with_species && limited) continue;
-                bench.experiment.loop.torque_limit = limited ? 3.0 : std::numeric_limits<double>::infinity();
+                bench.experiment.loop.controller.torque_limit = limited ? 3.0 : std::numeric_limits<double>::infinity();
                 PlantSettings s = with_species ? species(10) : paper(30);
                 s.in_float = in_float;
                 std::vector<PlantTrial> first;

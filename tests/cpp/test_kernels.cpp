@@ -69,17 +69,17 @@ struct Case {
         if (stepped) {
             const auto u = drives[0].template respond<double>().torque;
             const double largest = reference::deviation(u, std::vector<double>(u.size(), 0.0));
-            loop.torque_limit = 0.6 * largest;
-            loop.integrator_limit = 0.4 * largest;
+            loop.controller.torque_limit = 0.6 * largest;
+            loop.controller.integrator_limit = 0.4 * largest;
         }
         for (reference::Drive& d : drives) {
             // The bilinear recurrence depends on roots times Ts only.
             const double time = d.sample_time / sample_time;
             for (auto* roots : {&d.plant.A1, &d.plant.A2, &d.plant.B2})
                 for (auto& a : *roots) a *= time;
-            const double own_kp = d.loop.kp;
+            const double own_kp = d.loop.controller.kp;
             for (std::size_t i = 0; i < d.plant.A1.size(); ++i) d.plant.K *= time;
-            d.plant.K *= own_kp / loop.kp;
+            d.plant.K *= own_kp / loop.controller.kp;
             d.loop = loop;
             d.sample_time = sample_time;
             d.input = drives[0].input;
@@ -104,7 +104,7 @@ struct Case {
         const int n = c.response.order;
         for (int i = 0; i < n; ++i) a[i] = static_cast<T>(c.response.a[i]);
         for (int i = 0; i <= n; ++i) b[i] = static_cast<T>(c.response.b[i]);
-        SteppedLoop<T, -1> steps{Controller<T>(loop, sample_time)};
+        SteppedLoop<T, -1> steps{ControllerState<T>(loop.controller, Clock{sample_time})};
         std::vector<T> y;
         for (const T r : input) {
             T u;
@@ -125,7 +125,7 @@ template <class T>
 Results<T> run(const Kernels& kernels, const Case<T>& c, bool stepped) {
     constexpr std::size_t W = In<T>::Group::width;
     const auto& set = In<T>::set(kernels);
-    const Controller<T> pi(c.loop, c.sample_time);
+    const ControllerState<T> pi(c.loop.controller, Clock{c.sample_time});
     const std::size_t n = c.input.size(), cut = n / 3;
     Results<T> r;
     r.outputs.resize(n * W);
@@ -271,8 +271,8 @@ TEST_CASE("kernels: groups are loaded as prepare() does it, bit for bit, structu
             const std::vector<double> input(20, 1.0);
             Experiment experiment;
             experiment.loop.kind = kind;
-            experiment.loop.kp = 0.1;
-            experiment.loop.ki = 5.0;
+            experiment.loop.controller.kp = 0.1;
+            experiment.loop.controller.ki = 5.0;
             Record record{input, input, 0.444e-3, round % 2 == 0 ? Start::rest : Start::steady, 3.0};
             for (const char* name : sets) {
                 const Kernels* kernels = kernels_named(name);

@@ -14,7 +14,7 @@ reference::Response<double> stepped(const reference::Drive& d, const double* sta
     R a[max_loop_order], b[max_loop_order + 1], x[max_loop_order] = {};
     for (int i = 0; i < plant.order; ++i) a[i] = static_cast<R>(plant.a[i]);
     for (int i = 0; i <= plant.order; ++i) b[i] = static_cast<R>(plant.b[i]);
-    SteppedLoop<R, -1> loop{Controller<R>(d.loop, d.sample_time)};
+    SteppedLoop<R, -1> loop{ControllerState<R>(d.loop.controller, Clock{d.sample_time})};
     if (start != nullptr) {
         for (int i = 0; i < plant.order; ++i) x[i] = static_cast<R>(start[i]);
         loop.pi.s = static_cast<R>(start[plant.order]);
@@ -88,8 +88,8 @@ TEST_CASE("loop: without a reached limit the stepped loop is the linear one") {
 TEST_CASE("loop: limits of torque and integrator, as the referee's cases have them") {
     const auto limits = [](reference::Drive& d, Random& random) {
         const double largest = largest_torque(d);
-        if (random.below(3) != 0) d.loop.torque_limit = largest * reference::uniform(random, 0.1, 0.9);
-        if (random.below(3) != 0) d.loop.integrator_limit = largest * reference::uniform(random, 0.05, 0.9);
+        if (random.below(3) != 0) d.loop.controller.torque_limit = largest * reference::uniform(random, 0.1, 0.9);
+        if (random.below(3) != 0) d.loop.controller.integrator_limit = largest * reference::uniform(random, 0.05, 0.9);
     };
     compare("continuous, limited", LoopKind::continuous, 63, limits);
     compare("sampled, limited", LoopKind::sampled, 64, limits);
@@ -101,15 +101,18 @@ TEST_CASE("loop: the torque obeys the controller's own equation in every sample"
         auto d = reference::random_drive(random, LoopKind::continuous, random.below(4), random.below(4),
                                          reference::Family::ordinary, 150);
         const double largest = largest_torque(d);
-        d.loop.torque_limit = 0.5 * largest;
-        d.loop.integrator_limit = 0.3 * largest;
+        d.loop.controller.torque_limit = 0.5 * largest;
+        d.loop.controller.integrator_limit = 0.3 * largest;
         const auto out = stepped<double>(d);
         double I = 0.0, before = 0.0;
         for (std::size_t i = 0; i < d.input.size(); ++i) {
             const double e = d.input[i] - out.velocity[i];
-            I = clamp(I + 0.5 * d.loop.ki * d.sample_time * (e + before), -d.loop.integrator_limit, d.loop.integrator_limit);
+            I = clamp(I + 0.5 * d.loop.controller.ki * d.sample_time * (e + before), -d.loop.controller.integrator_limit,
+                      d.loop.controller.integrator_limit);
             before = e;
-            CHECK_NEAR(out.torque[i], clamp(d.loop.kp * e + I, -d.loop.torque_limit, d.loop.torque_limit), 1e-10 * largest);
+            CHECK_NEAR(out.torque[i],
+                       clamp(d.loop.controller.kp * e + I, -d.loop.controller.torque_limit, d.loop.controller.torque_limit),
+                       1e-10 * largest);
         }
     }
 }
@@ -124,7 +127,7 @@ TEST_CASE("loop: any start state gives the same response as the one difference e
         // A state of the size that the response has anyway: what the plant holds after a while.
         const Delta<double> plant = plant_of(d.factors(), d.loop, d.sample_time);
         double start[max_loop_order + 1] = {}, unused;
-        SteppedLoop<double, -1> warm{Controller<double>(d.loop, d.sample_time)};
+        SteppedLoop<double, -1> warm{ControllerState<double>(d.loop.controller, Clock{d.sample_time})};
         for (std::size_t i = 0; i < 20; ++i) warm.step(plant.order, plant.a, plant.b, start, d.input[i], unused);
         start[plant.order] = warm.pi.s;
         const Record record = [&] {

@@ -110,7 +110,7 @@ TEST_CASE("refine: recovers a known model from perturbed starts on noise-free da
         for (const bool limited : {false, true}) {
             if (limited && kind == LoopKind::open) continue;
             reference::Drive d = paper(kind);
-            if (limited) d.loop.torque_limit = 2.5;
+            if (limited) d.loop.controller.torque_limit = 2.5;
             const Bench bench(d, {command(kind, 700, 1), command(kind, 300, 2)});
             const Refiner refiner(bench.experiment, wide());
             const Factors<double> truth = d.factors();

@@ -14,7 +14,7 @@ TEST_CASE("simulate: velocity and torque in every loop, in double and in float")
             auto d = reference::random_drive(random, kind, p, q, family, 200);
             if (repeat % 3 == 0 && kind != LoopKind::open) {
                 const auto u = d.respond<double>().torque;
-                d.loop.torque_limit = 0.7 * reference::deviation(u, std::vector<double>(u.size(), 0.0));
+                d.loop.controller.torque_limit = 0.7 * reference::deviation(u, std::vector<double>(u.size(), 0.0));
             }
             const auto exact = d.respond<long double>();
             if (reference::deviation(d.respond<double>().velocity, exact.velocity) > 1e-12) continue;
@@ -51,7 +51,7 @@ TEST_CASE("simulate: a record cut in two goes on from the state where it was cut
 TEST_CASE("simulate: Table V from Table IV in powers of z") {
     const auto check = [](bool two_mass, std::vector<double> alpha, std::vector<double> beta, double tolerance) {
         const auto d = reference::paper_drive(two_mass);
-        const Delta<double> h = close_loop(plant_of(d.factors(), d.loop, d.sample_time), d.loop.kp, d.loop.ki, d.sample_time);
+        const Delta<double> h = close_loop(plant_of(d.factors(), d.loop, d.sample_time), d.loop.controller, Clock{d.sample_time});
         double a[max_loop_order + 1], b[max_loop_order];
         powers_of_z(h, a, b);
         for (std::size_t i = 0; i < alpha.size(); ++i) CHECK_NEAR(a[i], alpha[i], tolerance);
@@ -63,7 +63,7 @@ TEST_CASE("simulate: Table V from Table IV in powers of z") {
 
 TEST_CASE("simulate: equation (7), run as it is printed, gives the same velocity") {
     const auto d = reference::paper_drive(true);
-    const Delta<double> h = close_loop(plant_of(d.factors(), d.loop, d.sample_time), d.loop.kp, d.loop.ki, d.sample_time);
+    const Delta<double> h = close_loop(plant_of(d.factors(), d.loop, d.sample_time), d.loop.controller, Clock{d.sample_time});
     double alpha[max_loop_order + 1], beta[max_loop_order];
     powers_of_z(h, alpha, beta);
     std::vector<double> w, exact(250), u(250);

@@ -82,8 +82,8 @@ TEST_CASE("species: a structure asked for alone is found as well, by way of smal
     d.plant.A1 = {8.0};
     d.plant.A2 = {{30.0, 700.0}, {30.0, -700.0}};
     d.plant.B2 = {{20.0, 500.0}, {20.0, -500.0}};
-    d.loop.kp = 0.0232;
-    d.loop.ki = 1.367;
+    d.loop.controller.kp = 0.0232;
+    d.loop.controller.ki = 1.367;
     SearchRanges alone{{115.0, 3.9e6}, {-90.0, 2252.0}, {4.5, 5661.0}, 1, 1, 2, 2, 10, 350.0};
     PlantSettings s = quick();
     s.roots = Scale::logarithmic;

@@ -40,9 +40,8 @@ struct Tables {
         s.values.real = real.data();
         s.values.imaginary = imaginary.data();
         for (auto& unit : s.values.unit) unit = typename A::Number(1.0);
-        s.kp = d.loop.kp;
-        s.ki = d.loop.ki;
-        s.sample_time = d.sample_time;
+        s.controller = d.loop.controller;
+        s.clock.period = d.sample_time;
         for (const auto* signal : {&bench.measured.input, &bench.measured.output})
             for (const double v : *signal) s.peak = std::max(s.peak, std::abs(v));
         s.seed = seed;
@@ -219,6 +218,6 @@ TEST_CASE("mirror: two records, and records that begin in motion, cost what doub
     }
     CHECK(mirror_names().size() == std::size(rows));
     CHECK_THROWS(make_mirror("half", bench.experiment, genome, {}), std::invalid_argument);
-    bench.experiment.loop.torque_limit = 1.0;
+    bench.experiment.loop.controller.torque_limit = 1.0;
     CHECK_THROWS(make_mirror("c30", bench.experiment, genome, {}), std::invalid_argument);
 }

@@ -16,7 +16,7 @@ from independent import (
     random_case,
     random_signal,
 )
-from test_simulate import core
+from test_simulate import core, core_loop
 
 LOOPS = ("continuous", "sampled", "open")
 STRUCTURES = [(p, q) for p in range(4) for q in range(4) if p + q > 0]
@@ -39,7 +39,7 @@ TWO_MASS: Table = (
 
 
 def discrete(case: Case) -> tuple[Array, Array]:
-    return _core.discrete(case.gain, case.poles, case.zeros, case.dt, case.loop, case.kp, case.ki)
+    return _core.discrete(case.gain, case.poles, case.zeros, _core.Clock(period=case.dt), core_loop(case))
 
 
 def recurrence(alpha: Array, beta: Array, signal: Array) -> Array:

@@ -49,19 +49,20 @@ Result = tuple[Array, Array]
 Clamped = tuple[Case, Array, Array, Result]
 
 
+def core_loop(case: Case) -> _core.Loop:
+    controller = _core.Controller(kp=case.kp, ki=case.ki, torque_limit=case.torque_limit, integrator_limit=case.integrator_limit)
+    return _core.Loop(kind=case.loop, controller=controller)
+
+
 def core(case: Case, signal: Array, state: Array | None = None, arithmetic: str = "double") -> Result:
     """(velocity, torque) of gaident._core.simulate."""
     return _core.simulate(
         case.gain,
         case.poles,
         case.zeros,
-        case.dt,
+        _core.Clock(period=case.dt),
         signal,
-        case.loop,
-        case.kp,
-        case.ki,
-        case.torque_limit,
-        case.integrator_limit,
+        core_loop(case),
         np.zeros(0) if state is None else state,
         arithmetic,
     )

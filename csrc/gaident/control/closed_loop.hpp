@@ -14,8 +14,8 @@ namespace gaident {
 
 template <class R, int N>
     Delta < R,
-    N<0 ? -1 : N + 1> close_loop(const Delta<R, N>& plant, double kp, double ki, double sample_time) {
-    const R c1 = R(kp + 0.5 * ki * sample_time), c0 = R(ki * sample_time);
+    N<0 ? -1 : N + 1> close_loop(const Delta<R, N>& plant, const Controller& c, const Clock& clock) {
+    const R c1 = R(c.kp + 0.5 * c.ki * clock.period), c0 = R(c.ki * clock.period);
     const int n = N >= 0 ? N : plant.order;
     Delta < R, N<0 ? -1 : N + 1> loop;
     loop.order = n + 1;
@@ -69,8 +69,8 @@ void steady_state(const Delta<R>& h, double y0, double r0, R* x) {
 // From the plant's states (observer form) and the controller's stored torque s to the states of the closed loop's difference equation:
 // (D + N) Y = N R + (delta + 1) (B s + delta X),  X = x[0] delta^(n-1) + ... + x[n-1].
 template <class R>
-void loop_state(const Delta<R>& plant, double kp, double ki, double sample_time, const R* x, R s, R* out) {
-    const R lead = R(1.0) + R(kp + 0.5 * ki * sample_time) * plant.b[0];
+void loop_state(const Delta<R>& plant, const Controller& c, const Clock& clock, const R* x, R s, R* out) {
+    const R lead = R(1.0) + R(c.kp + 0.5 * c.ki * clock.period) * plant.b[0];
     for (int i = 0; i <= plant.order; ++i) {
         const R own = i < plant.order ? x[i] : R(0.0);
         out[i] = (own + plant.b[i] * s) / lead;

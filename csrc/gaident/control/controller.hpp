@@ -7,6 +7,7 @@
 #pragma once
 
 #include "../plant/bilinear.hpp"
+#include "clock.hpp"
 
 #include <cstdint>
 #include <limits>
@@ -15,29 +16,37 @@ namespace gaident {
 
 enum class LoopKind : std::uint8_t { continuous, sampled, open };
 
-struct Loop {
-    LoopKind kind = LoopKind::continuous;
-    double kp = 0.0, ki = 0.0;  // [N m s/rad], [N m/rad]
-    double torque_limit = std::numeric_limits<double>::infinity();
-    double integrator_limit = std::numeric_limits<double>::infinity();
+// The controller's settings.
+struct Controller {
+    double kp = 0.0, ki = 0.0;                                          // [N m s/rad], [N m/rad]
+    double torque_limit = std::numeric_limits<double>::infinity();      // [N m], of abs(u)
+    double integrator_limit = std::numeric_limits<double>::infinity();  // [N m], of abs(I)
 
     bool limited() const {
-        return kind != LoopKind::open && (torque_limit < std::numeric_limits<double>::infinity() ||
-                                          integrator_limit < std::numeric_limits<double>::infinity());
+        return torque_limit < std::numeric_limits<double>::infinity() ||
+               integrator_limit < std::numeric_limits<double>::infinity();
     }
 };
 
-// The controller as a state: s(n) = I(n-1) + g e(n-1), g = ki Ts/2, so I(n) = s(n) + g e(n), s(n+1) = I(n) + g e(n).
+// How the loop is closed, and over which controller; in the open loop there is none.
+struct Loop {
+    LoopKind kind = LoopKind::continuous;
+    Controller controller;
+
+    bool limited() const { return kind != LoopKind::open && controller.limited(); }
+};
+
+// The running controller, with its state: s(n) = I(n-1) + g e(n-1), g = ki Ts/2, so I(n) = s(n) + g e(n), s(n+1) = I(n) + g e(n).
 template <class R>
-struct Controller {
+struct ControllerState {
     R kp, g, torque_limit, integrator_limit;
     R s = R(0.0);
 
-    Controller(const Loop& loop, double sample_time)
-        : kp(R(loop.kp)),
-          g(R(0.5 * loop.ki * sample_time)),
-          torque_limit(R(loop.torque_limit)),
-          integrator_limit(R(loop.integrator_limit)) {}
+    ControllerState(const Controller& c, const Clock& clock)
+        : kp(R(c.kp)),
+          g(R(0.5 * c.ki * clock.period)),
+          torque_limit(R(c.torque_limit)),
+          integrator_limit(R(c.integrator_limit)) {}
 
     R step(R e) {
         const R I = clamp(s + g * e, -integrator_limit, integrator_limit);

@@ -8,7 +8,7 @@ namespace gaident {
 
 template <class R, int N>
 struct SteppedLoop {
-    Controller<R> pi;
+    ControllerState<R> pi;
 
     // One sample: reads the plant's state, solves for torque u and velocity y of this sample, advances both.
     //

@@ -1,6 +1,7 @@
 // What of a controller's replay on a measured velocity only one sample after the other gives. In place.
 #pragma once
 
+#include "controller.hpp"
 #include "slope_limit.hpp"
 
 #include <span>
@@ -25,14 +26,13 @@ enum class Hold { held, held_back, tracked };
 
 // e(n) -> u(n) of a PI with the torque limit U: I' = clamp(I(n-1) + newest e(n) + before e(n-1), +-clamp), v = kp e(n) + I',
 // u(n) = clamp(v, +-U); I(n) = I', but where |v| > U as the rule says: I(n-1), I(n-1) where e(n) v > 0, u(n) - kp e(n)
-inline void held_torque(std::span<double> error, double kp, double newest, double before, double torque_limit,
-                        double integrator_limit, Hold rule, double integral) {
+inline void held_torque(std::span<double> error, const Controller& c, double newest, double before, Hold rule, double integral) {
     double last = 0.0;
     for (double& x : error) {
-        const double e = x, next = clamp(integral + (newest * e + before * last), -integrator_limit, integrator_limit);
-        const double v = kp * e + next, u = clamp(v, -torque_limit, torque_limit);
+        const double e = x, next = clamp(integral + (newest * e + before * last), -c.integrator_limit, c.integrator_limit);
+        const double v = c.kp * e + next, u = clamp(v, -c.torque_limit, c.torque_limit);
         if (u == v || (rule == Hold::held_back && e * v <= 0.0)) integral = next;
-        else if (rule == Hold::tracked) integral = u - kp * e;
+        else if (rule == Hold::tracked) integral = u - c.kp * e;
         last = e;
         x = u;
     }

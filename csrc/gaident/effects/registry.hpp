@@ -162,7 +162,7 @@ struct Past {
 template <class E>
 concept command = requires(C<E> c, S<E> s, double x) { E::command(c, s, x); };
 template <class E>
-concept controller = requires(C<E> c, Controller<double>& pi) { E::controller(c, pi); };
+concept controller = requires(C<E> c, ControllerState<double>& pi) { E::controller(c, pi); };
 template <class E>
 concept actuator = requires(C<E> c, double x) { E::actuator(c, x); };
 template <class E>

@@ -73,7 +73,7 @@ void Sweep::linearise(std::span<const double> x, const Unknowns& unknowns, std::
     std::vector<double> scale;
     for (std::size_t r = 0; r < experiment_.records.size(); ++r) {
         const Record& record = experiment_.records[r];
-        const Controller<double> controller(experiment_.loop, record.sample_time);
+        const ControllerState<double> controller(experiment_.loop.controller, Clock{record.sample_time});
         const std::vector<std::size_t> own = unknowns.of_record(r);
         const std::size_t groups = (own.size() + Chunk::per_group - 1) / Chunk::per_group;
         bank_.resize(groups);
@@ -113,7 +113,7 @@ void Sweep::outputs(std::span<const double> x, const Unknowns& unknowns, const O
     const double* const points[] = {x.data()};
     for (std::size_t r = 0; r < experiment_.records.size(); ++r) {
         const Record& record = experiment_.records[r];
-        const Controller<double> controller(experiment_.loop, record.sample_time);
+        const ControllerState<double> controller(experiment_.loop.controller, Clock{record.sample_time});
         load(r, points, unknowns, group);
         each_chunk(record, [&](std::size_t first, std::size_t n) {
             advance_outputs(*experiment_.kernels, experiment_.loop, controller, group, record.input.data() + first, n,
@@ -130,7 +130,7 @@ void Sweep::errors(std::span<const double* const> points, const Unknowns& unknow
     double total[W] = {};
     for (std::size_t r = 0; r < experiment_.records.size(); ++r) {
         const Record& record = experiment_.records[r];
-        const Controller<double> controller(experiment_.loop, record.sample_time);
+        const ControllerState<double> controller(experiment_.loop.controller, Clock{record.sample_time});
         load(r, points, unknowns, group);
         each_chunk(record, [&](std::size_t first, std::size_t n) {
             const double *const in = record.input.data() + first, *const out = record.output.data() + first;

@@ -110,8 +110,8 @@ private:
         const auto& kernels = kernels_named(job_.kernel->name)->in_double;
         std::vector<double> y(samples_ * DoubleGroup::width);
         if (job_.loop.limited()) {
-            kernels.stepped_outputs(lanes, Controller<double>(job_.loop, job_.record.sample_time), record.input.data(), samples_,
-                                    y.data());
+            kernels.stepped_outputs(lanes, ControllerState<double>(job_.loop.controller, Clock{job_.record.sample_time}),
+                                    record.input.data(), samples_, y.data());
         } else {
             kernels.outputs(lanes, record.input.data(), samples_, y.data());
         }

@@ -63,10 +63,14 @@ template <class R, class Plant>
 class EffectLoop {
 public:
     EffectLoop(const EffectRun& run, const EffectConstants<R>& constants)
-        : run_(run), set_(run.effects), c_(constants), plant_(constants, run.order), pi_(run.loop, run.sample_time) {
+        : run_(run),
+          set_(run.effects),
+          c_(constants),
+          plant_(constants, run.order),
+          pi_(run.loop.controller, Clock{run.sample_time}) {
         const bool continuous = run.loop.kind == LoopKind::continuous;
         h_ = run.sample_time / run.substeps;
-        if (continuous) pi_ = Controller<R>(run.loop, h_);
+        if (continuous) pi_ = ControllerState<R>(run.loop.controller, Clock{h_});
         turning_ = run.own != nullptr;
         const Beginning<R> start{plant_.velocity(), c_.before, R(run.moving && !run.input.empty() ? run.input[0] : 0.0)};
         Effects::each([&]<class E>() {
@@ -332,7 +336,7 @@ private:
     const EffectSet set_;
     const EffectConstants<R>& c_;
     Plant plant_;
-    Controller<R> pi_;
+    ControllerState<R> pi_;
     double h_;
     bool dry_ = false, actuator_in_time_ = false, looking_back_ = false, filtering_ = false, turning_ = false;
     bool own_shaft_ = false, own_torque_ = false, own_friction_ = false, own_actuator_ = false, own_sensor_ = false;

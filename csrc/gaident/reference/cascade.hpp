@@ -115,7 +115,11 @@ struct Regulator {
     R I = R(0), e = R(0);
 
     Regulator(const Loop& loop, double Ts)
-        : kp(loop.kp), ki(loop.ki), sample_time(Ts), torque_limit(loop.torque_limit), integrator_limit(loop.integrator_limit) {}
+        : kp(loop.controller.kp),
+          ki(loop.controller.ki),
+          sample_time(Ts),
+          torque_limit(loop.controller.torque_limit),
+          integrator_limit(loop.controller.integrator_limit) {}
 
     R integral(R error) const { return limited<R>(I + R(ki) * R(sample_time) / R(2) * (error + e), integrator_limit); }
     R torque(R error) const { return limited<R>(R(kp) * error + integral(error), torque_limit); }

@@ -125,13 +125,15 @@ inline Drive random_drive(Random& random, LoopKind kind, std::size_t p, std::siz
         Complex shape = 1.0;
         for (const Complex a : d.plant.A1) shape /= crossover + a;
         for (std::size_t j = 0; j < q; ++j) shape *= (crossover + d.plant.B2[j]) / (crossover + d.plant.A2[j]);
-        d.loop.kp = log_uniform(random, 1e-3, 10.0);
-        d.loop.ki = d.loop.kp * crossover.imag() * uniform(random, 0.02, 0.5);
-        d.plant.K = 1.0 / (d.loop.kp * std::abs(shape));
-        for (int attempt = 0; attempt < 30; ++attempt, d.loop.kp /= 1.5, d.loop.ki /= 2.0) {
+        d.loop.controller.kp = log_uniform(random, 1e-3, 10.0);
+        d.loop.controller.ki = d.loop.controller.kp * crossover.imag() * uniform(random, 0.02, 0.5);
+        d.plant.K = 1.0 / (d.loop.controller.kp * std::abs(shape));
+        for (int attempt = 0; attempt < 30; ++attempt, d.loop.controller.kp /= 1.5, d.loop.controller.ki /= 2.0) {
             double G = d.plant.K;  // what a torque does within its own sample
             for (const auto& m : factor_modules<double>(d.plant).modules) G *= DifferenceEquation<double>(m, d.sample_time).g();
-            if (kind == LoopKind::continuous && std::abs(1.0 + G * (d.loop.kp + 0.5 * d.loop.ki * d.sample_time)) < 0.2) continue;
+            if (kind == LoopKind::continuous &&
+                std::abs(1.0 + G * (d.loop.controller.kp + 0.5 * d.loop.controller.ki * d.sample_time)) < 0.2)
+                continue;
             const std::vector<double> zero(samples, 0.0), velocity = d.respond<double>().velocity;
             double largest = 0.0;
             for (const double r : d.input) largest = std::max(largest, std::abs(r));
@@ -152,8 +154,8 @@ inline Drive paper_drive(bool two_mass) {
     Drive d;
     d.sample_time = 0.444e-3;
     const double scale = two_mass ? 5.5637 : 1.6744;
-    d.loop.kp = 0.0232 * scale;
-    d.loop.ki = 1.367 * scale;
+    d.loop.controller.kp = 0.0232 * scale;
+    d.loop.controller.ki = 1.367 * scale;
     d.input.assign(250, 43.6);
     if (two_mass) d.plant = {6545.29, {15.41}, {{10.30, 150.9}, {10.30, -150.9}}, {{4.26, 93.98}, {4.26, -93.98}}};
     else d.plant = {6278.26, {34.13}, {}, {}};

@@ -7,15 +7,15 @@
 namespace gaident {
 
 // sums[lane] = sum over n samples of (output - y)^2; the group goes on from where it stands.
-inline void advance_errors(const Kernels& kernels, const Loop& loop, const Controller<double>& controller, DoubleGroup& group,
-                           const double* input, const double* output, std::size_t n, double* sums) {
+inline void advance_errors(const Kernels& kernels, const Loop& loop, const ControllerState<double>& controller,
+                           DoubleGroup& group, const double* input, const double* output, std::size_t n, double* sums) {
     if (loop.limited()) kernels.in_double.stepped_errors(group, controller, input, output, n, sums);
     else kernels.in_double.errors(group, input, output, n, sums);
 }
 
 // y[sample][lane]
-inline void advance_outputs(const Kernels& kernels, const Loop& loop, const Controller<double>& controller, DoubleGroup& group,
-                            const double* input, std::size_t n, double* y) {
+inline void advance_outputs(const Kernels& kernels, const Loop& loop, const ControllerState<double>& controller,
+                            DoubleGroup& group, const double* input, std::size_t n, double* y) {
     if (loop.limited()) kernels.in_double.stepped_outputs(group, controller, input, n, y);
     else kernels.in_double.outputs(group, input, n, y);
 }

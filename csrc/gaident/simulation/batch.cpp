@@ -55,8 +55,8 @@ Prepared prepare(const Factors<double>& g, const Record& record, const Loop& loo
         c.response = plant;
         std::copy(x, x + plant.order, c.x);
     } else {
-        c.response = close_loop(plant, loop.kp, loop.ki, Ts);
-        loop_state(plant, loop.kp, loop.ki, Ts, x, s, c.x);
+        c.response = close_loop(plant, loop.controller, Clock{Ts});
+        loop_state(plant, loop.controller, Clock{Ts}, x, s, c.x);
     }
     return c;
 }
@@ -263,7 +263,7 @@ template <class T, class G>
 void Batch::advance_part(const View<T>& view, const Record& record, G* groups, int lanes, std::size_t from, std::size_t to,
                          double* sums) const {
     const bool settling = settling_[static_cast<std::size_t>(&record - experiment_.records.data())] != 0;
-    const Controller<double> controller(experiment_.loop, record.sample_time);
+    const ControllerState<double> controller(experiment_.loop.controller, Clock{record.sample_time});
     for (std::size_t i = from; i < to; i += chunk_samples) {
         const std::size_t n = std::min(chunk_samples, to - i);
         const T *const in = view.input.data() + i, *const out = view.output.data() + i;

@@ -25,7 +25,7 @@ void simulate(const Factors<double>& g, std::span<const double> input, double sa
     for (int i = 0; i <= n; ++i) b[i] = static_cast<R>(c.response.b[i]);
     for (int i = 0; i < max_loop_order; ++i) x[i] = static_cast<R>(c.x[i]);
 
-    Controller<R> controller(loop, sample_time);
+    ControllerState<R> controller(loop.controller, Clock{sample_time});
     controller.s = static_cast<R>(c.s);
     if (loop.limited()) {
         SteppedLoop<R, -1> stepped{controller};

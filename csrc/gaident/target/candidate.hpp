@@ -25,7 +25,8 @@ struct Extent {
     double peak;
     std::size_t samples;
     const SearchRanges* ranges;
-    double kp, ki, sample_time;
+    Controller controller;
+    Clock clock;
 };
 
 // double and float as they are, and numbers that know a memory word M from a register R and are otherwise like them.

@@ -76,9 +76,9 @@ struct FixedScaling {
         for (int p = extent.ranges->p_min; p <= extent.ranges->p_max; ++p)
             for (int q = extent.ranges->q_min; q <= extent.ranges->q_max; ++q) {
                 const Factors<double> end = end_of_ranges(*extent.ranges, {p, q});
-                const Delta<double> plant = bilinear_plant(end, extent.sample_time);
-                states[p][q] = StatePoints(close_loop(plant, extent.kp, extent.ki, extent.sample_time), peak,
-                                           static_cast<double>(extent.samples));
+                const Delta<double> plant = bilinear_plant(end, extent.clock.period);
+                states[p][q] =
+                    StatePoints(close_loop(plant, extent.controller, extent.clock), peak, static_cast<double>(extent.samples));
             }
     }
 };

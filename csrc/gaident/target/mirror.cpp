@@ -51,7 +51,7 @@ private:
         bool settles;
 
         Taken(const Record& r, const Loop& loop, const SearchRanges& ranges, double peak)
-            : scaling(Extent{peak, r.size(), &ranges, loop.kp, loop.ki, r.sample_time}) {
+            : scaling(Extent{peak, r.size(), &ranges, loop.controller, Clock{r.sample_time}}) {
             settles = std::all_of(r.input.begin(), r.input.end(), [&](double v) { return v == r.input[0]; });
             for (const double v : r.input) input.push_back(A::sample(v, scaling));
             for (const double v : r.output) output.push_back(A::sample(v, scaling));
@@ -72,7 +72,8 @@ private:
         Number error{};
         for (std::size_t r = 0; r < taken_.size(); ++r) {
             const Record& record = experiment_.records[r];
-            const Delta<Number> h = close_loop(bilinear_plant(factors, record.sample_time), loop.kp, loop.ki, record.sample_time);
+            const Delta<Number> h =
+                close_loop(bilinear_plant(factors, record.sample_time), loop.controller, Clock{record.sample_time});
             typename A::State x[max_loop_order];
             double start[max_loop_order] = {};
             if (record.start != Start::rest) {
@@ -160,7 +161,7 @@ bool velocity_in(bool in_z, const Factors<double>& g, std::span<const double> in
     double peak = 0.0;
     for (const double v : input) peak = std::max(peak, std::abs(v));
     const SearchRanges ranges = ranges_around(g);
-    const typename A::Scaling scaling(Extent{peak, input.size(), &ranges, loop.kp, loop.ki, Ts});
+    const typename A::Scaling scaling(Extent{peak, input.size(), &ranges, loop.controller, Clock{Ts}});
     const double limit = static_cast<double>(A::worst());
     bool left = false;
     const auto keep = [&](std::size_t k, const typename A::Signal& y) {
@@ -168,14 +169,14 @@ bool velocity_in(bool in_z, const Factors<double>& g, std::span<const double> in
         velocity[k] = left ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(y);
     };
     if (in_z) {
-        PowersOfZ<A> z(close_loop(bilinear_plant(g, Ts), loop.kp, loop.ki, Ts));
+        PowersOfZ<A> z(close_loop(bilinear_plant(g, Ts), loop.controller, Clock{Ts}));
         for (std::size_t k = 0; k < input.size(); ++k) keep(k, z.step(A::sample(input[k], scaling), scaling));
         return left;
     }
     std::vector<typename A::Sample> in, out;
     for (const double v : input) in.push_back(A::sample(v, scaling));
     out = in;
-    const Delta<Number> h = close_loop(bilinear_plant(taken_over<Number>(g), Ts), loop.kp, loop.ki, Ts);
+    const Delta<Number> h = close_loop(bilinear_plant(taken_over<Number>(g), Ts), loop.controller, Clock{Ts});
     typename A::State x[max_loop_order];
     begin<A>(h, g.structure, {in.data(), out.data(), in.size(), false}, scaling, x);
     std::size_t k = 0;

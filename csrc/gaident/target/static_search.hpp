@@ -21,8 +21,9 @@ template <class A>
 struct StaticSetup {
     const Genome* genome = nullptr;
     GeneValues<typename A::Number> values;
-    double kp = 0.0, ki = 0.0, sample_time = 0.0;  // [N m s/rad], [N m/rad], [s]
-    double peak = 0.0;                             // largest command or velocity to be expected [rad/s]; 0, for floats only: any
+    Controller controller;  // without limits
+    Clock clock;
+    double peak = 0.0;  // largest command or velocity to be expected [rad/s]; 0, for floats only: any
     int tournament = 2;
     double crossover = 0.9, mutation = 0.01;
     FitnessWeights weights;
@@ -39,7 +40,7 @@ public:
 
     explicit StaticSearch(const StaticSetup<A>& s)
         : setup_(s),
-          scaling_(Extent{s.peak, max_samples, &s.genome->ranges(), s.kp, s.ki, s.sample_time}),
+          scaling_(Extent{s.peak, max_samples, &s.genome->ranges(), s.controller, s.clock}),
           weights_(s.weights),
           random_(Random::stream(s.seed, s.stream)),
           mutation_(s.mutation, random_),
@@ -111,8 +112,7 @@ private:
         const Word* const c = now_ + next_individual_ * words;
         const Factors<Number> factors = decode<A>(c, *setup_.genome, setup_.values);
         const RecordView<A> record{command_, velocity_, static_cast<std::size_t>(samples()), settles_};
-        const Delta<Number> loop =
-            close_loop(bilinear_plant(factors, setup_.sample_time), setup_.kp, setup_.ki, setup_.sample_time);
+        const Delta<Number> loop = close_loop(bilinear_plant(factors, setup_.clock.period), setup_.controller, setup_.clock);
         typename A::State x[max_loop_order];
         gaident::begin<A>(loop, factors.structure, record, scaling_, x);
         costs_[next_individual_] = weights_.fitness(A::error(squared_errors<A>(loop, x, record, scaling_)), factors.structure);

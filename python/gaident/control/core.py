@@ -1,11 +1,10 @@
-"""The core's functions that take a controller: the only file that writes a PI as the numbers of their signatures.
+"""The core's functions that take a controller: the only file that makes the core's controller, loop and clock of a PI and a dt.
 
 controller: None for the open loop, where the torque drives the model.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,7 +14,19 @@ from numpy.typing import NDArray
 from gaident import _core
 from gaident.control.pi import PI
 
-__all__ = ["discrete", "effect_record", "experiment", "held_torque", "loop_name", "recurrence", "simulate"]
+__all__ = [
+    "clock",
+    "core_controller",
+    "discrete",
+    "effect_record",
+    "experiment",
+    "held_torque",
+    "loop",
+    "loop_name",
+    "record",
+    "recurrence",
+    "simulate",
+]
 
 Vector = NDArray[np.float64]
 Roots = NDArray[np.complex128]
@@ -26,45 +37,60 @@ def loop_name(controller: PI | None) -> str:
     return "open" if controller is None else controller.loop
 
 
+def clock(dt: float) -> _core.Clock:
+    """The controller's clock of a record with the sample time dt [s]."""
+    return _core.Clock(period=dt)
+
+
+def core_controller(controller: PI) -> _core.Controller:
+    """The core's controller."""
+    torque, integrator = controller.limits
+    return _core.Controller(kp=controller.kp, ki=controller.ki, torque_limit=torque, integrator_limit=integrator)
+
+
+def loop(controller: PI | None) -> _core.Loop:
+    """The core's loop."""
+    if controller is None:
+        return _core.Loop(kind="open")
+    return _core.Loop(kind=controller.loop, controller=core_controller(controller))
+
+
 def simulate(
     gain: float, poles: Roots, zeros: Roots, dt: float, source: Vector, controller: PI | None, start: Vector, arithmetic: str
 ) -> tuple[Vector, Vector]:
     """(velocity [rad/s], torque [N m]) of a linear model in its loop; source: command [rad/s], in the open loop torque [N m]."""
-    return _core.simulate(gain, poles, zeros, dt, source, *_loop(controller), *_limits(controller), start, arithmetic)
+    return _core.simulate(gain, poles, zeros, clock(dt), source, loop(controller), start, arithmetic)
 
 
 def discrete(gain: float, poles: Roots, zeros: Roots, dt: float, controller: PI | None) -> tuple[Vector, Vector]:
     """(alpha, beta) of equation (7), without limits."""
-    return _core.discrete(gain, poles, zeros, dt, *_loop(controller))
+    return _core.discrete(gain, poles, zeros, clock(dt), loop(controller))
 
 
 def effect_record(
     dt: float, source: Vector, position: Vector, velocity: Vector, start_angle: float, controller: PI | None
 ) -> _core.EffectRecord:
     """A record and its loop, for models with effects."""
-    return _core.EffectRecord(dt, source, position, velocity, start_angle, *_loop(controller), *_limits(controller))
+    return _core.EffectRecord(
+        clock=clock(dt), input=source, position=position, velocity=velocity, start_angle=start_angle, loop=loop(controller)
+    )
 
 
-def experiment(
-    records: Sequence[tuple[Vector, Vector, float, str, float]], controller: PI | None, kernels: str = ""
-) -> _core.Experiment:
-    """Records (input, velocity, dt, start, first velocity) and their loop, for the genetic search and the local fit."""
-    return _core.Experiment(records, *_loop(controller), *_limits(controller), kernels)
+def record(dt: float, source: Vector, velocity: Vector, start: str, velocity0: float) -> _core.Record:
+    """A record of an identification; start: "rest", "steady" or "free", with the first velocity [rad/s]."""
+    return _core.Record(clock=clock(dt), input=source, output=velocity, start=start, velocity0=velocity0)
+
+
+def experiment(records: Sequence[_core.Record], controller: PI | None, kernels: str = "") -> _core.Experiment:
+    """Records and their loop, for the genetic search and the local fit."""
+    return _core.Experiment(records, loop(controller), kernels)
 
 
 def recurrence(model: _core.EffectModel, dt: float, controller: PI | None, substeps: int, top_speed: float) -> dict[str, Any]:
     """The numbers of the recurrence that simulates a model."""
-    return _core.recurrence(model, dt, *_loop(controller), *_limits(controller), substeps, top_speed)
+    return _core.recurrence(model, clock(dt), loop(controller), substeps, top_speed)
 
 
 def held_torque(error: Vector, controller: PI, newest: float, before: float, rule: str, integral: float) -> Vector:
     """Torque [N m] of a PI whose integrator does not wind up; it adds newest e(n) + before e(n-1)."""
-    return _core.held_torque(error, controller.kp, newest, before, *_limits(controller), rule, integral)
-
-
-def _loop(controller: PI | None) -> tuple[str, float, float]:
-    return ("open", 0.0, 0.0) if controller is None else (controller.loop, controller.kp, controller.ki)
-
-
-def _limits(controller: PI | None) -> tuple[float, float]:
-    return (math.inf, math.inf) if controller is None else controller.limits
+    return _core.held_torque(error, core_controller(controller), newest, before, rule, integral)

@@ -188,7 +188,8 @@ class _Work:
         """The core's view of (record, whether it starts in motion)."""
         c = self.controller
         rows = [
-            (_input(r, c), r.velocity, r.dt, "free" if moving else "rest", float(r.velocity[:3].mean())) for r, moving in parts
+            core.record(r.dt, _input(r, c), r.velocity, "free" if moving else "rest", float(r.velocity[:3].mean()))
+            for r, moving in parts
         ]
         return core.experiment(rows, c)
 

@@ -21,7 +21,7 @@ struct IntegratorClamp {
     static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.limit = p[0]; }
 
     template <class R>
-    static void controller(const Coefficients<R>& c, Controller<R>& pi) {
+    static void controller(const Coefficients<R>& c, ControllerState<R>& pi) {
         pi.integrator_limit = minimum(pi.integrator_limit, c.limit);
     }
 };

@@ -56,7 +56,7 @@ struct KernelSource {
             Delta<L, N> plant;
             if (loop.kind == LoopKind::continuous) plant = bilinear_plant<L, N>(g, sample_time);
             else if constexpr (N != 0) plant = held_plant<L, N>(g, sample_time, f.doublings);
-            if (closed) store(close_loop(plant, loop.kp, loop.ki, sample_time), n + 1);
+            if (closed) store(close_loop(plant, loop.controller, Clock{sample_time}), n + 1);
             else store(plant, n);
         });
     }
@@ -138,8 +138,8 @@ struct KernelSource {
     template <class T, int W, int N>
     struct Stepped {
         using L = Lanes<T, W, Isa>;
-        static SteppedLoop<L, N> loop_of(const Group<T, W>& g, const Controller<T>& c) {
-            SteppedLoop<L, N> loop{Controller<L>(Loop{}, 0.0)};
+        static SteppedLoop<L, N> loop_of(const Group<T, W>& g, const ControllerState<T>& c) {
+            SteppedLoop<L, N> loop{ControllerState<L>(Controller{}, Clock{})};
             loop.pi.kp = L::all(c.kp);
             loop.pi.g = L::all(c.g);
             loop.pi.torque_limit = L::all(c.torque_limit);
@@ -147,7 +147,7 @@ struct KernelSource {
             loop.pi.s = L::load(g.s);
             return loop;
         }
-        static void errors(Group<T, W>& g, const Controller<T>& c, const T* input, const T* output, std::size_t n, T* sums) {
+        static void errors(Group<T, W>& g, const ControllerState<T>& c, const T* input, const T* output, std::size_t n, T* sums) {
             Bank<T, W, N> k(g);
             SteppedLoop<L, N> loop = loop_of(g, c);
             L sum(0.0), u(0.0);
@@ -159,7 +159,7 @@ struct KernelSource {
             loop.pi.s.store(g.s);
             sum.store(sums);
         }
-        static void outputs(Group<T, W>& g, const Controller<T>& c, const T* input, std::size_t n, T* y) {
+        static void outputs(Group<T, W>& g, const ControllerState<T>& c, const T* input, std::size_t n, T* y) {
             Bank<T, W, N> k(g);
             SteppedLoop<L, N> loop = loop_of(g, c);
             L u(0.0);
@@ -204,11 +204,11 @@ struct KernelSource {
         by_order<8>(g.order, [&](auto N) { Linear<T, W, N>::outputs(g, in, n, y); });
     }
     template <class T, int W>
-    static void stepped_errors(Group<T, W>& g, const Controller<T>& c, const T* in, const T* out, std::size_t n, T* sums) {
+    static void stepped_errors(Group<T, W>& g, const ControllerState<T>& c, const T* in, const T* out, std::size_t n, T* sums) {
         by_order<8>(g.order, [&](auto N) { Stepped<T, W, N>::errors(g, c, in, out, n, sums); });
     }
     template <class T, int W>
-    static void stepped_outputs(Group<T, W>& g, const Controller<T>& c, const T* in, std::size_t n, T* y) {
+    static void stepped_outputs(Group<T, W>& g, const ControllerState<T>& c, const T* in, std::size_t n, T* y) {
         by_order<8>(g.order, [&](auto N) { Stepped<T, W, N>::outputs(g, c, in, n, y); });
     }
 

@@ -51,9 +51,9 @@ struct KernelSet {
 
 // The same with the controller's limits, the group holding plants and not closed loops.
 struct SteppedKernelSet : KernelSet<DoubleGroup, double> {
-    void (*stepped_errors)(DoubleGroup&, const Controller<double>&, const double* input, const double* output, std::size_t n,
+    void (*stepped_errors)(DoubleGroup&, const ControllerState<double>&, const double* input, const double* output, std::size_t n,
                            double* sums);
-    void (*stepped_outputs)(DoubleGroup&, const Controller<double>&, const double* input, std::size_t n, double* y);
+    void (*stepped_outputs)(DoubleGroup&, const ControllerState<double>&, const double* input, std::size_t n, double* y);
 };
 
 struct Kernels {
