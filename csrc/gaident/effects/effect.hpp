@@ -1,43 +1,81 @@
 // What an effect is. Its header holds everything about it:
 //
-//     static constexpr EffectInfo info             its row in the table: name, place, meaning, parameters with units and ranges
-//     template <class R> struct Coefficients       what the sample loop needs of the parameters: members of type R only; absent: none
-//     template <class R> struct State              its memory, all zero where the record begins; absent: none
-//     static void prepare(p, Timing, c)            parameters -> coefficients
-//     static constexpr Pace pace                   how fine the substeps must be; absent: one a sample is enough
-//     static double substeps(p, Circumstances)     how many a sample it asks for beyond that
+//     static constexpr EffectInfo info           its row in the table: name, place, meaning, parameters with units and ranges
+//     static constexpr Hooks hooks               which of the functions with a dash below it has
+//     template <class R> struct Coefficients     what the sample loop needs of the parameters: members of type R; absent: none
+//     template <class R> struct State            its memory, all zero where the record begins; absent: none
+//     static void prepare(p, Timing, c)          parameters -> coefficients
+//     static constexpr Pace pace                 how fine the substeps must be; absent: one a sample is enough
+//   - static double substeps(p, Circumstances)   how many a sample it asks for beyond that
 //
-// and a hook, the place in the loop where it acts. R is double or lanes of doubles; on R there are selections and no branches.
+// and a hook, the place in the loop where it acts.
+// R is double or lanes of doubles; on R there are selections and no branches.
 //
-//     command            r' = command(c, s, r)                        what the controller is asked to follow [rad/s]
-//     controller         controller(c, pi)                            once: its limits
-//     actuator           u' = actuator(c, u)                          the torque issued, once a control step [N m]
-//     actuator_dynamics  T = actuator_dynamics(c, s, past, T)         its mean over the substep [N m]
-//     torque             T' = T - torque(c, theta)                    a torque that brakes, at the angle theta [rad]
-//     law                law(c, friction)                             once: its part of the friction law with constant coefficients
-//     level              level(c, t)                                  dry friction known by the time t [s] alone [N m]
-//     friction           friction(c, s, step)                         what its friction changes in the substep's equation
-//                        after_friction(c, s, step, w_next)           and once its velocity is known; may be absent
-//     coupling           coupling, mean_coupling, loaded_twist        a nonlinear coupling of two masses (mechanism.hpp)
-//     sensor             w' = sensor(c, theta, w)                     the velocity as it is measured [rad/s]
-//     sensor_dynamics    y = sensor_dynamics(c, s, w)                 the same filtered, once a substep, its output kept as s.output
-//     reading            y' = reading(c, y)                           the number read from it, once a sample
-//     plant              plant(p, linear)                             the mechanism changed, linearly
+//   - command             r' = command(c, s, r)                  what the controller is asked to follow [rad/s]
+//   - controller          controller(c, pi)                      once: its limits
+//   - actuator            u' = actuator(c, u)                    the torque issued, once a control step [N m]
+//   - actuator_dynamics   T = actuator_dynamics(c, s, past, T)   its mean over the substep [N m]
+//   - torque              T' = T - torque(c, theta)              a torque that brakes, at the angle theta [rad]
+//   - law                 law(c, friction)                       once: its part of the friction law that is constant
+//   - level               level(c, t)                            dry friction known by the time t [s] alone [N m]
+//   - friction            friction(c, s, step)                   what its friction changes in the substep's equation
+//   - after_friction      after_friction(c, s, step, w_next)     and once its velocity is known; may be absent
+//   - coupling            coupling, mean_coupling, loaded_twist  a nonlinear coupling of two masses (mechanism.hpp)
+//   - sensor              w' = sensor(c, theta, w)               the velocity as it is measured [rad/s]
+//   - sensor_dynamics     y = sensor_dynamics(c, s, w)           the same filtered, once a substep, its output kept as s.output
+//   - reading             y' = reading(c, y)                     the number read from it, once a sample
+//   - plant               plant(p, linear)                       the mechanism changed, linearly
 //
-// An effect may also have `begin(c, s, Beginning)`, its state where the record begins in motion; `possible(p)`, false where there is no such
-// drive; a `Table` made by tabulate(p, Timing, table), for what is not a number per lane, with reach(table, steps), how many torques back
-// it looks. Neutral parameters make it the identity. Effects do not know one another.
+// An effect may also have
+//
+//   - begin(c, s, Beginning)   its state where the record begins in motion
+//   - possible(p)              false where there is no such drive
+//
+// and a `Table` made by tabulate(p, Timing, table), for what is not a number per lane, with reach(table, steps), how many torques
+// back it looks.
+// The compiler compares `hooks` with the functions that are there (registry.hpp).
+// One that is misspelt, or takes other arguments, is an error, and so is an effect that has no function that acts at its place.
+// Neutral parameters make an effect the identity. Effects do not know one another.
 #pragma once
 
 #include "../control/closed_loop.hpp"
 #include "../numeric/elementary.hpp"
 
+#include <cstdint>
 #include <limits>
 #include <span>
 
 namespace gaident {
 
 enum class Place { shaft, coupling, actuator, controller, sensor, plant, record };
+
+// The functions that an effect may have, a bit each.
+enum class Hooks : std::uint32_t {
+    none = 0,
+    command = 1U << 0,
+    controller = 1U << 1,
+    actuator = 1U << 2,
+    actuator_dynamics = 1U << 3,
+    torque = 1U << 4,
+    law = 1U << 5,
+    level = 1U << 6,
+    friction = 1U << 7,
+    after_friction = 1U << 8,
+    coupling = 1U << 9,
+    sensor = 1U << 10,
+    sensor_dynamics = 1U << 11,
+    reading = 1U << 12,
+    plant = 1U << 13,
+    begin = 1U << 14,
+    substeps = 1U << 15,
+    possible = 1U << 16,
+};
+constexpr Hooks operator|(Hooks a, Hooks b) {
+    return static_cast<Hooks>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
+}
+constexpr Hooks operator&(Hooks a, Hooks b) {
+    return static_cast<Hooks>(static_cast<std::uint32_t>(a) & static_cast<std::uint32_t>(b));
+}
 
 inline constexpr double infinite = std::numeric_limits<double>::infinity();
 inline constexpr double any_value = std::numeric_limits<double>::quiet_NaN();

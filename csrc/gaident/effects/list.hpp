@@ -1,5 +1,5 @@
-// THE list of effects: the registry, the order of the public table, and the order in which effects that share a hook act. A new effect is
-// its header and one line in each of the two lists here; all else follows from it.
+// THE list of effects: the registry, the order of the public table, and the order in which effects that share a hook act.
+// A new effect is its header and one line in each of the two lists here; all else follows from it.
 #pragma once
 
 #include "actuator/torque_dead_band.hpp"

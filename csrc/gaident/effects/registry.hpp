@@ -1,5 +1,5 @@
-// What follows from a list of effects (list.hpp) and from what their headers say (effect.hpp): the table, the coefficients and states of
-// all side by side, and which hooks an effect has.
+// What follows from a list of effects (list.hpp) and from what their headers say (effect.hpp).
+// That is the table, which hooks an effect has, and the coefficients and states of all side by side.
 #pragma once
 
 #include "effect.hpp"
@@ -71,8 +71,99 @@ concept HasTable = requires { typename E::Table; };
 template <class E>
 concept HasCoefficients = requires { typename E::template Coefficients<double>; };
 
+// Which hooks an effect has.
+namespace hook {
+
+template <class E>
+using C = const CoefficientsOf<E, double>&;
+template <class E>
+using S = StateOf<E, double>&;
+struct Past {
+    std::size_t newest;
+    int substep;
+    double torque(std::size_t at, std::size_t lane) const;
+    template <class E>
+    const typename E::Table& table(std::size_t lane) const;
+};
+
+template <class E>
+concept command = requires(C<E> c, S<E> s, double x) { E::command(c, s, x); };
+template <class E>
+concept controller = requires(C<E> c, ControllerState<double>& pi) { E::controller(c, pi); };
+template <class E>
+concept actuator = requires(C<E> c, double x) { E::actuator(c, x); };
+template <class E>
+concept actuator_dynamics = requires(C<E> c, S<E> s, const Past& past, double x) { E::actuator_dynamics(c, s, past, x); };
+template <class E>
+concept torque = requires(C<E> c, double x) { E::torque(c, x); };
+template <class E>
+concept law = requires { &E::template law<double>; };
+template <class E>
+concept level = requires(C<E> c, double x) { E::level(c, x); };
+template <class E>
+concept friction = requires { &E::template friction<double>; };
+template <class E>
+concept after_friction = requires { &E::template after_friction<double>; };
+template <class E>
+concept coupling = requires(C<E> c, double x) { E::coupling(c, x, x, x, x); };
+template <class E>
+concept sensor = requires(C<E> c, double x) { E::sensor(c, x, x); };
+template <class E>
+concept sensor_dynamics = requires(C<E> c, S<E> s, double x) { E::sensor_dynamics(c, s, x); };
+template <class E>
+concept reading = requires(C<E> c, double x) { E::reading(c, x); };
+template <class E>
+concept plant = requires(const double* p, const Factors<double>& g) { E::plant(p, g); };
+template <class E>
+concept begin = requires(C<E> c, S<E> s, const Beginning<double>& b) { E::begin(c, s, b); };
+template <class E>
+concept substeps = requires(const double* p, const Circumstances& at) { E::substeps(p, at); };
+template <class E>
+concept possible = requires(const double* p) { E::possible(p); };
+
+template <class E>
+constexpr Hooks all_of() {
+    const auto if_there = [](bool there, Hooks h) { return there ? h : Hooks::none; };
+    return if_there(command<E>, Hooks::command) | if_there(controller<E>, Hooks::controller) |
+           if_there(actuator<E>, Hooks::actuator) | if_there(actuator_dynamics<E>, Hooks::actuator_dynamics) |
+           if_there(torque<E>, Hooks::torque) | if_there(law<E>, Hooks::law) | if_there(level<E>, Hooks::level) |
+           if_there(friction<E>, Hooks::friction) | if_there(after_friction<E>, Hooks::after_friction) |
+           if_there(coupling<E>, Hooks::coupling) | if_there(sensor<E>, Hooks::sensor) |
+           if_there(sensor_dynamics<E>, Hooks::sensor_dynamics) | if_there(reading<E>, Hooks::reading) |
+           if_there(plant<E>, Hooks::plant) | if_there(begin<E>, Hooks::begin) | if_there(substeps<E>, Hooks::substeps) |
+           if_there(possible<E>, Hooks::possible);
+}
+
+// Those of which an effect at this place has to have one.
+constexpr Hooks acting_at(Place place) {
+    switch (place) {
+        case Place::shaft: return Hooks::torque | Hooks::law | Hooks::level | Hooks::friction;
+        case Place::coupling: return Hooks::coupling;
+        case Place::actuator: return Hooks::actuator | Hooks::actuator_dynamics;
+        case Place::controller: return Hooks::command | Hooks::controller;
+        case Place::sensor: return Hooks::sensor | Hooks::sensor_dynamics | Hooks::reading;
+        case Place::plant: return Hooks::plant;
+        case Place::record: break;
+    }
+    return Hooks::none;
+}
+
+// Whether an effect does what it says. Its own type in the compiler's message says which one does not.
+template <class E>
+struct Checked {
+    static_assert(
+        all_of<E>() == E::hooks,
+        "a function in the effect's `hooks` is missing, misspelt or takes other arguments, or one that it has is not listed");
+    static_assert(!E::info.simulated || (E::hooks & acting_at(E::info.place)) != Hooks::none,
+                  "the effect has no function that acts at its place");
+    static constexpr bool right = true;
+};
+
+}  // namespace hook
+
 template <class... E>
 struct EffectList {
+    static_assert((hook::Checked<E>::right && ...));
     static constexpr int size = sizeof...(E);
     static constexpr std::array<EffectInfo, sizeof...(E)> table{E::info...};
     static constexpr int parameters = (0 + ... + E::info.count());
@@ -143,53 +234,5 @@ struct EffectList {
         }
     };
 };
-
-// Which hooks an effect has.
-namespace hook {
-
-template <class E>
-using C = const CoefficientsOf<E, double>&;
-template <class E>
-using S = StateOf<E, double>&;
-struct Past {
-    std::size_t newest;
-    int substep;
-    double torque(std::size_t at, std::size_t lane) const;
-    template <class E>
-    const typename E::Table& table(std::size_t lane) const;
-};
-
-template <class E>
-concept command = requires(C<E> c, S<E> s, double x) { E::command(c, s, x); };
-template <class E>
-concept controller = requires(C<E> c, ControllerState<double>& pi) { E::controller(c, pi); };
-template <class E>
-concept actuator = requires(C<E> c, double x) { E::actuator(c, x); };
-template <class E>
-concept actuator_dynamics = requires(C<E> c, S<E> s, const Past& past, double x) { E::actuator_dynamics(c, s, past, x); };
-template <class E>
-concept torque = requires(C<E> c, double x) { E::torque(c, x); };
-template <class E>
-concept law = requires { &E::template law<double>; };
-template <class E>
-concept level = requires(C<E> c, double x) { E::level(c, x); };
-template <class E>
-concept friction = requires { &E::template friction<double>; };
-template <class E>
-concept after_friction = requires { &E::template after_friction<double>; };
-template <class E>
-concept coupling = requires(C<E> c, double x) { E::coupling(c, x, x, x, x); };
-template <class E>
-concept sensor = requires(C<E> c, double x) { E::sensor(c, x, x); };
-template <class E>
-concept sensor_dynamics = requires(C<E> c, S<E> s, double x) { E::sensor_dynamics(c, s, x); };
-template <class E>
-concept reading = requires(C<E> c, double x) { E::reading(c, x); };
-template <class E>
-concept plant = requires(const double* p, const Factors<double>& g) { E::plant(p, g); };
-template <class E>
-concept begin = requires(C<E> c, S<E> s, const Beginning<double>& b) { E::begin(c, s, b); };
-
-}  // namespace hook
 
 }  // namespace gaident

@@ -137,8 +137,7 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
     Effects::each([&]<class E>() {
         if (!model.effects.has<E>()) return;
         if constexpr (requires { E::pace; }) pace = std::max(pace, E::pace);
-        if constexpr (requires { E::substeps(model.parameter, at); })
-            wanted = std::max(wanted, E::substeps(model.of(effect<E>), at));
+        if constexpr (hook::substeps<E>) wanted = std::max(wanted, E::substeps(model.of(effect<E>), at));
     });
     if (pace != Pace::sample) {
         double fastest = 0.0;
@@ -148,7 +147,7 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
         wanted = std::max({wanted, finer ? 4.0 : 2.0, fastest * Ts / (finer ? 0.0215 : 0.045)});
     }
     if (loop.kind == LoopKind::continuous && g.structure.p == 1)
-        wanted = std::max({wanted, 8.0, std::abs(g.gain * loop.kp) * Ts / 0.06});
+        wanted = std::max({wanted, 8.0, std::abs(g.gain * loop.controller.kp) * Ts / 0.06});
     int m = 1;
     while (m < wanted && m < 16) m *= 2;
     return m;
@@ -174,7 +173,7 @@ void prepare_effects(const EffectModel& model, const EffectRecord& record, const
         const double* const p = model.of(effect<E>);
         if constexpr (HasCoefficients<E>) E::prepare(p, time, c.effects.template of<E>());
         if constexpr (HasTable<E>) E::tabulate(p, time, out.tables.template of<E>());
-        if constexpr (requires { E::possible(p); }) possible = possible && E::possible(p);
+        if constexpr (hook::possible<E>) possible = possible && E::possible(p);
     });
     Delta<double> whole;
     if (moving) whole = plant_of(model.linear, loop, Ts);

@@ -13,6 +13,7 @@ struct TorqueDeadBand {
         .meaning = "torques below this (half) width do nothing, larger ones lose it",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::actuator | Hooks::substeps;
 
     template <class R>
     struct Coefficients {

@@ -15,6 +15,7 @@ struct TorqueLag {
         .meaning = "the torque follows its command with a first-order lag",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::actuator_dynamics | Hooks::begin;
 
     template <class R>
     struct Coefficients {

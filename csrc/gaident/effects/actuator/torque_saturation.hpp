@@ -13,6 +13,7 @@ struct TorqueSaturation {
         .meaning = "the actuator gives no more torque than this",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::actuator;
 
     template <class R>
     struct Coefficients {

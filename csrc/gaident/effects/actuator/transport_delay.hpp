@@ -1,4 +1,5 @@
-// u(t - delay), any fraction of a sample. A held torque delayed is still piecewise constant: over the substep [t, t + h] its mean is
+// u(t - delay), any fraction of a sample.
+// A held torque delayed is still piecewise constant: over the substep [t, t + h] its mean is
 //
 //     (1 - v) u(k) + v u(k+1),   x = (t - delay)/T,  k = floor(x),  v = max(0, (x - k) + h/T - 1) T/h
 //
@@ -19,6 +20,7 @@ struct TransportDelay {
         .meaning = "the torque acts later than it was commanded",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::actuator_dynamics | Hooks::possible;
 
     // The mean over substep j: (1 - share) u(n - back) + share u(n - back + 1).
     struct Table {

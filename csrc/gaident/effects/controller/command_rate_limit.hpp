@@ -14,6 +14,7 @@ struct CommandRateLimit {
         .meaning = "the command is followed with at most this slope",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::command | Hooks::begin;
 
     template <class R>
     struct Coefficients {

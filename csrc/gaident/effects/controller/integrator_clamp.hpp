@@ -13,6 +13,7 @@ struct IntegratorClamp {
         .meaning = "the controller's integrator is limited",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::controller;
 
     template <class R>
     struct Coefficients {

@@ -1,5 +1,5 @@
-// Play in the coupling: no torque while abs(twist) < gap/2, then stiffness on the rest. As a correction to the linear coupling torque
-// K x + D dx/dt:
+// Play in the coupling: no torque while abs(twist) < gap/2, then stiffness on the rest.
+// As a correction to the linear coupling torque K x + D dx/dt:
 //
 //     c(x) = -K clamp(x, -gap/2, gap/2),   and inside the gap -D dx/dt as well
 //
@@ -23,6 +23,7 @@ struct Backlash {
         .parameters = parameters,
         .needs_two_masses = true,
     };
+    static constexpr Hooks hooks = Hooks::coupling;
 
     template <class R>
     struct Coefficients {

@@ -14,6 +14,7 @@ struct HardeningStiffness {
         .parameters = parameters,
         .needs_two_masses = true,
     };
+    static constexpr Hooks hooks = Hooks::coupling;
 
     template <class R>
     struct Coefficients {

@@ -1,4 +1,6 @@
-// Friction that differs with the direction: -(Tp + bp w) for w > 0, +(Tn + bn abs(w)) for w < 0, on top of the model's own damping.
+// Friction that differs with the direction, on top of the model's own damping:
+//
+//     -(Tp + bp w) for w > 0,   +(Tn + bn abs(w)) for w < 0
 #pragma once
 
 #include "../effect.hpp"
@@ -19,6 +21,7 @@ struct AsymmetricFriction {
         .meaning = "dry and viscous friction that differ with the direction of motion",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::law;
 
     template <class R>
     struct Coefficients {

@@ -2,7 +2,8 @@
 //
 //     dz/dt = w - abs(w) z/zc
 //
-// over one substep h, solved jointly with the velocity (with the velocity of the substep before, the solution would oscillate). With W and zm the mean velocity and deflection,
+// over one substep h, solved jointly with the velocity (with the velocity of the substep before, the solution would oscillate).
+// With W and zm the mean velocity and deflection,
 //
 //     zm = (z + e W)/(1 + e abs(W)/zc),  e = theta h,     W = w + theta (w+ - w),     w+ = w_free - beta k zm
 //
@@ -19,17 +20,18 @@ struct Bristle {
     R other;               // the other friction's torque one substep ago [N m]
     R theta, e, one_plus;  // of the substep being solved
 
-    // theta towards 1 where the substep does not resolve the bristle: `decay`, the share of it that decays in the substep, fits the exact
-    // decay (W. Liniger, R. A. Willoughby, Efficient integration methods for stiff systems of ordinary differential equations, SIAM J.
-    // Numer. Anal. 7, 1970), `spring` = beta h s0 the resonance of the inertia on the bristle.
+    // theta towards 1 where the substep does not resolve the bristle.
+    // `decay`, the share of it that decays in the substep, fits the exact decay (W. Liniger, R. A. Willoughby,
+    // Efficient integration methods for stiff systems of ordinary differential equations, SIAM J. Numer. Anal. 7, 1970).
+    // `spring` = beta h s0 is the resonance of the inertia on the bristle.
     [[gnu::always_inline]] void weigh(R h, R decay, R spring) {
         const R one = R(1.0);
         theta = one - one / (((R(2.0) + decay * R(1.0 / 3.0)) + (decay * decay) * R(0.058)) + spring * R(0.5));
         e = theta * h;
     }
 
-    // Puts the torque k zm into w+ = w_free - beta f: afterwards f stands for the other friction alone, whose torque one substep ago is good
-    // enough for choosing abs(W).
+    // Puts the torque k zm into w+ = w_free - beta f: afterwards f stands for the other friction alone.
+    // Its torque one substep ago is good enough for choosing abs(W).
     [[gnu::always_inline]] void join(R k, R per_break, FrictionStep<R>& step) {
         const R one = R(1.0), two = R(2.0), four = R(4.0), zero = R(0.0);
         const R ez = e * per_break, kb = (theta * step.beta) * k;

@@ -14,6 +14,7 @@ struct CoulombFriction {
         .meaning = "dry friction of constant size; holds still below it",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::law;
 
     template <class R>
     struct Coefficients {

@@ -14,6 +14,7 @@ struct FrictionDrift {
         .meaning = "dry friction that grows or falls with time",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::level;
 
     template <class R>
     struct Coefficients {

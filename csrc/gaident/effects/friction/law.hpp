@@ -6,8 +6,10 @@
 //
 //     f = C + B (w + w+)/2 + Q abs(w) w+                                                         (second order, no ringing)
 //
-// and where it would reverse, it stops after the share of the substep that the deceleration asks for, and spends the rest moving off
-// the other way, or at rest: w+ = 0 exactly, as long as the other torques stay below the level there. Directions are folded, so that w >= 0.
+// and where it would reverse, it stops after the share of the substep that the deceleration asks for.
+// The rest it spends moving off the other way, or at rest.
+// There w+ = 0 exactly, as long as the other torques stay below the level.
+// Directions are folded, so that w >= 0.
 #pragma once
 
 #include "../../numeric/elementary.hpp"

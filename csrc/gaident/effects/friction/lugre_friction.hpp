@@ -1,12 +1,14 @@
-// LuGre friction: a bristle with damping of its own, whose break-away falls with the velocity (C. Canudas de Wit, H. Olsson, K. J. Astrom,
-// P. Lischinsky, A new model for control of systems with friction, IEEE Trans. Automatic Control 40, 1995), torque
+// LuGre friction: a bristle with damping of its own, whose break-away falls with the velocity (C. Canudas de Wit, H. Olsson,
+// K. J. Astrom, P. Lischinsky, A new model for control of systems with friction, IEEE Trans. Automatic Control 40, 1995).
+// Its torque is
 //
 //     -(s0 z + s1 dz/dt),   dz/dt = w - s0 abs(w) z/g(w),   g(w) = Tc + (Ts - Tc) exp(-(w/vs)^2)
 //
-// beside the model's own viscous damping. It is stiff: z decays at s0 abs(w)/g, which no log resolves, and an explicit step diverges
-// (L. Freidovich, A. Robertsson, A. Shiriaev, R. Johansson, LuGre-model-based friction compensation, IEEE Trans. Control Systems Technology
-// 18, 2010). So the substep is implicit and solved exactly (bristle.hpp), g taken at the mean velocity, which is foreseen: with
-// zm = z + e dz/dt the torque's mean is (s0 + s1/e) zm - (s1/e) z, a bristle of the stiffness s0 + s1/e.
+// beside the model's own viscous damping.
+// It is stiff: z decays at s0 abs(w)/g, which no log resolves, and an explicit step diverges (L. Freidovich, A. Robertsson,
+// A. Shiriaev, R. Johansson, LuGre-model-based friction compensation, IEEE Trans. Control Systems Technology 18, 2010).
+// So the substep is implicit and solved exactly (bristle.hpp), with g taken at the mean velocity, which is foreseen.
+// With zm = z + e dz/dt the torque's mean is (s0 + s1/e) zm - (s1/e) z, a bristle of the stiffness s0 + s1/e.
 #pragma once
 
 #include "../effect.hpp"
@@ -30,6 +32,7 @@ struct LugreFriction {
         .allowed = [](const double* p) { return p[1] >= p[0]; },
         .relation = "static_torque must be at least torque",
     };
+    static constexpr Hooks hooks = Hooks::friction | Hooks::after_friction | Hooks::begin | Hooks::substeps;
 
     template <class R>
     struct Coefficients {

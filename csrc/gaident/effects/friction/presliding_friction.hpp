@@ -21,6 +21,7 @@ struct PreslidingFriction {
         .meaning = "friction that is a spring over small angles before it slides (Dahl)",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::friction | Hooks::after_friction | Hooks::substeps;
 
     template <class R>
     struct Coefficients {

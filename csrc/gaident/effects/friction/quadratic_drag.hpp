@@ -14,6 +14,7 @@ struct QuadraticDrag {
         .meaning = "drag of a fan or fluid, growing with the square of speed",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::law;
 
     template <class R>
     struct Coefficients {

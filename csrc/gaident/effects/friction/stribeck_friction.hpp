@@ -20,6 +20,7 @@ struct StribeckFriction {
         .allowed = [](const double* p) { return p[1] >= p[0]; },
         .relation = "static_torque must be at least torque",
     };
+    static constexpr Hooks hooks = Hooks::friction | Hooks::begin;
 
     template <class R>
     struct Coefficients {

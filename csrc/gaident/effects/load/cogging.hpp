@@ -18,6 +18,7 @@ struct Cogging {
         .parameters = parameters,
         .turns = true,
     };
+    static constexpr Hooks hooks = Hooks::torque | Hooks::substeps;
 
     template <class R>
     struct Coefficients {

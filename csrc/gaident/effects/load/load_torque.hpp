@@ -13,6 +13,7 @@ struct LoadTorque {
         .meaning = "constant load; positive brakes positive rotation",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::torque;
 
     template <class R>
     struct Coefficients {

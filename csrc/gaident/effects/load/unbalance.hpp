@@ -14,6 +14,7 @@ struct Unbalance {
         .parameters = parameters,
         .turns = true,
     };
+    static constexpr Hooks hooks = Hooks::torque | Hooks::substeps;
 
     template <class R>
     struct Coefficients {

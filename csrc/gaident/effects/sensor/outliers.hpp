@@ -14,6 +14,7 @@ struct Outliers {
         .parameters = parameters,
         .simulated = false,
     };
+    static constexpr Hooks hooks = Hooks::none;
 };
 
 }  // namespace gaident

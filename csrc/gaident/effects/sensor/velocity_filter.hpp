@@ -15,6 +15,7 @@ struct VelocityFilter {
         .meaning = "the measured velocity is filtered, first order",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::sensor_dynamics | Hooks::begin;
 
     template <class R>
     struct Coefficients {

@@ -13,6 +13,7 @@ struct VelocityQuantisation {
         .meaning = "the measured velocity comes in steps (noise)",
         .parameters = parameters,
     };
+    static constexpr Hooks hooks = Hooks::reading;
 
     template <class R>
     struct Coefficients {

@@ -18,6 +18,7 @@ struct VelocityRipple {
         .parameters = parameters,
         .turns = true,
     };
+    static constexpr Hooks hooks = Hooks::sensor;
 
     template <class R>
     struct Coefficients {
