@@ -44,6 +44,7 @@ ACCURACIES = {
         "ON_TOP": "the same behind a noise at the shaft",
         "TAUS": "grid of time constants; the cost takes one",
         "SIZES": "grid of sizes; the cost takes one",
+        "MIDDLE": "place in the grid of both where the search for the least cost begins",
     },
 }
 

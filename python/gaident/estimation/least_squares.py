@@ -88,9 +88,8 @@ def scored(objective: Objective, found: Fit) -> Fit:
 
 
 def _scored(objective: Objective, found: Fit) -> Fit:
-    error = objective.error(found)
-    noise = objective.noise_of(error, found.predictor.closed)
-    v = objective.whitened(error[None, :], noise)[0]
+    noise = objective.own_noise(found)
+    v = objective.whitened(objective.error(found)[None, :], noise)[0]
     return objective.fitted(found.hypothesis, found.x, noise, float(v @ v), found.converged)
 
 
@@ -104,7 +103,7 @@ def reestimated(objective: Objective, found: Fit, iterations: int = 6) -> Fit:
 def _reestimated(objective: Objective, found: Fit, iterations: int) -> Fit:
     best = found
     for n in (iterations, max(iterations // 2, 2)):
-        noise = objective.noise_of(objective.error(found), found.predictor.closed)
+        noise = objective.own_noise(found)
         found = fit(objective, found.hypothesis, found.x, noise, n)
         if found.bic < best.bic:
             best = found

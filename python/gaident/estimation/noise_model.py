@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from gaident.control.filtering import filtered
 from gaident.control.pi import PI
-from gaident.estimation.state_space import Discretised, discretised, disturbed, steady_covariances
+from gaident.estimation.state_space import discretised, disturbed, steady_covariances
 from gaident.identification.noise import autocorrelation, autoregression_of, highest_order
 from gaident.models.model import Model
 
@@ -38,6 +38,7 @@ HIGHEST = 20  # order of an autoregression alone
 ON_TOP = 6  # and of one behind a shaft's noise: what the sensor does
 TAUS = 2.5 * 2.0 ** np.arange(10)  # samples
 SIZES = 2.0 ** np.arange(-12.0, 6.0)  # std of w times the velocity that 1 N m for one sample leaves, over the std of n
+MIDDLE = 4, 7  # place in the grid of both where a search begins
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +80,7 @@ class NoiseFilter:
 
 
 WHITE = NoiseFilter()
+Grid = dict[tuple[int, int], NoiseFilter | None]
 
 
 def autoregression(parts: Sequence[Vector], highest: int = HIGHEST, floor: float = 0.0) -> Vector:
@@ -122,50 +124,63 @@ def _polynomials(roots: NDArray[Any]) -> Matrix:
     return c.real.copy()
 
 
+@dataclass(frozen=True, eq=False)
 class ShaftNoise:
-    """The filters of torque noise at the shaft of one linear model, over a grid of tau and size, each made when asked for."""
+    """The filters of torque noise at the shaft of one linear model, over a grid of tau and size.
 
-    def __init__(self, model: Model, dt: float, controller: PI | None) -> None:
-        self.plant: Discretised = discretised(model, dt)
-        self.roots = np.linalg.eigvals(self.plant.A)
-        self.loop = None if controller is None else np.linalg.eigvals(disturbed(self.plant, controller, dt).A)
-        self.last: dict[bool, tuple[int, int]] = {}
-        self.made: dict[tuple[int, int, bool], NoiseFilter | None] = {}
+    dt [s]; controller: of a model that runs in its loop, None: no loop is closed.
+    """
+
+    model: Model
+    dt: float
+    controller: PI | None
+
+    @cached_property
+    def _open(self) -> Grid:
+        return self._filters(looped=False)
+
+    @cached_property
+    def _closed(self) -> Grid:
+        return self._filters(looped=True)
 
     def filters(self, places: Sequence[tuple[int, int]], looped: bool = False) -> list[NoiseFilter | None]:
         """The filters of TAUS[i] and SIZES[j]; None outside the grid or where there is none."""
-        keys = [(i, j, looped) for i, j in places]
-        missing = [k for k in keys if k not in self.made and 0 <= k[0] < len(TAUS) and 0 <= k[1] < len(SIZES)]
-        if missing:
-            phis = np.exp(-1.0 / TAUS[[i for i, _, _ in missing]])
-            sizes = SIZES[[j for _, j, _ in missing]] / self.plant.first_response
-            self.made.update(zip(missing, self._filters(phis, sizes, looped), strict=True))
-        return [self.made.get(k) for k in keys]
+        grid = self._closed if looped and self.controller is not None else self._open
+        return [grid.get(k) for k in places]
 
-    def _filters(self, phis: Vector, sizes: Vector, looped: bool) -> list[NoiseFilter | None]:
-        m = len(self.plant.B)
+    def _filters(self, looped: bool) -> Grid:
+        """The whole grid at once, so that no filter depends on which others were asked for."""
+        plant = discretised(self.model, self.dt)
+        places = [(i, j) for i in range(len(TAUS)) for j in range(len(SIZES))]
+        phis = np.exp(-1.0 / TAUS[[i for i, _ in places]])
+        sizes = SIZES[[j for _, j in places]] / plant.first_response
+        m = len(plant.B)
         A = np.zeros((len(phis), m + 1, m + 1), dtype=np.complex128)
-        A[:, :m, :m], A[:, :m, m], A[:, m, m] = self.plant.A, self.plant.B, phis
-        H = np.append(self.plant.C, 0.0).astype(np.complex128)
+        A[:, :m, :m], A[:, :m, m], A[:, m, m] = plant.A, plant.B, phis
+        H = np.append(plant.C, 0.0).astype(np.complex128)
         Q = np.zeros_like(A)
         Q[:, m, m] = sizes**2
         P = steady_covariances(A, H, Q)
         known = np.all(np.isfinite(P), axis=(1, 2))
         PH = np.where(known[:, None, None], P, 0.0) @ H.conj()
         K = (A @ PH[:, :, None])[:, :, 0] / (1.0 + (PH @ H).real)[:, None]
-        unfiltered: NDArray[Any] = self.roots
+        unfiltered: NDArray[Any] = np.linalg.eigvals(plant.A)
         filtered: NDArray[Any] = np.linalg.eigvals(A - K[:, :, None] * H)
-        if looped and self.loop is not None:
-            unfiltered, filtered = self.loop, np.append(filtered, np.ones((len(A), 1)), axis=1)
+        if looped:
+            unfiltered = np.linalg.eigvals(disturbed(plant, self.controller, self.dt).A)
+            filtered = np.append(filtered, np.ones((len(A), 1)), axis=1)
         numerators = _polynomials(np.append(np.tile(unfiltered, (len(A), 1)), phis[:, None], axis=1))
         denominators = _polynomials(filtered)
-        return [NoiseFilter(b, a, 2) if k else None for b, a, k in zip(numerators, denominators, list(known), strict=True)]
+        return {k: NoiseFilter(numerators[n], denominators[n], 2) if known[n] else None for n, k in enumerate(places)}
 
     def best(self, cost: Callable[[NoiseFilter], float], looped: bool) -> NoiseFilter | None:
-        """The filter of least cost, downhill from the one before; the first time from the middle of the grid, in large steps."""
+        """The filter of least cost, downhill from the middle of the grid, in large steps and then in small ones.
+
+        Always from there, so that the filter of an error is a matter of this error alone.
+        """
         costs: dict[tuple[int, int], float] = {}
-        here = self.last.get(looped, (4, 7))
-        for stride in (1,) if looped in self.last else (3, 1):
+        here = MIDDLE
+        for stride in (3, 1):
             while True:
                 i, j = here
                 around = [(i + stride * u, j + stride * v) for u in (-1, 0, 1) for v in (-1, 0, 1)]
@@ -176,5 +191,4 @@ class ShaftNoise:
                 if not costs[best] < costs[here]:
                     break
                 here = best
-        self.last[looped] = here
         return self.filters([here], looped)[0] if np.isfinite(costs[here]) else None

@@ -265,6 +265,11 @@ class Objective:
             return WHITE
         return self.family.estimated(self, error, closed)
 
+    def own_noise(self, fit: Fit) -> NoiseFilter:
+        """The noise filter of what a fit leaves itself."""
+        key = "own noise", fit.hypothesis, fit.x.tobytes()
+        return self.once(key, lambda: self.noise_of(self.error(fit), fit.predictor.closed))
+
     def parts(self, row: Vector) -> list[Vector]:
         """The records without their heads, where filters begin."""
         return [part[self.head // 2 :] for part in np.split(row, np.cumsum(self.lengths)[:-1])]

@@ -1,0 +1,55 @@
+"""The objective: noise filters that are a matter of the error alone, and what masked samples and several records do to it."""
+
+from __future__ import annotations
+
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import gaident as ga
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.noise_model import ShaftNoise
+from gaident.estimation.objective import Innovations, Objective
+
+Vector = NDArray[np.float64]
+
+DT, N = 1e-3, 1000
+TWO = ga.TwoMass(JM=1e-3, DM=1e-3, JL=2e-3, DL=2e-3, KG=50.0, DG=1e-2).model()
+
+
+def disturbed_error(rng: np.random.Generator) -> Vector:
+    """What a true model leaves under a slow torque, a hum and steps of a load, beside the sensor's noise; sizes drawn wide."""
+    t = np.arange(N) * DT
+    size = 10.0 ** rng.uniform(-3.0, [1.0, 0.0, 0.0])
+    torque = size[1] * np.sin(2.0 * np.pi * rng.uniform(1.0, 300.0) * t) + size[2] * np.repeat(rng.standard_normal(20), N // 20)
+    w = ga.simulate(TWO, ga.Record(DT, velocity=np.zeros(N), torque=torque))
+    return np.asarray(w + size[0] * rng.standard_normal(N))
+
+
+def fresh() -> Objective:
+    """An objective with noise at the shaft in its family, that was asked nothing yet."""
+    rest = ga.Record(DT, velocity=np.zeros(N), torque=np.zeros(N))
+    return Objective(DataSet.of([rest], None), np.ones(N), Innovations(ShaftNoise(TWO, DT, None)))
+
+
+def test_the_noise_filter_of_an_error_is_the_same_whatever_was_asked_before() -> None:
+    rng = np.random.default_rng(2)
+    errors = [disturbed_error(rng) for _ in range(12)]
+    alone = [fresh().noise_of(e, False).key for e in errors]
+    assert len(set(alone)) > 6, "these errors have filters of their own"
+    forwards, backwards, shared = fresh(), fresh(), fresh()
+    assert [forwards.noise_of(e, False).key for e in errors] == alone
+    assert [backwards.noise_of(e, False).key for e in errors[::-1]] == alone[::-1]
+    for i in rng.integers(0, len(errors), 40):
+        assert shared.noise_of(errors[i], False).key == alone[i]
+
+
+def test_a_shaft_noise_keeps_nothing_of_what_it_was_asked() -> None:
+    shaft = ShaftNoise(TWO, DT, ga.PI(1.0, 10.0))
+    with pytest.raises(FrozenInstanceError):
+        shaft.dt = 1.0  # type: ignore[misc]
+    one, many = shaft.filters([(3, 5)], True)[0], ShaftNoise(TWO, DT, ga.PI(1.0, 10.0)).filters([(9, 17), (3, 5), (-1, 0)], True)
+    assert one is not None and many[1] is not None and one.key == many[1].key
+    assert many[0] is not None and many[2] is None, "outside the grid there is none"
