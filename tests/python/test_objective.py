@@ -53,3 +53,33 @@ def test_a_shaft_noise_keeps_nothing_of_what_it_was_asked() -> None:
     one, many = shaft.filters([(3, 5)], True)[0], ShaftNoise(TWO, DT, ga.PI(1.0, 10.0)).filters([(9, 17), (3, 5), (-1, 0)], True)
     assert one is not None and many[1] is not None and one.key == many[1].key
     assert many[0] is not None and many[2] is None, "outside the grid there is none"
+
+
+def masked(lengths: tuple[int, ...], gaps: list[int]) -> Objective:
+    """An objective over records of these lengths at rest, with samples that do not count."""
+    rest = [ga.Record(DT, velocity=np.zeros(n), torque=np.zeros(n)) for n in lengths]
+    weight = np.ones(sum(lengths))
+    weight[gaps] = 0.0
+    return Objective(DataSet.of(rest, None), weight)
+
+
+def test_a_bridge_ends_where_its_record_ends() -> None:
+    """A line from the end of one record to the start of the next would be an error that no model made."""
+    lengths = (60, 50, 40)
+    e = np.concatenate([np.full(60, 1.0), np.full(50, 10.0), np.full(40, -5.0)])
+    objective = masked(lengths, [0, 1, 30, 57, 58, 59, 60, 61, 109, 149])
+    np.testing.assert_array_equal(objective.bridged(e[None, :])[0], e)
+    # Records by themselves and one after the other come to the same.
+    e = np.random.default_rng(1).standard_normal(150)
+    parts = [masked((n,), g).bridged(part[None, :])[0] for n, g, part in
+             zip(lengths, ([0, 1, 30, 57, 58, 59], [0, 1, 49], [39]), np.split(e, [60, 110]), strict=True)]  # fmt: skip
+    np.testing.assert_array_equal(objective.bridged(e[None, :])[0], np.concatenate(parts))
+    assert parts[0][30] == pytest.approx(0.5 * (e[29] + e[31])) and parts[0][59] == e[56] and parts[1][0] == e[62]
+
+
+def test_a_record_of_which_no_sample_counts_leaves_nothing() -> None:
+    objective = masked((60, 50, 40), list(range(60, 110)))
+    row = objective.bridged(np.ones((2, 150)))
+    np.testing.assert_array_equal(row, np.tile(np.repeat([1.0, 0.0, 1.0], (60, 50, 40)), (2, 1)))
+    assert objective.count == 100.0 - 2 * objective.head
+    np.testing.assert_array_equal(masked((60, 50), list(range(110))).bridged(np.ones((1, 110))), np.zeros((1, 110)))

@@ -228,21 +228,39 @@ class Objective:
         return use
 
     def bridged(self, E: Matrix) -> Matrix:
-        """Errors with a straight line over the masked samples, so that a filter does not see them."""
-        gaps, before, after, share = self._bridges
-        if len(gaps) == 0:
+        """Errors with a straight line over the masked samples of each record, so that a filter does not see them.
+
+        At a record's ends its nearest sample that counts goes on; a record of which none counts is 0.
+        """
+        gaps, before, after, share, blank = self._bridges
+        if len(gaps) == 0 and len(blank) == 0:
             return E
         E = E.copy()
         E[:, gaps] = E[:, before] + share * (E[:, after] - E[:, before])
+        E[:, blank] = 0.0
         return E
 
     @cached_property
-    def _bridges(self) -> tuple[Index, Index, Index, Vector]:
-        """Masked samples, those that count before and after each, and its place between them from 0 to 1."""
-        gaps, known = np.flatnonzero(self.weight == 0.0), np.flatnonzero(self.weight > 0.0)
-        right = np.searchsorted(known, gaps)
-        before, after = known[np.maximum(right - 1, 0)], known[np.minimum(right, len(known) - 1)]
-        return gaps, before, after, np.clip((gaps - before) / np.maximum(after - before, 1), 0.0, 1.0)
+    def _bridges(self) -> tuple[Index, Index, Index, Vector, Index]:
+        """Masked samples, those of their record that count before and after each, its place between them from 0 to 1; samples
+        of records in which none counts."""
+        gaps, before, after, blank = ([np.zeros(0, dtype=np.intp)] for _ in range(4))
+        first = 0
+        for n in self.lengths:
+            counts = self.weight[first : first + n] > 0.0
+            known, masked = first + np.flatnonzero(counts), first + np.flatnonzero(~counts)
+            first += n
+            if len(known) == 0:
+                blank.append(masked)
+                continue
+            right = np.searchsorted(known, masked)
+            gaps.append(masked)
+            before.append(known[np.maximum(right - 1, 0)])
+            after.append(known[np.minimum(right, len(known) - 1)])
+        left, right = np.concatenate(before), np.concatenate(after)
+        masked = np.concatenate(gaps)
+        share = np.clip((masked - left) / np.maximum(right - left, 1), 0.0, 1.0)
+        return masked, left, right, share, np.concatenate(blank)
 
     @property
     def head(self) -> int:
