@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 import gaident as ga
 from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.selection import model_space, moves, score_test
 from gaident.diagnosis.selection.moves import Moves
+from gaident.diagnosis.selection.select import specification
 from gaident.estimation import least_squares as ls
 from gaident.estimation import prediction
 from gaident.estimation.dataset import DataSet
@@ -248,6 +250,39 @@ def test_what_is_not_material_is_not_worth_it_however_significant() -> None:
     less, more = bench.fit(), bench.fit(A)
     assert bench.space.score(more) < bench.space.score(less)
     assert not bench.space.worth(more, less)
+
+
+def test_a_cause_that_whitening_hid_is_one_by_the_plain_scores_of_two_models() -> None:
+    """A slow effect passes for noise. Against a model of other effects no specification test is defined: the score decides."""
+    bench = Bench({"a": (0.3,)}, plain=True, noise=0.05)
+    space, without, other = bench.space, bench.fit(B), bench.fit(A)
+    assert space.hidden(without, other) and not space.hidden(other, without)
+    assert not space.hidden(other, other), "the same causes hide nothing"
+    assert not space.hidden(bench.fit(A, B), other), "nor does a model that holds them all"
+    # The score is that of the independent samples: of too few of them the same cost says nothing.
+    few = replace(space, objective=space.objective.under(OutputErrors(3.0)))
+    assert few.score(few.seen_plainly(other, other.predictor)) > few.score(few.seen_plainly(bench.fit(), other.predictor))
+    assert not few.hidden(bench.fit(), few.seen_plainly(other, other.predictor))
+    # Most of what is left without it has to be its work.
+    little = Bench({"a": (0.3,)}, extra=0.7 * np.sin(70.0 * S**2), plain=True, noise=0.01)
+    assert little.space.score(little.fit(A)) < little.space.score(little.fit(B))
+    assert not little.space.hidden(little.fit(B), little.fit(A))
+
+
+def test_the_specification_test_is_of_one_model_and_counts_what_a_fit_moves() -> None:
+    """H = I ln(V_P(x_W) / V_P(x_P)); an order that is searched for is the same in both estimates."""
+    bench = Bench({"a": (0.3,)}, noise=0.05)
+    fit = bench.fit(A)
+    apart = replace(fit, x=fit.x + np.array([0.2, 0.0, 0.0]))
+    found = specification(bench.space, apart)
+    objective = bench.space.objective
+    plain = bench.space.seen_plainly(fit, fit.predictor)
+    assert found.bound == pytest.approx(chi2.isf(POLICY.specification_level, 3))
+    whole = float(objective.costs(fit.hypothesis, apart.x[None, :], WHITE)[0])
+    assert found.statistic == pytest.approx(objective.count * np.log(whole / plain.cost))
+    assert found.contradicts and not specification(bench.space, fit).contradicts
+    searched = replace(A, steps=lambda s: (0.0,))
+    assert specification(bench.space, bench.fit(searched)).bound == pytest.approx(chi2.isf(POLICY.specification_level, 2))
 
 
 def test_models_are_compared_in_the_same_view() -> None:

@@ -13,7 +13,7 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
 from gaident.diagnosis.experiments.excitation import excitation
-from gaident.diagnosis.explain.wording import evidence_of
+from gaident.diagnosis.explain.wording import basis_of, evidence_of
 from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
 from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, TWO_LEVELS, conditional_classes
@@ -221,6 +221,7 @@ class _Work:
         """Everything the user sees."""
         self.note(0.9, "measuring the gain")
         said = list(self.notes)
+        self.notes += basis_of(self.found)
         gains = self._accepted_gains()
         driver = self.left.driver if self.adequate else self.left.strongest
         after = gains.after

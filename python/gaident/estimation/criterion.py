@@ -18,9 +18,10 @@ errors,
 
     H = I ln(V_P(x_W) / V_P(x_P))
 
-is then near chi-square with as many degrees of freedom as there are parameters. A larger H says that what the model leaves is
-no stationary noise (a friction that changes with load, angle and temperature, a torque that is itself measured): the noise
-model has taken a misfit for noise, and trusts the frequencies where that happens to be small.
+is then near chi-square with as many degrees of freedom as there are parameters that a fit moves. A larger H says that what the
+model leaves is no stationary noise (a friction that changes with load, angle and temperature, a torque that is itself measured):
+the noise model has taken a misfit for noise, and trusts the frequencies where that happens to be small. H is defined for two
+estimates of one model; two models are compared by the information criterion.
 
 **The variance ratio.** A model leaves noise where the variance of its whitened errors is that of the sensor's noise, up to a
 ratio that the policy states.
@@ -28,10 +29,12 @@ ratio that the policy states.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["bic", "chi_square_bound", "effective_samples", "specification_statistic"]
+__all__ = ["Specification", "bic", "chi_square_bound", "effective_samples", "specification_statistic"]
 
 Vector = NDArray[np.float64]
 
@@ -65,6 +68,18 @@ def effective_samples(error: Vector) -> float:
     dead = np.flatnonzero(rho < DEAD)
     memory = int(dead[0]) if len(dead) else count
     return float(max(count / (1.0 + 2.0 * float(rho[1:memory].sum())), 1.0))
+
+
+class Specification(NamedTuple):
+    """H of the specification test, and the bound from which on it speaks against a model."""
+
+    statistic: float
+    bound: float
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether whitened and plain estimate contradict each other."""
+        return self.statistic > self.bound
 
 
 def specification_statistic(whitened_estimate: float, plain_estimate: float, information: float) -> float:

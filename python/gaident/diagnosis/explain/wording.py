@@ -1,4 +1,4 @@
-"""Findings in one plain sentence each."""
+"""Findings, and the errors that decided, in one plain sentence each."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 from gaident.diagnosis.library.terms import TWO_LEVELS
 from gaident.diagnosis.selection.offset import Offset
+from gaident.diagnosis.selection.select import Selection
 from gaident.models.effects import table
 
-__all__ = ["evidence_of"]
+__all__ = ["basis_of", "evidence_of"]
 
 
 def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None) -> str:
@@ -23,3 +24,19 @@ def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: O
     if effect == TWO_LEVELS.name and offset is not None:
         return f"{what}: {certainty(gain)} {units}. {offset.sentence}"
     return f"{what}: {certainty(gain)} {units}."
+
+
+def basis_of(found: Selection) -> list[str]:
+    """Which errors the parameters rest on, where these are not whitened ones or the specification test speaks against them."""
+    test = found.specification
+    if test is None:  # a measured torque, as the user says
+        return []
+    if test.contradicts:
+        figures = f"specification test {test.statistic:.0f}, bound {test.bound:.0f}"
+        finding = f"What the model leaves is no stationary noise ({figures})"
+        if found.space.whitens:
+            return [f"{finding}: the standard deviations of the parameters are too small."]
+        return [f"{finding}: the parameters are those that miss the velocity least, not those that leave white noise."]
+    if found.space.whitens:
+        return []
+    return ["A noise model would take a cause for noise here: the parameters are those that miss the velocity least."]

@@ -6,7 +6,8 @@
        Only this search where the torque itself was measured: noise on the input, which no noise model of the output describes.
     3. The specification test: where whitened and plain estimates of the selected model contradict each other, its errors are no
        stationary noise, and the model that output errors select is the result, with the information of its independent samples.
-    4. The rivals of every effect.
+    4. The same is the result where it holds a cause that the whitened errors hide: two models, compared by their plain errors.
+    5. The rivals of every effect.
 
 Long records are searched on a coarser grid of time first.
 """
@@ -30,14 +31,14 @@ from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.rivals import Rival, rivals_of
 from gaident.estimation import least_squares as ls
-from gaident.estimation.criterion import chi_square_bound, effective_samples, specification_statistic
+from gaident.estimation.criterion import Specification, chi_square_bound, effective_samples, specification_statistic
 from gaident.estimation.noise_model import WHITE, ShaftNoise
 from gaident.estimation.objective import Fit, Innovations, Objective, OutputErrors
 from gaident.estimation.projection import WORST
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 
-__all__ = ["Selection", "by_whitened_errors", "compared", "selected"]
+__all__ = ["Selection", "by_whitened_errors", "compared", "selected", "specification"]
 
 Vector = NDArray[np.float64]
 Classes = Callable[[str], Collection[str]]
@@ -48,22 +49,16 @@ class Selection:
     """The selected model.
 
     space: of the noise family that decided; base: its linear part, fitted alone; final: the model; rivals: effect -> (gain in BIC
-    units, explanations in its place); statistic, bound: of the specification test. whitened: what whitened errors had selected,
-    where output errors decided and both searches ran.
+    units, explanations in its place); specification: the test of the model of whitened errors, None where it was not asked.
+    whitened: what whitened errors had selected, where output errors decided and both searches ran.
     """
 
     space: Moves
     base: Fit
     final: Fit
     rivals: dict[str, tuple[float, list[Rival]]]
-    statistic: float
-    bound: float
+    specification: Specification | None
     whitened: _Found | None = None
-
-    @property
-    def stationary(self) -> bool:
-        """Whether whitened errors decided."""
-        return self.space.whitens
 
 
 def selected(
@@ -100,37 +95,35 @@ class _Found:
     space: Moves
     base: Fit
     final: Fit
-    statistic: float
-    bound: float
+    specification: Specification | None
     whitened: _Found | None = None
 
 
 def _decided(task: Task, note: Callable[[str], None]) -> _Found:
-    """Steps 1 to 3; where the linear model leaves a large misfit, step 2 first: step 1 may then be needless."""
+    """Steps 1 to 4; where the linear model leaves a large misfit, step 2 first: step 1 may then be needless."""
     task, bases = linear_bases(task)
     space = task.space()
     if task.data.torque_measured:
         # Noise on the input makes a whitened inertia too large, whatever the noise model; at the slow end there is little of it.
-        return _Found(*_plainly(task, bases, note), np.inf, 0.0)
+        return _Found(*_plainly(task, bases, note), None)
     plainly: tuple[Moves, Fit, Fit] | None = None
     if min(space.ratio(b) for b in bases) > POLICY.misfit_ratio:
         plainly = _plainly(task, bases, note)
-        as_whitened = _as_innovations(space, plainly[2])
-        statistic, bound = _specification(space, as_whitened, plainly[2])
-        if statistic > bound:
-            return _Found(*plainly, statistic, bound)
+        test = specification(space, _as_innovations(space, plainly[2]))
+        if test.contradicts:
+            return _Found(*plainly, test)
     base, final = _explored(task, space, bases)
-    statistic, bound = _specification(space, final)
-    if plainly is None and (statistic > bound or not space.runs_free(final)):
+    test = specification(space, final)
+    if plainly is None and (test.contradicts or not space.runs_free(final)):
         plainly = _plainly(task, bases, note)
     if plainly is not None:
         again = _improved(space, _as_innovations(space, plainly[2]), final)
         if again is not final:
             base, final = _bare(space, again), again
-        statistic, bound = _specification(space, final, plainly[2])
-    whitened = _Found(space, base, final, statistic, bound)
-    if plainly is not None and statistic > bound:
-        return _Found(*plainly, statistic, bound, whitened)
+        test = specification(space, final)
+    whitened = _Found(space, base, final, test)
+    if plainly is not None and (test.contradicts or plainly[0].hidden(final, plainly[2])):
+        return _Found(*plainly, test, whitened)
     return whitened
 
 
@@ -216,27 +209,19 @@ def _as_innovations(space: Moves, fit: Fit) -> Fit:
     return space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit)))
 
 
-def _specification(space: Moves, fit: Fit, other: Fit | None = None) -> tuple[float, float]:
-    """(H of the specification test, its bound): the plain errors of the whitened and of the plain estimate.
+def specification(space: Moves, fit: Fit) -> Specification:
+    """The specification test: the plain errors of the whitened and of the plain estimate of one model.
 
-    The plain estimate is that of the same model, and of the one that output errors selected where that holds another cause: what
-    whitened errors have selected may be no model that a plain estimate could start from.
+    What no estimate moves by slope, the order of a harmonic, is the same in both and no degree of freedom.
     """
     objective = space.objective
-    found = 0.0
-    bound = chi_square_bound(fit.parameters.size, space.policy.specification_level)
-    views = [ls.fit(objective, fit.hypothesis, fit.x, WHITE, 12)]
-    pairs = [(fit, views[0])]
-    if other is not None and set(other.effects) - set(fit.effects):  # a cause that whitening hid
-        seen = space.seen_plainly(fit, other.predictor)
-        if other.cost < space.policy.overrules * seen.cost:
-            pairs.append((seen, other))
-    for whitened, plain in pairs:
-        errors = [objective.error(f) * objective.counted for f in (whitened, plain)]
-        information = min(effective_samples(errors[1]), objective.count)
-        whole, least = (float(e @ e) for e in errors)
-        found = max(found, specification_statistic(whole, least, information))
-    return found, bound
+    plain = ls.fit(objective, fit.hypothesis, fit.x, WHITE, 12)
+    errors = [objective.error(f) * objective.counted for f in (fit, plain)]
+    information = min(effective_samples(errors[1]), objective.count)
+    whole, least = (float(e @ e) for e in errors)
+    freedom = int(np.count_nonzero(fit.parameters.steps()))
+    bound = chi_square_bound(freedom, space.policy.specification_level)
+    return Specification(specification_statistic(whole, least, information), bound)
 
 
 def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) -> _Found:
@@ -256,8 +241,8 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     final = _beam(space).run([final])
     if base.parameters.masses != final.parameters.masses:
         base = _bare(space, final)
-    statistic, bound = _specification(space, final) if space.whitens else (outline.statistic, outline.bound)
-    return _Found(space, base, final, statistic, bound)
+    test = specification(space, final) if space.whitens else outline.specification
+    return _Found(space, base, final, test)
 
 
 def _moved(space: Moves, scales: Scales, fit: Fit) -> Fit:
@@ -282,7 +267,7 @@ def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> S
             break
         final = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
     base = found.base if found.base.parameters.masses == final.parameters.masses else _bare(space, final)
-    return Selection(space, base, final, rivals, found.statistic, found.bound, found.whitened)
+    return Selection(space, base, final, rivals, found.specification, found.whitened)
 
 
 def by_whitened_errors(selection: Selection, classes: Classes, note: Callable[[str], None]) -> Selection | None:
