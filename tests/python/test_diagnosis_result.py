@@ -362,15 +362,6 @@ def test_records_that_do_not_fit_the_loop_are_refused(rec: ga.Record) -> None:
         ga.diagnose(rec, CONTROLLER, validation=[drive_record(1), rec])
 
 
-def test_the_same_seed_and_records_in_any_order_give_the_same_result(rec: ga.Record) -> None:
-    parts = [rec[:800], rec[800:]]
-    one, two = (ga.diagnose(p, CONTROLLER, bootstrap=1, seed=5) for p in (parts, parts[::-1]))
-    without = {"seconds": 0.0, "identification": None}  # an identification lists its records as given
-    assert one.to_dict() | without == two.to_dict() | without
-    assert one.causes[0].p_value == 0.5 and one.bootstrap == 1  # (1 + 0) / (1 + 1)
-    assert "(bootstrap): at most 0.5." in flat(one.summary())
-
-
 def test_a_record_may_begin_in_motion(rec: ga.Record) -> None:
     """In the middle of a level, where a resonance would have to have been moving too."""
     found = ga.diagnose(rec[300:], CONTROLLER)

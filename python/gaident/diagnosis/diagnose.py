@@ -20,7 +20,7 @@ from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, 
 from gaident.diagnosis.mechanics import mechanics_of, moved
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.policy import POLICY
-from gaident.diagnosis.records.arguments import ProgressCallback, checked, noise_std_of, records_of
+from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_order, noise_std_of, records_of
 from gaident.diagnosis.records.folded import ADVICE, FOLDED, folded
 from gaident.diagnosis.records.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.records.sizes import scales_of
@@ -111,6 +111,7 @@ def diagnose(
     records = records_of(rec, "rec")
     held = () if validation is None else records_of(validation, "validation")
     checked(records, held, controller, identification, bootstrap, seed, progress)
+    records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
     logged = as_logged(records, controller)
     controller = logged.controller
@@ -147,9 +148,6 @@ class _Work:
     def __post_init__(self) -> None:
         self.controller = self.logged.controller
         self.notes = [*self.logged.notes, *open_loop_notes(self.records, self.controller)]
-        order = sorted(range(len(self.records)), key=lambda i: (self.records[i].digest, self.records[i].name))
-        self.records = tuple(self.records[i] for i in order)  # sums must not depend on the order given
-        self.held = tuple(sorted(self.held, key=lambda r: (r.digest, r.name)))
         hit = [self._spikes(r) for r in self.records]
         clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
         self.clean = tuple(clean)

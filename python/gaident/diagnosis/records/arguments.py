@@ -12,7 +12,7 @@ from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.results.identification import Identification
 
-__all__ = ["LEAST_SAMPLES", "ProgressCallback", "checked", "noise_std_of", "records_of"]
+__all__ = ["LEAST_SAMPLES", "ProgressCallback", "checked", "in_order", "noise_std_of", "records_of"]
 
 ProgressCallback = Callable[[float, str], None]
 
@@ -67,6 +67,11 @@ def checked(
     for name, value, low, high in (("bootstrap", bootstrap, 0, 100_000), ("seed", seed, 0, 2**63 - 1)):
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
             raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
+
+
+def in_order(records: tuple[Record, ...]) -> tuple[Record, ...]:
+    """The records in an order of their content, so that no sum and no sentence depends on the one in which they were given."""
+    return tuple(sorted(records, key=lambda r: (r.digest, r.name)))
 
 
 def noise_std_of(noise: float | Record | None) -> float | None:
