@@ -150,12 +150,13 @@ class ModelSpace:
         """Whether a model of plain errors holds a cause that whitened errors took for noise; of the space of output errors.
 
         The two are different models, of which no specification test says anything. Each is fitted to the plain errors, under the
-        same predictor; the score decides, and the cause has to explain most of what is left without it.
+        same predictor; the score decides, by as much as tells two explanations apart, and the cause has to explain most of what is
+        left without it.
         """
         if not set(plain.effects) - set(whitened.effects):
             return False
         without = self.seen_plainly(whitened, plain.predictor)
-        return plain.cost < self.policy.overrules * without.cost and self.score(plain) < self.score(without)
+        return plain.cost < self.policy.overrules * without.cost and self.score(plain) < self.score(without) - self.margin
 
     def plain_cost(self, fit: Fit) -> float:
         """Sum of squared plain errors, refitted to these, of the loop where there is one."""
