@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 from scipy.stats import chi2
 
 import gaident as ga
 from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.selection import model_space, moves, score_test
+from gaident.diagnosis.selection.bootstrap import largest_gains
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.select import specification
 from gaident.estimation import least_squares as ls
@@ -512,3 +514,27 @@ def test_valleys_are_searched_beside_a_linear_model() -> None:
     (found,) = bench.space.valleys(bench.fit())
     assert found.effects == ("valley",) and found.x[-1] == pytest.approx(0.52, abs=2e-3)
     assert replace(bench.space, allowed=(A, B)).valleys(bench.fit()) == []
+
+
+# The bootstrap.
+
+
+def test_records_that_are_drawn_where_plain_errors_count_are_as_slow_as_the_real_one() -> None:
+    """White noise would make the gains of chance too small, and a p-value of a slow misfit too good."""
+
+    def bench(seed: int) -> Bench:
+        slow = lfilter([1.0], [1.0, -0.97], 0.05 * np.random.default_rng(seed).standard_normal(N))
+        return Bench(extra=slow, plain=True, noise=1e-3, seed=seed, allowed=(A, PLACED))
+
+    def gain(one: Bench) -> float:
+        start = one.fit()
+        return start.bic - min(f.bic for f in one.space.add(start))
+
+    true = np.array([gain(bench(seed)) for seed in range(40)])
+    one = bench(100)
+    fit = one.fit()
+    drawn = largest_gains(one.space, fit, fit, 40, 0, lambda message: None)
+    for share, most in ((0.5, 2.0), (0.9, 5.0)):  # of white noise the largest are smaller by 6.6
+        assert np.quantile(drawn, share) == pytest.approx(np.quantile(true, share), abs=most)
+    again = largest_gains(one.space, fit, fit, 3, 0, lambda message: None)
+    np.testing.assert_array_equal(again, drawn[:3])

@@ -29,7 +29,7 @@ from gaident.estimation.state_space import discretised, disturbed, steady_covari
 from gaident.identification.noise import autocorrelation, autoregression_of, highest_order
 from gaident.models.model import Model
 
-__all__ = ["HIGHEST", "WHITE", "NoiseFilter", "ShaftNoise", "autoregression"]
+__all__ = ["HIGHEST", "WHITE", "NoiseFilter", "ShaftNoise", "autoregression", "stationary_autoregression"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -88,17 +88,30 @@ def autoregression(parts: Sequence[Vector], highest: int = HIGHEST, floor: float
 
     floor: variance of white noise that is taken to be on the parts beside what they show.
     """
-    total = sum(len(e) for e in parts)
-    top = highest_order([len(e) for e in parts], highest)
-    products = [autocorrelation(e, top) for e in parts]
-    pooled: Vector = np.sum(products, axis=0)
-    pooled[0] += floor * total
-    order = autoregression_of(pooled, total).order
+    products, total = _products(parts, highest), sum(len(e) for e in parts)
+    order = len(_by_autocovariance(products, total, floor))
     if order == 0:
         return np.zeros(0)
     M = sum(_moments(e, r, order) for e, r in zip(parts, products, strict=True))
     M = M + floor * (total - order * len(parts)) * np.eye(order + 1)
     return np.asarray(np.linalg.lstsq(M[1:, 1:], M[0, 1:], rcond=1e-13)[0], dtype=np.float64)
+
+
+def stationary_autoregression(parts: Sequence[Vector], highest: int = HIGHEST) -> Vector:
+    """Coefficients by the equations of Yule and Walker, order by BIC: a process that never grows, to draw noise from."""
+    return _by_autocovariance(_products(parts, highest), sum(len(e) for e in parts))
+
+
+def _products(parts: Sequence[Vector], highest: int) -> list[Vector]:
+    """Of each part sum_n e(n) e(n+k), for k up to the highest order that they allow."""
+    top = highest_order([len(e) for e in parts], highest)
+    return [autocorrelation(e, top) for e in parts]
+
+
+def _by_autocovariance(products: Sequence[Vector], total: int, floor: float = 0.0) -> Vector:
+    pooled: Vector = np.sum(products, axis=0)
+    pooled[0] += floor * total
+    return autoregression_of(pooled, total).phi
 
 
 def _moments(e: Vector, products: Vector, order: int) -> Matrix:
