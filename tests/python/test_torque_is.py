@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from gaident.cli import COMMANDS, main
 from gaident.cli.drive import drive_of
 from gaident.cli.options import parser_of
 from gaident.data.torque_kind import kind_of_torque
+from gaident.diagnosis.experiments import next_experiment
 from gaident.diagnosis.records.hygiene import cleaned
 from gaident.diagnosis.selection.decimated import decimated_record
 from gaident.drive.drive_file import Drive, read_drive_file
@@ -68,6 +70,31 @@ def test_whatever_is_made_of_a_record_keeps_what_its_torque_is(tmp_path: Path) -
     # The torque that a controller makes of a record without one is the controller's.
     bare = rec.with_channels(torque=None)
     assert bare.torque_is == "commanded" == DataSet.of([bare], ga.PI(0.1, 1.0)).driven[0].torque_is
+
+
+@pytest.mark.parametrize("kind", ["measured", "commanded", None])
+def test_a_proposed_experiment_is_tried_on_records_of_the_same_kind_of_torque(
+    kind: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A step in one direction leaves dry friction, a load and a dead band; each command is tried by simulated records."""
+    tried: list[ga.Record] = []
+
+    def noted(records: list[ga.Record], *rest: Any) -> DataSet:
+        tried.extend(records)
+        return of(records, *rest)
+
+    loop, drive = ga.PI(0.05, 1.5), ga.OneMass(J=5e-4, D=2e-3).model().with_effect("coulomb_friction", torque=0.05)
+    noise = 0.02 * np.random.default_rng(0).standard_normal(400)
+    asked = np.repeat([0.0, 20.0], [50, 350])
+    done = ga.run(drive, ga.Record(1e-3, command=asked - noise, velocity=np.zeros(400)), loop)
+    rec = ga.Record(1e-3, command=asked, velocity=done.velocity + noise)
+    if kind is not None:
+        rec = rec.with_channels(torque=done.torque, torque_is=kind)
+    of = DataSet.of
+    monkeypatch.setattr(next_experiment, "DataSet", SimpleNamespace(of=noted))
+    assert ga.diagnose(rec, loop).causes[0].alternatives
+    assert tried, "an ambiguous finding asks for an experiment"
+    assert {r.torque_is if r.torque is not None else None for r in tried} == {kind}
 
 
 def test_with_channels_changes_what_it_is_given_and_shares_the_rest() -> None:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from gaident.control.pi import PI
 from gaident.data.record import Record
+from gaident.data.torque_kind import COMMANDED, MEASURED
 from gaident.diagnosis.experiments.first_experiment import MenuItem, candidate_commands
 from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
 from gaident.diagnosis.selection.rivals import Rival
@@ -59,7 +60,7 @@ class _Bench:
     controller: PI
     noise: NoiseFilter
     variance: float  # of the whitened noise
-    torque_logged: bool
+    torque_is: str | None  # "commanded" or "measured", as in the diagnosed records; None where they log none
     elsewhere: Mapping[str, Mapping[str, float]]  # effects at the controller, known from the replay
 
     def record(self, fit: Fit, item: MenuItem) -> Record | None:
@@ -72,7 +73,8 @@ class _Bench:
             done = run(model, command, self.controller)
         if not (np.all(np.isfinite(done.velocity)) and np.all(np.isfinite(done.torque))):
             return None
-        return Record(item.dt, command=item.command, velocity=done.velocity, torque=done.torque if self.torque_logged else None)
+        made = Record(item.dt, command=item.command, velocity=done.velocity)
+        return made if self.torque_is is None else made.with_channels(torque=done.torque, torque_is=self.torque_is)
 
     def left(self, record: Record, rival: Fit, refitted: bool) -> float:
         """T of the rival, fitted to the other explanation's record (or its linearised fit, which costs one step)."""
@@ -116,7 +118,8 @@ def propose(
     if data.controller is None or data.command is None:
         remedy = "give the controller, and a log with the velocity command"
         return None, [*notes, f"Without a controller no command can be worked out that tells {_listed(names)} apart: {remedy}."]
-    bench = _Bench(data.controller, final.noise, max(final.cost / count, 1e-300), data.torque_logged, elsewhere)
+    kind = None if not data.torque_logged else MEASURED if data.torque_measured else COMMANDED
+    bench = _Bench(data.controller, final.noise, max(final.cost / count, 1e-300), kind, elsewhere)
     items = menu(data, final)
     # A generalisation that was fitted as its neutral case is the same drive: such a pair no command separates.
     table = [

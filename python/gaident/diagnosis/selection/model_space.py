@@ -150,8 +150,8 @@ class ModelSpace:
         """Whether a model of plain errors holds a cause that whitened errors took for noise; of the space of output errors.
 
         The two are different models, of which no specification test says anything. Each is fitted to the plain errors, under the
-        same predictor; the score decides, by as much as tells two explanations apart, and the cause has to explain most of what is
-        left without it.
+        same predictor; the score decides, by as much as tells two explanations apart, and the cause has to explain most of what
+        is left without it.
         """
         if not set(plain.effects) - set(whitened.effects):
             return False
