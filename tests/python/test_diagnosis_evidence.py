@@ -337,6 +337,42 @@ def test_what_one_record_lacks_another_may_bring() -> None:
     )
 
 
+def test_a_limit_of_the_controller_is_why_no_more_torque_was_asked_for() -> None:
+    asked = np.repeat([0.0, 40.0, -40.0], [50, 200, 200])
+    still = ga.Record(DT, command=asked, velocity=np.zeros(450))
+    sizes = {}
+    for name, ctl in {
+        "none": CONTROLLER,
+        "torque": replace(CONTROLLER, torque_limit=0.5),
+        "integral": replace(CONTROLLER, integrator_limit=0.05),
+        "not reached": replace(CONTROLLER, torque_limit=1e3, integrator_limit=1e3),
+    }.items():
+        done = ga.run(ONE_MASS, still, ctl)
+        sizes[name] = excitation(ga.Record(DT, asked, done.velocity, torque=done.torque), ctl).one_sided
+    asked_for, let_through = "no more torque was asked for", "the controller's own limit lets no more through"
+    assert sizes["torque"]["torque_saturation"] == f"a limit above 0.5 N m would not have shown: {let_through}"
+    for name in ("none", "integral", "not reached"):
+        assert sizes[name]["torque_saturation"].endswith(asked_for)
+    own = "the controller's own clamp lets it go no higher"
+    assert sizes["integral"]["integrator_clamp"] == f"a clamp above 0.05 N m would not have shown: {own}"
+    for name in ("none", "torque", "not reached"):
+        assert sizes[name]["integrator_clamp"].endswith("the integral went no higher")
+
+
+def test_the_integral_is_read_where_no_limit_cuts_the_torque() -> None:
+    """u - kp (r - w) of a torque at its limit is not the integral."""
+    asked = np.repeat([0.0, 40.0, -40.0], [50, 200, 200])
+    ctl = replace(CONTROLLER, ki=0.05, torque_limit=0.3 * CONTROLLER.kp * 40.0)
+    still = ga.Record(DT, command=asked, velocity=np.zeros(450))
+    done = ga.run(ONE_MASS, still, ctl)
+    free = np.abs(done.torque) < 0.999 * ctl.limits[0]
+    integral = float(np.abs(done.torque - ctl.kp * (asked - done.velocity))[free].max())
+    cut = float(np.abs(done.torque - ctl.kp * (asked - done.velocity)).max())
+    assert cut > 1.5 * integral
+    sizes = excitation(ga.Record(DT, asked, done.velocity, torque=done.torque), ctl).one_sided
+    assert f"above {integral:.3g} N m" in sizes["integrator_clamp"]
+
+
 # --- residual tests
 
 

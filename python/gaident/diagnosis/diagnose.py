@@ -169,7 +169,7 @@ class _Work:
             at += n
         self.objective = Objective(self.data, weight)
         self.spoiled = int(sum(len(h) for h in hit))
-        self.excited = excitation(self.clean, self.controller)
+        self.excited = excitation(self.clean, shown)
 
     def _shown(self, effect: str) -> bool:
         return effect in self.at_controller.effects

@@ -18,6 +18,7 @@ Vector = NDArray[np.float64]
 
 TURN = math.tau
 LEAST_TURN = math.pi / 3.0  # rad of travel below which a once-per-turn torque is a constant and a spring
+REACHED = 0.999  # of a limit of the controller: from there on it was reached
 HIGHEST_ORDER = 60  # of cogging and encoder ripple that a drive is expected to have
 FRICTIONS = (
     "coulomb_friction",
@@ -63,14 +64,17 @@ def not_testable(motions: Sequence[Motion], controller: PI | None, model: Model 
 
 def one_sided(motions: Sequence[Motion], controller: PI | None) -> dict[str, str]:
     """Effect -> which sizes of it could not have shown in these records; what stands there is tested, but not beyond."""
+    limit, clamp = (math.inf, math.inf) if controller is None else controller.limits
     highest = max(float(np.abs(m.torque).max()) for m in motions)
-    notes = {"torque_saturation": f"a limit above {highest:.3g} N m would not have shown: no more torque was asked for"}
+    own = highest > REACHED * limit
+    why = "the controller's own limit lets no more through" if own else "no more torque was asked for"
+    notes = {"torque_saturation": f"a limit above {highest:.3g} N m would not have shown: {why}"}
     if controller is not None:
-        integral = max(
-            float(np.abs(m.torque - controller.kp * (m.command - m.velocity)).max()) for m in motions if m.command is not None
-        ) if any(m.command is not None for m in motions) else math.nan  # fmt: skip
-        if math.isfinite(integral):
-            notes["integrator_clamp"] = f"a clamp above {integral:.3g} N m would not have shown: the integral went no higher"
+        integral = max((_integral(m, controller) for m in motions), default=0.0)
+        if integral > 0.0:
+            own = integral > REACHED * clamp
+            why = "the controller's own clamp lets it go no higher" if own else "the integral went no higher"
+            notes["integrator_clamp"] = f"a clamp above {integral:.3g} N m would not have shown: {why}"
         slope = max((float(np.abs(np.diff(m.command)).max()) / m.dt for m in motions if m.command is not None), default=0.0)
         if slope > 0.0:
             notes["command_rate_limit"] = f"a limit above {slope:.3g} rad/s^2 would not have shown: no command rises faster"
@@ -84,6 +88,15 @@ def one_sided(motions: Sequence[Motion], controller: PI | None) -> dict[str, str
         if parts and least <= HIGHEST_ORDER:
             notes[effect] = "; ".join(parts)
     return notes
+
+
+def _integral(m: Motion, controller: PI) -> float:
+    """Highest |u - kp (r - w)| [N m] while the controller's limit does not cut its torque u; 0 without a command."""
+    if m.command is None:
+        return 0.0
+    free = np.abs(m.torque) <= REACHED * controller.limits[0]
+    held = np.abs(m.torque - controller.kp * (m.command - m.velocity))[free]
+    return float(held.max(initial=0.0))
 
 
 def _slowest(m: Motion) -> float:
