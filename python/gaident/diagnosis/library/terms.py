@@ -44,12 +44,17 @@ __all__ = [
     "LIBRARY",
     "LOAD",
     "RESONANCE",
+    "HIGHEST_ORDER",
     "TWO_LEVELS",
     "conditional_classes",
+    "friction_family",
 ]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+
+HIGHEST_ORDER = 64
+"""Of cogging and encoder ripple that a drive is expected to have [1/turn]."""
 
 FRICTION = "dry friction"
 """The family of dry friction and its generalisations: a model holds one of them."""
@@ -67,7 +72,7 @@ EQUIVALENT: dict[frozenset[str], str] = {
 """Equivalence classes: effects that no record of command, velocity and torque tells apart, and what else would."""
 
 
-def _friction_family() -> tuple[str, ...]:
+def friction_family() -> tuple[str, ...]:
     """Dry friction, simplest first, and its generalisations."""
     return tuple(t.name for t in LIBRARY.values() if t.family == FRICTION)
 
@@ -76,7 +81,7 @@ def conditional_classes(reversals: int, step_sizes: int, torque_logged: bool) ->
     """Classes that records without reversals, or with a single size of step, cannot split."""
     classes = []
     if reversals == 0:
-        classes.append(frozenset({*_friction_family(), "load_torque", "torque_dead_band"}))
+        classes.append(frozenset({*friction_family(), "load_torque", "torque_dead_band"}))
         classes.append(frozenset({"quadratic_drag", "friction_drift"}))
     if step_sizes <= 1:
         classes.append(frozenset({"hardening_stiffness", "extra_resonance"}))
@@ -258,19 +263,21 @@ _METADATA: dict[str, dict[str, object]] = {
     "quadratic_drag": {"domains": _DRY, "curve": lambda w, p: -p["coefficient"] * w * np.abs(w)},
     "load_torque": {"domains": _DRY, "curve": lambda w, p: np.full_like(w, -p["torque"])},
     "unbalance": {"domains": _DRY},
-    "cogging": {"domains": _DRY, "orders": (2, 64)},
-    "velocity_ripple": {"domains": _DRY, "orders": (1, 64), "seen_angle": _behind_ripple},
+    "cogging": {"domains": _DRY, "orders": (2, HIGHEST_ORDER)},
+    "velocity_ripple": {"domains": _DRY, "orders": (1, HIGHEST_ORDER), "seen_angle": _behind_ripple},
     "backlash": {"domains": _DRY, "excludes": frozenset({"extra_resonance"})},
     "hardening_stiffness": {"domains": _DRY, "excludes": frozenset({"extra_resonance"})},
     "torque_saturation": {"domains": frozenset({"torque"})},
     "torque_dead_band": {"domains": frozenset({"torque"})},
+    "transport_delay": {},
+    "torque_lag": {},
     "velocity_filter": {"seen_angle": _behind_filter},
     "integrator_clamp": {"replayed": _clamped},
     "command_rate_limit": {"replayed": _rate_limited},
 }
 """What the rest of the package has to know of an effect: a row for each."""
 
-LIBRARY = Library({name: replace(term, **_METADATA.get(name, {})) for name, term in _BUILT_IN.items()})  # type: ignore[arg-type]
+LIBRARY = Library({name: replace(term, **_METADATA[name]) for name, term in _BUILT_IN.items()})  # type: ignore[arg-type]
 """Every effect that a diagnosis can name, in the order of a report's tables; user-defined ones last."""
 
 RESONANCE = LIBRARY["extra_resonance"]

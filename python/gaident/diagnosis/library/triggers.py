@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.pi import PI
+from gaident.diagnosis.library.terms import HIGHEST_ORDER, friction_family
 from gaident.models.model import Model
 
 __all__ = ["Motion", "not_testable", "one_sided"]
@@ -19,15 +20,6 @@ Vector = NDArray[np.float64]
 TURN = math.tau
 LEAST_TURN = math.pi / 3.0  # rad of travel below which a once-per-turn torque is a constant and a spring
 REACHED = 0.999  # of a limit of the controller: from there on it was reached
-HIGHEST_ORDER = 60  # of cogging and encoder ripple that a drive is expected to have
-FRICTIONS = (
-    "coulomb_friction",
-    "stribeck_friction",
-    "asymmetric_friction",
-    "presliding_friction",
-    "lugre_friction",
-    "friction_drift",
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +105,8 @@ def _monotone(m: Motion, apart: float) -> bool:
 def _speed(motions: Sequence[Motion]) -> dict[str, str]:
     top = max(float(np.abs(m.smooth).max()) for m in motions)
     if not any(np.any(m.moving) for m in motions):
-        still = "the axis does not move"
-        return dict.fromkeys(
-            (*FRICTIONS, "quadratic_drag", "unbalance", "cogging", "backlash", "hardening_stiffness", "velocity_ripple"), still
-        )
+        moving = ("quadratic_drag", "unbalance", "cogging", "backlash", "hardening_stiffness", "velocity_ripple")
+        return dict.fromkeys((*friction_family(), *moving), "the axis does not move")
     why = {}
     forward = any(np.any(m.moving & (m.smooth > 0.0)) for m in motions)
     backward = any(np.any(m.moving & (m.smooth < 0.0)) for m in motions)
