@@ -67,7 +67,7 @@ class DataSet:
         """The records as driven by their torque; spoiled: some velocities are not what the controller read."""
         driven = tuple(_driven(r, torque_of(r, controller)) for r in records)
         turned = tuple(with_angle(r, angle_of(a)) for r, a in zip(records, driven, strict=True))
-        free = tuple(a if r.position is not None else with_angle(a, None) for r, a in zip(records, driven, strict=True))
+        free = _freed(records, driven)
         moving = tuple(starts_moving(r, None) for r in driven)
         seen = tuple(records if read is None else read)
         measured = any(r.torque_is == MEASURED for r in records)
@@ -144,6 +144,10 @@ class DataSet:
             driven.append(_driven(r, replayed(read, self.controller, effects)))
         return tuple(driven)
 
+    def freed(self, driven: Sequence[Record]) -> tuple[Record, ...]:
+        """Torque-driven records without an angle that was not measured."""
+        return _freed(self.records, driven)
+
     def replayed_error(self, effects: Mapping[Term, Vector]) -> Vector:
         """Logged torque minus the controller's replay with these effects, records one after the other [N m]."""
         return np.concatenate([torque_in(r) - replayed(r, self.controller, effects) for r in self.read])
@@ -172,6 +176,10 @@ def replayed(rec: Record, controller: PI | None, effects: Mapping[Term, Vector])
 def with_angle(rec: Record, angle: Vector | None) -> Record:
     """The record with another angle [rad], or none."""
     return rec.with_channels(position=angle)
+
+
+def _freed(records: Sequence[Record], driven: Sequence[Record]) -> tuple[Record, ...]:
+    return tuple(a if r.position is not None else with_angle(a, None) for r, a in zip(records, driven, strict=True))
 
 
 def _driven(rec: Record, torque: Vector) -> Record:

@@ -80,24 +80,26 @@ class OpenLoop:
         """See `Predictor`."""
         inside = [t for t in parameters.terms if t.in_controller]
         if inside:
-            return self._limited(parameters, X, [t.name for t in inside])
+            return self._replayed(parameters, X, inside)
+        return self._under(parameters, X, self.data.free if self.own_angle else self.data.driven)
+
+    def _under(self, parameters: Parameterisation, X: Matrix, records: Sequence[Record], left_out: Sequence[str] = ()) -> Matrix:
+        """Rows of x under the torques of these records; left_out: effects that the torques hold already."""
         if not self.own_angle and _bends_the_angle(self.data, parameters):
-            return np.vstack([_of_true_angle(self.data, parameters, x, self.data.driven, None) for x in X])
-        names, values = parameters.values(X)
-        records = self.data.free if self.own_angle else self.data.driven
+            return np.vstack([_of_true_angle(self.data, parameters, x, records, None, left_out) for x in X])
+        names, values = parameters.values(X, left_out)
         return _simulated(parameters, X, names, values, records, substeps(self.data, parameters.terms))
 
-    def _limited(self, parameters: Parameterisation, X: Matrix, inside: Sequence[str]) -> Matrix:
+    def _replayed(self, parameters: Parameterisation, X: Matrix, inside: Sequence[Term]) -> Matrix:
         """With effects of the controller the torque itself depends on x: rows that share it are simulated together."""
-        values = np.column_stack([parameters.effect_values(X, e)[:, 0] for e in inside])
-        distinct, group = np.unique(values, axis=0, return_inverse=True)
+        parts = [parameters.effect_values(X, t.name) for t in inside]
+        _, first, group = np.unique(np.hstack(parts), axis=0, return_index=True, return_inverse=True)
         out = np.empty((len(X), sum(self.data.lengths)))
-        steps = substeps(self.data, parameters.terms)
-        for i, row in enumerate(distinct):
+        for i, row in enumerate(first.tolist()):
             of_row = np.flatnonzero(group.ravel() == i)
-            records = self.data.replayed({parameters.term(e): row[k : k + 1] for k, e in enumerate(inside)})
-            names, own = parameters.values(X[of_row], inside)
-            out[of_row] = _simulated(parameters, X[of_row], names, own, records, steps)
+            records = self.data.replayed({t: part[row] for t, part in zip(inside, parts, strict=True)})
+            records = self.data.freed(records) if self.own_angle else records
+            out[of_row] = self._under(parameters, X[of_row], records, [t.name for t in inside])
         return out
 
     def torque_response(self, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
@@ -168,10 +170,15 @@ def _bends_the_angle(data: DataSet, parameters: Parameterisation) -> bool:
 
 
 def _of_true_angle(
-    data: DataSet, parameters: Parameterisation, x: Vector, records: Sequence[Record], controller: PI | None
+    data: DataSet,
+    parameters: Parameterisation,
+    x: Vector,
+    records: Sequence[Record],
+    controller: PI | None,
+    left_out: Sequence[str] = (),
 ) -> Matrix:
     """One x with the true angle, from which the sensor of this model makes the angle that was seen."""
-    names, values = parameters.values(x[None, :])
+    names, values = parameters.values(x[None, :], left_out)
     # Back through the sensor: what stands last in the chain is taken back first.
     bending = sorted((t for t in parameters.terms if t.seen_angle), key=lambda t: -place_of(t.name))
     bent = [(t.seen_angle, parameters.effect_values(x[None, :], t.name)[0]) for t in bending]

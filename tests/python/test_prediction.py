@@ -1,0 +1,76 @@
+"""Predictors: effects of the controller beside effects of the angle, in the torque that drives an open loop."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from gaident.diagnosis.library.terms import LIBRARY
+from gaident.estimation.dataset import DataSet, torque_in, with_angle
+from gaident.estimation.parameterisation import Parameterisation
+from gaident.estimation.prediction import OpenLoop
+from gaident.estimation.term import Scales, Term
+
+DT, N = 1e-3, 600
+LOOP = ga.PI(kp=0.05, ki=1.5)
+ONE = ga.OneMass(J=5e-4, D=2e-3).model()
+SCALES = Scales(DT, N * DT, 40.0, 1.0, 1e3, 10.0, 0.02, float("nan"), float("nan"), False, 1.0)
+COGGING, CLAMP, FILTER = (LIBRARY[name] for name in ("cogging", "integrator_clamp", "velocity_filter"))
+VALUES = {"cogging": (0.02, 0.01, 6.0), "integrator_clamp": (np.log(0.05),), "velocity_filter": (np.log(2e-3),)}
+
+
+def data() -> DataSet:
+    rng = np.random.default_rng(0)
+    asked = np.repeat([30.0, -20.0, 40.0], N // 3)
+    rec = ga.Record(DT, command=asked, velocity=np.zeros(N))
+    return DataSet.of([rec.with_channels(velocity=ga.simulate(ONE, rec, LOOP) + 0.5 * rng.standard_normal(N))], LOOP)
+
+
+def parameters(*terms: Term) -> tuple[Parameterisation, np.ndarray]:
+    p = Parameterisation.of(ONE, SCALES, [False])
+    x = p.base_vector(ONE)
+    for t in terms:
+        p, x = p.extended(t), np.concatenate([x, VALUES[t.name]])
+    return p, x
+
+
+@pytest.mark.parametrize("own_angle", [False, True])
+@pytest.mark.parametrize("beside", [(), (FILTER,)], ids=["", "behind a filter"])
+def test_the_angle_is_the_same_matter_with_an_effect_of_the_controller(own_angle: bool, beside: tuple[Term, ...]) -> None:
+    """Under the torque that the clamped controller makes, the model is the one without a clamp, whichever angle it turns with."""
+    found = data()
+    p, x = parameters(CLAMP, COGGING, *beside)
+    less, y = parameters(COGGING, *beside)
+    torque = torque_in(found.replayed({CLAMP: np.exp(VALUES[CLAMP.name])})[0])
+    driven = (found.driven[0].with_channels(torque=torque),)
+    clamped = replace(found, driven=driven, free=tuple(with_angle(r, None) for r in driven))
+    w = OpenLoop(found, own_angle).velocities(p, x[None, :])
+    np.testing.assert_array_equal(w, OpenLoop(clamped, own_angle).velocities(less, y[None, :]))
+    other = OpenLoop(found, not own_angle).velocities(p, x[None, :])
+    assert np.abs(w - other).max() > 1e-3, "the two angles are not the same"
+
+
+def test_an_effect_of_the_controller_may_have_several_parameters() -> None:
+    found = data()
+    seen: list[np.ndarray] = []
+
+    def replayed(rec: ga.Record, controller: ga.PI, values: np.ndarray) -> tuple[ga.Record, ga.PI]:
+        seen.append(values.copy())
+        return rec, replace(controller, integrator_limit=float(values[0]), torque_limit=float(values[1]))
+
+    two = replace(
+        CLAMP,
+        natural=lambda Z: np.exp(Z),
+        limits=lambda s: [(-10.0, 10.0)] * 2,
+        steps=lambda s: (0.1, 0.1),
+        replayed=replayed,
+    )
+    p, x = parameters()
+    rows = np.array([[0.05, 0.6], [0.05, 0.2], [0.05, 0.6]])
+    w = OpenLoop(found).velocities(p.extended(two), np.hstack([np.tile(x, (3, 1)), np.log(rows)]))
+    np.testing.assert_array_equal(w[0], w[2])
+    assert np.abs(w[0] - w[1]).max() > 0.1, "they differ in the second parameter alone"
+    np.testing.assert_allclose(np.array(seen), [[0.05, 0.2], [0.05, 0.6]])
