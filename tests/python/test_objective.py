@@ -9,9 +9,16 @@ import pytest
 from numpy.typing import NDArray
 
 import gaident as ga
+from gaident.diagnosis.mechanics import mechanics_of
+from gaident.estimation import uncertainty
 from gaident.estimation.dataset import DataSet
-from gaident.estimation.noise_model import ShaftNoise
-from gaident.estimation.objective import Innovations, Objective
+from gaident.estimation.least_squares import fit as fitted
+from gaident.estimation.noise_model import WHITE, ShaftNoise
+from gaident.estimation.objective import Hypothesis, Innovations, Objective
+from gaident.estimation.parameterisation import Parameterisation
+from gaident.estimation.prediction import OpenLoop
+from gaident.estimation.term import Scales
+from gaident.estimation.uncertainty import estimates_of
 
 Vector = NDArray[np.float64]
 
@@ -83,3 +90,21 @@ def test_a_record_of_which_no_sample_counts_leaves_nothing() -> None:
     np.testing.assert_array_equal(row, np.tile(np.repeat([1.0, 0.0, 1.0], (60, 50, 40)), (2, 1)))
     assert objective.count == 100.0 - 2 * objective.head
     np.testing.assert_array_equal(masked((60, 50), list(range(110))).bridged(np.ones((1, 110))), np.zeros((1, 110)))
+
+
+def test_the_covariance_of_a_fit_is_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Effects and mechanics both ask for it; beside a gap it costs eight fits."""
+    one = ga.OneMass(J=1e-3, D=1e-3).model()
+    torque = np.repeat([0.1, -0.1], N // 2)
+    rec = ga.Record(DT, velocity=np.zeros(N), torque=torque)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(N)
+    data = DataSet.of([rec.with_channels(velocity=ga.simulate(one, rec) + noise)], None)
+    objective = Objective(data, np.ones(N))
+    scales = Scales(DT, 1.0, 50.0, 0.1, 1.0, 10.0, 0.002, float("nan"), float("nan"), False, 0.1)
+    parameters = Parameterisation.of(one, scales, [False])
+    fit = fitted(objective, Hypothesis(parameters, OpenLoop(data)), parameters.start(one), WHITE, 5)
+    asked: list[object] = []
+    at_one_point = uncertainty._at_one_point
+    monkeypatch.setattr(uncertainty, "_at_one_point", lambda o, f: asked.append(f) or at_one_point(o, f))
+    assert estimates_of(objective, fit) == {} and mechanics_of(objective, fit)["inertia"].value == pytest.approx(1e-3, rel=1e-2)
+    assert asked == [fit]

@@ -33,7 +33,11 @@ Matrix = NDArray[np.float64]
 
 
 def covariance_of(objective: Objective, fit: Fit) -> Matrix:
-    """Covariance of x; infinite where the record says nothing, 0 for entries that were not moved."""
+    """Covariance of x; infinite where the record says nothing, 0 for entries that were not moved. Worked out once for a fit."""
+    return objective.once(("covariance", fit.key), lambda: _covariance(objective, fit))
+
+
+def _covariance(objective: Objective, fit: Fit) -> Matrix:
     cov = _at_one_point(objective, fit)
     if not any(t.multimodal and t.in_coupling for t in fit.parameters.terms):
         return cov
