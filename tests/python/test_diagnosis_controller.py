@@ -182,6 +182,13 @@ def test_a_hum_gets_its_frequency_and_size_and_a_lattice_its_noise() -> None:
     assert found.before.noise_floor >= 0.1 / math.sqrt(12.0)
 
 
+def test_a_hum_in_two_records_is_one_frequency_with_a_phase_of_each() -> None:
+    whole = limited_drive(math.inf, hum=0.03)
+    found = ga.diagnose([whole[: len(whole) // 2], limited_drive(math.inf, seed=1, hum=0.03)[len(whole) // 3 :]], CONTROLLER)
+    assert found.driver == "time" and found.line is not None, found.summary()
+    assert found.line == (pytest.approx(37.0, abs=0.3), pytest.approx(0.03, rel=0.1))
+
+
 def test_a_record_is_replayed_once_with_the_same_controller(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its replay is passed on; only other gains, or a record cleaned of outliers, ask for another."""
     from gaident.diagnosis.controller import controller_place

@@ -85,11 +85,11 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
     none = account.bic(np.zeros((0, len(w))))
     gains = {driver: none - account.bic(rows) for driver, rows in columns.items()}
     line = None
-    for i in range(0, len(lines), 2):
+    for pairs in lines:
         # A frequency that was searched for counts as a number more.
-        gain = none - account.bic(lines[i : i + 2]) - np.log(objective.information)
+        gain = none - account.bic(pairs) - np.log(objective.information)
         if gain > gains["time"]:
-            gains["time"], line = gain, torque_of_line(objective, fit, J, error, lines[i : i + 2])
+            gains["time"], line = gain, torque_of_line(objective, fit, J, error, pairs)
     least = {driver: objective.plain(np.vstack([J, rows]), error) for driver, rows in columns.items()}
     whitened = isinstance(objective.family, Innovations)
     needed = POLICY.dependence_gain * (1.0 + (POLICY.short_record / objective.count if whitened else 0.0))
@@ -166,24 +166,33 @@ def _drifts(t: Vector, w: Vector) -> Matrix:
     return np.array([s, s * s, s * np.sign(w), s * w])
 
 
-def _lines(error: Vector, lengths: tuple[int, ...]) -> Matrix:
-    """Cosine and sine of the three frequencies that stand highest above the error's spectrum."""
+def _lines(error: Vector, lengths: tuple[int, ...]) -> list[Matrix]:
+    """The three frequencies that stand highest above the error's spectrum, each as rows cos, sin of every record by itself.
+
+    The frequency is that of all records, phase and size are each record's own: a hum knows nothing of when a log begins.
+    """
     longest = max(lengths)
-    if len(lengths) != 1 or longest < 64:
-        return np.zeros((0, len(error)))
-    spectrum = np.abs(np.fft.rfft((error - error.mean()) * np.hanning(longest))) ** 2
+    if longest < 64:
+        return []
+    parts = np.split(error, np.cumsum(lengths)[:-1])
+    windowed = np.array([np.fft.rfft((e - e.mean()) * np.hanning(len(e)), longest) for e in parts])
+    spectrum: Vector = np.sum(np.abs(windowed) ** 2, axis=0)
     kernel = np.ones(31) / 31.0
     level = np.convolve(np.pad(spectrum, 15, mode="reflect"), kernel, mode="valid")
     height = spectrum / np.maximum(level, 1e-300)
     height[:4] = 0.0
-    rows = []
-    t = np.arange(longest)
+    found = []
     for _ in range(3):
         k = int(np.argmax(height))
         f = 2.0 * np.pi * _peak(spectrum, k) / longest
-        rows += [np.cos(f * t), np.sin(f * t)]
+        rows = np.zeros((2 * len(lengths), len(error)))
+        at = 0
+        for i, n in enumerate(lengths):
+            rows[2 * i : 2 * i + 2, at : at + n] = np.cos(f * np.arange(n)), np.sin(f * np.arange(n))
+            at += n
+        found.append(rows)
         height[max(k - 4, 0) : k + 5] = 0.0
-    return np.array(rows)
+    return found
 
 
 def _peak(spectrum: Vector, k: int) -> float:
