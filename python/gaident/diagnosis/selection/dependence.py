@@ -64,7 +64,7 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
     data, parameters, x = objective.data, fit.parameters, fit.x
     _, J, error = objective.linearised(fit.hypothesis, x, WHITE)
     w = objective.measured - error
-    room = max(len(w) // 16, 4)
+    room = max(len(w) // 16, 4)  # numbers for a family; from 290 samples on there is room for all
     torques: dict[str, Matrix] = {
         "velocity": _hats_by_sign(w),
         "position": _of_position(data.angle, w),
@@ -75,11 +75,12 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
     if data.command is not None:
         torques["command"] = _hats(data.command, 8)
     response = fit.predictor.torque_response
-    columns = {d: response(parameters, x, rows[:room]) for d, rows in torques.items()}
+    columns = {d: response(parameters, x, rows) for d, rows in torques.items()}
     if parameters.masses == 2:
         columns["past"] = np.vstack(
             [columns["past"], coupling_response(data, parameters, x, _of_path(twist(data, parameters, x), data.lengths))]
         )
+    columns = {d: _strongest(rows, room) for d, rows in columns.items()}
     lines = _lines(project_out(J, error[None, :])[0], data.lengths)
     account = _Account(objective, J, error, fit)
     none = account.bic(np.zeros((0, len(w))))
@@ -94,6 +95,19 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
     whitened = isinstance(objective.family, Innovations)
     needed = POLICY.dependence_gain * (1.0 + (POLICY.short_record / objective.count if whitened else 0.0))
     return Dependence({driver: float(gain) for driver, gain in gains.items()}, least, needed, line, whitened)
+
+
+def _strongest(rows: Matrix, room: int) -> Matrix:
+    """As many combinations of the rows as a short record has room for: the principal components of the rows, each of size 1.
+
+    They are the same whatever the order of the rows, and hold of all of them as much as so few can.
+    """
+    sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    if len(rows) <= room or not np.all(np.isfinite(sizes)):
+        return rows
+    unit = rows[sizes > 0.0] / sizes[sizes > 0.0][:, None]
+    _, vectors = np.linalg.eigh(unit @ unit.T)
+    return np.asarray(vectors[:, ::-1][:, :room].T @ unit)
 
 
 class _Account:
