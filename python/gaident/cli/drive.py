@@ -24,7 +24,7 @@ def drive_of(args: argparse.Namespace) -> Drive:
     if getattr(args, "drive", None) is not None:
         sections, unfilled = read_drive_file(args.drive), unfilled_of(args.drive)
     for name, keys in KEYS.items():
-        if name in ("columns", "units"):
+        if name in ("columns", "units", "shift"):
             sections[name].update(_assignments(getattr(args, name, None) or [], f"--{name}"))
             continue
         for key in keys:
@@ -34,6 +34,7 @@ def drive_of(args: argparse.Namespace) -> Drive:
     if sections["controller"].get("loop") is not None:
         one_of(sections["controller"]["loop"], "loop", (*LOOPS, "open"), ControllerError)
     sections["units"] = {k: _as_number(v) for k, v in sections["units"].items()}
+    sections["shift"] = {k: _as_whole(v, f"--shift {k}") for k, v in sections["shift"].items()}
     return Drive(
         sections[""],
         sections["columns"],
@@ -41,6 +42,7 @@ def drive_of(args: argparse.Namespace) -> Drive:
         sections["controller"],
         sections["space"],
         sections["limits"],
+        sections["shift"],
         unfilled,
     )
 
@@ -97,3 +99,10 @@ def _as_number(text: str | float) -> str | float:
         return float(text)
     except ValueError:
         return text
+
+
+def _as_whole(text: str | int, option: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise SettingsError(f"{option}={text}: give a whole number of samples, negative for earlier") from None

@@ -107,6 +107,8 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
     )
     g.add_argument("--gear-ratio", type=number, metavar="X", help="turns of the motor per turn of the load, with --load-side")
     g.add_argument("--load-side", nargs="+", metavar="CH", help="channels that were measured behind the gear")
+    shift = "move channels by samples, where the log wrote them on another line: torque=-1 for one that was logged a sample late"
+    g.add_argument("--shift", action="append", metavar="CH=N,...", help=shift)
     kinds = "commanded: by the controller; measured: a current times a constant (default: as its column's name says)"
     g.add_argument("--torque-is", choices=TORQUE_KINDS, help=f"what the torque is: {kinds}")
     for name, text in CONSTANT_HELP.items():

@@ -49,6 +49,8 @@ drive.toml, every part optional:
   velocity = "w"
   [units]
   velocity = "rpm"                # or the factor to SI, as a number
+  [shift]
+  torque = -1                     # samples, for a channel that the log wrote on another line than the rest
   [controller]
   kp = 0.0232                     # N m s/rad
   ki = 1.367                      # N m/rad; also loop, torque_limit, integrator_limit

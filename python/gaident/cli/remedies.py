@@ -30,7 +30,7 @@ def in_options(error: GaidentError) -> str:
 def _option(a: Argument) -> str:
     if (a.name, a.value) in WHOLE:
         return WHOLE[a.name, a.value]
-    if a.name in ("columns", "units") and a.key:
+    if a.name in ("columns", "units", "shift") and a.key:
         value = "" if a.value == "None" else a.value.strip("'")
         return f"--{a.name} {a.key}={value}"
     if a.name in ("p", "q"):

@@ -50,7 +50,8 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
             values["velocity"] = differentiate(values["position"], dt, wanted.velocity_cutoff_hz)
         name = stem if wanted.name is None else wanted.name
         kind = _torque_kind(table, wanted, named.get("torque"))
-        return Record(dt, name=name, torque_is=kind, **{channel: values.get(channel) for channel in CHANNELS})
+        rec = Record(dt, name=name, torque_is=kind, **{channel: values.get(channel) for channel in CHANNELS})
+        return rec.shifted(**wanted.shift) if wanted.shift else rec
     except RecordError as error:
         raise RecordError(f"{table.path}: {error.marked}") from None
 

@@ -90,6 +90,7 @@ def read(
     load_side: str | Sequence[str] = (),
     measured: bool = True,
     torque_is: str | None = None,
+    shift: Mapping[str, int] | None = None,
     delimiter: str | None = None,
     decimal: str | None = None,
     skip: int | None = None,
@@ -146,6 +147,9 @@ def read(
         Whether the torque is the controller's command, or a measured current times a constant, with the sensor's noise.
         None: measured where the column's name says so (`Actual current`, `I_q`, `M_ist`, `torque feedback`), else commanded.
         The record's repr shows which it is.
+    shift : mapping of str to int, optional
+        Channel -> samples by which it is moved against the others, where the log wrote it on another line.
+        {"torque": -1} is for a torque that was logged one sample late; see `Record.shifted`.
     delimiter : str, optional
         Of a text table, where it cannot be found out: a character, "tab" or "space".
     decimal : {".", ","}, optional
@@ -194,6 +198,7 @@ def read(
         load_side=(load_side,) if isinstance(load_side, str) else tuple(load_side),
         measured=measured,
         torque_is=torque_is,
+        shift={} if shift is None else shift,
     ).check()
     with open_log(path, TextOptions(delimiter, decimal, skip, encoding)) as table:
         return assemble(table, wanted, "" if is_frame(path) else Path(path).stem)

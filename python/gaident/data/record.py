@@ -289,6 +289,41 @@ class Record:
         thinned: Mapping[str, Any] = {key: decimated(values, factor) for key, values in self.channels()}
         return self.with_channels(dt=self.dt * factor, **thinned)
 
+    def shifted(self, **samples: int) -> Record:
+        """The record with channels moved against the others by whole samples, for logs that wrote them on another line.
+
+            x_new(n) = x(n - k),   k > 0: later, k < 0: earlier
+
+        samples  channel -> k. `rec.shifted(torque=-1)` is for a torque that the log wrote one sample late
+
+        The record is cut to what all channels cover then; at least 20 samples remain. Raises RecordError.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import gaident as ga
+        >>> rec = ga.Record(1e-3, velocity=np.arange(30.0), torque=np.arange(30.0) - 1.0)
+        >>> moved = rec.shifted(torque=-1)
+        >>> len(moved), bool(np.all(moved.torque == moved.velocity))
+        (29, True)
+        """
+        for key, k in samples.items():
+            one_of(key, "shifted: the channel", CHANNELS, RecordError)
+            if isinstance(k, bool) or not isinstance(k, int | np.integer):
+                raise RecordError(f"shifted({key}={k!r}): give a whole number of samples, negative for earlier")
+            if getattr(self, key) is None:
+                raise RecordError(f"shifted({key}={k!r}): the record has no {key}; leave it out")
+        moves = {key: int(samples.get(key, 0)) for key, _ in self.channels()}
+        start, stop = max(0, *moves.values()), len(self) + min(0, *moves.values())
+        if stop - start < MINIMUM_SAMPLES:
+            listed = ", ".join(f"{key}={k}" for key, k in samples.items())
+            raise RecordError(
+                f"shifted({listed}) leaves {max(stop - start, 0)} of {len(self)} samples, but at least {MINIMUM_SAMPLES} are "
+                "needed; move by fewer samples"
+            )
+        held: Mapping[str, Any] = {key: values[start - moves[key] : stop - moves[key]] for key, values in self.channels()}
+        return self.with_channels(**held)
+
     def _sample_at(self, time: float) -> int:
         """First sample not before `time` [s], within 0..n."""
         return math.ceil(min(max(time / self.dt - _TIME_SLACK, 0.0), float(len(self))))

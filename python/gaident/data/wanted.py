@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from gaident.arguments import arg
 from gaident.checks import one_of
@@ -35,6 +35,7 @@ class Wanted:
     load_side: tuple[str, ...] = ()
     measured: bool = True
     torque_is: str | None = None
+    shift: Mapping[str, int] = field(default_factory=dict)
 
     def check(self) -> Wanted:
         """Itself, once what can be judged without the file is right; else ReadError or RecordError."""
@@ -57,9 +58,19 @@ class Wanted:
         self._check_gear()
         if self.torque_is is not None:
             one_of(self.torque_is, "torque_is", TORQUE_KINDS, ReadError)
+        self._check_shift()
         if self.name is not None and not isinstance(self.name, str):
             raise ReadError(f"name={self.name!r} is no text; give a str")
         return self
+
+    def _check_shift(self) -> None:
+        if not isinstance(self.shift, Mapping):
+            raise ReadError(f"shift={self.shift!r} is no mapping; give for example {arg('shift', '-1', 'torque')}")
+        if self.shift and (factor_of(self.decimate) > 1 or self.resample is not None):
+            raise ReadError(
+                "shift counts the log's own samples, which decimate and resample do away with: read the log without them, then "
+                "use rec.shifted(...).decimate(...)"
+            )
 
     def _check_gear(self) -> None:
         for channel in self.load_side:

@@ -115,6 +115,7 @@ KEYS: dict[str, dict[str, Check]] = {
     },
     "columns": dict.fromkeys(COLUMNS, _column),
     "units": dict.fromkeys(COLUMNS, _unit),
+    "shift": dict.fromkeys(CHANNELS, _whole),
     "controller": {
         "kp": _number,
         "ki": _number,
@@ -142,6 +143,7 @@ class Drive:
     controller_values: Mapping[str, Any]
     space_values: Mapping[str, Any]
     limit_values: Mapping[str, Any] = field(default_factory=dict)
+    shift: Mapping[str, int] = field(default_factory=dict)
     unfilled: Mapping[tuple[str, str], str] = field(default_factory=dict)  # (section, key) -> file and line, see `unfilled_of`
 
     @property
@@ -162,7 +164,8 @@ class Drive:
         more = {k: v for k, v in self.general.items() if k not in not_read}
         self._refuse_unfilled("units", [k for k in CHANNELS if k not in left_out], "or give it with --units CHANNEL=UNIT")
         units = {k: v for k, v in self.units.items() if k not in left_out}
-        return read(path, columns or None, units or None, self.general.get("dt"), measured=measured, **more)
+        shift = {k: v for k, v in self.shift.items() if k not in left_out}
+        return read(path, columns or None, units or None, self.general.get("dt"), measured=measured, shift=shift, **more)
 
     def controller(self) -> PI | None:
         """The PI controller; None: open loop. Raises ControllerError where half of it is missing."""
