@@ -30,6 +30,7 @@ from gaident.data.torque_kind import MEASURED
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.policy import POLICY
 from gaident.estimation.regression.torque_lag import TorqueLag, torque_lag
+from gaident.identification.notes import reading_notes
 from gaident.results.diagnosis import Diagnosis
 
 __all__ = ["Aligned", "aligned"]
@@ -71,7 +72,7 @@ class Aligned:
 
 def aligned(records: Sequence[Record], held: Sequence[Record], controller: PI | None) -> Aligned:
     """The records without shifts of their logs, those that the controller's law shows beyond doubt."""
-    notes: dict[str, None] = {}
+    notes: dict[str, None] = dict.fromkeys(reading_notes((*records, *held)))
     shifts: dict[str, Mapping[str, int]] = {}
     given: dict[str, Record] = {}
 
