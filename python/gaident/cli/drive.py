@@ -73,12 +73,6 @@ def reading_notes(drive: Drive, records: Sequence[Record]) -> list[str]:
             f"The torque of {', '.join(guessed)} is taken as measured, as the name of its column says; where it is the "
             "controller's command, say so with --torque-is commanded."
         )
-    cutoff = drive.general.get("velocity_cutoff_hz")
-    if cutoff is not None:
-        notes.append(
-            f"The velocity alone went through a low-pass of {cutoff:g} Hz, and what drives the model did not: that biases the "
-            "inertia of a fast axis. Leave velocity_cutoff_hz out; the velocity is then the plain difference of the position."
-        )
     return notes
 
 

@@ -93,8 +93,8 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
         type=number,
         metavar="HZ",
         dest="velocity_cutoff_hz",
-        help="a log without velocity gets it from position, low-passed at this corner [Hz] (default: not at all; the velocity "
-        "filtered alone biases the inertia)",
+        help="a log without velocity gets it from position; with this, all its channels pass one zero-phase low-pass of this "
+        "corner [Hz] first (default: none, which suits identification)",
     )
     g.add_argument(
         "--decimate", type=int, metavar="N", help="keep every N-th sample behind a linear-phase low-pass, as the log is read"

@@ -13,7 +13,7 @@ from gaident.data.counters import Counters
 from gaident.data.formats.table import Column, Table
 from gaident.data.record import CHANNELS, Record
 from gaident.data.signals.arrays import MINIMUM_SAMPLES
-from gaident.data.signals.conditioning import differentiate
+from gaident.data.signals.conditioning import differentiate, low_pass
 from gaident.data.signals.decimation import Decimator, decimated, factor_of
 from gaident.data.signals.resampling import resampled
 from gaident.data.timeaxis import TimeAxis
@@ -41,6 +41,7 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
             raise ReadError(f"{table.path}: load_side names {channel!r}, but no such column is read; leave it out there")
     scales = {channel: _scale(table, wanted, channel, column) for channel, column in named.items()}
     counters = Counters(table, wanted, named)
+    said: list[str] = []
     if wanted.resample is not None:
         dt, values = _on_even_axis(table, wanted, named, scales, counters)
     else:
@@ -49,11 +50,14 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
         if "velocity" not in values and "position" not in values:
             values["velocity"] = np.zeros(len(next(iter(values.values()))))
         elif "velocity" not in values:
-            values["velocity"] = differentiate(values["position"], dt, wanted.velocity_cutoff_hz)
+            if wanted.velocity_cutoff_hz is not None:  # all alike: what is filtered alone is another plant
+                values = {channel: low_pass(x, dt, wanted.velocity_cutoff_hz) for channel, x in values.items()}
+                said.append(f"All channels went through the same zero-phase low-pass of {wanted.velocity_cutoff_hz:g} Hz.")
+            values["velocity"] = differentiate(values["position"], dt)
         name = stem if wanted.name is None else wanted.name
         kind = _torque_kind(table, wanted, named.get("torque"))
         held = {channel: values.get(channel) for channel in CHANNELS}
-        rec = Record(dt, name=name, torque_is=kind, notes=counters.notes(), **held)
+        rec = Record(dt, name=name, torque_is=kind, notes=(*counters.notes(), *said), **held)
         return rec.shifted(**wanted.shift) if wanted.shift else rec
     except RecordError as error:
         raise RecordError(f"{table.path}: {error.marked}") from None

@@ -129,8 +129,9 @@ def read(
     torque_per_volt : float, optional
         Torque of a voltage [N m/V], for the unit V.
     velocity_cutoff_hz : float, optional
-        Corner [Hz] of `differentiate`, which gives the velocity of a log that has a position and none.
-        None, the plain difference, suits identification: a velocity that is filtered alone biases the inertia of a fast axis.
+        Corner [Hz]. The velocity of a log that has a position and none is the difference of the position; with a corner all
+        channels pass the same zero-phase low-pass first. Filtered alike, they keep the inertia.
+        None, no filter, suits identification.
     decimate : int
         10: every tenth sample behind a low-pass of linear phase whose delay is compensated, see `Record.decimate`.
         The log is decimated as it is read, whatever its length.
