@@ -1,6 +1,6 @@
 from . import errors
 from .control import PI
-from .data import Alignment, Record, align, columns, differentiate, read, read_columns
+from .data import Alignment, Record, align, columns, differentiate, read, read_axes, read_columns
 from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
 from .estimation import InverseDynamics, inverse_dynamics
@@ -65,6 +65,7 @@ __all__ = [
     "model_from_factor_parameters",
     "progress",
     "read",
+    "read_axes",
     "read_columns",
     "report",
     "run",

@@ -22,7 +22,8 @@ def drive_of(args: argparse.Namespace) -> Drive:
     sections: dict[str, dict[str, Any]] = {name: {} for name in KEYS}
     unfilled: dict[tuple[str, str], str] = {}
     if getattr(args, "drive", None) is not None:
-        sections, unfilled = read_drive_file(args.drive), unfilled_of(args.drive)
+        axis = _selected(args)
+        sections, unfilled = read_drive_file(args.drive, axis), unfilled_of(args.drive, axis)
     for name, keys in KEYS.items():
         if name in ("columns", "units", "shift"):
             sections[name].update(_assignments(getattr(args, name, None) or [], f"--{name}"))
@@ -45,6 +46,14 @@ def drive_of(args: argparse.Namespace) -> Drive:
         sections["shift"],
         unfilled,
     )
+
+
+def _selected(args: argparse.Namespace) -> str | None:
+    """The axis that --select names. Raises SettingsError for several."""
+    names = getattr(args, "select", None) or []
+    if len(names) > 1:
+        raise SettingsError(f"--select {' '.join(names)}: only gaident diagnose takes several axes at once; name one")
+    return names[0] if names else None
 
 
 def read_all(drive: Drive, logs: Sequence[str], controller: PI | None, measured: bool = True) -> list[Record]:

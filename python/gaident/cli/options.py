@@ -86,6 +86,9 @@ examples:
   gaident diagnose run1.csv run2.csv --validation run3.csv --drive drive.toml --plot run.png --out run.json
   gaident diagnose run1.csv --kp 0.0232 --ki 1.367 --bootstrap 99 --next-command next.csv
 
+A log of several axes: [axes.x.columns], [axes.x.controller], ... in drive.toml beside what is common; each is
+diagnosed, one row each, or those that --select names.
+
 exit codes: 0 done (whatever the verdict), 1 the work failed, 2 wrong use, 130 interrupted
 """
 DEMO_HELP = """\

@@ -1,7 +1,7 @@
 from .alignment import Alignment, align
 from .listing import Listing, columns
-from .readers import read, read_columns
+from .readers import read, read_axes, read_columns
 from .record import Record
 from .signals.conditioning import differentiate
 
-__all__ = ["Alignment", "Listing", "Record", "align", "columns", "differentiate", "read", "read_columns"]
+__all__ = ["Alignment", "Listing", "Record", "align", "columns", "differentiate", "read", "read_axes", "read_columns"]
