@@ -49,6 +49,9 @@ CONSTANT_HELP = {
     "torque_constant": "[N m/A], for a torque in A",
     "rated_torque": "what 100 %% means [N m], for a torque in %%",
     "torque_per_volt": "[N m/V], for a torque in V",
+    "resistance": "of the winding [Ohm], with --torque-constant for a torque from a voltage",
+    "inductance": "of the winding [H] (default: 0)",
+    "back_emf_constant": "[V s/rad] (default: the torque constant)",
 }
 TEXT_TABLE_HELP = {
     "delimiter": "what separates columns, a character, tab or space (default: found out)",

@@ -10,7 +10,17 @@ __all__ = ["in_options"]
 # Options with the name of the argument.
 SAME_NAME = {
     *("dt", "delimiter", "decimal", "skip", "encoding", "decimate", "resample", "loop", "ki", "kp"),
-    *("counts_per_turn", "torque_constant", "rated_torque", "torque_per_volt", "gear_ratio", "load_side", "torque_is"),
+    *(
+        "counts_per_turn",
+        "torque_constant",
+        "rated_torque",
+        "torque_per_volt",
+        "resistance",
+        "inductance",
+        "gear_ratio",
+        "load_side",
+        "torque_is",
+    ),
 }
 WHOLE = {
     ("space", "SearchSpace(gain=...)"): "--gain LOW HIGH",

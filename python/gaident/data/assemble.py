@@ -19,6 +19,7 @@ from gaident.data.signals.resampling import resampled
 from gaident.data.timeaxis import TimeAxis
 from gaident.data.torque_kind import COMMANDED, kind_of_torque
 from gaident.data.wanted import Wanted, si_factor
+from gaident.data.winding_torque import ELECTRICAL, torque_of_winding
 from gaident.errors import ReadError, RecordError
 
 __all__ = ["assemble"]
@@ -40,6 +41,7 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
         if channel not in named:
             raise ReadError(f"{table.path}: load_side names {channel!r}, but no such column is read; leave it out there")
     scales = {channel: _scale(table, wanted, channel, column) for channel, column in named.items()}
+    kind = _torque_kind(table, wanted, named.get("torque")) if ELECTRICAL.isdisjoint(named) else ""
     counters = Counters(table, wanted, named)
     said: list[str] = []
     if wanted.resample is not None:
@@ -54,8 +56,10 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
                 values = {channel: low_pass(x, dt, wanted.velocity_cutoff_hz) for channel, x in values.items()}
                 said.append(f"All channels went through the same zero-phase low-pass of {wanted.velocity_cutoff_hz:g} Hz.")
             values["velocity"] = differentiate(values["position"], dt)
+        if not ELECTRICAL.isdisjoint(named):
+            values["torque"], kind, note = torque_of_winding(table, wanted, values, dt)
+            said += [note] if note else []
         name = stem if wanted.name is None else wanted.name
-        kind = _torque_kind(table, wanted, named.get("torque"))
         held = {channel: values.get(channel) for channel in CHANNELS}
         rec = Record(dt, name=name, torque_is=kind, notes=(*counters.notes(), *said), **held)
         return rec.shifted(**wanted.shift) if wanted.shift else rec
@@ -168,7 +172,7 @@ def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
         }
     if wanted.measured and "velocity" not in found and "position" not in found:
         raise ReadError(_say_missing(table, wanted, "velocity", "the velocity (or the position, to derive it from)"))
-    if "command" not in found and "torque" not in found:
+    if "command" not in found and "torque" not in found and ELECTRICAL.isdisjoint(found):
         raise ReadError(_say_missing(table, wanted, "torque", "the command or the torque"))
     if "velocity" in found and wanted.velocity_cutoff_hz is not None:
         raise ReadError(

@@ -83,6 +83,9 @@ def read(
     torque_constant: float | None = None,
     rated_torque: float | None = None,
     torque_per_volt: float | None = None,
+    resistance: float | None = None,
+    inductance: float | None = None,
+    back_emf_constant: float | None = None,
     velocity_cutoff_hz: float | None = None,
     decimate: int = 1,
     resample: float | None = None,
@@ -106,7 +109,8 @@ def read(
         The log. MAT 7.3 and HDF5 need h5py, Parquet pyarrow, TDMS nptdms, MDF asammdf: the extras hdf5, parquet, tdms and mdf
         of this package.
     columns : mapping of str to str, int or None, optional
-        Channel -> column of the file; channels are command, velocity, torque, position and time.
+        Channel -> column of the file; channels are command, velocity, torque, position and time, and voltage and current, from
+        which a torque is worked out.
         A column is its name (or the name without a unit: `w` for `w [rpm]`), its number '#3' or 3 (zero based), or, in MAT and
         NPZ, a column of a two-dimensional array, 'data[:,3]' (zero based).
         None: columns that bear the channels' own names. {"time": None} ignores a time column.
@@ -128,6 +132,9 @@ def read(
         Torque that is 100 % [N m], for the unit %.
     torque_per_volt : float, optional
         Torque of a voltage [N m/V], for the unit V.
+    resistance, inductance, back_emf_constant : float, optional
+        Of the motor's winding [Ohm], [H], [V s/rad]: a voltage becomes the torque kt (U - ke w)/R, see `Winding`; None: L = 0,
+        ke = kt. Of voltage and current without a `torque_constant` the winding is estimated, and a note says so.
     velocity_cutoff_hz : float, optional
         Corner [Hz]. The velocity of a log that has a position and none is the difference of the position; with a corner all
         channels pass the same zero-phase low-pass first. Filtered alike, they keep the inertia.
@@ -195,6 +202,9 @@ def read(
         torque_constant=torque_constant,
         rated_torque=rated_torque,
         torque_per_volt=torque_per_volt,
+        resistance=resistance,
+        inductance=inductance,
+        back_emf_constant=back_emf_constant,
         velocity_cutoff_hz=velocity_cutoff_hz,
         decimate=decimate,
         resample=resample,
@@ -217,6 +227,9 @@ def _wanted(
     torque_constant: float | None = None,
     rated_torque: float | None = None,
     torque_per_volt: float | None = None,
+    resistance: float | None = None,
+    inductance: float | None = None,
+    back_emf_constant: float | None = None,
     velocity_cutoff_hz: float | None = None,
     load_side: str | Sequence[str] = (),
     shift: Mapping[str, int] | None = None,
@@ -229,7 +242,10 @@ def _wanted(
         units={} if units is None else units,
         dt=dt,
         name=name,
-        constants=Constants(counts_per_turn, torque_constant, rated_torque, torque_per_volt),
+        constants=Constants(
+            *(counts_per_turn, torque_constant, rated_torque, torque_per_volt),
+            *(resistance, inductance, back_emf_constant),
+        ),
         velocity_cutoff_hz=velocity_cutoff_hz,
         load_side=(load_side,) if isinstance(load_side, str) else tuple(load_side),
         shift={} if shift is None else shift,

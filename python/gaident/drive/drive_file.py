@@ -25,8 +25,11 @@ from gaident.show.wording import AXES
 __all__ = ["COLUMNS", "KEYS", "Drive", "axes_in", "read_drive_file", "unfilled_of"]
 
 
-COLUMNS = (*CHANNELS, "time")
-CONSTANTS = ("counts_per_turn", "torque_constant", "rated_torque", "torque_per_volt")
+COLUMNS = (*CHANNELS, "voltage", "current", "time")
+CONSTANTS = (
+    *("counts_per_turn", "torque_constant", "rated_torque", "torque_per_volt"),
+    *("resistance", "inductance", "back_emf_constant"),
+)
 RANGES = ("inertia", "resonance_hz", "damping", "gain", "real", "imaginary", "p", "q")
 
 Check = Callable[[object, str], object]
