@@ -1,6 +1,7 @@
 from .alignment import Alignment, align
+from .axes import read_axes
 from .listing import Listing, columns
-from .readers import read, read_axes, read_columns
+from .readers import read, read_columns
 from .record import Record
 from .signals.conditioning import differentiate
 from .winding import Winding

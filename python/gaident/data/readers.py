@@ -21,12 +21,11 @@ from gaident.data.formats.frames import frame_table, is_frame, open_parquet
 from gaident.data.formats.hdf import open_hdf
 from gaident.data.formats.instruments import open_mdf, open_tdms
 from gaident.data.formats.table import Table
-from gaident.data.formats.units import QUANTITIES, Constants
 from gaident.data.record import Record
-from gaident.data.wanted import Wanted
-from gaident.errors import ReadError, RecordError
+from gaident.data.wanted import wanted_of
+from gaident.errors import ReadError
 
-__all__ = ["READERS", "Reader", "open_log", "read", "read_axes", "read_columns"]
+__all__ = ["READERS", "Reader", "open_log", "read", "read_columns"]
 
 _HEAD = 4096
 
@@ -193,7 +192,7 @@ def read(
     >>> ga.read("run1.csv", columns={"time": "t", "command": "w_ref", "velocity": "w"})
     Record('run1', 30 samples, dt=0.001 s, 0.03 s; command 6.283..9.32, velocity 0..3.037)
     """
-    wanted = _wanted(
+    wanted = wanted_of(
         columns,
         units,
         dt,
@@ -216,98 +215,6 @@ def read(
     )
     with open_log(path, TextOptions(delimiter, decimal, skip, encoding)) as table:
         return assemble(table, wanted, "" if is_frame(path) else Path(path).stem)
-
-
-def _wanted(
-    columns: Mapping[str, str | int | None] | None = None,
-    units: Mapping[str, str | float] | None = None,
-    dt: float | None = None,
-    *,
-    counts_per_turn: float | None = None,
-    torque_constant: float | None = None,
-    rated_torque: float | None = None,
-    torque_per_volt: float | None = None,
-    resistance: float | None = None,
-    inductance: float | None = None,
-    back_emf_constant: float | None = None,
-    velocity_cutoff_hz: float | None = None,
-    load_side: str | Sequence[str] = (),
-    shift: Mapping[str, int] | None = None,
-    name: str | None = None,
-    **more: Any,
-) -> Wanted:
-    """The arguments of `read` that say what a record is made of, checked. Raises ReadError or RecordError."""
-    return Wanted(
-        columns=columns,
-        units={} if units is None else units,
-        dt=dt,
-        name=name,
-        constants=Constants(
-            *(counts_per_turn, torque_constant, rated_torque, torque_per_volt),
-            *(resistance, inductance, back_emf_constant),
-        ),
-        velocity_cutoff_hz=velocity_cutoff_hz,
-        load_side=(load_side,) if isinstance(load_side, str) else tuple(load_side),
-        shift={} if shift is None else shift,
-        **more,
-    ).check()
-
-
-def read_axes(path: str | os.PathLike[str] | Any, axes: Mapping[str, Mapping[str, Any]], **common: Any) -> dict[str, Record]:
-    """Read several axes of one log: name of the axis -> its Record, in the order given.
-
-    Parameters
-    ----------
-    path
-        As in `read`; the log is opened once.
-    axes
-        Name of the axis -> channel -> column, as `columns` of `read` takes them, for example
-        ``{"x": {"velocity": "axis1.w", "torque": "axis1.u"}, "y": {...}}``. Beside the channels stand arguments of `read` that
-        hold for this axis alone: ``"units"``, ``"counts_per_turn"``, ``"gear_ratio"``, ...
-    **common
-        Arguments of `read` that hold for all: ``columns`` (``{"time": "t"}``), ``units``, ``dt``, ``decimate``, ...
-        An axis's own come before them, those of mappings channel by channel.
-
-    Returns
-    -------
-    dict
-        Records of one sample time; each is named "LOG AXIS", or as its own ``"name"`` says.
-
-    Raises
-    ------
-    ReadError, RecordError
-        As `read`, with the axis in front.
-
-    Examples
-    --------
-    >>> import pandas as pd
-    >>> import numpy as np
-    >>> import gaident as ga
-    >>> t = 1e-3 * np.arange(100)
-    >>> log = pd.DataFrame({"t": t, "a1.n": 60 * t, "a1.M": 0 * t + 0.5, "a2.n": -30 * t, "a2.M": 0 * t - 0.25})
-    >>> axes = {"x": {"velocity": "a1.n", "torque": "a1.M"}, "y": {"velocity": "a2.n", "torque": "a2.M"}}
-    >>> found = ga.read_axes(log, axes, columns={"time": "t"}, units={"velocity": "rpm"})
-    >>> {name: round(float(rec.velocity[-1]), 3) for name, rec in found.items()}
-    {'x': 0.622, 'y': -0.311}
-    """
-    if not isinstance(axes, Mapping) or not axes or not all(isinstance(own, Mapping) for own in axes.values()):
-        raise ReadError(f"axes={axes!r:.80} is no mapping of axes; give axes={{'x': {{'velocity': 'axis1.w', ...}}, ...}}")
-    text = {key: common.pop(key, None) for key in ("delimiter", "decimal", "skip", "encoding")}
-    found = {}
-    with open_log(path, TextOptions(**text)) as table:
-        stem = "" if is_frame(path) else Path(path).stem
-        for name, own in axes.items():
-            asked = dict(common) | {key: value for key, value in own.items() if key not in QUANTITIES}
-            for key in ("columns", "units", "shift"):
-                asked[key] = {**(common.get(key) or {}), **(own.get(key) or {})} or None
-            asked["columns"] = {**(asked["columns"] or {}), **{k: v for k, v in own.items() if k in QUANTITIES}} or None
-            try:
-                found[name] = assemble(table, _wanted(**asked), f"{stem} {name}".strip())
-            except TypeError as error:
-                raise ReadError(f"axis {name!r}: {str(error).partition(' ')[2]}; give channels, and arguments of read") from None
-            except (ReadError, RecordError) as error:
-                raise type(error)(f"axis {name!r}: {error.marked}") from None
-    return found
 
 
 def read_columns(

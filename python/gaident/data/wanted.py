@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from gaident.arguments import arg
 from gaident.checks import one_of
@@ -16,7 +17,7 @@ from gaident.data.signals.decimation import factor_of
 from gaident.data.torque_kind import TORQUE_KINDS
 from gaident.errors import ReadError
 
-__all__ = ["Wanted", "si_factor"]
+__all__ = ["Wanted", "si_factor", "wanted_of"]
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,41 @@ class Wanted:
                 "per turn of "
                 f"the load, {arg('load_side', '...')} the channels that were measured behind the gear"
             )
+
+
+def wanted_of(
+    columns: Mapping[str, str | int | None] | None = None,
+    units: Mapping[str, str | float] | None = None,
+    dt: float | None = None,
+    *,
+    counts_per_turn: float | None = None,
+    torque_constant: float | None = None,
+    rated_torque: float | None = None,
+    torque_per_volt: float | None = None,
+    resistance: float | None = None,
+    inductance: float | None = None,
+    back_emf_constant: float | None = None,
+    velocity_cutoff_hz: float | None = None,
+    load_side: str | Sequence[str] = (),
+    shift: Mapping[str, int] | None = None,
+    name: str | None = None,
+    **more: Any,
+) -> Wanted:
+    """The arguments of `read` that say what a record is made of, checked. Raises ReadError or RecordError."""
+    return Wanted(
+        columns=columns,
+        units={} if units is None else units,
+        dt=dt,
+        name=name,
+        constants=Constants(
+            *(counts_per_turn, torque_constant, rated_torque, torque_per_volt),
+            *(resistance, inductance, back_emf_constant),
+        ),
+        velocity_cutoff_hz=velocity_cutoff_hz,
+        load_side=(load_side,) if isinstance(load_side, str) else tuple(load_side),
+        shift={} if shift is None else shift,
+        **more,
+    ).check()
 
 
 def si_factor(table: Table, wanted: Wanted, quantity: str, column: Column) -> float:

@@ -25,13 +25,13 @@ class Winding:
 
     Parameters
     ----------
-    resistance
+    resistance : float
         R [Ohm], above 0.
-    torque_constant
+    torque_constant : float
         kt [N m/A], above 0; of a linear motor N/A.
-    inductance
+    inductance : float
         L [H], from 0 on. 0: the current follows at once.
-    back_emf_constant
+    back_emf_constant : float, optional
         ke [V s/rad], above 0; None: as the torque constant, which holds for a DC motor in SI units. With the peak values of
         a three-phase motor in dq coordinates kt = 1.5 ke.
 
@@ -66,24 +66,53 @@ class Winding:
 
     @property
     def emf(self) -> float:
-        """ke [V s/rad]."""
+        """The back-EMF constant ke [V s/rad]."""
         return self.torque_constant if self.back_emf_constant is None else self.back_emf_constant
 
     def current(self, voltage: ArrayLike, velocity: ArrayLike, dt: float) -> Vector:
-        """The current i [A], shape (n,), of a voltage U [V] that is held over each sample, and a velocity w [rad/s].
+        """Return the current i of a voltage U that is held over each sample, and a velocity w.
 
             i(n+1) = a i(n) + (1 - a) (U(n) - ke (w(n) + w(n+1))/2)/R,   a = exp(-R dt/L),   i(0) = (U(0) - ke w(0))/R
 
-        Raises RecordError for arrays that a Record would refuse, and for unequal lengths.
+        Parameters
+        ----------
+        voltage : array_like, shape (n,)
+            U [V].
+        velocity : array_like, shape (n,)
+            w [rad/s].
+        dt : float
+            Sample time [s].
+
+        Returns
+        -------
+        ndarray of shape (n,)
+            i [A].
+
+        Raises
+        ------
+        RecordError
+            Arrays that a Record would refuse, or of unequal lengths.
         """
         return self._courses(voltage, velocity, dt)[0]
 
     def torque(self, voltage: ArrayLike, velocity: ArrayLike, dt: float) -> Vector:
-        """The mean torque over each sample [N m], shape (n,): what a record's torque, held until the next one, stands for.
+        """Return the mean torque over each sample: what a record's torque, held until the next one, stands for.
 
             u(n) = kt (s(n) + (i(n) - s(n)) (1 - a) L/(R dt)),   s(n) = (U(n) - ke (w(n) + w(n+1))/2)/R
 
-        Arguments and errors as of `current`.
+        Parameters
+        ----------
+        voltage : array_like, shape (n,)
+            U [V].
+        velocity : array_like, shape (n,)
+            w [rad/s].
+        dt : float
+            Sample time [s].
+
+        Returns
+        -------
+        ndarray of shape (n,)
+            u [N m].
         """
         current, settled, dt = self._courses(voltage, velocity, dt)
         if self.inductance == 0.0:

@@ -33,10 +33,20 @@ NAMES = {"resistance": "Ohm", "back_emf_constant": "V s/rad", "inductance": "H",
 class WindingFit:
     """What `estimate_winding` found.
 
-    winding     with these values, an inductance only where it is determined
-    parameters  "resistance", "back_emf_constant", "inductance", "offset" -> Estimate
-    error       rms of the voltage that is left over that of the voltage [1]
-    cutoff_hz   corner of the zero-phase filter that all three passed [Hz]
+    Attributes
+    ----------
+    winding : Winding
+        With these values, an inductance only where it is determined.
+    parameters : mapping of str to Estimate
+        "resistance", "back_emf_constant", "inductance" and "offset".
+    error : float
+        The rms of the voltage that is left over that of the voltage [1].
+    cutoff_hz : float
+        Corner of the zero-phase filter that all three passed [Hz].
+
+    See Also
+    --------
+    estimate_winding : Makes it, with an example.
     """
 
     winding: Winding
@@ -45,7 +55,7 @@ class WindingFit:
     cutoff_hz: float
 
     def summary(self) -> str:
-        """The values with their deviations, a line each."""
+        """Return the values with their deviations, a line each."""
         lines = [f"{name.replace('_', ' ')}  {e.value:.5g} +- {e.std:.2g} {e.unit}" for name, e in self.parameters.items()]
         return "\n".join([*lines, f"{100 * self.error:.2g} % of the voltage is left, below {self.cutoff_hz:g} Hz"])
 
@@ -53,7 +63,7 @@ class WindingFit:
 def estimate_winding(
     voltage: ArrayLike, current: ArrayLike, velocity: ArrayLike, dt: float, *, cutoff_hz: float | None = None
 ) -> WindingFit:
-    """Resistance and back-EMF constant, which is a DC motor's torque constant, from voltage, current and velocity.
+    """Estimate a winding's resistance and back-EMF constant from voltage, current and velocity.
 
         U_h(n) = R i(n) + ke w(n) + L (i(n+1) - i(n-1))/(2 dt) + U0,   U_h(n) = (U(n) + U(n-1))/2
 
@@ -62,11 +72,11 @@ def estimate_winding(
 
     Parameters
     ----------
-    voltage, current, velocity
-        U [V], i [A], w [rad/s], shape (n,) each; of a linear motor w in m/s.
-    dt
+    voltage, current, velocity : array_like, shape (n,)
+        U [V], i [A], w [rad/s]; of a linear motor w in m/s. The back-EMF constant is a DC motor's torque constant.
+    dt : float
         Sample time [s].
-    cutoff_hz
+    cutoff_hz : float, optional
         Corner of the filter [Hz]; None: as `inverse_dynamics` chooses it from the noise of the velocity.
 
     Returns
