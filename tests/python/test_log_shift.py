@@ -162,7 +162,7 @@ def test_records_are_moved_by_hand() -> None:
     np.testing.assert_array_equal(moved.velocity, rec.velocity[2:-1])
     assert rec.shifted() == rec and rec.shifted(torque=0) == rec
     for wrong, said in (
-        ({"speed": 1}, "the channel is 'speed'"),
+        ({"speed": 1}, r"shifted\(speed=1\): the record has no speed"),
         ({"torque": 0.5}, r"shifted\(torque=0.5\): give a whole number of samples"),
         ({"torque": -2990}, "leaves 10 of 3000 samples"),
     ):
