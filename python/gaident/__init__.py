@@ -19,8 +19,9 @@ _of_stub, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 # What methods of records, models and results call in rooms above their own, see gaident/providers.py.
 provide(
     {
-        # Record, Limits
+        # Record and its reader, Limits
         "record_html": "gaident.show.record_html:record_html",
+        "estimate_winding": "gaident.estimation.regression.winding:estimate_winding",
         "limits_of": "gaident.diagnosis.experiments.first_experiment:limits_of",
         # Model
         "to_scipy": "gaident.export.lti:to_scipy",

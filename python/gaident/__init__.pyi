@@ -1,9 +1,9 @@
 from . import errors
 from .control import PI
-from .data import Alignment, Record, align, columns, differentiate, read, read_columns
+from .data import Alignment, Record, Winding, align, columns, differentiate, read, read_axes, read_columns
 from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
-from .estimation import InverseDynamics, inverse_dynamics
+from .estimation import InverseDynamics, WindingFit, estimate_winding, inverse_dynamics
 from .identification import LeastSquares, identify, least_squares, m_sequence
 from .models import (
     Discrete,
@@ -47,12 +47,15 @@ __all__ = [
     "SearchSpace",
     "Settings",
     "TwoMass",
+    "Winding",
+    "WindingFit",
     "align",
     "columns",
     "diagnose",
     "differentiate",
     "effects",
     "errors",
+    "estimate_winding",
     "factor_parameters",
     "first_experiment",
     "identify",
@@ -65,6 +68,7 @@ __all__ = [
     "model_from_factor_parameters",
     "progress",
     "read",
+    "read_axes",
     "read_columns",
     "report",
     "run",

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gaident.data import differentiate, read
+from gaident.data.signals.conditioning import low_pass
 from gaident.errors import ReadError, RecordError
 from samples.logs import rows, write
 
@@ -93,10 +94,14 @@ def test_refusals(position: Any, dt: Any, cutoff: Any, words: list[str]) -> None
 
 def test_velocity_is_derived_from_position(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", "t,position [deg],torque", rows(100))
-    rec = read(path, velocity_cutoff_hz=100.0)
-    assert rec.position is not None
-    np.testing.assert_array_equal(rec.velocity, differentiate(rec.position, 1e-3, 100.0))
-    np.testing.assert_array_equal(read(path).velocity, differentiate(rec.position, 1e-3))
+    rec, filtered = read(path), read(path, velocity_cutoff_hz=100.0)
+    assert rec.position is not None and filtered.position is not None and filtered.torque is not None
+    np.testing.assert_array_equal(rec.velocity, differentiate(rec.position, 1e-3))
+    # Behind a corner all channels are filtered alike.
+    np.testing.assert_array_equal(filtered.velocity, differentiate(rec.position, 1e-3, 100.0))
+    np.testing.assert_array_equal(filtered.velocity, differentiate(filtered.position, 1e-3))
+    np.testing.assert_array_equal(filtered.torque, low_pass(rec.torque, 1e-3, 100.0))
+    assert rec.notes == () and "same zero-phase low-pass of 100 Hz" in filtered.notes[0]
 
 
 TIMES = {

@@ -22,9 +22,10 @@ def drive_of(args: argparse.Namespace) -> Drive:
     sections: dict[str, dict[str, Any]] = {name: {} for name in KEYS}
     unfilled: dict[tuple[str, str], str] = {}
     if getattr(args, "drive", None) is not None:
-        sections, unfilled = read_drive_file(args.drive), unfilled_of(args.drive)
+        axis = _selected(args)
+        sections, unfilled = read_drive_file(args.drive, axis), unfilled_of(args.drive, axis)
     for name, keys in KEYS.items():
-        if name in ("columns", "units"):
+        if name in ("columns", "units", "shift"):
             sections[name].update(_assignments(getattr(args, name, None) or [], f"--{name}"))
             continue
         for key in keys:
@@ -34,6 +35,7 @@ def drive_of(args: argparse.Namespace) -> Drive:
     if sections["controller"].get("loop") is not None:
         one_of(sections["controller"]["loop"], "loop", (*LOOPS, "open"), ControllerError)
     sections["units"] = {k: _as_number(v) for k, v in sections["units"].items()}
+    sections["shift"] = {k: _as_whole(v, f"--shift {k}") for k, v in sections["shift"].items()}
     return Drive(
         sections[""],
         sections["columns"],
@@ -41,8 +43,17 @@ def drive_of(args: argparse.Namespace) -> Drive:
         sections["controller"],
         sections["space"],
         sections["limits"],
+        sections["shift"],
         unfilled,
     )
+
+
+def _selected(args: argparse.Namespace) -> str | None:
+    """The axis that --select names. Raises SettingsError for several."""
+    names = getattr(args, "select", None) or []
+    if len(names) > 1:
+        raise SettingsError(f"--select {' '.join(names)}: only gaident diagnose takes several axes at once; name one")
+    return names[0] if names else None
 
 
 def read_all(drive: Drive, logs: Sequence[str], controller: PI | None, measured: bool = True) -> list[Record]:
@@ -71,12 +82,6 @@ def reading_notes(drive: Drive, records: Sequence[Record]) -> list[str]:
             f"The torque of {', '.join(guessed)} is taken as measured, as the name of its column says; where it is the "
             "controller's command, say so with --torque-is commanded."
         )
-    cutoff = drive.general.get("velocity_cutoff_hz")
-    if cutoff is not None:
-        notes.append(
-            f"The velocity alone went through a low-pass of {cutoff:g} Hz, and what drives the model did not: that biases the "
-            "inertia of a fast axis. Leave velocity_cutoff_hz out; the velocity is then the plain difference of the position."
-        )
     return notes
 
 
@@ -97,3 +102,10 @@ def _as_number(text: str | float) -> str | float:
         return float(text)
     except ValueError:
         return text
+
+
+def _as_whole(text: str | int, option: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise SettingsError(f"{option}={text}: give a whole number of samples, negative for earlier") from None

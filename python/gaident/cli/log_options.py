@@ -49,6 +49,9 @@ CONSTANT_HELP = {
     "torque_constant": "[N m/A], for a torque in A",
     "rated_torque": "what 100 %% means [N m], for a torque in %%",
     "torque_per_volt": "[N m/V], for a torque in V",
+    "resistance": "of the winding [Ohm], with --torque-constant for a torque from a voltage",
+    "inductance": "of the winding [H] (default: 0)",
+    "back_emf_constant": "[V s/rad] (default: the torque constant)",
 }
 TEXT_TABLE_HELP = {
     "delimiter": "what separates columns, a character, tab or space (default: found out)",
@@ -72,6 +75,8 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
     """How logs are read."""
     g = parser.add_argument_group("the log", "channels: command, velocity, torque, position, time")
     g.add_argument("--drive", metavar="FILE", help="drive.toml with what belongs to the axis; options override it")
+    selected = "of a drive file with several axes, [axes.NAME], the one that is meant; gaident diagnose takes several"
+    g.add_argument("--select", nargs="+", metavar="NAME", help=f"{selected} (default: all)")
     g.add_argument(
         "--columns",
         "--column",
@@ -93,8 +98,8 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
         type=number,
         metavar="HZ",
         dest="velocity_cutoff_hz",
-        help="a log without velocity gets it from position, low-passed at this corner [Hz] (default: not at all; the velocity "
-        "filtered alone biases the inertia)",
+        help="a log without velocity gets it from position; with this, all its channels pass one zero-phase low-pass of this "
+        "corner [Hz] first (default: none, which suits identification)",
     )
     g.add_argument(
         "--decimate", type=int, metavar="N", help="keep every N-th sample behind a linear-phase low-pass, as the log is read"
@@ -107,6 +112,8 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
     )
     g.add_argument("--gear-ratio", type=number, metavar="X", help="turns of the motor per turn of the load, with --load-side")
     g.add_argument("--load-side", nargs="+", metavar="CH", help="channels that were measured behind the gear")
+    shift = "move channels by samples, where the log wrote them on another line: torque=-1 for one that was logged a sample late"
+    g.add_argument("--shift", action="append", metavar="CH=N,...", help=shift)
     kinds = "commanded: by the controller; measured: a current times a constant (default: as its column's name says)"
     g.add_argument("--torque-is", choices=TORQUE_KINDS, help=f"what the torque is: {kinds}")
     for name, text in CONSTANT_HELP.items():

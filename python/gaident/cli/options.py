@@ -49,6 +49,8 @@ drive.toml, every part optional:
   velocity = "w"
   [units]
   velocity = "rpm"                # or the factor to SI, as a number
+  [shift]
+  torque = -1                     # samples, for a channel that the log wrote on another line than the rest
   [controller]
   kp = 0.0232                     # N m s/rad
   ki = 1.367                      # N m/rad; also loop, torque_limit, integrator_limit
@@ -83,6 +85,9 @@ examples:
   gaident diagnose run1.csv --drive drive.toml
   gaident diagnose run1.csv run2.csv --validation run3.csv --drive drive.toml --plot run.png --out run.json
   gaident diagnose run1.csv --kp 0.0232 --ki 1.367 --bootstrap 99 --next-command next.csv
+
+A log of several axes: [axes.x.columns], [axes.x.controller], ... in drive.toml beside what is common; each is
+diagnosed, one row each, or those that --select names.
 
 exit codes: 0 done (whatever the verdict), 1 the work failed, 2 wrong use, 130 interrupted
 """

@@ -10,7 +10,17 @@ __all__ = ["in_options"]
 # Options with the name of the argument.
 SAME_NAME = {
     *("dt", "delimiter", "decimal", "skip", "encoding", "decimate", "resample", "loop", "ki", "kp"),
-    *("counts_per_turn", "torque_constant", "rated_torque", "torque_per_volt", "gear_ratio", "load_side", "torque_is"),
+    *(
+        "counts_per_turn",
+        "torque_constant",
+        "rated_torque",
+        "torque_per_volt",
+        "resistance",
+        "inductance",
+        "gear_ratio",
+        "load_side",
+        "torque_is",
+    ),
 }
 WHOLE = {
     ("space", "SearchSpace(gain=...)"): "--gain LOW HIGH",
@@ -30,7 +40,7 @@ def in_options(error: GaidentError) -> str:
 def _option(a: Argument) -> str:
     if (a.name, a.value) in WHOLE:
         return WHOLE[a.name, a.value]
-    if a.name in ("columns", "units") and a.key:
+    if a.name in ("columns", "units", "shift") and a.key:
         value = "" if a.value == "None" else a.value.strip("'")
         return f"--{a.name} {a.key}={value}"
     if a.name in ("p", "q"):

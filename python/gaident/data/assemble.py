@@ -9,15 +9,17 @@ from numpy.typing import NDArray
 
 from gaident.arguments import NO_TIME, arg
 from gaident.data.clock import axis_of, clock_of, common_clock, part_of, second_of
+from gaident.data.counters import Counters
 from gaident.data.formats.table import Column, Table
 from gaident.data.record import CHANNELS, Record
 from gaident.data.signals.arrays import MINIMUM_SAMPLES
-from gaident.data.signals.conditioning import differentiate
+from gaident.data.signals.conditioning import differentiate, low_pass
 from gaident.data.signals.decimation import Decimator, decimated, factor_of
 from gaident.data.signals.resampling import resampled
 from gaident.data.timeaxis import TimeAxis
 from gaident.data.torque_kind import COMMANDED, kind_of_torque
 from gaident.data.wanted import Wanted, si_factor
+from gaident.data.winding_torque import ELECTRICAL, torque_of_winding
 from gaident.errors import ReadError, RecordError
 
 __all__ = ["assemble"]
@@ -39,18 +41,28 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
         if channel not in named:
             raise ReadError(f"{table.path}: load_side names {channel!r}, but no such column is read; leave it out there")
     scales = {channel: _scale(table, wanted, channel, column) for channel, column in named.items()}
+    kind = _torque_kind(table, wanted, named.get("torque")) if ELECTRICAL.isdisjoint(named) else ""
+    counters = Counters(table, wanted, named)
+    said: list[str] = []
     if wanted.resample is not None:
-        dt, values = _on_even_axis(table, wanted, named, scales)
+        dt, values = _on_even_axis(table, wanted, named, scales, counters)
     else:
-        dt, values = _block_by_block(table, wanted, named, scales)
+        dt, values = _block_by_block(table, wanted, named, scales, counters)
     try:
         if "velocity" not in values and "position" not in values:
             values["velocity"] = np.zeros(len(next(iter(values.values()))))
         elif "velocity" not in values:
-            values["velocity"] = differentiate(values["position"], dt, wanted.velocity_cutoff_hz)
+            if wanted.velocity_cutoff_hz is not None:  # all alike: what is filtered alone is another plant
+                values = {channel: low_pass(x, dt, wanted.velocity_cutoff_hz) for channel, x in values.items()}
+                said.append(f"All channels went through the same zero-phase low-pass of {wanted.velocity_cutoff_hz:g} Hz.")
+            values["velocity"] = differentiate(values["position"], dt)
+        if not ELECTRICAL.isdisjoint(named):
+            values["torque"], kind, note = torque_of_winding(table, wanted, values, dt)
+            said += [note] if note else []
         name = stem if wanted.name is None else wanted.name
-        kind = _torque_kind(table, wanted, named.get("torque"))
-        return Record(dt, name=name, torque_is=kind, **{channel: values.get(channel) for channel in CHANNELS})
+        held = {channel: values.get(channel) for channel in CHANNELS}
+        rec = Record(dt, name=name, torque_is=kind, notes=(*counters.notes(), *said), **held)
+        return rec.shifted(**wanted.shift) if wanted.shift else rec
     except RecordError as error:
         raise RecordError(f"{table.path}: {error.marked}") from None
 
@@ -70,7 +82,9 @@ def _torque_kind(table: Table, wanted: Wanted, column: Column | None) -> str:
 _Values = dict[str, NDArray[np.float64]]
 
 
-def _block_by_block(table: Table, wanted: Wanted, named: dict[str, Column], scales: dict[str, float]) -> tuple[float, _Values]:
+def _block_by_block(
+    table: Table, wanted: Wanted, named: dict[str, Column], scales: dict[str, float], counters: Counters
+) -> tuple[float, _Values]:
     """(dt [s], channel -> values in SI) of a log with one even time axis."""
     time = common_clock(table, wanted, named)
     keys = {channel: column for channel, column in named.items() if column is not time}
@@ -90,7 +104,7 @@ def _block_by_block(table: Table, wanted: Wanted, named: dict[str, Column], scal
     axis: TimeAxis | None = None
     count = 0
     for block in table.blocks(list({column.key: column for column in columns}.values())):
-        held = {channel: block.numbers(part_of(block, column), channel) for channel, column in named.items()}
+        held = {ch: counters.passed(block, ch, block.numbers(part_of(block, c), ch)) for ch, c in named.items()}
         count += len(next(iter(held.values())))
         if axis is None:
             axis = axis_of(block, wanted, time)
@@ -114,7 +128,9 @@ def _stated(table: Table, named: Mapping[str, Column]) -> float:
     return periods[0]
 
 
-def _on_even_axis(table: Table, wanted: Wanted, named: dict[str, Column], scales: dict[str, float]) -> tuple[float, _Values]:
+def _on_even_axis(
+    table: Table, wanted: Wanted, named: dict[str, Column], scales: dict[str, float], counters: Counters
+) -> tuple[float, _Values]:
     """(dt [s], channel -> values in SI), each channel interpolated from time stamps of its own."""
     assert wanted.resample is not None
     clocks = {channel: clock_of(table, wanted, column) for channel, column in named.items()}
@@ -122,7 +138,7 @@ def _on_even_axis(table: Table, wanted: Wanted, named: dict[str, Column], scales
     for channel, column in named.items():
         clock, first = clocks[channel], 0
         for block in table.blocks([column] if clock is None else [column, clock]):
-            values = part_of(block, column).whole().astype(np.float64, copy=False)
+            values = counters.passed(block, channel, part_of(block, column).whole().astype(np.float64, copy=False))
             if clock is None:
                 stamps = (first + np.arange(len(values))) * float(column.period or 0.0)
             else:
@@ -156,7 +172,7 @@ def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
         }
     if wanted.measured and "velocity" not in found and "position" not in found:
         raise ReadError(_say_missing(table, wanted, "velocity", "the velocity (or the position, to derive it from)"))
-    if "command" not in found and "torque" not in found:
+    if "command" not in found and "torque" not in found and ELECTRICAL.isdisjoint(found):
         raise ReadError(_say_missing(table, wanted, "torque", "the command or the torque"))
     if "velocity" in found and wanted.velocity_cutoff_hz is not None:
         raise ReadError(

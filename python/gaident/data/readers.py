@@ -21,9 +21,8 @@ from gaident.data.formats.frames import frame_table, is_frame, open_parquet
 from gaident.data.formats.hdf import open_hdf
 from gaident.data.formats.instruments import open_mdf, open_tdms
 from gaident.data.formats.table import Table
-from gaident.data.formats.units import Constants
 from gaident.data.record import Record
-from gaident.data.wanted import Wanted
+from gaident.data.wanted import wanted_of
 from gaident.errors import ReadError
 
 __all__ = ["READERS", "Reader", "open_log", "read", "read_columns"]
@@ -83,6 +82,9 @@ def read(
     torque_constant: float | None = None,
     rated_torque: float | None = None,
     torque_per_volt: float | None = None,
+    resistance: float | None = None,
+    inductance: float | None = None,
+    back_emf_constant: float | None = None,
     velocity_cutoff_hz: float | None = None,
     decimate: int = 1,
     resample: float | None = None,
@@ -90,6 +92,7 @@ def read(
     load_side: str | Sequence[str] = (),
     measured: bool = True,
     torque_is: str | None = None,
+    shift: Mapping[str, int] | None = None,
     delimiter: str | None = None,
     decimal: str | None = None,
     skip: int | None = None,
@@ -105,7 +108,8 @@ def read(
         The log. MAT 7.3 and HDF5 need h5py, Parquet pyarrow, TDMS nptdms, MDF asammdf: the extras hdf5, parquet, tdms and mdf
         of this package.
     columns : mapping of str to str, int or None, optional
-        Channel -> column of the file; channels are command, velocity, torque, position and time.
+        Channel -> column of the file; channels are command, velocity, torque, position and time, and voltage and current, from
+        which a torque is worked out.
         A column is its name (or the name without a unit: `w` for `w [rpm]`), its number '#3' or 3 (zero based), or, in MAT and
         NPZ, a column of a two-dimensional array, 'data[:,3]' (zero based).
         None: columns that bear the channels' own names. {"time": None} ignores a time column.
@@ -127,9 +131,13 @@ def read(
         Torque that is 100 % [N m], for the unit %.
     torque_per_volt : float, optional
         Torque of a voltage [N m/V], for the unit V.
+    resistance, inductance, back_emf_constant : float, optional
+        Of the motor's winding [Ohm], [H], [V s/rad]: a voltage becomes the torque kt (U - ke w)/R, see `Winding`; None: L = 0,
+        ke = kt. Of voltage and current without a `torque_constant` the winding is estimated, and a note says so.
     velocity_cutoff_hz : float, optional
-        Corner [Hz] of `differentiate`, which gives the velocity of a log that has a position and none.
-        None, the plain difference, suits identification: a velocity that is filtered alone biases the inertia of a fast axis.
+        Corner [Hz]. The velocity of a log that has a position and none is the difference of the position; with a corner all
+        channels pass the same zero-phase low-pass first. Filtered alike, they keep the inertia.
+        None, no filter, suits identification.
     decimate : int
         10: every tenth sample behind a low-pass of linear phase whose delay is compensated, see `Record.decimate`.
         The log is decimated as it is read, whatever its length.
@@ -146,6 +154,9 @@ def read(
         Whether the torque is the controller's command, or a measured current times a constant, with the sensor's noise.
         None: measured where the column's name says so (`Actual current`, `I_q`, `M_ist`, `torque feedback`), else commanded.
         The record's repr shows which it is.
+    shift : mapping of str to int, optional
+        Channel -> samples by which it is moved against the others, where the log wrote it on another line.
+        {"torque": -1} is for a torque that was logged one sample late; see `Record.shifted`.
     delimiter : str, optional
         Of a text table, where it cannot be found out: a character, "tab" or "space".
     decimal : {".", ","}, optional
@@ -181,20 +192,27 @@ def read(
     >>> ga.read("run1.csv", columns={"time": "t", "command": "w_ref", "velocity": "w"})
     Record('run1', 30 samples, dt=0.001 s, 0.03 s; command 6.283..9.32, velocity 0..3.037)
     """
-    wanted = Wanted(
-        columns=columns,
-        units={} if units is None else units,
-        dt=dt,
+    wanted = wanted_of(
+        columns,
+        units,
+        dt,
         name=name,
-        constants=Constants(counts_per_turn, torque_constant, rated_torque, torque_per_volt),
+        counts_per_turn=counts_per_turn,
+        torque_constant=torque_constant,
+        rated_torque=rated_torque,
+        torque_per_volt=torque_per_volt,
+        resistance=resistance,
+        inductance=inductance,
+        back_emf_constant=back_emf_constant,
         velocity_cutoff_hz=velocity_cutoff_hz,
         decimate=decimate,
         resample=resample,
         gear_ratio=gear_ratio,
-        load_side=(load_side,) if isinstance(load_side, str) else tuple(load_side),
+        load_side=load_side,
         measured=measured,
         torque_is=torque_is,
-    ).check()
+        shift=shift,
+    )
     with open_log(path, TextOptions(delimiter, decimal, skip, encoding)) as table:
         return assemble(table, wanted, "" if is_frame(path) else Path(path).stem)
 

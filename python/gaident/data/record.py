@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident.checks import one_of
-from gaident.data.record_checks import equally_long, sample_time, torque_kind
+from gaident.data.record_checks import equally_long, moved_channels, sample_time, texts, torque_kind
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel
 from gaident.data.signals.decimation import decimated, factor_of
 from gaident.data.torque_kind import COMMANDED, MEASURED
@@ -61,6 +61,8 @@ class Record:
         What the torque is.
         "commanded": as the controller issued it, before the actuator's limits, dead band, delay and lag.
         "measured": a measured current times a constant, behind the actuator, with the sensor's noise on it.
+    notes : sequence of str
+        What was noticed and done when the log was read; results repeat it, digest and == do not know it.
 
     Raises
     ------
@@ -92,6 +94,7 @@ class Record:
     position: NDArray[np.float64] | None
     name: str
     torque_is: str
+    notes: tuple[str, ...]
 
     def __init__(
         self,
@@ -103,6 +106,7 @@ class Record:
         name: str = "",
         *,
         torque_is: str = COMMANDED,
+        notes: Sequence[str] = (),
     ) -> None:
         if velocity is None:
             raise RecordError(
@@ -116,11 +120,11 @@ class Record:
         given = {"command": command, "velocity": velocity, "torque": torque, "position": position}
         channels = {key: None if values is None else channel(values, key) for key, values in given.items()}
         kind = torque_kind(torque_is, channels["torque"])
-        self._fill(sample_time(dt), equally_long(channels), str(name), kind)
+        self._fill(sample_time(dt), equally_long(channels), name=str(name), torque_is=kind, notes=texts(notes))
 
-    def _fill(self, dt: float, channels: Mapping[str, NDArray[np.float64] | None], name: str, torque_is: str) -> None:
+    def _fill(self, dt: float, channels: Mapping[str, NDArray[np.float64] | None], **about: Any) -> None:
         """Set the fields of this frozen object, unchecked."""
-        for key, value in {"dt": dt, **channels, "name": name, "torque_is": torque_is}.items():
+        for key, value in {"dt": dt, **channels, **about}.items():
             object.__setattr__(self, key, value)
 
     def with_channels(self, *, dt: float | None = None, torque_is: str | None = None, **changed: ArrayLike | None) -> Record:
@@ -170,7 +174,7 @@ class Record:
         period = self.dt if dt is None else sample_time(dt)
         kept = COMMANDED if channels["torque"] is None else self.torque_is
         kind = kept if torque_is is None else torque_kind(torque_is, channels["torque"])
-        made._fill(period, equally_long(channels), self.name, kind)
+        made._fill(period, equally_long(channels), name=self.name, torque_is=kind, notes=self.notes)
         return made
 
     def channels(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
@@ -289,6 +293,31 @@ class Record:
         thinned: Mapping[str, Any] = {key: decimated(values, factor) for key, values in self.channels()}
         return self.with_channels(dt=self.dt * factor, **thinned)
 
+    def shifted(self, **samples: int) -> Record:
+        """Return the record with channels moved against the others, for a log that wrote them on another line.
+
+            x_new(n) = x(n - k),   k > 0: later, k < 0: earlier
+
+        `samples` are channel=k; ``rec.shifted(torque=-1)`` is for a torque that the log wrote one sample late. The record is cut
+        to what all channels cover then.
+
+        Raises
+        ------
+        RecordError
+            What is no channel of this record, no whole number, or leaves too few samples.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import gaident as ga
+        >>> rec = ga.Record(1e-3, velocity=np.arange(30.0), torque=np.arange(30.0) - 1.0)
+        >>> moved = rec.shifted(torque=-1)
+        >>> len(moved), bool(np.all(moved.torque == moved.velocity))
+        (29, True)
+        """
+        moved: Mapping[str, Any] = moved_channels(dict(self.channels()), samples)
+        return self.with_channels(**moved)
+
     def _sample_at(self, time: float) -> int:
         """First sample not before `time` [s], within 0..n."""
         return math.ceil(min(max(time / self.dt - _TIME_SLACK, 0.0), float(len(self))))
@@ -302,13 +331,13 @@ class Record:
             )
         part = object.__new__(type(self))
         cut = {key: None if (v := getattr(self, key)) is None else v[start:stop] for key in CHANNELS}
-        part._fill(self.dt, cut, self.name, self.torque_is)
+        part._fill(self.dt, cut, name=self.name, torque_is=self.torque_is, notes=self.notes)
         return part
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON: dt, name, torque_is, and the channels as lists, None for those that are not there."""
         held = {key: None if (v := getattr(self, key)) is None else v.tolist() for key in CHANNELS}
-        about = {"name": self.name, "dt": self.dt, "torque_is": self.torque_is}
+        about = {"name": self.name, "dt": self.dt, "torque_is": self.torque_is, "notes": list(self.notes)}
         return {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **about, **held}
 
     @classmethod
@@ -327,8 +356,9 @@ class Record:
         if missing:
             raise RecordError(f"the saved record lacks {', '.join(missing)}; save it again")
         command, velocity, torque, position = (data[key] for key in CHANNELS)
-        kind = data.get("torque_is", COMMANDED)  # which early files do not hold
-        return cls(data["dt"], command, velocity, torque, position, data["name"], torque_is=kind)
+        # Early files hold neither of these.
+        kind, notes = data.get("torque_is", COMMANDED), data.get("notes", ())
+        return cls(data["dt"], command, velocity, torque, position, data["name"], torque_is=kind, notes=notes)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the record as JSON, all digits, for `gaident.load`; the file appears whole or not at all."""

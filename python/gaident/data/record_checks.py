@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import arg
 from gaident.checks import one_of
-from gaident.data.signals.arrays import positive_number
+from gaident.data.signals.arrays import MINIMUM_SAMPLES, positive_number
 from gaident.data.torque_kind import COMMANDED, TORQUE_KINDS
 from gaident.errors import RecordError
 
-__all__ = ["equally_long", "sample_time", "torque_kind"]
+__all__ = ["equally_long", "moved_channels", "sample_time", "texts", "torque_kind"]
 
 
 def sample_time(dt: object) -> float:
@@ -37,3 +39,29 @@ def equally_long(channels: dict[str, NDArray[np.float64] | None]) -> dict[str, N
             "or, where they come from two clocks, bring two records together with align"
         )
     return channels
+
+
+def texts(notes: Sequence[str]) -> tuple[str, ...]:
+    """The notes, once they are texts. Raises RecordError."""
+    if isinstance(notes, str) or not all(isinstance(note, str) for note in notes):
+        raise RecordError(f"notes={notes!r:.80} is no list of texts; give notes=[...] or leave it out")
+    return tuple(notes)
+
+
+def moved_channels(channels: Mapping[str, NDArray[np.float64]], samples: Mapping[str, int]) -> dict[str, NDArray[np.float64]]:
+    """The channels, each k samples later (negative: earlier), cut to what all cover. Raises RecordError."""
+    for key, k in samples.items():
+        if isinstance(k, bool) or not isinstance(k, int | np.integer):
+            raise RecordError(f"shifted({key}={k!r}): give a whole number of samples, negative for earlier")
+        if key not in channels:
+            raise RecordError(f"shifted({key}={k!r}): the record has no {key}; it has {', '.join(channels)}")
+    moves = {key: int(samples.get(key, 0)) for key in channels}
+    length = len(channels["velocity"])
+    start, stop = max(0, *moves.values()), length + min(0, *moves.values())
+    if stop - start < MINIMUM_SAMPLES:
+        listed = ", ".join(f"{key}={k}" for key, k in samples.items())
+        raise RecordError(
+            f"shifted({listed}) leaves {max(stop - start, 0)} of {length} samples, but at least {MINIMUM_SAMPLES} are needed; "
+            "move by fewer samples"
+        )
+    return {key: values[start - moves[key] : stop - moves[key]] for key, values in channels.items()}

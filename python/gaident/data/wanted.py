@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 from gaident.arguments import arg
 from gaident.checks import one_of
@@ -16,7 +17,7 @@ from gaident.data.signals.decimation import factor_of
 from gaident.data.torque_kind import TORQUE_KINDS
 from gaident.errors import ReadError
 
-__all__ = ["Wanted", "si_factor"]
+__all__ = ["Wanted", "si_factor", "wanted_of"]
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class Wanted:
     load_side: tuple[str, ...] = ()
     measured: bool = True
     torque_is: str | None = None
+    shift: Mapping[str, int] = field(default_factory=dict)
 
     def check(self) -> Wanted:
         """Itself, once what can be judged without the file is right; else ReadError or RecordError."""
@@ -57,9 +59,19 @@ class Wanted:
         self._check_gear()
         if self.torque_is is not None:
             one_of(self.torque_is, "torque_is", TORQUE_KINDS, ReadError)
+        self._check_shift()
         if self.name is not None and not isinstance(self.name, str):
             raise ReadError(f"name={self.name!r} is no text; give a str")
         return self
+
+    def _check_shift(self) -> None:
+        if not isinstance(self.shift, Mapping):
+            raise ReadError(f"shift={self.shift!r} is no mapping; give for example {arg('shift', '-1', 'torque')}")
+        if self.shift and (factor_of(self.decimate) > 1 or self.resample is not None):
+            raise ReadError(
+                "shift counts the log's own samples, which decimate and resample do away with: read the log without them, then "
+                "use rec.shifted(...).decimate(...)"
+            )
 
     def _check_gear(self) -> None:
         for channel in self.load_side:
@@ -74,6 +86,41 @@ class Wanted:
                 "per turn of "
                 f"the load, {arg('load_side', '...')} the channels that were measured behind the gear"
             )
+
+
+def wanted_of(
+    columns: Mapping[str, str | int | None] | None = None,
+    units: Mapping[str, str | float] | None = None,
+    dt: float | None = None,
+    *,
+    counts_per_turn: float | None = None,
+    torque_constant: float | None = None,
+    rated_torque: float | None = None,
+    torque_per_volt: float | None = None,
+    resistance: float | None = None,
+    inductance: float | None = None,
+    back_emf_constant: float | None = None,
+    velocity_cutoff_hz: float | None = None,
+    load_side: str | Sequence[str] = (),
+    shift: Mapping[str, int] | None = None,
+    name: str | None = None,
+    **more: Any,
+) -> Wanted:
+    """The arguments of `read` that say what a record is made of, checked. Raises ReadError or RecordError."""
+    return Wanted(
+        columns=columns,
+        units={} if units is None else units,
+        dt=dt,
+        name=name,
+        constants=Constants(
+            *(counts_per_turn, torque_constant, rated_torque, torque_per_volt),
+            *(resistance, inductance, back_emf_constant),
+        ),
+        velocity_cutoff_hz=velocity_cutoff_hz,
+        load_side=(load_side,) if isinstance(load_side, str) else tuple(load_side),
+        shift={} if shift is None else shift,
+        **more,
+    ).check()
 
 
 def si_factor(table: Table, wanted: Wanted, quantity: str, column: Column) -> float:

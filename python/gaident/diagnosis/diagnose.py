@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
+from gaident.diagnosis.controller.log_shift import aligned
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.wording import basis_of, evidence_of
 from gaident.diagnosis.gains import Gains, measured_gains
@@ -113,7 +114,8 @@ def diagnose(
     checked(records, held, controller, identification, bootstrap, seed, progress)
     records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
-    logged = as_logged(records, controller)
+    moved = aligned(records, held, controller)
+    logged = as_logged(moved.records, controller)
     controller = logged.controller
     import scipy.linalg  # noqa: F401  brings a BLAS of its own, to be limited too
     from threadpoolctl import threadpool_limits
@@ -121,10 +123,10 @@ def diagnose(
     # A sum that several threads share is rounded otherwise with each number of them, and a search follows the last digit.
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.02, "identifying the linear model")
-        idn = identification if identification is not None else identify(list(records), controller, seed=seed)
-        work = _Work(records, held, logged, idn, noise_std, note)
+        idn = identification if identification is not None else identify(list(moved.records), controller, seed=seed)
+        work = _Work(moved.records, moved.held, logged, idn, noise_std, note)
         work.search()
-        result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap)
+        result = moved.noted(replace(work.report(seed), noise=noise_std, bootstrap=bootstrap))
         if bootstrap:
             from gaident.diagnosis.selection.bootstrap import with_p_value
 

@@ -52,6 +52,9 @@ class Policy:
     rival_margin: float = _row(10.0, "BIC units", "closer explanations are not told apart (Kass and Raftery 1995)", SIZES)
     rival_short: float = _row(400.0, "samples", "a record this short doubles the margin", SIZES)
     hint: float = _row(8.0, "BIC units", "of likelihood, from which a generalisation is not ruled out by what it contains", SIZES)
+    log_shift: float = _row(
+        50.0, "BIC units", "by which the controller's law holds better before a channel is moved by samples: odds of e^25", CLEAN
+    )
     swap: float = _row(2.0, "BIC units", "by which a rival has to be better to take a place", SIZES)
     harm: float = _row(0.02, "1", "of the held-out error that an effect may add before it is refused", REAL)
     held_motion: float = _row(0.33, "1", "rms speed of a held-out part over that before: below, it is cut by path", REAL)

@@ -22,11 +22,14 @@ from gaident.models.search_space import SearchSpace
 from gaident.results.experiment import Limits
 from gaident.show.wording import AXES
 
-__all__ = ["COLUMNS", "KEYS", "Drive", "read_drive_file", "unfilled_of"]
+__all__ = ["COLUMNS", "KEYS", "Drive", "axes_in", "read_drive_file", "unfilled_of"]
 
 
-COLUMNS = (*CHANNELS, "time")
-CONSTANTS = ("counts_per_turn", "torque_constant", "rated_torque", "torque_per_volt")
+COLUMNS = (*CHANNELS, "voltage", "current", "time")
+CONSTANTS = (
+    *("counts_per_turn", "torque_constant", "rated_torque", "torque_per_volt"),
+    *("resistance", "inductance", "back_emf_constant"),
+)
 RANGES = ("inertia", "resonance_hz", "damping", "gain", "real", "imaginary", "p", "q")
 
 Check = Callable[[object, str], object]
@@ -115,6 +118,7 @@ KEYS: dict[str, dict[str, Check]] = {
     },
     "columns": dict.fromkeys(COLUMNS, _column),
     "units": dict.fromkeys(COLUMNS, _unit),
+    "shift": dict.fromkeys(CHANNELS, _whole),
     "controller": {
         "kp": _number,
         "ki": _number,
@@ -142,6 +146,7 @@ class Drive:
     controller_values: Mapping[str, Any]
     space_values: Mapping[str, Any]
     limit_values: Mapping[str, Any] = field(default_factory=dict)
+    shift: Mapping[str, int] = field(default_factory=dict)
     unfilled: Mapping[tuple[str, str], str] = field(default_factory=dict)  # (section, key) -> file and line, see `unfilled_of`
 
     @property
@@ -162,7 +167,8 @@ class Drive:
         more = {k: v for k, v in self.general.items() if k not in not_read}
         self._refuse_unfilled("units", [k for k in CHANNELS if k not in left_out], "or give it with --units CHANNEL=UNIT")
         units = {k: v for k, v in self.units.items() if k not in left_out}
-        return read(path, columns or None, units or None, self.general.get("dt"), measured=measured, **more)
+        shift = {k: v for k, v in self.shift.items() if k not in left_out}
+        return read(path, columns or None, units or None, self.general.get("dt"), measured=measured, shift=shift, **more)
 
     def controller(self) -> PI | None:
         """The PI controller; None: open loop. Raises ControllerError where half of it is missing."""
@@ -242,8 +248,33 @@ def _is_proposal(path: str) -> bool:
         return False
 
 
-def read_drive_file(path: str) -> dict[str, dict[str, Any]]:
-    """drive.toml as {section: {key: value}}, checked; raises ReadError with file, key, value and remedy."""
+def axes_in(path: str) -> tuple[str, ...]:
+    """The names of the axes that a drive file holds, `[axes.NAME]`; none in a file of one axis. Raises ReadError."""
+    axes = _parsed(path).get("axes", {})
+    if not isinstance(axes, Mapping) or not all(isinstance(own, Mapping) for own in axes.values()):
+        raise ReadError(f"{path}: axes is no table of axes: write [axes.x], and below it what belongs to x alone")
+    return tuple(axes)
+
+
+def read_drive_file(path: str, axis: str | None = None) -> dict[str, dict[str, Any]]:
+    """drive.toml as {section: {key: value}}, checked; raises ReadError with file, key, value and remedy.
+
+    axis: of a file of several axes the one that is meant; what stands below `[axes.NAME]` counts before what is common to all.
+    """
+    data, names = _parsed(path), axes_in(path)
+    own = data.pop("axes", {})
+    if axis is None and names:
+        raise ReadError(f"{path}: this drive file holds the axes {', '.join(names)}: say which with --select NAME")
+    common = _checked(data, path, "")
+    if axis is None:
+        return common
+    one_of(axis, f"{path}: the axis", names, ReadError)
+    special = _checked(own[axis], path, f"axes.{axis}.")
+    return {name: {**values, **special[name]} for name, values in common.items()}
+
+
+def _parsed(path: str) -> dict[str, Any]:
+    """What a TOML file holds. Raises ReadError."""
     if sys.version_info >= (3, 11):
         import tomllib
     else:
@@ -263,14 +294,19 @@ def read_drive_file(path: str) -> dict[str, dict[str, Any]]:
         raise ReadError(
             f"{path}: this drive file is empty: it holds {_SECTIONS} and {', '.join(KEYS[''])}; leave it out otherwise"
         )
+    return data
+
+
+def _checked(data: Mapping[str, Any], path: str, prefix: str) -> dict[str, dict[str, Any]]:
+    """{section: {key: value}} of a whole file, or of one axis in it, whose sections begin with `prefix`."""
     _misplaced(data, path, "")
-    top = known_keys(data, path, [*KEYS[""], *(s for s in KEYS if s)], (), ReadError)
+    top = known_keys(data, f"{path}: [{prefix[:-1]}]" if prefix else path, [*KEYS[""], *(s for s in KEYS if s)], (), ReadError)
     sections: dict[str, dict[str, Any]] = {"": {k: v for k, v in top.items() if k not in KEYS or not k}}
     for name in (s for s in KEYS if s):
         _misplaced(top.get(name, {}), path, name)
-        sections[name] = known_keys(top.get(name, {}), f"{path}: [{name}]", KEYS[name], (), ReadError)
+        sections[name] = known_keys(top.get(name, {}), f"{path}: [{prefix}{name}]", KEYS[name], (), ReadError)
     for name, values in sections.items():
-        where = f"{path}: [{name}] " if name else f"{path}: "
+        where = f"{path}: [{prefix}{name}] " if name else f"{path}: [{prefix[:-1]}] " if prefix else f"{path}: "
         for key, value in values.items():
             try:
                 values[key] = KEYS[name][key](value, key)
@@ -279,14 +315,14 @@ def read_drive_file(path: str) -> dict[str, dict[str, Any]]:
     return sections
 
 
-def unfilled_of(path: str) -> dict[tuple[str, str], str]:
-    """(section, key) -> "file: line n" of what `gaident init` marked FILL IN and is commented out still."""
+def unfilled_of(path: str, axis: str | None = None) -> dict[tuple[str, str], str]:
+    """(section, key) -> "file: line n" of what `gaident init` marked FILL IN and is commented out still; axis: see above."""
     found, section = {}, ""
     for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):
         if (header := _SECTION.match(line)) is not None:
             section = header[1]
         elif (mark := _MARK.match(line)) is not None:
-            found[section, mark[1]] = f"{path}: line {number}"
+            found[section.removeprefix(f"axes.{axis}."), mark[1]] = f"{path}: line {number}"
     return found
 
 
@@ -302,7 +338,7 @@ def _decimal_comma(text: str, error: str) -> str:
     return f"line {number}: {key} is {value}, with a decimal comma: write {value.replace(',', '.')}"
 
 
-_SECTION = re.compile(r"\s*\[(\w+)\]")
+_SECTION = re.compile(r"\s*\[([\w.]+)\]")
 _MARK = re.compile(r"\s*#\s*(\w+)\s*=.*#\s*FILL IN\b")
 _WITH_COMMA = re.compile(r"\s*([\w.-]+)\s*=\s*([-+]?\d+,\d+(?:[eE][-+]?\d+)?)\s*(?:#|$)")
 _SECTIONS = ", ".join(f"[{name}]" for name in KEYS if name)

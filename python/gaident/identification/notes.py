@@ -14,7 +14,7 @@ from gaident.results.adequacy import Adequacy
 from gaident.results.estimate import Estimate
 from gaident.results.structures import Rival
 
-__all__ = ["open_loop_notes", "record_notes", "warnings_of"]
+__all__ = ["open_loop_notes", "reading_notes", "record_notes", "warnings_of"]
 
 
 def warnings_of(
@@ -79,4 +79,10 @@ def open_loop_notes(records: Sequence[Record], controller: PI | None) -> list[st
 def record_notes(records: Sequence[Record], controller: PI | None, initial_state: str) -> list[str]:
     """What is doubtful about the records themselves: their input, and how they begin."""
     begun = [n for r in records if (n := doubtful_start(r, controller))] if initial_state == "auto" else []
-    return [*open_loop_notes(records, controller), *begun]
+    return [*reading_notes(records), *open_loop_notes(records, controller), *begun]
+
+
+def reading_notes(records: Sequence[Record]) -> list[str]:
+    """What was noticed when the logs were read, each sentence once, with the name of its record where there are several."""
+    told = ((f"{r.name}: " if len(records) > 1 and r.name else "", note) for r in records for note in r.notes)
+    return list(dict.fromkeys(f"{name}{note}" for name, note in told))

@@ -108,7 +108,8 @@ def view_of(result: Diagnosis | Identification, records: Records, validation: Re
             if curve is not None and any(f.alternatives for f in result.causes):
                 curve = (*curve[:2], f"{curve[2]} (not told apart from others)")
         try:
-            response = response_of(longest, result.model, result.controller)
+            used = result.as_used(longest) if isinstance(result, Diagnosis) else longest
+            response = response_of(used, result.model, result.controller)
         except GaidentError as error:
             missing = str(error)
     return View(tuple(runs), curve, response, missing, axis, _made_with())

@@ -31,11 +31,13 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
     """One record and what the models make of it."""
     controller = result.controller
     linear: Model = result.model.linear if isinstance(result, Diagnosis) else result.model
-    used = "fitted" if rec.digest in result.digests else "new"
+    digest = rec.digest
+    used = "fitted" if digest in result.digests else "new"
     notes: list[str] = []
     extended = first_held = None
     if isinstance(result, Diagnosis):
-        if rec.digest in result.validation_digests:
+        rec = result.as_used(rec)
+        if digest in result.validation_digests:
             used, first_held = "held out", 0
         elif used == "fitted" and not result.validation_digests and result.held_out != IN_SAMPLE:
             first_held = held_from(rec)
@@ -54,7 +56,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
         notes.append(f"The missing torque cannot be worked out: {error}")
     return Run(
         name=rec.name,
-        digest=rec.digest,
+        digest=digest,
         used=used,
         time=rec.time,
         measured=rec.velocity,

@@ -114,6 +114,9 @@ class Diagnosis:
         Effect that was tested and not found -> which sizes of it would not have shown in these records.
     mechanics : mapping of str to Estimate
         Mechanical parameters of the linear part, fitted together with the effects.
+    log_shifts : mapping of str to mapping of str to int
+        Digest of a record -> channel -> samples by which it was moved, as `Record.shifted` takes them, where the log wrote
+        channels on different lines; `as_used` does it again.
     records, validation_records : tuple of Record
         The data; empty where the diagnosis was loaded from a file.
 
@@ -151,6 +154,7 @@ class Diagnosis:
     line: tuple[float, float] | None = None
     one_sided: Mapping[str, str] = field(default_factory=dict, hash=False)
     mechanics: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
+    log_shifts: Mapping[str, Mapping[str, int]] = field(default_factory=dict, hash=False)
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
@@ -162,6 +166,21 @@ class Diagnosis:
     def causes(self) -> tuple[Finding, ...]:
         """The findings that describe the drive."""
         return tuple(f for f in self.findings if not f.is_noise)
+
+    def as_used(self, rec: Record) -> Record:
+        """Return a record as the diagnosis used it: without the shifts of its log, see `log_shifts`.
+
+        Parameters
+        ----------
+        rec : Record
+            A record that was given to `diagnose`, or any other, which is returned as it is.
+
+        Returns
+        -------
+        Record
+            The same, or one with its channels moved.
+        """
+        return rec.shifted(**moves) if (moves := self.log_shifts.get(rec.digest)) else rec
 
     def summary(self, axis: str = "rotary") -> str:
         """Return the result as text; axis="linear" for units of m and N."""
@@ -225,7 +244,7 @@ class Diagnosis:
         given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
         if not given:
             raise GaidentError("records: a loaded diagnosis holds no data; give plot_bode(records)")
-        figure: Figure = provided("plot_bode")(self.model, self.controller, given, hz, axis)
+        figure: Figure = provided("plot_bode")(self.model, self.controller, tuple(map(self.as_used, given)), hz, axis)
         return figure
 
     def _repr_html_(self) -> str:
@@ -277,6 +296,7 @@ class Diagnosis:
             "loop_follows": self.loop_follows,
             "line": None if self.line is None else list(self.line),
             "one_sided": dict(self.one_sided),
+            "log_shifts": {digest: dict(moves) for digest, moves in self.log_shifts.items()},
             "mechanics": {n: asdict(e) for n, e in self.mechanics.items()},
         }
 
@@ -327,6 +347,7 @@ class Diagnosis:
                 loop_follows=data.get("loop_follows", True),
                 line=None if data.get("line") is None else (data["line"][0], data["line"][1]),
                 one_sided=data.get("one_sided", {}),
+                log_shifts=data.get("log_shifts", {}),
                 mechanics={n: Estimate(**e) for n, e in data.get("mechanics", {}).items()},
             )
         except (KeyError, TypeError, AttributeError, IndexError) as error:

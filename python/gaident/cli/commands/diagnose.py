@@ -2,25 +2,90 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+from argparse import Namespace
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import starmap
+from pathlib import Path
 
 from gaident.cli.commands.report import write_report
 from gaident.cli.drive import drive_of, read_all, reading_notes
 from gaident.cli.options import PICTURES
 from gaident.cli.output import apart, naming, print_json, proposal_csv, save_figure, target_of, write
+from gaident.cli.remedies import in_options
 from gaident.diagnosis.diagnose import diagnose
-from gaident.errors import SettingsError
+from gaident.drive.drive_file import Drive, axes_in
+from gaident.errors import GaidentError, SettingsError
 from gaident.identification.space import derive_space
+from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.results.store import load
+from gaident.show.diagnosis_summary import either, words
 from gaident.show.progress_bar import Progress
+from gaident.show.wording import number, table, velocity_unit
 
 __all__ = ["diagnose_command"]
 
 
-def diagnose_command(args: argparse.Namespace) -> None:
+def diagnose_command(args: Namespace) -> int | None:
+    names = () if args.drive is None else axes_in(args.drive)
+    if names and (args.select is None or len(args.select) > 1):
+        return _several(args, args.select or names)
+    drive, dia, written = _diagnosed(args)
+    if args.json:
+        print_json(dia.to_dict())
+        return None
+    print(dia.summary(drive.axis))
+    if args.next_command is not None and dia.next_experiment is None:
+        print(f"\nnot written: {args.next_command}, as there is no next experiment to propose")
+    if written:
+        print(f"\nwritten: {', '.join(map(str, written))}")
+    return None
+
+
+def _several(args: Namespace, names: Sequence[str]) -> int | None:
+    """Every axis by itself: a table with a row for each, then their summaries. An axis that cannot be diagnosed is a row too."""
+    if args.model is not None:
+        raise SettingsError("--model is the identification of one axis: name the axis with --select, or leave it out")
+    found: dict[str, tuple[Drive, Diagnosis] | GaidentError] = {}
+    written: list[Path] = []
+    for name in names:
+        own = Namespace(**{**vars(args), "select": [name]})
+        for option in ("out", "plot", "report", "next_command"):
+            if (path := getattr(args, option)) is not None:
+                setattr(own, option, str(Path(path).with_stem(f"{Path(path).stem}_{name}")))
+        try:
+            drive, dia, more = _diagnosed(own)
+        except GaidentError as error:
+            found[name] = error
+        else:
+            found[name] = drive, dia
+            written += more
+    failed = sum(isinstance(result, GaidentError) for result in found.values())
+    if args.json:
+        said = {n: {"error": in_options(r)} if isinstance(r, GaidentError) else r[1].to_dict() for n, r in found.items()}
+        print_json({"schema": "gaident/axes", "schema_version": 1, "axes": said})
+        return 1 if failed else None
+    print("\n".join(table([("axis", "verdict", "cause", "rmse, linear", "extended", ""), *starmap(_row, found.items())], "")))
+    for name, result in found.items():
+        if not isinstance(result, GaidentError):
+            print(f"\n--- {name}\n\n{result[1].summary(result[0].axis)}")
+    if written:
+        print(f"\nwritten: {', '.join(map(str, written))}")
+    return 1 if failed else None
+
+
+def _row(name: str, result: tuple[Drive, Diagnosis] | GaidentError) -> tuple[str, ...]:
+    if isinstance(result, GaidentError):
+        return name, "not diagnosed", in_options(result), "", "", ""
+    drive, dia = result
+    causes = ", ".join(either(f) if f.alternatives else words(f.effect) for f in dia.causes) or "none"
+    return name, dia.verdict, causes, number(dia.before.rmse), number(dia.after.rmse), velocity_unit(drive.axis)
+
+
+def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
+    """(the drive, its diagnosis, the files that were written)."""
     drive = drive_of(args)
     sources = [*args.logs, *(args.validation or []), *([] if args.model is None else [args.model])]
     out = target_of(args.out, sources)
@@ -65,11 +130,4 @@ def diagnose_command(args: argparse.Namespace) -> None:
     if following is not None and dia.next_experiment is not None:
         write(following, proposal_csv(dia.next_experiment, drive.axis).encode())
         written.append(following)
-    if args.json:
-        print_json(dia.to_dict())
-        return
-    print(dia.summary(drive.axis))
-    if following is not None and following not in written:
-        print(f"\nnot written: {following}, as there is no next experiment to propose")
-    if written:
-        print(f"\nwritten: {', '.join(map(str, written))}")
+    return drive, dia, written

@@ -65,6 +65,8 @@ _TORQUE: dict[tuple[str, ...], _Unit] = {
     ("V", "volt"): _Unit(1.0, _VOLT),
     ("mV",): _Unit(1e-3, _VOLT),
 }
+_VOLTAGE: dict[tuple[str, ...], _Unit] = {("V", "volt"): _Unit(1.0), ("mV",): _Unit(1e-3)}
+_CURRENT: dict[tuple[str, ...], _Unit] = {("A", "amp", "ampere", "arms"): _Unit(1.0), ("mA",): _Unit(1e-3)}
 _TIME: dict[tuple[str, ...], _Unit] = {
     ("s", "sec", "second", "seconds"): _Unit(1.0),
     ("ms", "msec", "millisecond", "milliseconds"): _Unit(1e-3),
@@ -95,6 +97,8 @@ _TABLES = {
     "velocity": _VELOCITY,
     "torque": _TORQUE,
     "position": _POSITION,
+    "voltage": _VOLTAGE,
+    "current": _CURRENT,
     "time": _TIME,
 }
 _UNITS = {quantity: _by_spelling(table) for quantity, table in _TABLES.items()}
@@ -102,7 +106,7 @@ _OURS = {spelling for units in _UNITS.values() for spelling in units}
 _ANY = _OURS | {_spelling(name) for name in _OTHERS}
 
 QUANTITIES = tuple(_TABLES)
-"""What a unit can be given for: the channels of a Record, and time."""
+"""What a unit can be given for: the channels of a Record, what a torque is worked out from, and time."""
 
 
 @dataclass(frozen=True)
@@ -113,12 +117,18 @@ class Constants:
     torque_constant  [N m/A] (linear: [N/A])
     rated_torque     what 100 % means [N m] (linear: [N])
     torque_per_volt  [N m/V] (linear: [N/V])
+    resistance       of the motor's winding [Ohm], for a torque from its voltage
+    inductance       of it [H]
+    back_emf_constant  [V s/rad] (linear: [V s/m]); None: as the torque constant
     """
 
     counts_per_turn: float | None = None
     torque_constant: float | None = None
     rated_torque: float | None = None
     torque_per_volt: float | None = None
+    resistance: float | None = None
+    inductance: float | None = None
+    back_emf_constant: float | None = None
 
     def check(self) -> None:
         """Raise ReadError unless each constant is None or a positive finite number."""
@@ -148,7 +158,7 @@ def is_any_unit(text: str) -> bool:
 def factor(quantity: str, unit: str | float, constants: Constants | None = None) -> float:
     """What a value in `unit` is multiplied by to get SI (rad, rad/s, N m, s; linear m, m/s, N).
 
-    quantity   "command", "velocity", "torque", "position" or "time"
+    quantity   "command", "velocity", "torque", "position", "voltage", "current" or "time"
     unit       a spelling from the table, or the factor itself as a number (finite, not 0; negative turns the
                sign)
     constants  of the drive, for counts, A, V and %

@@ -11,7 +11,7 @@ from gaident.arguments import arg
 from gaident.data.signals.arrays import channel, positive_number
 from gaident.errors import RecordError
 
-__all__ = ["differentiate"]
+__all__ = ["differentiate", "low_pass"]
 
 _ORDER = 4
 _SHORTEST_EXTENSION = 15
@@ -57,13 +57,14 @@ def differentiate(position: ArrayLike, dt: float, cutoff_hz: float | None = None
     x = channel(position, "position")
     dt = positive_number(dt, "dt", "s", f"give the sample time in seconds, for example {arg('dt', '1e-3')}")
     if cutoff_hz is not None:
-        x = _low_pass(x, dt, cutoff_hz)
+        x = low_pass(x, dt, cutoff_hz)
     # The edges stay one-sided: a second-order edge formula would amplify encoder noise there by 2.5.
     w: NDArray[np.float64] = np.gradient(x, dt, edge_order=1)
     return w
 
 
-def _low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float) -> NDArray[np.float64]:
+def low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float) -> NDArray[np.float64]:
+    """The filter of `differentiate` alone. Raises RecordError for a corner that is not between 0 and 1/(2 dt)."""
     nyquist = 0.5 / dt
     cutoff_hz = positive_number(cutoff_hz, "cutoff_hz", "Hz", f"give a corner between 0 and {nyquist:g} Hz, or None")
     if cutoff_hz >= nyquist:

@@ -1,0 +1,110 @@
+"""Counters that run over: a position that starts again at the other end of its range, a velocity or torque that turned its sign.
+
+A wrap is a step d(n) = x(n+1) - x(n) of nearly the whole range seen so far, between steps p before and after it that are small,
+alike and of the other sign: the motion goes on as if nothing had happened. The counter's range is
+
+    M = |d| + |p|        p: mean of the steps before and after, in the direction of the motion
+
+to within the difference of the two; where that holds a usual range (2^8 .. 2^32, 1, 360, 2 pi, counts per turn, ...), it is that.
+Where the steps beside it differ by more than half or are none, as of an encoder at low speed, a usual range alone is taken.
+A position is continued: x + k M, k the wraps so far. A glitch jumps back at once and is none; nor is a jump of a rotor that takes
+more than a quarter of M in a sample.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Unwrapper", "overflow"]
+
+Vector = NDArray[np.float64]
+
+_USUAL = (1.0, 100.0, 360.0, 3600.0, 36000.0, 360000.0, 1000.0, 2.0 * math.pi, *(float(2**k) for k in range(8, 33)))
+_NEARLY = 0.75  # of the range seen
+_SMALL = 0.25  # of the jump: the steps beside it
+_ALIKE = 0.05  # of the jump: by which they may differ
+_STEADY = 0.5  # of the larger of these steps: the smaller one
+_REACH = 8  # samples on either side in which a slow motion shows its direction
+_INTEGERS = (float(2**16), float(2**32))  # of an integer that overflows
+
+
+def _clean(x: Vector, usual: Sequence[float]) -> tuple[NDArray[np.intp], Vector]:
+    """(n of each clean jump from x(n) to x(n+1), what it lacks of M: the mean step beside it)."""
+    if len(x) < 4:
+        return np.zeros(0, dtype=np.intp), np.zeros(0)
+    d = np.diff(x)
+    at = np.flatnonzero(np.abs(d[1:-1]) >= _NEARLY * float(np.ptp(x))) + 1
+    size, before, after = np.abs(d[at]), d[at - 1], d[at + 1]
+    beside = np.maximum(np.abs(before), np.abs(after))
+    clean = (beside <= _SMALL * size) & (np.abs(before - after) <= _ALIKE * size)
+    lacking = 0.5 * np.abs(before + after)
+    sign = -np.sign(d[at])
+    steady = (sign * before > 0.0) & (sign * after > 0.0) & (np.minimum(np.abs(before), np.abs(after)) >= _STEADY * beside)
+    known = np.array([any(abs(m - s) <= 1e-3 * m for m in usual) for s in size + lacking], dtype=bool)
+    came = sign * (x[at] - x[np.maximum(at - _REACH, 0)])
+    went = sign * (x[np.minimum(at + 1 + _REACH, len(x) - 1)] - x[at + 1])
+    clean &= steady | (known & (came >= 0.0) & (went >= 0.0) & (came + went > 0.0))
+    return at[clean], lacking[clean]
+
+
+class Unwrapper:
+    """A position made continuous as it comes in, block by block; usual: more ranges that a counter may have, in its unit."""
+
+    def __init__(self, usual: Sequence[float] = ()) -> None:
+        self.usual = (*usual, *_USUAL)
+        self.period: float | None = None
+        self.wraps = 0
+        self._tail = np.zeros(0)  # the last values as they came, for a jump between two blocks
+        self._turns = 0.0
+
+    def push(self, values: Vector) -> Vector:
+        """The next values, continued; they are not changed where nothing wraps."""
+        x = np.concatenate([self._tail, values])
+        if self.period is None:
+            self.period = self._period(x)
+        if self.period is not None and len(values):
+            before = self._tail[-1:] if len(self._tail) else values[:1]
+            k = -np.round(np.diff(np.concatenate([before, values])) / self.period)
+            turns = self._turns + np.cumsum(k)
+            self.wraps += int(np.count_nonzero(k))
+            self._turns = float(turns[-1])
+            values = values + turns * self.period
+        self._tail = x[-3:]
+        return values
+
+    def _period(self, x: Vector) -> float | None:
+        """M from the clean jumps; None where there is none, or where other steps would be taken for wraps."""
+        at, lacking = _clean(x, self.usual)
+        if not len(at):
+            return None
+        d = np.diff(x)
+        found = np.abs(d[at]) + lacking
+        period = float(np.median(found))
+        slack = max(float(np.abs(d[at - 1] - d[at + 1]).max()), 1e-3 * period)
+        near = [m for m in self.usual if abs(m - period) <= slack and m >= float(np.ptp(x))]
+        period = min(near, key=lambda m: abs(m - period), default=period)
+        rest = np.abs(d - period * np.round(d / period))
+        return period if float(np.quantile(rest, 0.999)) < _SMALL * period else None
+
+
+def overflow(x: Vector) -> tuple[int, float] | None:
+    """(n, M) where an integer overflowed from x(n) to x(n+1), M its 2^16 or 2^32 steps in the unit of x; None where none did.
+
+    The jump has to be as long as 2^16 or 2^32 of the smallest steps between values: a torque that is reversed also jumps.
+    """
+    at, lacking = _clean(x, ())
+    if not len(at):
+        return None
+    distinct = np.unique(x)
+    gaps = np.diff(distinct)
+    step = float(gaps[gaps > 1e-9 * float(np.abs(x).max())].min())
+    for n, more in zip(at, lacking, strict=True):
+        size = abs(float(x[n + 1] - x[n])) + float(more)
+        for integer in _INTEGERS:
+            if abs(size / (integer * step) - 1.0) < 0.02:
+                return int(n), integer * step
+    return None

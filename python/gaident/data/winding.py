@@ -1,0 +1,135 @@
+"""The winding of a motor: from its voltage and velocity to its torque."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gaident.checks import real_number
+from gaident.control.filtering import filtered
+from gaident.data.signals.arrays import channel, positive_number
+from gaident.errors import RecordError
+
+__all__ = ["Winding"]
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Winding:
+    """A winding with back-EMF, of a DC motor or of the torque-forming axis of a servo motor.
+
+        U = R i + L di/dt + ke w,   u = kt i
+
+    Parameters
+    ----------
+    resistance : float
+        R [Ohm], above 0.
+    torque_constant : float
+        kt [N m/A], above 0; of a linear motor N/A.
+    inductance : float
+        L [H], from 0 on. 0: the current follows at once.
+    back_emf_constant : float, optional
+        ke [V s/rad], above 0; None: as the torque constant, which holds for a DC motor in SI units. With the peak values of
+        a three-phase motor in dq coordinates kt = 1.5 ke.
+
+    Raises
+    ------
+    RecordError
+        A value out of its range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> winding = ga.Winding(resistance=0.5, torque_constant=0.05)
+    >>> bool(np.allclose(winding.torque(np.full(100, 6.0), np.full(100, 20.0), dt=1e-3), 0.05 * (6 - 0.05 * 20) / 0.5))
+    True
+    """
+
+    resistance: float
+    torque_constant: float
+    inductance: float = 0.0
+    back_emf_constant: float | None = None
+
+    def __post_init__(self) -> None:
+        units = {"resistance": "Ohm", "torque_constant": "N m/A", "back_emf_constant": "V s/rad"}
+        for name, unit in units.items():
+            if (value := getattr(self, name)) is not None:
+                object.__setattr__(self, name, positive_number(value, name, unit, f"give it in {unit}"))
+        inductance = real_number(self.inductance, "inductance", RecordError)
+        if inductance < 0.0:
+            raise RecordError(f"inductance={self.inductance!r} H: it must be 0 or more; 0 leaves it out")
+        object.__setattr__(self, "inductance", inductance)
+
+    @property
+    def emf(self) -> float:
+        """The back-EMF constant ke [V s/rad]."""
+        return self.torque_constant if self.back_emf_constant is None else self.back_emf_constant
+
+    def current(self, voltage: ArrayLike, velocity: ArrayLike, dt: float) -> Vector:
+        """Return the current i of a voltage U that is held over each sample, and a velocity w.
+
+            i(n+1) = a i(n) + (1 - a) (U(n) - ke (w(n) + w(n+1))/2)/R,   a = exp(-R dt/L),   i(0) = (U(0) - ke w(0))/R
+
+        Parameters
+        ----------
+        voltage : array_like, shape (n,)
+            U [V].
+        velocity : array_like, shape (n,)
+            w [rad/s].
+        dt : float
+            Sample time [s].
+
+        Returns
+        -------
+        ndarray of shape (n,)
+            i [A].
+
+        Raises
+        ------
+        RecordError
+            Arrays that a Record would refuse, or of unequal lengths.
+        """
+        return self._courses(voltage, velocity, dt)[0]
+
+    def torque(self, voltage: ArrayLike, velocity: ArrayLike, dt: float) -> Vector:
+        """Return the mean torque over each sample: what a record's torque, held until the next one, stands for.
+
+            u(n) = kt (s(n) + (i(n) - s(n)) (1 - a) L/(R dt)),   s(n) = (U(n) - ke (w(n) + w(n+1))/2)/R
+
+        Parameters
+        ----------
+        voltage : array_like, shape (n,)
+            U [V].
+        velocity : array_like, shape (n,)
+            w [rad/s].
+        dt : float
+            Sample time [s].
+
+        Returns
+        -------
+        ndarray of shape (n,)
+            u [N m].
+        """
+        current, settled, dt = self._courses(voltage, velocity, dt)
+        if self.inductance == 0.0:
+            return self.torque_constant * settled
+        samples = self.inductance / (self.resistance * dt)  # of the time constant L/R
+        return np.asarray(self.torque_constant * (settled + (current - settled) * samples * -np.expm1(-1.0 / samples)))
+
+    def _courses(self, voltage: ArrayLike, velocity: ArrayLike, dt: float) -> tuple[Vector, Vector, float]:
+        """(i(n), s(n) that it goes to, dt), checked."""
+        U, w = channel(voltage, "voltage"), channel(velocity, "velocity")
+        dt = positive_number(dt, "dt", "s", "give the sample time in seconds")
+        if len(U) != len(w):
+            raise RecordError(f"voltage has {len(U)} samples, velocity {len(w)}: give them of the same samples")
+        towards = (U - 0.5 * self.emf * (w + np.concatenate([w[1:], w[-1:]]))) / self.resistance
+        if self.inductance == 0.0:
+            return (U - self.emf * w) / self.resistance, towards, dt
+        a = float(np.exp(-self.resistance * dt / self.inductance))
+        first = (U[:1] - self.emf * w[:1]) / self.resistance
+        more = filtered(np.array([1.0 - a]), np.array([1.0, -a]), (towards[:-1] - first)[None, :], [len(U) - 1])[0]
+        return np.concatenate([first, first + more]), towards, dt

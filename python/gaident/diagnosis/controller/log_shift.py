@@ -1,0 +1,211 @@
+"""Channels that a log wrote on another line than the others: found, moved back, and said.
+
+What the controller issued at a sample follows from what it read there. With its gains known (or free), the law
+
+    u(n) = kp (r(n-a) - w(n-b)) + ki dt sum + I0
+
+shows a and b; what the motion tells of the torque's place is its lag L (estimation/regression/torque_lag.py, [samples], positive
+where the torque stands behind its motion). Of a torque that the log wrote s samples late, in a drive that computes for d_c and
+acts after d_p samples, both not negative,
+
+    b = s + d_c,   L = s - d_p,   therefore   L <= s <= b
+
+A controller that reads the future (b < 0), and a motion before its torque (L > 0), are the log's beyond doubt.
+Where the law holds for b > 0 alone, the log and a delay of the drive are not told apart by it. Moving a commanded torque by b is
+right in either case: a delay of the drive then stands where the model has one, between torque and shaft, and is found there.
+A measured torque stands behind that delay, and is moved only where L agrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.data.torque_kind import MEASURED
+from gaident.diagnosis.controller.replay import replay
+from gaident.diagnosis.policy import POLICY
+from gaident.estimation.regression.torque_lag import TorqueLag, torque_lag
+from gaident.identification.notes import reading_notes
+from gaident.results.diagnosis import Diagnosis
+
+__all__ = ["Aligned", "aligned"]
+
+Vector = NDArray[np.float64]
+
+FARTHEST = 2  # samples in either direction
+LONGEST = 1 << 16  # samples that the law is fitted to
+SHARES = (0.0, 0.5, -0.5)  # of ki dt, by which the newest error counts more than half: trapezoidal and rectangular integrals
+MOST_LEFT = 0.1  # of the torque's standard deviation: where the law leaves more, it is not this controller
+
+
+@dataclass(frozen=True)
+class Aligned:
+    """The records with their channels on the lines where the law holds.
+
+    given: digest of a record as it is here -> as it was given. notes: what was moved, and what may have to be.
+    """
+
+    records: tuple[Record, ...]
+    held: tuple[Record, ...]
+    notes: tuple[str, ...] = ()
+    shifts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    given: Mapping[str, Record] = field(default_factory=dict)
+
+    def noted(self, result: Diagnosis) -> Diagnosis:
+        """The result, in terms of the records that were given."""
+        records, held = ([self.given[r.digest] for r in part] for part in (result.records, result.validation_records))
+        return replace(
+            result,
+            notes=(*self.notes, *result.notes),
+            log_shifts=self.shifts,
+            records=tuple(records),
+            validation_records=tuple(held),
+            digests=tuple(r.digest for r in records),
+            validation_digests=tuple(r.digest for r in held),
+        )
+
+
+def aligned(records: Sequence[Record], held: Sequence[Record], controller: PI | None) -> Aligned:
+    """The records without shifts of their logs, those that the controller's law shows beyond doubt."""
+    notes: dict[str, None] = dict.fromkeys(reading_notes((*records, *held)))
+    shifts: dict[str, Mapping[str, int]] = {}
+    given: dict[str, Record] = {}
+
+    def one(rec: Record) -> Record:
+        moves, note = _of_law(rec, controller) if controller is not None else ({}, _of_motion(rec))
+        if note:
+            name = f"{rec.name}: " if len(records) + len(held) > 1 and rec.name else ""
+            notes[f"{name}{note}"] = None
+        moved = rec.shifted(**moves) if moves else rec
+        if moves:
+            shifts[rec.digest] = moves
+        given[moved.digest] = rec
+        return moved
+
+    return Aligned(tuple(map(one, records)), tuple(map(one, held)), tuple(notes), shifts, given)
+
+
+def _of_law(rec: Record, controller: PI | None) -> tuple[Mapping[str, int], str]:
+    """(channel -> samples by which it is moved, note) of a record with a controller; ({}, "") where there is no shift."""
+    if controller is None or rec.torque is None or rec.command is None:
+        return {}, ""
+    said = replay(rec, controller)
+    if said.follows is not False:
+        return {}, ""
+    a, b = _shift_of_law(rec, controller)
+    if (a, b) == (0, 0):
+        return {}, ""
+    moves = _moves(rec, a, b)
+    after = replay(rec.shifted(**moves), controller)
+    if after.follows is False and after.cause in ("", "shift"):
+        return {}, ""
+    lag = torque_lag(rec)
+    if rec.torque_is == MEASURED and b > 0 and not (lag is not None and lag.lag > b - 0.25):
+        return {}, _measured_note(b, lag)
+    return moves, _moved_note(moves, b, lag)
+
+
+def _shift_of_law(rec: Record, controller: PI) -> tuple[int, int]:
+    """(a, b): by how many samples command and velocity are older than the log's where the law, its gains free, holds.
+
+    (0, 0) where another shift is not better beyond doubt, or b not sure. Of an undetermined a, as a constant command leaves it,
+    that of the fewest channels.
+    """
+    assert rec.command is not None and rec.torque is not None
+    r, w, u = (x[:LONGEST] for x in (rec.command, rec.velocity, rec.torque))
+    inner = slice(FARTHEST, len(u) - FARTHEST)
+    within = np.abs(u[inner]) < 0.999 * float(np.abs(u).max())
+    n, top = int(within.sum()), float(np.std(u))
+    if n < 20 or not top > 0.0:
+        return 0, 0
+    steps = range(-FARTHEST, FARTHEST + 1)
+    least = (1e-6 * float(np.abs(u).max())) ** 2
+    left: dict[tuple[int, int], float] = {}
+    for a in steps:
+        for b in steps:
+            e = _older(r, a) - _older(w, b)
+            for share in SHARES if controller.ki else SHARES[:1]:
+                columns = [e, np.cumsum(e) - (0.5 - share) * e, np.ones(len(e))] if controller.ki else [e, np.ones(len(e))]
+                table = np.column_stack(columns)[inner][within]
+                table /= np.maximum(np.linalg.norm(table, axis=0), 1e-300)
+                off = u[inner][within] - table @ np.linalg.lstsq(table, u[inner][within], rcond=1e-12)[0]
+                left[a, b] = min(left.get((a, b), np.inf), float(off @ off) / n)
+    best = min(left.values())
+    if best > (MOST_LEFT * top) ** 2:
+        return 0, 0
+    worse = {shift: n * float(np.log((value + least) / (best + least))) for shift, value in left.items()}
+    alike = [shift for shift, units in worse.items() if units < POLICY.log_shift]
+    if len({b for _, b in alike}) > 1:  # what the torque was made of is not sure
+        return 0, 0
+    return min(alike, key=lambda s: (s != (0, 0), not (s[0] == s[1] or 0 in s), s[0] != s[1], abs(s[0]) + abs(s[1]), s))
+
+
+def _older(x: Vector, k: int) -> Vector:
+    """x(n-k); what lies beyond the ends repeats them."""
+    k = int(k)
+    return x if k == 0 else np.concatenate([np.full(k, x[0]), x[:-k]] if k > 0 else [x[-k:], np.full(-k, x[-1])])
+
+
+def _moves(rec: Record, a: int, b: int) -> dict[str, int]:
+    """Channel -> samples by which it is moved, as few channels as possible; a position stays beside its velocity."""
+    if a == b:
+        return {"torque": -b}
+    moves = {"command": a} if a else {}
+    if b:
+        moves |= {"velocity": b} | ({"position": b} if rec.position is not None else {})
+    return moves
+
+
+def _samples(k: float) -> str:
+    return f"{abs(k):.3g} sample{'' if abs(k) == 1 else 's'}"
+
+
+def _moved_note(moves: Mapping[str, int], b: int, lag: TorqueLag | None) -> str:
+    late = [f"the {name} {_samples(k)} {'late' if k < 0 else 'early'}" for name, k in moves.items() if name != "position"]
+    done = ", ".join(f"{name} by {k:+d}" for name, k in moves.items())
+    text = (
+        f"The log wrote {' and '.join(late)} against the rest: only so does the torque follow from command and velocity through "
+        f"the controller. The channels were moved ({done}), and everything below is of that."
+    )
+    if b < 0:
+        return f"{text} As logged, the controller would have acted before it measured."
+    if b > 0 and (lag is None or lag.lag < b - 0.5):
+        same = f"A drive that computes for {_samples(b)} makes the same log; that delay would show below as a transport delay."
+        return f"{text} {same}"
+    return text
+
+
+def _measured_note(b: int, lag: TorqueLag | None) -> str:
+    text = (
+        f"The measured torque is {_samples(b)} behind the controller's, exactly: the log may have written it late, or the drive "
+        "needs that long. "
+    )
+    where = (
+        "The motion does not tell which"
+        if lag is None
+        else f"The motion puts it {_samples(lag.lag)} {'behind' if lag.lag > 0 else 'before'} its place"
+    )
+    return f"{text}{where}; nothing was moved. Where you know that it is the log, read it with shift torque={-b}."
+
+
+def _of_motion(rec: Record) -> str:
+    """What the motion says of a torque in open loop, where no law proves anything: a note, "" where there is nothing to say."""
+    lag = torque_lag(rec)
+    if lag is None or abs(lag.lag) - 3.0 * lag.std < 0.5 or abs(lag.lag) < 0.75:
+        return ""
+    k = round(lag.lag)
+    remedy = f"where you know that it is the log, read it with shift torque={-k}. Nothing was moved."
+    if lag.lag > 0.0:
+        return (
+            f"The motion comes {_samples(lag.lag)} before the logged torque that makes it, which no axis does: the log wrote the "
+            f"torque late (or the velocity early), or the torque was filtered on its way into the log; {remedy}"
+        )
+    return (
+        f"The motion follows the logged torque by {_samples(lag.lag)} more than an axis needs: a delay of the drive or of the "
+        f"velocity's sensor, or a log that wrote the torque early; without a controller the data cannot tell; {remedy}"
+    )

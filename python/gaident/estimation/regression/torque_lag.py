@@ -1,0 +1,86 @@
+"""By how many samples a logged torque stands behind the motion that it makes, from the inverse-dynamics regression.
+
+    u_h(n)  = (u(n) + u(n-1))/2                 a torque held over each sample, as it shows in w(n+1) - w(n-1)
+    J(k)    = min |u_h(n + k) - J a - B w - C sign(w) - T|^2 / |u_h|^2,   k = -3 .. 3
+    lag     = where the parabola through the least of J and its neighbours has its lowest point
+    std     = sqrt(J_min/(n_eff c)),   J(k) = J_min + c (k - lag)^2
+
+All channels pass the filter of the regression.
+A lightly damped resonance above the filter's corner turns no phase, so an elastic axis has the lag of a rigid one.
+A motion before its torque, lag > 0, is nothing that an axis can do; a motion behind it, lag < 0, is what a delay makes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.estimation.regression.motion import cutoff_of
+from gaident.estimation.regression.regression import effective_samples, solve
+from gaident.estimation.regression.rows import decimation_of, rows_of
+
+__all__ = ["TorqueLag", "torque_lag"]
+
+Vector = NDArray[np.float64]
+
+ORDER = 4
+FARTHEST = 3
+"""Samples in either direction; what is farther away is no slip of a log's lines."""
+LONGEST = 1 << 17
+"""Samples that are looked at."""
+LEAST_ROWS = 20
+MOST_LEFT = 0.05
+"""Of the torque's power: where the best lag leaves more, the regression does not describe the axis and tells nothing."""
+
+LEAST_CURVATURE = 1e-3
+"""Of the torque's power, that one sample more has to cost: at a single frequency (2e-5 and less) inertia and friction take it."""
+
+
+@dataclass(frozen=True)
+class TorqueLag:
+    """lag and std [samples]; left: share of the torque's power that the regression leaves at that lag."""
+
+    lag: float
+    std: float
+    left: float
+
+
+def torque_lag(rec: Record) -> TorqueLag | None:
+    """The lag of the record's torque; None without one, or where the motion does not tell."""
+    if rec.torque is None:
+        return None
+    rec = rec[:LONGEST]
+    assert rec.torque is not None
+    cutoff = cutoff_of(rec, ORDER)
+    factor = decimation_of(None, cutoff, rec.dt)
+    held = 0.5 * (rec.torque + np.concatenate([rec.torque[:1], rec.torque[:-1]]))
+    both = bool(np.any(rec.velocity > 0.0) and np.any(rec.velocity < 0.0))
+    terms = ("inertia", "viscous", "coulomb", "offset") if both else ("inertia", "viscous", "offset")
+    steps = range(-FARTHEST, FARTHEST + 1)
+    left: list[float] = []
+    residuals: list[Vector] = []
+    for k in steps:
+        moved = np.concatenate([held[k:], np.full(k, held[-1])] if k >= 0 else [np.full(-k, held[0]), held[:k]])
+        rows = rows_of(rec.with_channels(torque=moved), terms, cutoff, ORDER, factor, None)
+        power = float(rows.torque @ rows.torque)
+        if len(rows.torque) < LEAST_ROWS or not power > 0.0:
+            return None
+        theta, rank = solve(rows.of(terms), rows.torque)
+        if rank < len(theta):
+            return None
+        residuals.append(rows.torque - rows.of(terms) @ theta)
+        left.append(float(residuals[-1] @ residuals[-1]) / power)
+    best = int(np.argmin(left))
+    if best in (0, len(left) - 1) or left[best] > MOST_LEFT:
+        return None
+    before, least, after = left[best - 1 : best + 2]
+    curvature = 0.5 * (before + after) - least
+    if not curvature > LEAST_CURVATURE:
+        return None
+    within = 0.25 * (before - after) / curvature
+    lowest = max(least - curvature * within**2, 0.0)
+    std = float(np.sqrt(lowest / (effective_samples([residuals[best]]) * curvature)))
+    return TorqueLag(steps[best] + within, std, lowest)

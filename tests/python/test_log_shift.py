@@ -1,0 +1,198 @@
+"""A log that wrote a channel on another line than the rest: what law and motion tell, what is moved, what is only said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from drive_rig import Plant, rig
+from gaident.cli import main
+from gaident.diagnosis.controller.log_shift import Aligned, aligned
+from gaident.errors import ReadError, RecordError
+from gaident.estimation.regression.torque_lag import torque_lag
+
+RIGID = Plant(3e-4, 2e-3, 0.03, 1.9, 1e-3, name="rigid")
+ELASTIC = Plant(1e-4, 1e-3, 0.03, 1.0, 1e-3, JL=1e-4, DL=1e-3, KG=20.0, name="antiresonance at 71 Hz")
+SOFT = Plant(2e-4, 2e-3, 0.03, 1.9, 1e-3, JL=3e-4, DL=1e-3, KG=2.0, name="antiresonance at 13 Hz")
+STEPS = np.repeat(np.random.default_rng(5).uniform(-60, 60, 15), 200)
+SINE = 40 * np.sin(2 * np.pi * 2e-3 * np.arange(3000))
+FRICTION = {"coulomb_friction": {"torque": 0.05}}
+DELAY = {"transport_delay": {"delay": 1e-3}}
+
+
+def noisy(rec: ga.Record, share: float = 0.05) -> ga.Record:
+    """The record with its torque measured."""
+    assert rec.torque is not None
+    noise = share * float(rec.torque.std()) * np.random.default_rng(2).standard_normal(len(rec))
+    return rec.with_channels(torque=rec.torque + noise, torque_is="measured")
+
+
+def looked_at(rec: ga.Record, plant: Plant | None) -> tuple[dict[str, int], Aligned]:
+    found = aligned([rec], [], None if plant is None else plant.controller)
+    return {name: k for moves in found.shifts.values() for name, k in moves.items()}, found
+
+
+@pytest.mark.parametrize("plant", [RIGID, ELASTIC, SOFT], ids=lambda p: p.name)
+@pytest.mark.parametrize("noise", ["white"])
+def test_the_law_shows_which_channel_was_moved(plant: Plant, noise: str) -> None:
+    rec = rig(plant, STEPS, FRICTION, noise)
+    assert looked_at(rec, plant) == ({}, aligned([rec], [], plant.controller))
+    for channel, k in (("torque", 1), ("torque", -2), ("velocity", 1), ("velocity", -1), ("command", -2)):
+        back, found = looked_at(rec.shifted(**{channel: k}), plant)
+        assert back == {channel: -k}
+        assert f"{channel} by {-k:+d}" in found.notes[0] and len(found.notes) == 1
+    back, found = looked_at(rec.shifted(torque=1, velocity=-1), plant)
+    assert back == {"command": 1, "velocity": 2}  # all stand as before, a sample later
+    assert looked_at(found.records[0], plant)[0] == {}
+
+
+def test_what_is_no_shift_is_not_moved() -> None:
+    """Delay, lag, filter, wrong gains, another rule of integration and limits are explained otherwise, or are the drive's."""
+    rectangular = ga.PI(RIGID.kp + 0.5 * RIGID.ki * RIGID.dt, RIGID.ki)
+    for effects in ({}, DELAY, {"torque_lag": {"time_constant": 1e-3}}, {"velocity_filter": {"time_constant": 2e-3}},
+                    {"integrator_clamp": {"limit": 0.1}}):  # fmt: skip
+        for command in (STEPS, SINE):
+            rec = rig(RIGID, command, effects)
+            for controller in (RIGID.controller, rectangular, ga.PI(1.3 * RIGID.kp, 0.8 * RIGID.ki)):
+                assert not aligned([rec], [], controller).shifts
+                assert not aligned([noisy(rec)], [], controller).shifts
+
+
+def test_a_lagging_measured_torque_is_no_shift() -> None:
+    """A current behind a first-order lag of one sample stands about a sample late, but by no whole number of them."""
+    rec = rig(RIGID, STEPS, FRICTION)
+    assert rec.torque is not None
+    lagged = np.copy(rec.torque)
+    for n in range(1, len(lagged)):
+        lagged[n] = lagged[n - 1] + (1 - np.exp(-1.0)) * (rec.torque[n] - lagged[n - 1])
+    for share in (0.0, 0.02):
+        assert not aligned([noisy(rec.with_channels(torque=lagged), share)], [], RIGID.controller).shifts
+
+
+def test_gains_that_are_wrong_beside_a_shift_are_still_found() -> None:
+    rec = rig(RIGID, STEPS).shifted(torque=1)
+    back, _ = looked_at(rec, RIGID)
+    assert back == {"torque": -1}
+    wrong = ga.PI(1.3 * RIGID.kp, RIGID.ki)
+    assert list(aligned([rec], [], wrong).shifts.values()) == [{"torque": -1}]
+
+
+def test_where_the_command_stands_still_its_place_is_not_told_and_nothing_depends_on_it() -> None:
+    rec = rig(RIGID, np.full(1500, 40.0))
+    assert looked_at(rec.shifted(command=-2), RIGID)[0] == {}
+    assert looked_at(rec.shifted(velocity=1), RIGID)[0] == {"torque": 1}
+
+
+def test_a_measured_torque_is_moved_only_where_law_and_motion_agree() -> None:
+    rec = rig(RIGID, STEPS, FRICTION)
+    assert looked_at(noisy(rec.shifted(torque=1)), RIGID)[0] == {"torque": -1}
+    # A drive that acts a sample late, its current measured: law and motion disagree by that sample.
+    late = rig(RIGID, STEPS, DELAY).shifted(torque=1)
+    moves, found = looked_at(noisy(late), RIGID)
+    assert moves == {} and "or the drive needs that long. The motion puts it" in found.notes[0]
+    assert "shift torque=-1" in found.notes[0]
+    # Before its law it cannot be: that is the log.
+    assert looked_at(noisy(rec.shifted(torque=-1)), RIGID)[0] == {"torque": 1}
+    # The same of a soft drive, whose motion the regression does not describe.
+    moves, found = looked_at(noisy(rig(SOFT, STEPS).shifted(torque=1)), SOFT)
+    assert moves == {} and "The motion does not tell which" in found.notes[0]
+
+
+@pytest.mark.parametrize("noise", ["white", "encoder", "coloured"])
+@pytest.mark.parametrize("plant", [RIGID, ELASTIC], ids=lambda p: p.name)
+def test_the_lag_of_a_torque_from_its_motion(plant: Plant, noise: str) -> None:
+    for effects, expected in (({}, 0.0), (FRICTION, 0.0), (DELAY, -1.0), ({"velocity_filter": {"time_constant": 1e-3}}, -1.0)):
+        rec = rig(plant, STEPS, effects, noise)
+        for k in (0, 1, -1):
+            found = torque_lag(rec.shifted(torque=k))
+            assert found is not None and abs(found.lag - (expected + k)) < 0.2, (effects, k, found)  # decided at a quarter
+    assert torque_lag(rig(plant, SINE)) is None  # one frequency: inertia and friction take any lag
+    assert torque_lag(rig(SOFT, STEPS)) is None  # not the motion of one mass
+    assert torque_lag(rig(plant, STEPS, torque_logged=False)) is None
+
+
+def test_in_open_loop_it_is_said_and_nothing_is_moved() -> None:
+    rec = rig(ELASTIC, STEPS, FRICTION)
+    assert aligned([rec], [], None).notes == ()
+    moves, found = looked_at(rec.shifted(torque=1), None)
+    assert moves == {} and "which no axis does" in found.notes[0] and "shift torque=-1" in found.notes[0]
+    for late in (rec.shifted(torque=-1), rig(ELASTIC, STEPS, DELAY)):
+        moves, found = looked_at(late, None)
+        assert (
+            moves == {} and "without a controller the data cannot tell" in found.notes[0] and "shift torque=1" in found.notes[0]
+        )
+
+
+def test_the_diagnosis_names_the_cause_behind_a_shift_and_speaks_of_the_records_that_it_was_given(tmp_path: Path) -> None:
+    rec = rig(RIGID, STEPS, FRICTION, position_logged=True).shifted(torque=1)
+    dia = ga.diagnose(rec, RIGID.controller)
+    assert [f.effect for f in dia.findings] == ["coulomb_friction"], dia.summary()
+    assert dia.findings[0].parameters["torque"].value == pytest.approx(0.05, rel=0.02)
+    assert (
+        dia.notes[0].startswith("The log wrote the torque 1 sample late against the rest")
+        and "transport delay" not in dia.notes[0]
+    )
+    assert dia.records == (rec,) and dia.digests == (rec.digest,) and dia.log_shifts == {rec.digest: {"torque": -1}}
+    assert dia.as_used(rec) == rec.shifted(torque=-1) and dia.loop_follows
+    dia.save(tmp_path / "dia.json")
+    again = ga.load(tmp_path / "dia.json")
+    assert again == dia and again.log_shifts == dia.log_shifts
+    ga.report(dia, tmp_path / "page.html")
+    assert "The log wrote the torque 1 sample late" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+def test_a_drive_that_computes_for_a_sample_has_a_transport_delay() -> None:
+    """Its log is the same as one of a shift, but the motion comes a sample later, and the delay is found where it acts."""
+    rec = rig(RIGID, STEPS, DELAY, "none").shifted(torque=1)
+    dia = ga.diagnose(rec, RIGID.controller)
+    assert [f.effect for f in dia.causes] == ["transport_delay"], dia.summary()
+    assert dia.causes[0].parameters["delay"].value == pytest.approx(1e-3, rel=0.02)
+    assert "A drive that computes for 1 sample makes the same log" in dia.notes[0]
+
+
+def test_records_are_moved_by_hand() -> None:
+    rec = rig(RIGID, STEPS, position_logged=True)
+    assert rec.torque is not None and rec.command is not None
+    moved = rec.shifted(torque=-1, command=2)
+    np.testing.assert_array_equal(moved.torque, rec.torque[3:])
+    np.testing.assert_array_equal(moved.command, rec.command[:-3])
+    np.testing.assert_array_equal(moved.velocity, rec.velocity[2:-1])
+    assert rec.shifted() == rec and rec.shifted(torque=0) == rec
+    for wrong, said in (
+        ({"speed": 1}, r"shifted\(speed=1\): the record has no speed"),
+        ({"torque": 0.5}, r"shifted\(torque=0.5\): give a whole number of samples"),
+        ({"torque": -2990}, "leaves 10 of 3000 samples"),
+    ):
+        with pytest.raises(RecordError, match=said):
+            rec.shifted(**wrong)  # type: ignore[arg-type]
+    with pytest.raises(RecordError, match=r"shifted\(position=1\): the record has no position"):
+        rec.with_channels(position=None).shifted(position=1)
+
+
+def test_the_user_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    rec = rig(RIGID, STEPS)
+    late = rec.shifted(torque=1)
+    rows = np.column_stack([late.time, late.command, late.velocity, late.torque])
+    np.savetxt("log.csv", rows, delimiter=",", header="time,command,velocity,torque", comments="", fmt="%.17g")
+    read = ga.read("log.csv", shift={"torque": -1})
+    np.testing.assert_array_equal(read.torque, late.torque[1:])
+    np.testing.assert_array_equal(read.velocity, late.velocity[:-1])
+    for wrong, said in (({"torque": 1.5}, "whole number"), ({"speed": 1}, "no|channel"), (3, "is no mapping")):
+        with pytest.raises((ReadError, RecordError), match=said):
+            ga.read("log.csv", shift=wrong)  # type: ignore[arg-type]
+    with pytest.raises(ReadError, match="shift counts the log's own samples"):
+        ga.read("log.csv", shift={"torque": -1}, decimate=2)
+    gains = ["--kp", str(RIGID.kp), "--ki", str(RIGID.ki)]
+    for options in (["--shift", "torque=-1"], ["--drive", "drive.toml"]):
+        Path("drive.toml").write_text("[shift]\ntorque = -1\n")
+        assert main(["diagnose", "log.csv", *gains, *options]) == 0
+        said = capsys.readouterr().out
+        assert "Verdict: adequate" in said and "The log wrote" not in said
+    assert main(["diagnose", "log.csv", *gains]) == 0
+    assert "The log wrote the torque 1 sample late" in " ".join(capsys.readouterr().out.split())
+    assert main(["diagnose", "log.csv", *gains, "--shift", "torque=late"]) == 2
+    assert "--shift torque=late: give a whole number of samples" in capsys.readouterr().err

@@ -1,0 +1,186 @@
+"""A log with the motor's voltage in the place of its torque: the winding known, estimated from the current, or neither."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import FrozenInstanceError
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import gaident as ga
+from gaident.cli import main
+from gaident.errors import ReadError, RecordError
+
+R, L, KT, KE = 0.8, 0.6e-3, 0.06, 0.06  # Ohm, H, N m/A, V s/rad
+J, D, FRICTION = 2e-4, 4e-4, 0.03  # kg m^2, N m s/rad, N m; the back-EMF brakes like kt ke/R = 4.5e-3 N m s/rad
+DT, FINE = 1e-3, 100
+VOLTAGE = np.repeat(np.random.default_rng(4).uniform(-20, 20, 40), 75)
+
+
+def motor(
+    friction: float = FRICTION, inductance: float = L, ke: float = KE, voltage: NDArray[np.float64] = VOLTAGE
+) -> dict[str, NDArray[np.float64]]:
+    """Voltage [V], held over each sample, current [A] and velocity [rad/s] of a motor with dry friction, in fine Euler steps.
+
+    Shares nothing with the package; the current follows its own time constant exactly within each fine step.
+    """
+    h, i, w = DT / FINE, 0.0, 0.0
+    a = np.exp(-R * h / inductance) if inductance else 0.0
+    seen = np.empty((2, len(voltage)))
+    for n, u in enumerate(voltage):
+        if not inductance:
+            i = (u - ke * w) / R
+        seen[:, n] = i, w
+        for _ in range(FINE):
+            i = a * i + (1 - a) * (u - ke * w) / R
+            drive = KT * i - D * w
+            stop = w + h / J * (drive - np.copysign(friction, w if w else drive))
+            w = 0.0 if w * stop < 0 or (w == 0 and abs(drive) <= friction) else stop
+    return {"voltage": voltage, "current": seen[0], "velocity": seen[1]}
+
+
+@pytest.fixture(scope="module")
+def log() -> dict[str, NDArray[np.float64]]:
+    return motor()
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, log: dict[str, NDArray[np.float64]]) -> Path:
+    """motor.csv: time, U [mV], i [A], n [rpm]."""
+    monkeypatch.chdir(tmp_path)
+    rpm = 60 / (2 * np.pi)
+    noise = np.random.default_rng(1).standard_normal((2, len(VOLTAGE)))
+    rows = (DT * np.arange(len(VOLTAGE)), 1e3 * log["voltage"], log["current"] + 0.05 * noise[0],
+            rpm * (log["velocity"] + 0.05 * noise[1]))  # fmt: skip
+    np.savetxt("motor.csv", np.column_stack(rows), delimiter=",", header="t,U [mV],i [A],n [rpm]", comments="", fmt="%.10g")
+    return tmp_path
+
+
+COLUMNS = {"time": "t", "velocity": "n"}
+
+
+@pytest.mark.parametrize("inductance", [0.0, L])
+def test_the_current_of_a_known_winding(inductance: float) -> None:
+    held = motor(inductance=inductance)
+    winding = ga.Winding(R, KT, inductance)
+    current = winding.current(held["voltage"], held["velocity"], DT)
+    off = np.abs(current - held["current"])[1:]  # the rig's current begins at 0
+    assert float(off[10:].max()) < 0.01 * float(np.abs(held["current"]).max())
+    # The torque is the mean over each sample: what accelerates the mass beside its friction.
+    torque = motor(friction=0.0, inductance=inductance)
+    mean = ga.Winding(R, KT, inductance).torque(torque["voltage"], torque["velocity"], DT)
+    w = torque["velocity"]
+    needed = J * np.diff(w) / DT + 0.5 * D * (w[1:] + w[:-1])
+    assert float(np.abs(mean[:-1] - needed)[10:].max()) < 0.01 * float(np.abs(needed).max())
+    # A back-EMF constant of its own, as dq coordinates have it.
+    other = ga.Winding(R, 1.5 * KT, inductance, back_emf_constant=KE)
+    np.testing.assert_allclose(other.current(held["voltage"], held["velocity"], DT), current)
+    assert other.emf == KE and winding.emf == KT
+
+
+def test_the_winding_is_estimated_from_voltage_current_and_velocity(log: dict[str, NDArray[np.float64]]) -> None:
+    off = []
+    for seed in range(6):
+        noise = np.random.default_rng(seed).standard_normal((2, len(VOLTAGE)))
+        found = ga.estimate_winding(log["voltage"], log["current"] + 0.05 * noise[0], log["velocity"] + 0.05 * noise[1], DT)
+        p = found.parameters
+        assert p["resistance"].value == pytest.approx(R, rel=0.02) and p["back_emf_constant"].value == pytest.approx(KE, rel=0.02)
+        off.append([(p["resistance"].value - R) / p["resistance"].std, (p["back_emf_constant"].value - KE) / KE])
+        assert p["resistance"].std < 0.02 * R and p["back_emf_constant"].std < 0.02 * KE
+        assert found.error < 0.1 and "resistance  0.8" in found.summary() and found.cutoff_hz <= 100.0
+    assert float(np.abs(np.array(off)[:, 0]).max()) < 5.0
+    offset = ga.estimate_winding(log["voltage"] + 0.3, log["current"], log["velocity"], DT)
+    assert offset.parameters["offset"].value == pytest.approx(0.3, abs=0.05)
+    assert offset.winding.resistance == pytest.approx(R, rel=0.02)
+    with pytest.raises(FrozenInstanceError):
+        offset.error = 0.0  # type: ignore[misc]
+
+
+def test_a_motion_that_does_not_tell() -> None:
+    t = DT * np.arange(2000)
+    rng = np.random.default_rng(0)
+    i = np.sin(40 * t) + 0.01 * rng.standard_normal(2000)
+    with pytest.raises(RecordError, match=r"the back emf constant comes out as .*do not determine it"):
+        ga.estimate_winding(
+            R * i + 0.05 * rng.standard_normal(2000), i, 1e-3 * rng.standard_normal(2000), DT, cutoff_hz=50
+        )  # locked
+    with pytest.raises(RecordError, match=r"the resistance comes out as -0\.8"):
+        ga.estimate_winding(-R * i + KE * np.sin(7 * t), i, np.sin(7 * t), DT, cutoff_hz=50)
+    with pytest.raises(RecordError, match="3000, 2999 and 3000 samples"):
+        ga.estimate_winding(VOLTAGE, VOLTAGE[1:], VOLTAGE, DT)
+    with pytest.raises(RecordError, match="cutoff_hz=600"):
+        ga.estimate_winding(VOLTAGE, VOLTAGE, VOLTAGE, DT, cutoff_hz=600)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"resistance": 0.0}, "resistance=0.0 Ohm"),
+        ({"torque_constant": "a"}, "torque_constant='a' is no number"),
+        ({"inductance": -1e-3}, "inductance=-0.001 H: it must be 0 or more"),
+        ({"back_emf_constant": -1.0}, "back_emf_constant=-1.0 V s/rad"),
+    ],
+)
+def test_refused_windings(wrong: dict[str, Any], said: str) -> None:
+    with pytest.raises(RecordError, match=said):
+        ga.Winding(**{"resistance": R, "torque_constant": KT, **wrong})
+
+
+def test_back_emf_apart_from_viscous_friction(here: Path) -> None:
+    """Read with the winding's constants, or with its current, the log gives the motor's own friction; with a torque
+    that is taken as proportional to the voltage, eleven times as much."""
+    by_volt = ga.read("motor.csv", {**COLUMNS, "torque": "U"}, torque_per_volt=KT / R)
+    known = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT, inductance=L)
+    estimated = ga.read("motor.csv", {**COLUMNS, "voltage": "U", "current": "i"})
+    plain = ga.read("motor.csv", {**COLUMNS, "current": "i"}, torque_constant=KT)
+    assert [rec.torque_is for rec in (by_volt, known, estimated, plain)] == ["commanded", *["measured"] * 3]
+    assert known.notes == plain.notes == () and len(estimated.notes) == 1
+    assert "The winding was estimated from voltage, current and velocity: R = 0." in estimated.notes[0]
+    viscous = {}
+    for name, rec in (("voltage", by_volt), ("known", known), ("estimated", estimated), ("current", plain)):
+        p = ga.inverse_dynamics(rec, terms=("inertia", "viscous", "coulomb")).parameters
+        viscous[name] = p["viscous"].value
+        if name != "voltage":
+            assert abs(p["coulomb"].value - FRICTION) < 3 * p["coulomb"].std < 0.3 * FRICTION, name
+            assert p["inertia"].value == pytest.approx(J, rel=0.05), name
+            assert abs(p["viscous"].value - D) < 0.2 * KT * KE / R, name
+    assert viscous["voltage"] == pytest.approx(D + KT * KE / R, rel=0.1)
+    said = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT, torque_is="commanded")
+    assert said.torque_is == "commanded" and said.torque is not None
+    thinned = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT, decimate=2)
+    assert len(thinned) == len(said) // 2
+
+
+def test_the_diagnosis_finds_the_friction_behind_the_winding(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("drive.toml").write_text(
+        f"resistance = {R}\ntorque_constant = {KT}\ninductance = {L}\n[columns]\ntime = 't'\nvelocity = 'n'\nvoltage = 'U'\n"
+    )
+    assert main(["diagnose", "motor.csv", "--drive", "drive.toml", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    causes = {f["effect"]: f for f in data["findings"] if not f["is_noise"]}
+    assert "coulomb_friction" in causes, data["findings"]
+    torque = causes["coulomb_friction"]["parameters"]["torque"]
+    assert abs(torque["value"] - FRICTION) < 2 * torque["std"] < 0.3 * FRICTION
+    options = ["--columns", "time=t,velocity=n,voltage=U,current=i"]
+    assert main(["identify", "motor.csv", *options]) == 0
+    assert "The winding was estimated from voltage, current and velocity" in " ".join(capsys.readouterr().out.split())
+    assert main(["identify", "motor.csv", "--columns", "time=t,velocity=n,voltage=U"]) == 2
+    said = capsys.readouterr().err
+    assert "do not tell the motor's back-EMF from viscous friction; give --resistance ... [Ohm] and --torque-constant" in said
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        ({"voltage": "U"}, "voltage and velocity alone do not tell the motor's back-EMF from viscous friction"),
+        ({"current": "i"}, "a current makes a torque with torque_constant="),
+        ({"torque": "i", "voltage": "U"}, "a torque is read, and a voltage that would make one"),
+    ],
+)
+def test_refusals(here: Path, columns: dict[str, Any], said: str) -> None:
+    with pytest.raises(ReadError, match=said):
+        ga.read("motor.csv", {**COLUMNS, **columns}, units={"torque": 1.0} if "torque" in columns else None)
