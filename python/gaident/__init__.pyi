@@ -3,7 +3,7 @@ from .control import PI
 from .data import Alignment, Record, align, columns, differentiate, read, read_columns
 from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
-from .estimation import InverseDynamics, inverse_dynamics
+from .estimation import inverse_dynamics
 from .identification import LeastSquares, identify, least_squares, m_sequence
 from .models import (
     Discrete,
@@ -23,7 +23,7 @@ from .models import (
     simulate_many,
 )
 from .reporting import report
-from .results import Diagnosis, Estimate, Finding, Identification, Limits, Proposal, Settings, load
+from .results import Diagnosis, Estimate, Finding, Identification, InverseDynamics, Limits, Proposal, Settings, load
 from .show import progress
 
 __all__ = [

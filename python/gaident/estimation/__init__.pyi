@@ -1,4 +1,3 @@
 from .regression.inverse_dynamics import inverse_dynamics
-from .regression.inverse_dynamics_result import InverseDynamics
 
-__all__ = ["InverseDynamics", "inverse_dynamics"]
+__all__ = ["inverse_dynamics"]

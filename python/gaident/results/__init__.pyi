@@ -5,6 +5,7 @@ from .experiment import Limits, Proposal
 from .finding import Finding
 from .frequency import FrequencyResponse, Responses
 from .identification import Identification
+from .inverse_dynamics import InverseDynamics
 from .settings import Settings
 from .store import load, schema
 
@@ -16,6 +17,7 @@ __all__ = [
     "Fitness",
     "FrequencyResponse",
     "Identification",
+    "InverseDynamics",
     "Limits",
     "Proposal",
     "Responses",
