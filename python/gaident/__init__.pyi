@@ -3,7 +3,7 @@ from .control import PI
 from .data import Alignment, Record, align, columns, differentiate, read, read_columns
 from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
-from .estimation import inverse_dynamics
+from .estimation import ForceError, force_error, inverse_dynamics
 from .identification import LeastSquares, identify, least_squares, m_sequence
 from .models import (
     Discrete,
@@ -34,6 +34,7 @@ __all__ = [
     "Effect",
     "Estimate",
     "Finding",
+    "ForceError",
     "GaidentError",
     "Identification",
     "InverseDynamics",
@@ -55,6 +56,7 @@ __all__ = [
     "errors",
     "factor_parameters",
     "first_experiment",
+    "force_error",
     "identify",
     "initial_state",
     "inverse_dynamics",
