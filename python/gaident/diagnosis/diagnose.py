@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gaident.control.pi import PI
 from gaident.data.record import Record
+from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.wording import evidence_of
@@ -262,6 +263,7 @@ class _Work:
                     evidence=evidence_of(effect, gain, alternatives, offset),
                 )
             )
+        mechanics = mechanics_of(self.objective, self.final)
         model = self.final.parameters.model(self.final.x)
         for name, values in self.at_controller.effects.items():
             model = model.with_effect(name, **values)
@@ -277,6 +279,8 @@ class _Work:
                     f"The closest description is {' and '.join(dropped)}, but it leaves an error that depends on {driver}: "
                     "no effect of the library fits, so none is named."
                 )
+        check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None)
+        self.notes += check.notes
         ambiguous = [f for f in real if f.alternatives]
         proposal = None
         if ambiguous:
@@ -291,8 +295,8 @@ class _Work:
             findings=tuple(findings),
             not_testable=self.not_testable,
             model=model,
-            before=gains.before,
-            after=gains.after,
+            before=check.before,
+            after=check.after,
             driver=driver,
             next_experiment=proposal,
             gain_interval=gains.interval,
@@ -301,7 +305,11 @@ class _Work:
             left=self.left.gains,
             line=self.left.line if driver == "time" else None,
             one_sided={e: sizes for e, sizes in self.excited.one_sided.items() if e not in answered},
-            mechanics=mechanics_of(self.objective, self.final),
+            mechanics=mechanics,
+            regression=check.regression,
+            regression_force_error=check.force_error,
+            comparisons=check.comparisons,
+            force_reason=check.reason,
             notes=tuple(self.notes),
             identification=self.idn,
             controller=self.controller,

@@ -39,7 +39,8 @@ IN_SAMPLE = "in-sample"
 class Gains:
     """before, after, interval of the total fall, how it was held out, and each effect's own fall.
 
-    harmful: effects without which the extended model is better on the held-out data, beyond chance.
+    harmful: effects without which the extended model is better on the held-out data, beyond chance. judged: records, each with
+    the first sample that is held out; mechanism, extended: the models, without and with the effects, fitted to the rest.
     """
 
     before: Fitness
@@ -47,6 +48,9 @@ class Gains:
     interval: tuple[float, float]
     held_out: str
     steps: dict[str, float]
+    judged: tuple[tuple[Record, int], ...]
+    mechanism: Model
+    extended: Model
     harmful: tuple[str, ...] = ()
 
     def of(self, effect: str) -> float:
@@ -114,7 +118,17 @@ def measured_gains(
         level = float(np.sqrt(np.mean(np.concatenate(spared) ** 2)))
         if level < (1.0 - POLICY.harm) * extended_level and _interval(spared, extended)[1] < 0.0:
             harmful.append(effect)
-    return Gains(fitness(errors[0]), fitness(errors[-1]), _interval(errors[0], errors[-1]), words, steps, tuple(harmful))
+    return Gains(
+        before=fitness(errors[0]),
+        after=fitness(errors[-1]),
+        interval=_interval(errors[0], errors[-1]),
+        held_out=words,
+        steps=steps,
+        judged=tuple(judged),
+        mechanism=bare,
+        extended=chain[-1],
+        harmful=tuple(harmful),
+    )
 
 
 def _without(found: Fit, effect: str, objective: Objective) -> Fit:

@@ -1,5 +1,5 @@
 from .adequacy import Adequacy
-from .diagnosis import Diagnosis, Fitness
+from .diagnosis import Comparison, Diagnosis, Fitness
 from .estimate import Estimate
 from .experiment import Limits, Proposal
 from .finding import Finding
@@ -11,6 +11,7 @@ from .store import load, schema
 
 __all__ = [
     "Adequacy",
+    "Comparison",
     "Diagnosis",
     "Estimate",
     "Finding",

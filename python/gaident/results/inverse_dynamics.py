@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from gaident.results.estimate import Estimate
 __all__ = ["InverseDynamics"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class InverseDynamics:
     """The result of `inverse_dynamics`: what the torque of an axis is made of.
 
@@ -68,7 +68,7 @@ class InverseDynamics:
     inverse_dynamics : Makes it, with an example.
     """
 
-    parameters: dict[str, Estimate]
+    parameters: dict[str, Estimate] = field(hash=False)
     terms: tuple[str, ...]
     coefficients: tuple[float, ...]
     cutoff_hz: float

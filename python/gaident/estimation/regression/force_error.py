@@ -33,7 +33,7 @@ from gaident.models.model import Model
 from gaident.models.simulate import run, simulate
 from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["ForceError", "force_error", "needed_torque"]
+__all__ = ["ForceError", "band_of", "effects_before_the_shaft", "force_error", "needed_torque"]
 
 Vector = NDArray[np.float64]
 TorqueOf = Callable[[Record], Vector]
@@ -161,10 +161,10 @@ def needed_torque(model: Model, rec: Record, cutoff_hz: float, order: int = ORDE
     return _led(model, rec, motion_of(rec, cutoff_hz, order), cutoff_hz)
 
 
-def band_of(model: object, records: Sequence[Record], order: int = ORDER) -> float:
-    """The cutoff [Hz] for a model over these records: the regression's, at most half of the model's lowest antiresonance."""
+def band_of(model: object, records: Sequence[Record], order: int = ORDER, below: float = BELOW) -> float:
+    """The cutoff [Hz] over these records: the regression's, at most `below` times the model's lowest antiresonance."""
     zeros = [abs(z) for z in model.zeros if z.imag > 0.0] if isinstance(model, Model) else []
-    highest = BELOW * min(zeros, default=math.inf) / (2.0 * math.pi)
+    highest = below * min(zeros, default=math.inf) / (2.0 * math.pi)
     return float(min(highest, *(cutoff_of(r, order) for r in records)))
 
 
@@ -191,7 +191,7 @@ def _torques(
     return motion.torque, needed
 
 
-def _on_the_way(model: Model) -> list[str]:
+def effects_before_the_shaft(model: Model) -> list[str]:
     """Effects between the logged torque and the shaft: of the actuator, and a sensor's filter, which acts like a lag there."""
     return [e.name for e in model.effects if e.row.place == "actuator" or (e.row.place == "sensor" and not _turns(e.parameters))]
 
@@ -203,7 +203,7 @@ def _turns(parameters: object) -> bool:
 def _at_shaft(model: Model, rec: Record) -> Vector:
     """The logged torque behind the actuator [N m], its mean over each sample: an inertia of 1 makes it a velocity's change."""
     assert rec.torque is not None
-    ahead = _on_the_way(model)
+    ahead = effects_before_the_shaft(model)
     if not ahead:
         return rec.torque
     unit = Model(1.0, [0.0], effects=[e for e in model.effects if e.name in ahead])
@@ -221,7 +221,7 @@ def _led(model: Model, rec: Record, motion: Motion, cutoff_hz: float) -> Vector:
             f"{model.linear!r} cannot be led along a motion, which takes p = 1, a positive gain and stable zeros: give one mass, "
             "two, or a regression"
         )
-    out = {*_on_the_way(model), *(e.name for e in model.effects if e.row.place == "controller")}
+    out = {*effects_before_the_shaft(model), *(e.name for e in model.effects if e.row.place == "controller")}
     mechanism = Model(model.gain, model.poles, model.zeros, [e for e in model.effects if e.name not in out])
     n = len(rec)
     fine = max(1, math.ceil(STEPS * cutoff_hz * rec.dt))
