@@ -396,8 +396,10 @@ class _Work:
 
     def _base_shift(self) -> dict[str, tuple[float, float]]:
         """Base parameters before (the linear fit) and after (with the effects)."""
-        if self.base.parameters.masses != self.final.parameters.masses:
+        if self.base.parameters.kind != self.final.parameters.kind:
             return {}
+        if self.final.parameters.held:
+            return moved(self.base, self.final)
         names = ("gain", "pole", "pole_pair_e1", "pole_pair_e0", "zero_pair_e1", "zero_pair_e0")
         before = self.base.parameters.base_values(self.base.x[None, :])[0]
         after = self.final.parameters.base_values(self.final.x[None, :])[0]

@@ -17,6 +17,7 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.records.hygiene import quantisation
+from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit
 from gaident.estimation.objective import Fit, Objective
 from gaident.models import simulate
@@ -79,6 +80,7 @@ def measured_gains(
         words = f"the last 30 % of {'the record' if by_time else 'its path'}, parameters fitted to the first 70 %"
     else:
         judged, words, part = [(r, 0) for r in records], IN_SAMPLE, None
+    judged = [(_turned(r, controller, final), first) for r, first in judged]
     stages = _stages(final, objective, part)
     chain = [linear]
     named = list(at_controller.items())
@@ -129,6 +131,18 @@ def measured_gains(
         extended=chain[-1],
         harmful=tuple(harmful),
     )
+
+
+def _turned(rec: Record, controller: PI | None, final: Fit) -> Record:
+    """The record with the angle that the model's effects turned with when it was selected.
+
+    Where none is logged that is the measured velocity, integrated, or the simulation's own. A pendulum that is simulated with its
+    own angle falls to another side sooner or later, whatever is wrong with it.
+    """
+    if final.predictor.own_angle or rec.position is not None or not any(t.harmonic == "torque" for t in final.parameters.terms):
+        return rec
+    (turned,) = DataSet.of([rec], controller).turned
+    return turned
 
 
 def _without(found: Fit, effect: str, objective: Objective) -> Fit:

@@ -1,6 +1,7 @@
 """The linear part of an extended model as a mechanic calls it, with standard deviations.
 
-One mass: J = 1/|K|, D = a/|K|. Two masses, motor and load on a damped shaft, with the numerator s^2 + f1 s + f0 and
+One mass: J = 1/|K|, D = a/|K|, and k = c/|K| of a spring that holds it.
+Two masses, motor and load on a damped shaft, with the numerator s^2 + f1 s + f0 and
 
     (s + a)(s^2 + e1 s + e0) = s^3 + (a + e1) s^2 + (e0 + a e1) s + a e0
 
@@ -31,8 +32,10 @@ MECHANICS = {
     "resonance_damping": "1",
     "antiresonance": "Hz",
     "antiresonance_damping": "1",
+    "ground_stiffness": "N m/rad",
+    "ground_resonance": "Hz",
 }
-"""Names and units; inertia and viscous friction are of the whole axis."""
+"""Names and units; inertia and viscous friction are of the whole axis, the last two of a spring between it and the ground."""
 WHOLE = 2  # of these, what every axis has
 
 
@@ -67,13 +70,17 @@ def moved(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:
 
 
 def _numbers(values: Vector) -> Vector:
-    """In the order of MECHANICS, from [K, a] or [K, a, e1, e0, f1, f0]; nan where there is none."""
+    """In the order of MECHANICS, from [K, a], [K, a, c] or [K, a, e1, e0, f1, f0]; nan where there is none."""
     K, a, *pairs = (float(v) for v in values)
     JM = 1.0 / abs(K)
     if not pairs:
         return np.array([JM, a * JM])
-    e1, e0, f1, f0 = pairs
     none = np.full(len(MECHANICS), np.nan)
+    if len(pairs) == 1:
+        none[:WHOLE] = JM, a * JM
+        none[-2:] = pairs[0] * JM, np.sqrt(max(pairs[0], 0.0)) / (2.0 * np.pi)
+        return none
+    e1, e0, f1, f0 = pairs
     if f0 == 0.0:
         return none
     D = a * e0 * JM / f0
@@ -86,4 +93,5 @@ def _numbers(values: Vector) -> Vector:
         return none
     _, _, JL, _, KG, _ = mechanics
     wp, wz, turn = np.sqrt(e0), np.sqrt(f0), 2.0 * np.pi
-    return np.array([JM + JL, D, JM, JL, KG, wp / turn, 0.5 * e1 / wp, wz / turn, 0.5 * f1 / wz])
+    none[:-2] = JM + JL, D, JM, JL, KG, wp / turn, 0.5 * e1 / wp, wz / turn, 0.5 * f1 / wz
+    return none

@@ -120,6 +120,11 @@ class DataSet:
         return np.concatenate([angle_of(r) for r in self.driven])
 
     @cached_property
+    def travel(self) -> float:
+        """The largest travel of a record [rad]."""
+        return max(float(np.ptp(angle_of(r))) for r in self.driven)
+
+    @cached_property
     def time(self) -> Vector:
         """Time since each record's start, records one after the other [s]."""
         return np.concatenate([r.time for r in self.records])

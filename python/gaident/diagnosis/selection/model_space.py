@@ -87,11 +87,12 @@ class ModelSpace:
         effects = sum(_depth(t) for t in fit.parameters.terms)
         # An order of the angle that was searched for counts as so many candidates more.
         orders = sum(2.0 * float(np.log(t.orders[1] - t.orders[0] + 1)) for t in fit.parameters.terms)
-        return fit.bic + self.penalty * (effects + fit.parameters.masses - 1) + orders
+        more = fit.parameters.masses - 1 + fit.parameters.held  # a second mass, or a spring, counts as an effect
+        return fit.bic + self.penalty * (effects + more) + orders
 
     def key(self, fit: Fit) -> Hashable:
         """The same for the same mechanism with the same effects, or with equivalent ones."""
-        return fit.parameters.masses, frozenset(_representative(t) for t in fit.parameters.terms)
+        return fit.parameters.kind, frozenset(_representative(t) for t in fit.parameters.terms)
 
     def ratio(self, fit: Fit) -> float:
         """Rms of the whitened errors over the noise that the measured velocity itself shows."""
@@ -177,7 +178,7 @@ class ModelSpace:
         own = simpler.parameters
         level = float(simpler.x[own.slot(inner.name)][0])
         base, bare = own.removed(simpler.x, inner.name), own.without(inner.name)
-        if set(bare.effects) != set(fuller.parameters.without(term.name).effects) or bare.masses != fuller.parameters.masses:
+        if set(bare.effects) != set(fuller.parameters.without(term.name).effects) or bare.kind != fuller.parameters.kind:
             return np.inf
         neutral = np.array(term.neutral(level, fuller.parameters.scales))
         hypothesis = Hypothesis(bare.extended(term), fuller.predictor)
@@ -225,7 +226,7 @@ class ModelSpace:
 
     def canonical(self, fit: Fit) -> Fit:
         """One mass with an extra resonance is a drive of two masses: part of the linear model, not an effect."""
-        if fit.parameters.masses == 2 or not any(t.resonates for t in fit.parameters.terms):
+        if fit.parameters.kind != "one mass" or not any(t.resonates for t in fit.parameters.terms):
             return fit
         hypothesis, x = as_two_masses(fit)
         return self.continued(hypothesis, fit, x)
