@@ -17,7 +17,7 @@ from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.wording import evidence_of
 from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
-from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, TWO_LEVELS, conditional_classes
+from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, LOAD, TWO_LEVELS, conditional_classes
 from gaident.diagnosis.mechanics import mechanics_of, moved
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.policy import POLICY
@@ -281,6 +281,8 @@ class _Work:
                 )
         check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None)
         self.notes += check.notes
+        if self.final.parameters.held and LOAD.name in self.final.effects:
+            self.notes.append("The axis is held by a spring: its tension where the record starts is part of the constant load.")
         ambiguous = [f for f in real if f.alternatives]
         proposal = None
         if ambiguous:

@@ -48,6 +48,9 @@ class Policy:
     material_beside_impacts: float = _row(
         0.5, "1", "the same beside a gap or a hard coupling: no model foresees an impact", PAIRS
     )
+    another_torque: float = _row(
+        1.25, "1", "force error over that of the simpler model: above, an effect explains a motion and not the drive", REAL
+    )
     overrules: float = _row(0.5, "1", "of the plain error that a cause which whitening hid may leave at most", REAL)
     rival_margin: float = _row(10.0, "BIC units", "closer explanations are not told apart (Kass and Raftery 1995)", SIZES)
     rival_short: float = _row(400.0, "samples", "a record this short doubles the margin", SIZES)

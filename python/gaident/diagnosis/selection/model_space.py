@@ -19,11 +19,13 @@ from numpy.typing import NDArray
 from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
 from gaident.diagnosis.policy import POLICY, Policy
 from gaident.diagnosis.selection.mechanisms import as_two_masses
+from gaident.errors import GaidentError
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
+from gaident.estimation.regression.force_error import force_error
 from gaident.estimation.term import Term
 
 __all__ = ["ModelSpace", "words"]
@@ -115,12 +117,36 @@ class ModelSpace:
     def worth(self, fuller: Fit, simpler: Fit) -> bool:
         """The decision: whether a fuller model is worth its effects against a simpler one."""
         simpler = self.in_view_of(simpler, fuller)
-        if not self.score(fuller) < self.score(simpler):
+        if not self.score(fuller) < self.score(simpler) or self.needs_another_torque(simpler, fuller):
             return False
         more = [t for t in fuller.parameters.terms if t.name not in simpler.effects]
         if any(set(t.nested) & set(simpler.effects) for t in more) and not self.in_both_views(simpler, fuller):
             return False
         return self.material(simpler, fuller)
+
+    def needs_another_torque(self, simpler: Fit, fuller: Fit) -> bool:
+        """Whether a model needs a torque that is further from the logged one than that of a simpler model.
+
+        A free run judges the velocity alone. A large inertia that swings under gravity, or on a spring, from where a record
+        starts may follow it better than the drive's own does, whatever the torque: it explains a motion and not the drive.
+        """
+        if not self.data.torque_logged:
+            return False
+        before, after = (self.force_error(f) for f in (simpler, fuller))
+        return bool(after > self.policy.another_torque * before)
+
+    def force_error(self, fit: Fit) -> float:
+        """Force error of a model on the records that it is fitted to [N m]; nan where it has none."""
+
+        def computed() -> float:
+            model, records = fit.parameters.model(fit.x), list(self.data.driven)
+            try:
+                return force_error(model, records, cutoff_hz=self.data.torque_band).rms
+            except GaidentError:
+                return float("nan")
+
+        found: float = self.objective.once(("force", fit.key), computed)
+        return found
 
     def in_view_of(self, fit: Fit, other: Fit) -> Fit:
         """The fit as the other's predictor sees it, where that is better: models are compared under the same predictors."""
