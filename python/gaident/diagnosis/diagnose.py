@@ -18,7 +18,7 @@ from gaident.diagnosis.explain.wording import evidence_of
 from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
 from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, LOAD, TWO_LEVELS, conditional_classes
-from gaident.diagnosis.mechanics import mechanics_of, moved
+from gaident.diagnosis.mechanics import base_shift, mechanics_of
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.records.arguments import ProgressCallback, checked, noise_std_of, records_of
@@ -303,7 +303,7 @@ class _Work:
             next_experiment=proposal,
             gain_interval=gains.interval,
             held_out=gains.held_out,
-            base_shift=self._base_shift(),
+            base_shift=base_shift(self.base, self.final),
             left=self.left.gains,
             line=self.left.line if driver == "time" else None,
             one_sided={e: sizes for e, sizes in self.excited.one_sided.items() if e not in answered},
@@ -395,15 +395,3 @@ class _Work:
             "parameters: it is not named."
         )
         return False
-
-    def _base_shift(self) -> dict[str, tuple[float, float]]:
-        """Base parameters before (the linear fit) and after (with the effects)."""
-        if self.base.parameters.kind != self.final.parameters.kind:
-            return {}
-        if self.final.parameters.held:
-            return moved(self.base, self.final)
-        names = ("gain", "pole", "pole_pair_e1", "pole_pair_e0", "zero_pair_e1", "zero_pair_e0")
-        before = self.base.parameters.base_values(self.base.x[None, :])[0]
-        after = self.final.parameters.base_values(self.final.x[None, :])[0]
-        coefficients = {n: (float(b), float(a)) for n, b, a in zip(names, before, after, strict=False)}
-        return coefficients | moved(self.base, self.final)

@@ -18,7 +18,7 @@ from gaident.estimation.uncertainty import covariance_of
 from gaident.models.two_mass import mechanics_with_shaft_damping
 from gaident.results.estimate import Estimate
 
-__all__ = ["MECHANICS", "mechanics_of", "moved"]
+__all__ = ["MECHANICS", "base_shift", "mechanics_of", "moved"]
 
 Vector = NDArray[np.float64]
 
@@ -67,6 +67,18 @@ def moved(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:
     """Name -> (before, after) of what both have."""
     pair = [_numbers(fit.parameters.base_values(fit.x[None, :])[0]) for fit in (before, after)]
     return {name: (float(b), float(a)) for name, b, a in zip(MECHANICS, *pair, strict=False) if np.isfinite(b) and np.isfinite(a)}
+
+
+def base_shift(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:
+    """Base parameters and mechanics before (the linear fit) and after (with the effects); none of mechanisms of two kinds."""
+    if before.parameters.kind != after.parameters.kind:
+        return {}
+    if after.parameters.held:
+        return moved(before, after)
+    names = ("gain", "pole", "pole_pair_e1", "pole_pair_e0", "zero_pair_e1", "zero_pair_e0")
+    pair = [fit.parameters.base_values(fit.x[None, :])[0] for fit in (before, after)]
+    coefficients = {n: (float(b), float(a)) for n, b, a in zip(names, *pair, strict=False)}
+    return coefficients | moved(before, after)
 
 
 def _numbers(values: Vector) -> Vector:

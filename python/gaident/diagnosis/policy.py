@@ -48,6 +48,7 @@ class Policy:
     material_beside_impacts: float = _row(
         0.5, "1", "the same beside a gap or a hard coupling: no model foresees an impact", PAIRS
     )
+    most_of_a_spring: float = _row(62.8, "rad", "of travel: what turns more than ten times no spring holds to the ground", REAL)
     another_torque: float = _row(
         1.25, "1", "force error over that of the simpler model: above, an effect explains a motion and not the drive", REAL
     )

@@ -35,7 +35,6 @@ from gaident.estimation.term import Term
 
 __all__ = ["Moves"]
 
-MOST_OF_A_SPRING = 20.0 * np.pi  # rad: what turns more than ten times no spring holds
 MISSED = 0.05  # of the largest torque: a level of friction to start from where the fitted one is lower
 
 
@@ -138,7 +137,7 @@ class Moves(ModelSpace):
         Its stiffness is that of a linear test, a torque -k theta beside the model and a constant, or of the momentum's balance.
         """
         data = self.data
-        if fit.parameters.kind != "one mass" or data.travel > MOST_OF_A_SPRING:
+        if fit.parameters.kind != "one mass" or data.travel > self.policy.most_of_a_spring:
             return []
         _, J, error = self.objective.linearised(fit.hypothesis, fit.x, WHITE)
         response = fit.predictor.torque_response(fit.parameters, fit.x, np.vstack([-data.angle, np.ones(len(data.angle))]))
