@@ -55,11 +55,24 @@ BELOW = 0.5
 class ForceError:
     """The force error of a model on records.
 
-    rms                rms of logged torque minus needed torque [N m]
-    torque_rms         rms of the torque at the shaft over the same samples [N m]
-    noise_floor        rms that noise of the sensor, and of a measured torque, leave of it at most [N m]
-    cutoff_hz, order   of the filter that all channels passed
-    samples            in motion, over which the figures are taken
+    Attributes
+    ----------
+    rms : float
+        Root mean square of logged torque minus needed torque [N m].
+    torque_rms : float
+        Root mean square of the torque at the shaft over the same samples [N m].
+    noise_floor : float
+        What noise of the sensor, and of a measured torque, leave of `rms` at most [N m].
+    cutoff_hz : float
+        Corner of the filter that all channels passed [Hz].
+    order : int
+        Order of the filter in each direction.
+    samples : int
+        Samples in motion, over which the figures are taken.
+
+    See Also
+    --------
+    force_error : Makes it.
     """
 
     rms: float
@@ -87,16 +100,16 @@ def force_error(
 
     Parameters
     ----------
-    model
+    model : Model or InverseDynamics or callable
         A Model with p = 1, positive gain and stable zeros, an InverseDynamics, or a function that gives the needed torque [N m]
         of a record, an array (n,).
-    records
+    records : Record or sequence of Record
         One Record or several of one sample time, each with its torque.
-    cutoff_hz
+    cutoff_hz : float, optional
         Corner of the filter [Hz]. None: what `inverse_dynamics` would choose, at most half of the model's lowest antiresonance.
-    order
+    order : int
         Order of the Butterworth filter, 1 to 10; it runs forward and backward.
-    first
+    first : int or sequence of int
         Sample of each record from which the error counts, one number or one for each record.
 
     Returns
