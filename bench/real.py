@@ -66,7 +66,7 @@ def of_model(model: ga.Model, parts: Parts) -> dict[str, Any]:
     """Free run and force error of a model of the library."""
     return {
         "velocity": fits.rmse(parts.held_out, lambda r: models.free_run(model, r)),
-        "force": fits.force_error(parts.held_out, lambda r: models.needed_torque(model, r)),
+        "force": fits.force_error(parts.held_out, model),
         "training": fits.rmse(parts.training, lambda r: models.free_run(model, r)),
     }
 

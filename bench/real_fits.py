@@ -163,23 +163,12 @@ def smooth(rec: ga.Record, x: Vector) -> Vector:
     return np.asarray(sosfiltfilt(butter(4, 2.0 * BAND, output="sos"), x))
 
 
-def moving(rec: ga.Record) -> NDArray[np.bool_]:
-    """The samples at which torques are compared: faster than 2 % of the rms velocity, away from the ends."""
-    w = smooth(rec, rec.velocity)
-    kept = np.abs(w) > 0.02 * np.sqrt(np.mean(w**2))
-    edge = round(2.0 / BAND)
-    kept[:edge] = kept[-edge:] = False
-    return kept
-
-
-def force_error(records: Sequence[ga.Record], torque_of: Callable[[ga.Record], Vector]) -> float:
-    """|u - u_model|/|u| in the band, over the samples that move."""
-    left = whole = 0.0
-    for r in records:
-        kept, u = moving(r), smooth(r, r.torque)
-        left += float(np.sum((u - smooth(r, torque_of(r)))[kept] ** 2))
-        whole += float(np.sum(u[kept] ** 2))
-    return float(np.sqrt(left / whole)) if whole > 0.0 else float("nan")
+def force_error(records: Sequence[ga.Record], model: ga.Model | Callable[[ga.Record], Vector]) -> float:
+    """|u - u_model|/|u| in the band, over the samples that move; nan where the model cannot be led along a motion."""
+    try:
+        return ga.force_error(model, records, cutoff_hz=BAND / records[0].dt).percent / 100.0
+    except ga.GaidentError:
+        return float("nan")
 
 
 def rigid_torque(eight: Vector, rec: ga.Record) -> Vector:

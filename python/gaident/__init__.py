@@ -41,6 +41,8 @@ provide(
         "diagnosis_table": "gaident.export.tables:diagnosis_table",
         "plot_diagnosis": "gaident.reporting.figures:plot_diagnosis",
         # InverseDynamics
+        "regression_torque": "gaident.estimation.regression.prediction:regression_torque",
+        "regression_error": "gaident.estimation.regression.prediction:regression_error",
         "inverse_dynamics_summary": "gaident.show.inverse_dynamics_summary:inverse_dynamics_summary",
         # both
         "plot_bode": "gaident.reporting.figures:plot_bode",

@@ -3,7 +3,7 @@ from .control import PI
 from .data import Alignment, Record, Winding, align, columns, differentiate, read, read_axes, read_columns
 from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
-from .estimation import InverseDynamics, WindingFit, estimate_winding, inverse_dynamics
+from .estimation import ForceError, WindingFit, estimate_winding, force_error, inverse_dynamics
 from .identification import LeastSquares, identify, least_squares, m_sequence
 from .models import (
     Discrete,
@@ -23,7 +23,7 @@ from .models import (
     simulate_many,
 )
 from .reporting import report
-from .results import Diagnosis, Estimate, Finding, Identification, Limits, Proposal, Settings, load
+from .results import Diagnosis, Estimate, Finding, Identification, InverseDynamics, Limits, Proposal, Settings, load
 from .show import progress
 
 __all__ = [
@@ -34,6 +34,7 @@ __all__ = [
     "Effect",
     "Estimate",
     "Finding",
+    "ForceError",
     "GaidentError",
     "Identification",
     "InverseDynamics",
@@ -58,6 +59,7 @@ __all__ = [
     "estimate_winding",
     "factor_parameters",
     "first_experiment",
+    "force_error",
     "identify",
     "initial_state",
     "inverse_dynamics",

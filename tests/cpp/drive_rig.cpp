@@ -61,6 +61,8 @@ struct Drive {  // SI units, rad; neutral values
     double load = 0;  // N m
     double unbalance = 0;
     double unbalance_phase = 0;
+    double ground = 0;  // a spring to the ground, N m/rad, that rests at the angle `rest` [rad]
+    double rest = 0;
     double cogging = 0;
     double cogging_order = 2;
     double cogging_phase = 0;
@@ -149,6 +151,7 @@ private:
         if (d.drag != 0) q -= d.drag * x[w1] * std::abs(x[w1]);
         if (d.dahl != 0) q -= d.dahl_stiffness * x[bristle];
         if (d.lugre != 0) q -= d.lugre_stiffness * x[bent] + d.lugre_damping * bending(x);
+        q -= d.ground * (x[angle] - d.rest);
         if (d.unbalance != 0) q -= d.unbalance * std::sin(x[angle] + d.unbalance_phase);
         if (d.cogging != 0) q -= d.cogging * std::sin(d.cogging_order * x[angle] + d.cogging_phase);
         if (d.hum != 0) q += d.hum * std::sin(d.hum_frequency * t + d.hum_phase);

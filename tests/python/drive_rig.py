@@ -32,7 +32,10 @@ SUBSTEPS, MOST_SUBSTEPS = 40, 400
 
 @dataclass(frozen=True)
 class Plant:
-    """A drive without effects. One mass J [kg m2], D [N m s/rad]; with JL also a load JL, DL on a shaft KG [N m/rad], DG."""
+    """A drive without effects. One mass J [kg m2], D [N m s/rad]; with JL also a load JL, DL on a shaft KG [N m/rad], DG.
+
+    ground, rest: a spring between motor and ground [N m/rad], and the angle at which it rests [rad].
+    """
 
     J: float
     D: float
@@ -43,6 +46,8 @@ class Plant:
     DL: float = 0.0
     KG: float = 0.0
     DG: float = 0.0
+    ground: float = 0.0
+    rest: float = 0.0
     name: str = "drive"
 
     @property
@@ -151,6 +156,7 @@ def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:
     """The fields of the simulated drive that has these effects."""
     values = dict(fields())
     values.update(J1=plant.J, D1=plant.D, J2=plant.JL, D2=plant.DL, K=plant.KG, DG=plant.DG, kp=plant.kp, ki=plant.ki)
+    values.update(ground=plant.ground, rest=plant.rest)
     for effect, parameters in effects.items():
         if effect == "outliers":
             continue  # they spoil the log, not the drive

@@ -74,7 +74,7 @@ def test_the_force_error_of_a_led_model_is_that_of_the_equation(bench: SimpleNam
     rec = driven(list(truth), bench)
     model = ga.Model(1.0 / 0.02, [-0.05 / 0.02]).with_effect("coulomb_friction", torque=0.1)
     wrong = ga.Model(1.0 / 0.03, [-0.05 / 0.03]).with_effect("coulomb_friction", torque=0.1)
-    of = [bench.fits.force_error([rec], lambda r, m=m: bench.models.needed_torque(m, r)) for m in (model, wrong)]
+    of = [bench.fits.force_error([rec], m) for m in (model, wrong)]
     other = truth.copy()
     other[0] = 0.03
     by_equation = [bench.fits.force_error([rec], lambda r, e=e: bench.fits.rigid_torque(e, r)) for e in (truth, other)]

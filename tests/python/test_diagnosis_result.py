@@ -17,7 +17,7 @@ import gaident as ga
 from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.diagnosis.explain.wording import evidence_of
 from gaident.errors import GaidentError, RecordError, SettingsError
-from gaident.results.diagnosis import Fitness
+from gaident.results.diagnosis import Comparison, Fitness
 from gaident.results.finding import Finding
 from gaident.show.wording import certainty, sentence
 
@@ -90,8 +90,15 @@ def fake() -> Any:
             "command_rate_limit": "a limit above 2e+04 rad/s^2 would not have shown: no command rises faster",
         },
         model=SimpleNamespace(effects=("coulomb_friction", "cogging"), poles=(-1.0, -1.0 + 2.0j, -1.0 - 2.0j)),
-        before=Fitness(0.5, 97.1, 0.1),
-        after=Fitness(0.2, 98.84, 0.1),
+        before=Fitness(0.5, 97.1, 0.1, 0.0511, 0.184, 0.0021),
+        after=Fitness(0.2, 98.84, 0.1, 0.0123, 0.184, 0.0021),
+        regression=SimpleNamespace(terms=("inertia", "viscous", "coulomb"), cutoff_hz=12.34, order=4, samples=812),
+        regression_force_error=0.0119,
+        comparisons=(
+            Comparison("inertia", ga.Estimate(6.88e-4, 1.2e-6, "kg m^2"), ga.Estimate(6.91e-4, 4e-6, "kg m^2"), False),
+            Comparison("dry friction", torque, ga.Estimate(0.0522, 0.0006, "N m"), True),
+        ),
+        force_reason="the torque drives the simulation, and a free run adds up what is small in every sample",
         driver="time",
         next_experiment=ga.Proposal(np.zeros(2000), DT, ("cogging", "velocity_ripple"), 412.3, "Slow speeds: several turns."),
         gain_interval=(0.55, 0.64),

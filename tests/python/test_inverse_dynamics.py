@@ -5,6 +5,8 @@ The records are simulated by the rig (drive_rig.py), which shares no code with t
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -282,3 +284,16 @@ def test_hsm150_in_both_directions(data_dir: object, channel: int) -> None:
     by_criterion = ga.inverse_dynamics(records)
     assert {"coulomb", "offset"} <= set(by_criterion.terms) or "coulomb_by_direction" in by_criterion.terms
     assert "spring" not in by_criterion.terms and "gravity" not in by_criterion.terms
+
+
+def test_a_saved_regression_comes_back_as_it_was() -> None:
+    t = 1e-3 * np.arange(4000)
+    motion = {"position": 1.0 - np.cos(5.0 * t), "velocity": 5.0 * np.sin(5.0 * t)}
+    rec = ga.Record(1e-3, torque=2e-3 * 25.0 * np.cos(5.0 * t) + 0.1 * np.sign(motion["velocity"]), **motion)
+    found = ga.inverse_dynamics(rec)
+    back = ga.InverseDynamics.from_dict(json.loads(json.dumps(found.to_dict())))
+    assert back.to_dict() == found.to_dict()
+    assert back.parameters == found.parameters and back.rivals == found.rivals
+    np.testing.assert_array_equal(back.torque(rec), found.torque(rec))
+    with pytest.raises(ga.GaidentError, match="damaged"):
+        ga.InverseDynamics.from_dict({"terms": 1})

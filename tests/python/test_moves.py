@@ -131,6 +131,7 @@ def _no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (moves, model_space):
         monkeypatch.setattr(module, "LIBRARY", LIBRARY)
         monkeypatch.setattr(module, "EQUIVALENT", {frozenset({"lag", "seen"}): ""})
+    monkeypatch.setattr(model_space.ModelSpace, "force_error", lambda self, fit: float("nan"))
     monkeypatch.setattr(model_space, "ClosedLoop", lambda data, own=False: Toy(data, own, True))
     monkeypatch.setattr(score_test, "ClosedLoop", lambda data, own=False: Toy(data, own, True))
     monkeypatch.setattr(model_space, "OpenLoop", Toy)
@@ -194,6 +195,14 @@ def test_an_effect_that_is_there_is_worth_it_and_one_that_is_not_is_none() -> No
     assert there.space.worth(there.fit(A), there.fit())
     assert not absent.space.worth(absent.fit(A), absent.fit())
     assert not there.space.worth(there.fit(A, B), there.fit(A))
+
+
+@pytest.mark.parametrize(("after", "worth"), [(0.9, True), (1.2, True), (1.3, False), (float("nan"), True)])
+def test_a_model_that_needs_another_torque_is_not_worth_it(after: float, worth: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However well it follows the velocity; without a logged torque, or without a force error, that is no question."""
+    monkeypatch.setattr(model_space.ModelSpace, "force_error", lambda self, fit: after if fit.effects else 1.0)
+    bench = Bench({"a": (0.3,)})
+    assert bench.space.worth(bench.fit(A), bench.fit()) is worth
 
 
 def test_an_effect_is_worth_it_from_its_penalty_on() -> None:

@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 
 from gaident.control.pi import PI
 from gaident.data.record import Record
+from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
 from gaident.diagnosis.controller.log_shift import aligned
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.wording import basis_of, evidence_of
 from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
-from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, TWO_LEVELS, conditional_classes
-from gaident.diagnosis.mechanics import mechanics_of, moved
+from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, LOAD, TWO_LEVELS, conditional_classes
+from gaident.diagnosis.mechanics import base_shift, mechanics_of
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_order, noise_std_of, records_of
@@ -263,6 +264,7 @@ class _Work:
                     evidence=evidence_of(effect, gain, alternatives, offset),
                 )
             )
+        mechanics = mechanics_of(self.objective, self.final)
         model = self.final.parameters.model(self.final.x)
         for name, values in self.at_controller.effects.items():
             model = model.with_effect(name, **values)
@@ -278,6 +280,10 @@ class _Work:
                     f"The closest description is {' and '.join(dropped)}, but it leaves an error that depends on {driver}: "
                     "no effect of the library fits, so none is named."
                 )
+        check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None)
+        self.notes += check.notes
+        if self.final.parameters.held and LOAD.name in self.final.effects:
+            self.notes.append("The axis is held by a spring: its tension where the record starts is part of the constant load.")
         ambiguous = [f for f in real if f.alternatives]
         proposal = None
         if ambiguous:
@@ -292,17 +298,21 @@ class _Work:
             findings=tuple(findings),
             not_testable=self.not_testable,
             model=model,
-            before=gains.before,
-            after=gains.after,
+            before=check.before,
+            after=check.after,
             driver=driver,
             next_experiment=proposal,
             gain_interval=gains.interval,
             held_out=gains.held_out,
-            base_shift=self._base_shift(),
+            base_shift=base_shift(self.base, self.final),
             left=self.left.gains,
             line=self.left.line if driver == "time" else None,
             one_sided={e: sizes for e, sizes in self.excited.one_sided.items() if e not in answered},
-            mechanics=mechanics_of(self.objective, self.final),
+            mechanics=mechanics,
+            regression=check.regression,
+            regression_force_error=check.force_error,
+            comparisons=check.comparisons,
+            force_reason=check.reason,
             notes=tuple(self.notes),
             identification=self.idn,
             controller=self.controller,
@@ -386,13 +396,3 @@ class _Work:
             "parameters: it is not named."
         )
         return False
-
-    def _base_shift(self) -> dict[str, tuple[float, float]]:
-        """Base parameters before (the linear fit) and after (with the effects)."""
-        if self.base.parameters.masses != self.final.parameters.masses:
-            return {}
-        names = ("gain", "pole", "pole_pair_e1", "pole_pair_e0", "zero_pair_e1", "zero_pair_e0")
-        before = self.base.parameters.base_values(self.base.x[None, :])[0]
-        after = self.final.parameters.base_values(self.final.x[None, :])[0]
-        coefficients = {n: (float(b), float(a)) for n, b, a in zip(names, before, after, strict=False)}
-        return coefficients | moved(self.base, self.final)

@@ -17,6 +17,7 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.records.hygiene import quantisation
+from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit
 from gaident.estimation.objective import Fit, Objective
 from gaident.models import simulate
@@ -39,7 +40,8 @@ IN_SAMPLE = "in-sample"
 class Gains:
     """before, after, interval of the total fall, how it was held out, and each effect's own fall.
 
-    harmful: effects without which the extended model is better on the held-out data, beyond chance.
+    harmful: effects without which the extended model is better on the held-out data, beyond chance. judged: records, each with
+    the first sample that is held out; mechanism, extended: the models, without and with the effects, fitted to the rest.
     """
 
     before: Fitness
@@ -47,6 +49,9 @@ class Gains:
     interval: tuple[float, float]
     held_out: str
     steps: dict[str, float]
+    judged: tuple[tuple[Record, int], ...]
+    mechanism: Model
+    extended: Model
     harmful: tuple[str, ...] = ()
 
     def of(self, effect: str) -> float:
@@ -75,6 +80,7 @@ def measured_gains(
         words = f"the last 30 % of {'the record' if by_time else 'its path'}, parameters fitted to the first 70 %"
     else:
         judged, words, part = [(r, 0) for r in records], IN_SAMPLE, None
+    judged = [(_turned(r, controller, final), first) for r, first in judged]
     stages = _stages(final, objective, part)
     chain = [linear]
     named = list(at_controller.items())
@@ -114,7 +120,29 @@ def measured_gains(
         level = float(np.sqrt(np.mean(np.concatenate(spared) ** 2)))
         if level < (1.0 - POLICY.harm) * extended_level and _interval(spared, extended)[1] < 0.0:
             harmful.append(effect)
-    return Gains(fitness(errors[0]), fitness(errors[-1]), _interval(errors[0], errors[-1]), words, steps, tuple(harmful))
+    return Gains(
+        before=fitness(errors[0]),
+        after=fitness(errors[-1]),
+        interval=_interval(errors[0], errors[-1]),
+        held_out=words,
+        steps=steps,
+        judged=tuple(judged),
+        mechanism=bare,
+        extended=chain[-1],
+        harmful=tuple(harmful),
+    )
+
+
+def _turned(rec: Record, controller: PI | None, final: Fit) -> Record:
+    """The record with the angle that the model's effects turned with when it was selected.
+
+    Where none is logged that is the measured velocity, integrated, or the simulation's own. A pendulum that is simulated with its
+    own angle falls to another side sooner or later, whatever is wrong with it.
+    """
+    if final.predictor.own_angle or rec.position is not None or not any(t.harmonic == "torque" for t in final.parameters.terms):
+        return rec
+    (turned,) = DataSet.of([rec], controller).turned
+    return turned
 
 
 def _without(found: Fit, effect: str, objective: Objective) -> Fit:

@@ -1,6 +1,7 @@
 """The linear part of an extended model as a mechanic calls it, with standard deviations.
 
-One mass: J = 1/|K|, D = a/|K|. Two masses, motor and load on a damped shaft, with the numerator s^2 + f1 s + f0 and
+One mass: J = 1/|K|, D = a/|K|, and k = c/|K| of a spring that holds it.
+Two masses, motor and load on a damped shaft, with the numerator s^2 + f1 s + f0 and
 
     (s + a)(s^2 + e1 s + e0) = s^3 + (a + e1) s^2 + (e0 + a e1) s + a e0
 
@@ -17,7 +18,7 @@ from gaident.estimation.uncertainty import covariance_of
 from gaident.models.two_mass import mechanics_with_shaft_damping
 from gaident.results.estimate import Estimate
 
-__all__ = ["MECHANICS", "mechanics_of", "moved"]
+__all__ = ["MECHANICS", "base_shift", "mechanics_of", "moved"]
 
 Vector = NDArray[np.float64]
 
@@ -31,8 +32,10 @@ MECHANICS = {
     "resonance_damping": "1",
     "antiresonance": "Hz",
     "antiresonance_damping": "1",
+    "ground_stiffness": "N m/rad",
+    "ground_resonance": "Hz",
 }
-"""Names and units; inertia and viscous friction are of the whole axis."""
+"""Names and units; inertia and viscous friction are of the whole axis, the last two of a spring between it and the ground."""
 WHOLE = 2  # of these, what every axis has
 
 
@@ -66,14 +69,30 @@ def moved(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:
     return {name: (float(b), float(a)) for name, b, a in zip(MECHANICS, *pair, strict=False) if np.isfinite(b) and np.isfinite(a)}
 
 
+def base_shift(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:
+    """Base parameters and mechanics before (the linear fit) and after (with the effects); none of mechanisms of two kinds."""
+    if before.parameters.kind != after.parameters.kind:
+        return {}
+    if after.parameters.held:
+        return moved(before, after)
+    names = ("gain", "pole", "pole_pair_e1", "pole_pair_e0", "zero_pair_e1", "zero_pair_e0")
+    pair = [fit.parameters.base_values(fit.x[None, :])[0] for fit in (before, after)]
+    coefficients = {n: (float(b), float(a)) for n, b, a in zip(names, *pair, strict=False)}
+    return coefficients | moved(before, after)
+
+
 def _numbers(values: Vector) -> Vector:
-    """In the order of MECHANICS, from [K, a] or [K, a, e1, e0, f1, f0]; nan where there is none."""
+    """In the order of MECHANICS, from [K, a], [K, a, c] or [K, a, e1, e0, f1, f0]; nan where there is none."""
     K, a, *pairs = (float(v) for v in values)
     JM = 1.0 / abs(K)
     if not pairs:
         return np.array([JM, a * JM])
-    e1, e0, f1, f0 = pairs
     none = np.full(len(MECHANICS), np.nan)
+    if len(pairs) == 1:
+        none[:WHOLE] = JM, a * JM
+        none[-2:] = pairs[0] * JM, np.sqrt(max(pairs[0], 0.0)) / (2.0 * np.pi)
+        return none
+    e1, e0, f1, f0 = pairs
     if f0 == 0.0:
         return none
     D = a * e0 * JM / f0
@@ -86,4 +105,5 @@ def _numbers(values: Vector) -> Vector:
         return none
     _, _, JL, _, KG, _ = mechanics
     wp, wz, turn = np.sqrt(e0), np.sqrt(f0), 2.0 * np.pi
-    return np.array([JM + JL, D, JM, JL, KG, wp / turn, 0.5 * e1 / wp, wz / turn, 0.5 * f1 / wz])
+    none[:-2] = JM + JL, D, JM, JL, KG, wp / turn, 0.5 * e1 / wp, wz / turn, 0.5 * f1 / wz
+    return none

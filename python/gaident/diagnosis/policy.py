@@ -48,6 +48,10 @@ class Policy:
     material_beside_impacts: float = _row(
         0.5, "1", "the same beside a gap or a hard coupling: no model foresees an impact", PAIRS
     )
+    most_of_a_spring: float = _row(62.8, "rad", "of travel: what turns more than ten times no spring holds to the ground", REAL)
+    another_torque: float = _row(
+        1.25, "1", "force error over that of the simpler model: above, an effect explains a motion and not the drive", REAL
+    )
     overrules: float = _row(0.5, "1", "of the plain error that a cause which whitening hid may leave at most", REAL)
     rival_margin: float = _row(10.0, "BIC units", "closer explanations are not told apart (Kass and Raftery 1995)", SIZES)
     rival_short: float = _row(400.0, "samples", "a record this short doubles the margin", SIZES)
@@ -58,6 +62,13 @@ class Policy:
     swap: float = _row(2.0, "BIC units", "by which a rival has to be better to take a place", SIZES)
     harm: float = _row(0.02, "1", "of the held-out error that an effect may add before it is refused", REAL)
     held_motion: float = _row(0.33, "1", "rms speed of a held-out part over that before: below, it is cut by path", REAL)
+
+    # Do two methods contradict each other? The diagnosis and the inverse-dynamics regression of the same records.
+    check_deviations: float = _row(3.0, "deviations of both", "of a normal distribution 0.3 % are beyond", CLEAN)
+    check_share: float = _row(0.1, "1", "of the larger value: a smaller difference does not matter", CLEAN)
+    check_torque: float = _row(0.05, "1", "of the torque's rms: the same, of friction and gravity", CLEAN)
+    rigid_band: float = _row(0.25, "1", "of the antiresonance: below, a load is rigid within 1/16 (1/(1 - 1/16))", SIZES)
+    loses: float = _row(2.0, "1", "force error of the diagnosed model over that of the regression: above, it is a note", REAL)
 
     # Is this noise? One variance ratio, one specification test, one test for dependence.
     noise_ratio: float = _row(1.5, "1", "rms of whitened errors over the noise of the velocity, coloured torques included", CLEAN)

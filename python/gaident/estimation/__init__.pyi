@@ -1,5 +1,5 @@
+from .regression.force_error import ForceError, force_error
 from .regression.inverse_dynamics import inverse_dynamics
-from .regression.inverse_dynamics_result import InverseDynamics
 from .regression.winding import WindingFit, estimate_winding
 
-__all__ = ["InverseDynamics", "WindingFit", "estimate_winding", "inverse_dynamics"]
+__all__ = ["ForceError", "WindingFit", "estimate_winding", "force_error", "inverse_dynamics"]

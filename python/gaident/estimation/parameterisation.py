@@ -1,9 +1,13 @@
 """The parameters of an extended model as one vector, and back.
 
-    one mass   x = [ln |K|, a | effects | start states]                  G(s) = K / (s + a)
-    two masses x = [ln |K|, a, e1, e0, f1, f0 | effects | start states]  G(s) = K (s^2 + f1 s + f0) / ((s + a) (s^2 + e1 s + e0))
+    one mass      x = [ln K, a | effects | start states]                  G(s) = K / (s + a)
+    held by a spring  [ln K, a, c | effects | start states]               G(s) = K s / (s^2 + a s + c)
+    two masses        [ln K, a, e1, e0, f1, f0 | effects | start states]  G(s) = K (s^2 + f1 s + f0) / ((s + a) (s^2 + e1 s + e0))
 
-a, e1, e0, f1, f0 in units of their own size, so that a step of 1 is large and one of 1e-4 small for every entry. Pairs pass
+K = 1/J is positive by construction: whatever the start, no fit can end at a negative inertia.
+Below its resonance an axis that a spring or gravity holds answers as if it had one.
+c = k/J, k the stiffness of a spring between the axis and the ground.
+a, c, e1, e0, f1, f0 in units of their own size, so that a step of 1 is large and one of 1e-4 small for every entry. Pairs pass
 smoothly from complex to real roots.
 """
 
@@ -34,7 +38,13 @@ def parameter_names(effect: str) -> tuple[str, ...]:
 
 
 def mechanism(model: Model) -> Vector:
-    """[K, a] or [K, a, e1, e0, f1, f0] of a model of structure (1, 0) or (1, 2); of three real poles the slowest is a."""
+    """[K, a], [K, a, c] or [K, a, e1, e0, f1, f0] of a model of structure (1, 0), (1, 1) with a zero at 0, or (1, 2).
+
+    Of three real poles the slowest is a.
+    """
+    if model.q == 1:
+        one, other = model.poles
+        return np.array([model.gain, -(one + other).real, (one * other).real])
     poles = sorted(model.poles, key=lambda r: (r.imag != 0.0, abs(r)))
     a, rest = -poles[0].real, poles[1:]
     values = [model.gain, a]
@@ -47,7 +57,7 @@ def mechanism(model: Model) -> Vector:
 def described(scales: Scales, model: Model) -> Scales:
     """Scales with what the mechanism of a model says."""
     values = mechanism(model)
-    if len(values) == 2:
+    if len(values) < 6:
         return replace(scales, two_masses=False)
     K, a, e1, e0, _, f0 = values
     JM = 1.0 / abs(K)
@@ -61,11 +71,10 @@ def described(scales: Scales, model: Model) -> Scales:
 class Parameterisation:
     """What the entries of x mean.
 
-    masses: 1 or 2. sign: of K. units: size of a, e1, ...; starts: start states of each record (0: it starts at rest).
+    masses: 1 or 2. units: size of a, c or e1, ...; starts: start states of each record (0: it starts at rest).
     """
 
     masses: int
-    sign: float
     units: tuple[float, ...]
     terms: tuple[Term, ...]
     starts: tuple[int, ...]
@@ -73,16 +82,31 @@ class Parameterisation:
 
     @classmethod
     def of(cls, model: Model, scales: Scales, moving: Sequence[bool]) -> Parameterisation:
-        """That of a linear model of one or two masses (effects are added by `extended`); scales as the model describes them."""
+        """That of a linear model of one mass, one that a spring holds, or two (effects are added by `extended`).
+
+        Its scales are those given, as the model describes them.
+        """
         values = mechanism(model)
         floor = 2.0 / scales.duration
         units = [max(abs(values[1]), floor)]
-        for _, e0 in values[2:].reshape(-1, 2):
+        if len(values) == 3:
+            units.append(max(abs(values[2]), floor**2))
+        for _, e0 in values[2:].reshape(-1, 2) if len(values) > 3 else ():
             w = max(np.sqrt(abs(e0)), floor)
             units += [w, w * w]
-        masses = 1 if len(values) == 2 else 2
-        starts = tuple((1, 3)[masses - 1] if m else 0 for m in moving)
-        return cls(masses, float(np.sign(values[0])), tuple(float(u) for u in units), (), starts, described(scales, model))
+        masses = 2 if len(values) > 3 else 1
+        starts = tuple(model.order if m else 0 for m in moving)
+        return cls(masses, tuple(float(u) for u in units), (), starts, described(scales, model))
+
+    @property
+    def held(self) -> bool:
+        """Whether a spring between the one mass and the ground holds it."""
+        return len(self.units) == 2
+
+    @property
+    def kind(self) -> str:
+        """The mechanism in words; two fits of the same kind have the same base parameters."""
+        return "two masses" if self.masses == 2 else "one mass, held by a spring" if self.held else "one mass"
 
     @cached_property
     def effects(self) -> tuple[str, ...]:
@@ -103,7 +127,10 @@ class Parameterisation:
 
     @property
     def structure(self) -> Structure:
-        """The linear part as the core takes it: one real pole, and a pair of poles and of zeros for two masses."""
+        """The linear part as the core takes it: one real pole, and a pair of poles and of zeros for two masses; a spring makes
+        it a pair of poles, and a zero at 0."""
+        if self.held:
+            return Structure(0, 1, 1, 0)
         return Structure(1, 0, 0, 0) if self.masses == 1 else Structure(1, 1, 0, 1)
 
     @property
@@ -154,7 +181,7 @@ class Parameterisation:
     def base_values(self, X: Matrix) -> Matrix:
         """Rows [K, a, ...] of rows of x."""
         values = np.empty((len(X), self.base))
-        values[:, 0] = self.sign * np.exp(np.clip(X[:, 0], -300.0, 300.0))
+        values[:, 0] = np.exp(np.clip(X[:, 0], -300.0, 300.0))
         values[:, 1:] = X[:, 1 : self.base] * np.array(self.units)
         return values
 
@@ -165,7 +192,8 @@ class Parameterisation:
     def values(self, X: Matrix, left_out: Sequence[str] = ()) -> tuple[tuple[str, ...], Matrix]:
         """(effects in the order of the table, rows of base parameters and theirs) for `simulate_values`."""
         shown = [t for t in self._ordered if t.name not in left_out]
-        rows = np.hstack([self.base_values(X), *(t.natural(X[:, self.slot(t.name)]) for t in shown)])
+        zero = [np.zeros((len(X), 1))] if self.held else []
+        rows = np.hstack([self.base_values(X), *zero, *(t.natural(X[:, self.slot(t.name)]) for t in shown)])
         return tuple(t.name for t in shown), rows
 
     def start_values(self, X: Matrix, record: int) -> Matrix | None:
@@ -187,6 +215,8 @@ class Parameterisation:
     def linear(self, x: Vector) -> Model:
         """The linear mechanism of one x."""
         values = self.base_values(x[None, :])[0]
+        if self.held:
+            return Model(float(values[0]), quadratic_roots(float(values[1]), float(values[2])), [0.0])
         poles = [complex(-values[1])]
         zeros: list[complex] = []
         if self.masses == 2:

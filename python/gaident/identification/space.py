@@ -72,6 +72,8 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
             # The torque is a replay, which a limit inside the controller spoils; its sign is the one at which the loop stands.
             found = [abs(k) for k in (rigid, steps / energy) if np.isfinite(k) and k != 0.0]
     if not found:
+        found = _held_gain(records, controller)
+    if not found:
         raise SpaceError(
             "the velocity falls when the torque rises: reverse the sign of one of them (for example by a unit of -1), "
             f"or give {arg('space', 'SearchSpace(gain=...)')}"
@@ -86,6 +88,31 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
         p=(0, 3) if controller is not None and controller.loop == "continuous" else (1, 3),
         source=f"derived from the data: K about {shown}, sample time {1e3 * dt:.4g} ms",
     )
+
+
+def _held_gain(records: Sequence[Record], controller: PI | None) -> list[float]:
+    """[K] of an axis that a spring or gravity holds, [] where the records show no such thing.
+
+        w = K int u dt - a int w dt - c int theta dt + b_0 + b_1 t,   K > 0 and c > 0
+
+    Below its resonance such an axis is further out where the torque is larger, and its velocity falls when the torque rises.
+    """
+    gram, right = np.zeros((3, 3)), np.zeros(3)
+    for rec in records:
+        u = np.concatenate([part for _, part, _ in torque_blocks(rec, controller)])
+        angle = np.cumsum(rec.velocity) * rec.dt
+        x = np.vstack([np.cumsum(u) * rec.dt, -angle, -np.cumsum(angle) * rec.dt, rec.velocity])
+        line = np.vstack([np.ones(len(u)), np.linspace(-1.0, 1.0, len(u))])
+        line[0] /= math.sqrt(_dot(line[0], line[0]))
+        line[1] /= math.sqrt(_dot(line[1], line[1]))
+        for row in line:
+            x -= np.array([_dot(one, row) for one in x])[:, None] * row
+        products = np.array([[_dot(one, other) for other in x] for one in x])
+        gram += products[:3, :3]
+        right += products[:3, 3]
+    sizes = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    K, _, c = np.linalg.lstsq(gram / np.outer(sizes, sizes), right / sizes, rcond=1e-12)[0] / sizes
+    return [float(K)] if K > 0.0 and c > 0.0 else []
 
 
 def _check_scales(records: Sequence[Record], controller: PI | None, only_certain: bool) -> None:

@@ -1,21 +1,24 @@
 from .adequacy import Adequacy
-from .diagnosis import Diagnosis, Fitness
+from .diagnosis import Comparison, Diagnosis, Fitness
 from .estimate import Estimate
 from .experiment import Limits, Proposal
 from .finding import Finding
 from .frequency import FrequencyResponse, Responses
 from .identification import Identification
+from .inverse_dynamics import InverseDynamics
 from .settings import Settings
 from .store import load, schema
 
 __all__ = [
     "Adequacy",
+    "Comparison",
     "Diagnosis",
     "Estimate",
     "Finding",
     "Fitness",
     "FrequencyResponse",
     "Identification",
+    "InverseDynamics",
     "Limits",
     "Proposal",
     "Responses",

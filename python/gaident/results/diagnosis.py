@@ -17,12 +17,13 @@ from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
 from gaident.results.identification import Identification
+from gaident.results.inverse_dynamics import InverseDynamics
 from gaident.results.json_text import json_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Diagnosis", "Fitness"]
+__all__ = ["Comparison", "Diagnosis", "Fitness"]
 
 SCHEMA = "gaident/diagnosis"
 SCHEMA_VERSION = 1
@@ -30,25 +31,56 @@ SCHEMA_VERSION = 1
 
 @dataclass(frozen=True)
 class Fitness:
-    """Free-run simulation against the measured velocity.
+    """A model against held-out data, in the free run and by its force error.
 
     Attributes
     ----------
     rmse : float
-        Root mean square of the error [rad/s].
+        Root mean square of the free run's velocity error [rad/s].
     fit_percent : float
         100 (1 - norm(error)/norm(velocity - mean velocity)) [%].
     noise_floor : float
         Root mean square that the noise of the measured velocity alone leaves [rad/s].
+    force_error : float or None
+        Root mean square of the logged torque minus the torque that the model needs for the measured motion [N m]; None where no
+        torque is logged, or nothing moves.
+    torque_rms : float or None
+        Root mean square of the torque itself, over the same samples [N m].
+    force_floor : float or None
+        What noise leaves of the force error at most [N m].
 
     See Also
     --------
     diagnose : Makes it.
+    force_error : The same figure of any model on any records.
     """
 
     rmse: float
     fit_percent: float
     noise_floor: float
+    force_error: float | None = None
+    torque_rms: float | None = None
+    force_floor: float | None = None
+
+    @property
+    def force_percent(self) -> float | None:
+        """The force error as a percentage of the torque's rms."""
+        if self.force_error is None or not self.torque_rms:
+            return None
+        return 100.0 * self.force_error / self.torque_rms
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One quantity by two methods.
+
+    name: "inertia", "dry friction", "gravity" or "ground stiffness"; differs: they contradict each other, and it matters.
+    """
+
+    name: str
+    diagnosis: Estimate
+    regression: Estimate
+    differs: bool
 
 
 @dataclass(frozen=True, repr=False)
@@ -117,6 +149,14 @@ class Diagnosis:
     log_shifts : mapping of str to mapping of str to int
         Digest of a record -> channel -> samples by which it was moved, as `Record.shifted` takes them, where the log wrote
         channels on different lines; `as_used` does it again.
+    regression : InverseDynamics or None
+        The inverse-dynamics regression of the same records, where a torque is logged.
+    regression_force_error : float or None
+        Its force error on the held-out data [N m].
+    comparisons : tuple of Comparison
+        What both methods say of the same quantity; a contradiction is one of the notes, too.
+    force_reason : str
+        Why the force error is the figure to go by here, in words; empty where the free run is as good a figure.
     records, validation_records : tuple of Record
         The data; empty where the diagnosis was loaded from a file.
 
@@ -155,6 +195,10 @@ class Diagnosis:
     one_sided: Mapping[str, str] = field(default_factory=dict, hash=False)
     mechanics: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
     log_shifts: Mapping[str, Mapping[str, int]] = field(default_factory=dict, hash=False)
+    regression: InverseDynamics | None = None
+    regression_force_error: float | None = None
+    comparisons: tuple[Comparison, ...] = ()
+    force_reason: str = ""
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
@@ -298,6 +342,10 @@ class Diagnosis:
             "one_sided": dict(self.one_sided),
             "log_shifts": {digest: dict(moves) for digest, moves in self.log_shifts.items()},
             "mechanics": {n: asdict(e) for n, e in self.mechanics.items()},
+            "regression": None if self.regression is None else self.regression.to_dict(),
+            "regression_force_error": self.regression_force_error,
+            "comparisons": [asdict(c) for c in self.comparisons],
+            "force_reason": self.force_reason,
         }
 
     @classmethod
@@ -349,6 +397,13 @@ class Diagnosis:
                 one_sided=data.get("one_sided", {}),
                 log_shifts=data.get("log_shifts", {}),
                 mechanics={n: Estimate(**e) for n, e in data.get("mechanics", {}).items()},
+                regression=None if data.get("regression") is None else InverseDynamics.from_dict(data["regression"]),
+                regression_force_error=data.get("regression_force_error"),
+                comparisons=tuple(
+                    Comparison(c["name"], Estimate(**c["diagnosis"]), Estimate(**c["regression"]), c["differs"])
+                    for c in data.get("comparisons", ())
+                ),
+                force_reason=data.get("force_reason", ""),
             )
         except (KeyError, TypeError, AttributeError, IndexError) as error:
             raise GaidentError(f"the saved diagnosis is damaged: {error!r}; save it again") from error

@@ -9,6 +9,7 @@ from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
+from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
 from gaident.show.wording import certainty, number, sentence, table, unit, velocity_unit, with_std
 
 __all__ = [
@@ -47,6 +48,8 @@ def diagnosis_summary(dia: Diagnosis, axis: str = "rotary") -> str:
         _verdict(dia, axis),
         _causes(dia, axis),
         _gain(dia, axis),
+        _force(dia, axis),
+        _second_method(dia, axis),
         _next(dia, axis),
         _mechanics(dia, axis),
         _base(dia, axis),
@@ -168,6 +171,26 @@ def _gain(dia: Diagnosis, axis: str) -> list[str]:
         if len(steps) > 1:
             lines += _wrapped(f"One after the other, each of what was left before it: {', '.join(steps)}.", "  ")
     return lines
+
+
+def _force(dia: Diagnosis, axis: str) -> list[str]:
+    """The force error on the held-out data."""
+    rows = force_rows(dia, axis)
+    if not rows:
+        return []
+    where = "IN-SAMPLE" if dia.held_out == "in-sample" else f"on {dia.held_out}"
+    torque = "torque" if axis == "rotary" else "force"
+    head = ("", f"rms [{unit('N m', axis)}]", f"of the {torque} [%]")
+    return [f"Force error, {where}", *table([head, *rows]), *_wrapped(force_words(dia, axis), "  ")]
+
+
+def _second_method(dia: Diagnosis, axis: str) -> list[str]:
+    """The regression beside the diagnosis."""
+    rows = comparison_rows(dia, axis)
+    if not rows:
+        return []
+    head = ("", "diagnosis", "regression", "", "")
+    return ["Check by inverse-dynamics regression", *table([head, *rows]), *_wrapped(method_words(dia, axis), "  ")]
 
 
 def fall_words(dia: Diagnosis) -> str:

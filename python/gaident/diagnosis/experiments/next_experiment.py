@@ -171,7 +171,7 @@ def menu(data: DataSet, fit: Fit) -> list[MenuItem]:
 def inertia_of(fit: Fit) -> float:
     """Total inertia [kg m^2]: 1/J = K for one mass, K f0/e0 for two."""
     values = fit.parameters.base_values(fit.x[None, :])[0]
-    gain = abs(values[0] * values[5] / values[3]) if len(values) > 2 and values[3] and values[5] else abs(values[0])
+    gain = abs(values[0] * values[5] / values[3]) if len(values) > 3 and values[3] and values[5] else abs(values[0])
     return 1.0 / max(float(gain), 1e-300)
 
 

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from gaident.estimation.term import Natural, Rows, Scales, Term
 
+FREE = 1e6
+"""Times the largest torque of the log: a pendulum that swings with little friction has far more torque than drives it."""
+
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
@@ -90,7 +93,7 @@ def harmonic(effect: str, place: str, first: int, with_order: bool, kind: str) -
         return s.torque if kind == "torque" else 0.2
 
     def limits(s: Scales) -> Rows:
-        a = (10.0 if kind == "torque" else 1.0) * amplitude(s)  # a swung pendulum has more torque than drives it
+        a = (10.0 if with_order else FREE) * amplitude(s) if kind == "torque" else amplitude(s)
         rows: Rows = [(-a, a), (-a, a), (float(first), 1000.0)]
         return rows[: 3 if with_order else 2]
 

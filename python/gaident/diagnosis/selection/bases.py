@@ -23,6 +23,7 @@ from gaident.estimation.projection import WORST
 from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
+from gaident.models.roots import quadratic_roots
 from gaident.models.simulate import simulate
 
 __all__ = ["Task", "linear_bases", "noise_floor", "plain_bases", "regressed"]
@@ -160,7 +161,10 @@ def regressed(task: Task, predictor: Predictor) -> Fit | None:
     if not inertia > 0.0:
         return None
     slowest = 1.0 / max(r.duration for r in data.records)
-    rigid_axis = Model(1.0 / inertia, [-max(viscous / inertia, slowest)])
+    damping, stiffness = max(viscous / inertia, slowest), values.get("spring", 0.0)
+    rigid_axis = Model(1.0 / inertia, [-damping])
+    if stiffness > 0.0:
+        rigid_axis = Model(1.0 / inertia, quadratic_roots(damping, stiffness / inertia), [0.0])
     parameters = Parameterisation.of(rigid_axis, task.scales, data.moving)
     x = parameters.base_vector(rigid_axis)
     for term, own in of_inverse_dynamics(values).items():

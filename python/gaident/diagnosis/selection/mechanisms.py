@@ -20,12 +20,15 @@ from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
 
 __all__ = [
+    "as_held",
     "as_one_mass",
     "as_two_masses",
     "evenly_damped",
+    "held",
     "is_mechanism",
     "one_mass",
     "reduced",
+    "released",
     "resonant",
     "rigid",
     "swings",
@@ -54,14 +57,56 @@ def one_mass(data: DataSet, identified: Model) -> Model:
     return Model(abs(float(K)) or 1.0, [-max(float(a), slow)])
 
 
+def held(data: DataSet) -> Model | None:
+    """One mass that a spring holds, from the same balance with the spring's momentum; None where its stiffness is not positive.
+
+        w = K int u dt - a int w dt - c int theta dt + w(0) + (K T0) t,   T0 the torque at the angle where the record starts
+
+    The balance needs no start. Without the spring an axis below its resonance would have a negative inertia.
+    """
+    gram, right = np.zeros((3, 3)), np.zeros(3)
+    for r in data.driven:
+        assert r.torque is not None and r.position is not None
+        columns = np.vstack([np.cumsum(r.torque), -np.cumsum(r.velocity), -np.cumsum(r.position - r.position[0])]) * r.dt
+        line = np.vstack([np.ones(len(r)), np.linspace(-1.0, 1.0, len(r))])
+        beyond = np.linalg.qr(line.T)[0]
+        rows = np.vstack([columns, r.velocity])
+        rows = rows - (rows @ beyond) @ beyond.T
+        gram += rows[:3] @ rows[:3].T
+        right += rows[:3] @ rows[3]
+    sizes = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    K, a, c = np.linalg.lstsq(gram / np.outer(sizes, sizes), right / sizes, rcond=1e-12)[0] / sizes
+    if not (K > 0.0 and c > 0.0):
+        return None
+    return _held(float(K), float(a), float(c), data)
+
+
+def _held(K: float, a: float, c: float, data: DataSet) -> Model:
+    slow = 1.0 / max(r.duration for r in data.records)
+    return Model(K, quadratic_roots(max(a, slow), c), [0.0])
+
+
+def as_held(fit: Fit, stiffness: float, data: DataSet) -> tuple[Hypothesis, Vector]:
+    """A fit of one mass, with its effects, held by a spring of this stiffness [N m/rad]."""
+    K, a = fit.parameters.base_values(fit.x[None, :])[0]
+    return moved_to(_held(float(K), float(a), stiffness * float(K), data), fit)
+
+
+def released(fit: Fit) -> tuple[Hypothesis, Vector]:
+    """A fit of one mass that a spring holds, with its effects, without the spring."""
+    K, a, _ = fit.parameters.base_values(fit.x[None, :])[0]
+    return moved_to(Model(float(K), [-float(a)]), fit)
+
+
 def rigid(identified: Model) -> list[Model]:
-    """The identified model's slowest real pole alone, with its gain at standstill; none without a real pole."""
+    """The identified model's slowest real pole alone, with its gain at standstill; none without one, or where it is negative."""
     real = [r for r in identified.poles if r.imag == 0.0]
     if not real:
         return []
     slow = min(real, key=abs)
     others = [r for r in identified.poles if r != slow]
-    return [Model(float(identified.gain * np.prod(np.abs(identified.zeros)) / np.prod(np.abs(others))), [slow])]
+    gain = float(identified.gain * np.prod(np.abs(identified.zeros)) / np.prod(np.abs(others)))
+    return [Model(gain, [slow])] if gain > 0.0 else []
 
 
 def reduced(identified: Model) -> list[Model]:
@@ -128,7 +173,7 @@ def as_two_masses(fit: Fit) -> tuple[Hypothesis, Vector]:
 def as_one_mass(fit: Fit) -> tuple[Hypothesis, Vector]:
     """The effects of a fit of two masses on one: K f0/e0 is the gain of the whole."""
     K, a, _, e0, _, f0 = fit.parameters.base_values(fit.x[None, :])[0]
-    return moved_to(Model(float(K * f0 / e0) if e0 else float(K), [-float(a)]), fit)
+    return moved_to(Model(abs(float(K * f0 / e0)) if e0 * f0 else float(K), [-float(a)]), fit)
 
 
 def evenly_damped(parameters: Parameterisation, x: Vector) -> Vector:
@@ -150,9 +195,12 @@ def evenly_damped(parameters: Parameterisation, x: Vector) -> Vector:
 
 
 def is_mechanism(parameters: Parameterisation, x: Vector) -> bool:
-    """Whether two masses are two masses on a shaft: sum of pairwise A = K_G (1/J_M + 1/J_L) is above prod B = K_G/J_L."""
+    """Whether two masses are two masses on a shaft: sum of pairwise A = K_G (1/J_M + 1/J_L) is above prod B = K_G/J_L.
+
+    A spring to the ground has a positive stiffness.
+    """
     if parameters.masses == 1:
-        return True
+        return not parameters.held or bool(parameters.base_values(x[None, :])[0, 2] > 0.0)
     _, a, e1, e0, _, f0 = parameters.base_values(x[None, :])[0]
     return bool(e0 + a * e1 > f0)
 
@@ -168,4 +216,4 @@ def swings(fit: Fit) -> bool:
 def resonance(fit: Fit) -> float:
     """Of a fit of two masses [rad/s]; 0 for one."""
     values = fit.parameters.base_values(fit.x[None, :])[0]
-    return float(np.sqrt(abs(values[3]))) if len(values) > 2 else 0.0
+    return float(np.sqrt(abs(values[3]))) if len(values) > 3 else 0.0

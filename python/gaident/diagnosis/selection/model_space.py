@@ -19,11 +19,13 @@ from numpy.typing import NDArray
 from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
 from gaident.diagnosis.policy import POLICY, Policy
 from gaident.diagnosis.selection.mechanisms import as_two_masses
+from gaident.errors import GaidentError
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
+from gaident.estimation.regression.force_error import force_error
 from gaident.estimation.term import Term
 
 __all__ = ["ModelSpace", "words"]
@@ -87,11 +89,12 @@ class ModelSpace:
         effects = sum(_depth(t) for t in fit.parameters.terms)
         # An order of the angle that was searched for counts as so many candidates more.
         orders = sum(2.0 * float(np.log(t.orders[1] - t.orders[0] + 1)) for t in fit.parameters.terms)
-        return fit.bic + self.penalty * (effects + fit.parameters.masses - 1) + orders
+        more = fit.parameters.masses - 1 + fit.parameters.held  # a second mass, or a spring, counts as an effect
+        return fit.bic + self.penalty * (effects + more) + orders
 
     def key(self, fit: Fit) -> Hashable:
         """The same for the same mechanism with the same effects, or with equivalent ones."""
-        return fit.parameters.masses, frozenset(_representative(t) for t in fit.parameters.terms)
+        return fit.parameters.kind, frozenset(_representative(t) for t in fit.parameters.terms)
 
     def ratio(self, fit: Fit) -> float:
         """Rms of the whitened errors over the noise that the measured velocity itself shows."""
@@ -114,12 +117,36 @@ class ModelSpace:
     def worth(self, fuller: Fit, simpler: Fit) -> bool:
         """The decision: whether a fuller model is worth its effects against a simpler one."""
         simpler = self.in_view_of(simpler, fuller)
-        if not self.score(fuller) < self.score(simpler):
+        if not self.score(fuller) < self.score(simpler) or self.needs_another_torque(simpler, fuller):
             return False
         more = [t for t in fuller.parameters.terms if t.name not in simpler.effects]
         if any(set(t.nested) & set(simpler.effects) for t in more) and not self.in_both_views(simpler, fuller):
             return False
         return self.material(simpler, fuller)
+
+    def needs_another_torque(self, simpler: Fit, fuller: Fit) -> bool:
+        """Whether a model needs a torque that is further from the logged one than that of a simpler model.
+
+        A free run judges the velocity alone. A large inertia that swings under gravity, or on a spring, from where a record
+        starts may follow it better than the drive's own does, whatever the torque: it explains a motion and not the drive.
+        """
+        if not self.data.torque_logged:
+            return False
+        before, after = (self.force_error(f) for f in (simpler, fuller))
+        return bool(after > self.policy.another_torque * before)
+
+    def force_error(self, fit: Fit) -> float:
+        """Force error of a model on the records that it is fitted to [N m]; nan where it has none."""
+
+        def computed() -> float:
+            model, records = fit.parameters.model(fit.x), list(self.data.driven)
+            try:
+                return force_error(model, records, cutoff_hz=self.data.torque_band).rms
+            except GaidentError:
+                return float("nan")
+
+        found: float = self.objective.once(("force", fit.key), computed)
+        return found
 
     def in_view_of(self, fit: Fit, other: Fit) -> Fit:
         """The fit as the other's predictor sees it, where that is better: models are compared under the same predictors."""
@@ -189,7 +216,7 @@ class ModelSpace:
         own = simpler.parameters
         level = float(simpler.x[own.slot(inner.name)][0])
         base, bare = own.removed(simpler.x, inner.name), own.without(inner.name)
-        if set(bare.effects) != set(fuller.parameters.without(term.name).effects) or bare.masses != fuller.parameters.masses:
+        if set(bare.effects) != set(fuller.parameters.without(term.name).effects) or bare.kind != fuller.parameters.kind:
             return np.inf
         neutral = np.array(term.neutral(level, fuller.parameters.scales))
         hypothesis = Hypothesis(bare.extended(term), fuller.predictor)
@@ -237,7 +264,7 @@ class ModelSpace:
 
     def canonical(self, fit: Fit) -> Fit:
         """One mass with an extra resonance is a drive of two masses: part of the linear model, not an effect."""
-        if fit.parameters.masses == 2 or not any(t.resonates for t in fit.parameters.terms):
+        if fit.parameters.kind != "one mass" or not any(t.resonates for t in fit.parameters.terms):
             return fit
         hypothesis, x = as_two_masses(fit)
         return self.continued(hypothesis, fit, x)

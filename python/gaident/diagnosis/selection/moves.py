@@ -7,7 +7,8 @@ A model is a mechanism (one mass or two) with effects. The moves are
     simplify    a generalisation to what it contains
     exchange    an effect for one of its equivalence class, where only others tell them apart
     resettle    the mechanism's resonance at the place of an extra one
-    demote      two masses to one
+    hold        one mass by a spring to the ground
+    demote      two masses to one, or the spring away
     close       the open loop to the closed one
     search      the same model again, from all starts and globally, beside stops and impacts
 
@@ -22,14 +23,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
-from gaident.diagnosis.selection.mechanisms import as_one_mass, as_two_masses, is_mechanism
+from gaident.diagnosis.selection.mechanisms import as_held, as_one_mass, as_two_masses, held, is_mechanism, moved_to, released
 from gaident.diagnosis.selection.model_space import ModelSpace, words
 from gaident.diagnosis.selection.score_test import ScoreTest
 from gaident.estimation import least_squares as ls
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis
 from gaident.estimation.prediction import OpenLoop
-from gaident.estimation.projection import WORST
+from gaident.estimation.projection import WORST, orthonormal_rows
 from gaident.estimation.term import Term
 
 __all__ = ["Moves"]
@@ -62,12 +63,12 @@ class Moves(ModelSpace):
         if len(now.effects) >= self.policy.most_effects:
             return []
         key = "add", now.key, self.allowed
-        self.grown.setdefault((now.parameters.masses, frozenset(now.effects)), []).append(now)
-        return self.objective.once(key, lambda: self._add(now))
+        self.grown.setdefault((now.parameters.kind, frozenset(now.effects)), []).append(now)
+        return self.objective.once(key, lambda: self._best([*self.hold(now), *self._add(now)]))
 
     def known(self, fit: Fit) -> Fit:
         """A fit of the same model that was grown already, where it is no worse by what swaps a place: its growth is known."""
-        same = self.grown.get((fit.parameters.masses, frozenset(fit.effects)), [])
+        same = self.grown.get((fit.parameters.kind, frozenset(fit.effects)), [])
         near = [f for f in same if f.bic < fit.bic + self.policy.swap]
         return min(near, key=lambda f: f.bic) if near else fit
 
@@ -130,6 +131,33 @@ class Moves(ModelSpace):
             scales = replace(parameters.scales, friction=friction)
             test.add(Hypothesis(replace(parameters, scales=scales), source.predictor), x, wanted)
 
+    def hold(self, fit: Fit) -> list[Fit]:
+        """One mass with its effects, held by a spring to the ground; none where a spring promises too little.
+
+        Its stiffness is that of a linear test, a torque -k theta beside the model and a constant, or of the momentum's balance.
+        """
+        data = self.data
+        if fit.parameters.kind != "one mass" or data.travel > self.policy.most_of_a_spring:
+            return []
+        _, J, error = self.objective.linearised(fit.hypothesis, fit.x, WHITE)
+        response = fit.predictor.torque_response(fit.parameters, fit.x, np.vstack([-data.angle, np.ones(len(data.angle))]))
+        best, stiffness = 0.0, 0.0
+        for noise in (WHITE, fit.noise):
+            rows = self.objective.whitened(np.vstack([J, response[1:], response[:1], error]), noise)
+            basis = orthonormal_rows(rows[:-2])
+            column, rest = (v - (v @ basis.T) @ basis for v in rows[-2:])
+            size, slope = float(column @ column), float(column @ rest)
+            if size > 0.0 and slope != 0.0:
+                power = float(rest @ rest)
+                fall = -self.objective.information * float(np.log(max(1.0 - slope**2 / (size * power), 1e-300)))
+                if fall > best:
+                    best, stiffness = fall, slope / size
+        starts = [as_held(fit, stiffness, data)] if stiffness > 0.0 and best > 0.5 * self.penalty else []
+        if not fit.effects and not self.quiet(fit) and (balanced := held(data)) is not None:
+            starts.append(moved_to(balanced, fit))
+        fits = [self.refitted(h, x, 20) for h, x in starts]
+        return [f for f in fits if f.cost < WORST and is_mechanism(f.parameters, f.x)]
+
     def resettled(self, fit: Fit) -> list[Fit]:
         """The two masses with the resonance that was found as their own, alone or with a simple effect beside it.
 
@@ -184,7 +212,10 @@ class Moves(ModelSpace):
         return self.continued(hypothesis, fit, x, 12)
 
     def demote(self, fit: Fit) -> list[Fit]:
-        """Two masses with effects as one mass with these effects."""
+        """Two masses with effects as one mass with these effects; one that a spring holds without the spring."""
+        if fit.parameters.held:
+            hypothesis, x = released(fit)
+            return [self.continued(hypothesis, fit, x, 20)]
         if fit.parameters.masses == 1 or not fit.effects or any(t.in_coupling or t.resonates for t in fit.parameters.terms):
             return []
         hypothesis, x = as_one_mass(fit)
@@ -219,7 +250,7 @@ class Moves(ModelSpace):
 
     def prefers(self, other: Fit, fit: Fit) -> bool:
         """Whether a reduced model takes the place of a model."""
-        if len(other.effects) == len(fit.effects) and other.parameters.masses == fit.parameters.masses:
+        if len(other.effects) == len(fit.effects) and other.parameters.kind == fit.parameters.kind:
             nested = any(set(t.nested) & set(other.effects) for t in fit.parameters.terms)
             if not nested:
                 return self.score(other) < self.score(fit)

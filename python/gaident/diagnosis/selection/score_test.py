@@ -135,7 +135,7 @@ class ScoreTest:
         turned, path = float(np.ptp(angle)), float(np.abs(np.diff(angle)).sum())
         speed = float(np.median(np.abs(self.objective.measured)) + 1e-12)
         seen = (orders * turned > 0.75 * TURN) & (orders * path > 3.0 * TURN)
-        if last == 1 and self.data.angle_logged:
+        if last == 1:
             seen |= turned > SIXTH
         orders = orders[seen & (orders * speed * self.data.dt < 2.5)]
         if len(orders) == 0:

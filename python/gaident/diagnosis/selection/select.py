@@ -143,7 +143,7 @@ def _plainly(task: Task, bases: Sequence[Fit], note: Callable[[str], None]) -> t
     start = regressed(plain, least.predictor)
     if start is not None and start.cost < WORST:
         final = _improved(space, start, final)
-        base = base if base.parameters.masses == final.parameters.masses else _bare(space, final)
+        base = base if base.parameters.kind == final.parameters.kind else _bare(space, final)
     return space, base, final
 
 
@@ -239,7 +239,7 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     final = reduced_by(final, _reductions(space), space.prefers, space.score)
     note(f"looking beyond {words(final.effects) or 'the linear model'}, at all samples")
     final = _beam(space).run([final])
-    if base.parameters.masses != final.parameters.masses:
+    if base.parameters.kind != final.parameters.kind:
         base = _bare(space, final)
     test = specification(space, final) if space.whitens else outline.specification
     return _Found(space, base, final, test)
@@ -266,7 +266,7 @@ def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> S
         if better is None:
             break
         final = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
-    base = found.base if found.base.parameters.masses == final.parameters.masses else _bare(space, final)
+    base = found.base if found.base.parameters.kind == final.parameters.kind else _bare(space, final)
     return Selection(space, base, final, rivals, found.specification, found.whitened)
 
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
-from gaident.estimation.regression.inverse_dynamics_result import InverseDynamics
 from gaident.estimation.regression.motion import cutoff_of, noise_share
 from gaident.estimation.regression.regression import bic, covariance, effective_samples, solve
 from gaident.estimation.regression.rows import Rows, decimation_of, rows_of
 from gaident.estimation.regression.torque_terms import CHOICES, TERMS, estimates_of
+from gaident.results.inverse_dynamics import InverseDynamics
 
 __all__ = ["inverse_dynamics"]
 

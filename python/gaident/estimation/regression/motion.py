@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 
-__all__ = ["Motion", "cutoff_of", "motion_of", "noise_share"]
+__all__ = ["Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "torque_noise"]
 
 Vector = NDArray[np.float64]
 
@@ -113,10 +113,23 @@ def _velocity_noise(rec: Record, cutoff_hz: float, order: int) -> float:
     return float(np.sqrt(level * np.sum(_gain(rec, f, cutoff_hz, order, 1)) * (f[1] - f[0])))
 
 
+def torque_noise(rec: Record, cutoff_hz: float, order: int) -> float:
+    """Standard deviation of the filtered torque's noise [N m], white with the level of its spectrum at high frequencies."""
+    assert rec.torque is not None
+    f, _, level = _spectrum_of(rec.torque, rec.dt)
+    weight = _twice(rec, f, cutoff_hz, order) ** 2
+    return float(np.sqrt(level * np.sum(weight) * (f[1] - f[0])))
+
+
+def _twice(rec: Record, f: Vector, cutoff_hz: float, order: int) -> Vector:
+    """Gain of the filter, run forward and backward, at frequencies f [Hz]."""
+    warped = np.tan(np.pi * np.minimum(f, 0.499 / rec.dt) * rec.dt) / math.tan(math.pi * cutoff_hz * rec.dt)
+    return np.asarray(1.0 / (1.0 + warped ** (2 * order)))
+
+
 def _gain(rec: Record, f: Vector, cutoff_hz: float, order: int, derivative: int) -> Vector:
     """Squared gain from the sensor's signal to the velocity (derivative 1) or acceleration (2), at frequencies f [Hz]."""
-    warped = np.tan(np.pi * np.minimum(f, 0.499 / rec.dt) * rec.dt) / math.tan(math.pi * cutoff_hz * rec.dt)
-    twice = 1.0 / (1.0 + warped ** (2 * order))  # forward and backward: |H|^2
+    twice = _twice(rec, f, cutoff_hz, order)
     slope = np.sin(2.0 * np.pi * f * rec.dt) / rec.dt
     steps = derivative if rec.position is not None else derivative - 1
     return np.asarray((twice * slope**steps) ** 2)
@@ -124,12 +137,15 @@ def _gain(rec: Record, f: Vector, cutoff_hz: float, order: int, derivative: int)
 
 def _spectrum(rec: Record) -> tuple[Vector, Vector, float]:
     """(frequencies [Hz], power density of the sensor's signal, level of its noise)."""
+    return _spectrum_of(rec.velocity if rec.position is None else rec.position, rec.dt)
+
+
+def _spectrum_of(x: Vector, dt: float) -> tuple[Vector, Vector, float]:
     from scipy.signal import welch
 
-    x = rec.velocity if rec.position is None else rec.position
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
-    f, power = welch(x - line, 1.0 / rec.dt, nperseg=min(x.size, 2048))
-    high = (f >= HIGH[0] / rec.dt) & (f <= HIGH[1] / rec.dt)
+    f, power = welch(x - line, 1.0 / dt, nperseg=min(x.size, 2048))
+    high = (f >= HIGH[0] / dt) & (f <= HIGH[1] / dt)
     return f, power, float(np.median(power[high])) if np.any(high) else 0.0
 
 

@@ -40,6 +40,7 @@ from gaident.show.report.parts import (
     tile,
 )
 from gaident.show.report.views import View
+from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
 from gaident.show.wording import sentence, unit, velocity_unit
 
 __all__ = ["chapters", "headline", "mark", "tiles"]
@@ -219,6 +220,7 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
         parts.append(box(tag("p", "The simulated controller is not the drive's: these figures include its errors."), kind="warn"))
     if extended and dia.before.rmse > 0.0:
         parts.append(tag("p", typeset(sentence(fall_words(dia), axis))))
+    parts += _force(dia, axis)
     held = next((r for r in view.runs if r.used == "held out"), None) or next(
         (r for r in view.runs if r.held_from is not None), None
     )
@@ -238,6 +240,21 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
         parts.append(tag("p", verdict, " BIC units gained by a free function of each; below 0 it is not worth its parameters."))
         parts.append(table(("", "BIC units", ""), [lines]))
     return Section("gain", "Before and after", *parts)
+
+
+def _force(dia: Diagnosis, axis: str) -> list[str]:
+    """The force error on the same data, and the check by the regression."""
+    parts: list[str] = []
+    rows: list[Row] = [(what, value, typeset(share)) for what, value, share in force_rows(dia, axis)]
+    if rows:
+        torque = "torque" if axis == "rotary" else "force"
+        parts += [tag("h3", "Force error"), tag("p", typeset(force_words(dia, axis)))]
+        parts.append(table(("", f"rms [{unit('N m', axis)}]", f"of the {torque} [%]"), [rows]))
+    both: list[Row] = [tuple(map(typeset, row)) for row in comparison_rows(dia, axis)]
+    if both:
+        parts += [tag("h3", "Check by inverse-dynamics regression"), tag("p", typeset(method_words(dia, axis)))]
+        parts.append(table(("", "diagnosis", "regression", "unit", ""), [both]))
+    return parts
 
 
 def _untested(dia: Diagnosis, view: View) -> Section:

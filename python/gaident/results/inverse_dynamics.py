@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.errors import RecordError, SettingsError
-from gaident.estimation.regression.motion import motion_of
-from gaident.estimation.regression.rows import rows_of
-from gaident.estimation.regression.torque_terms import columns_of
+from gaident.errors import GaidentError
 from gaident.providers import provided
 from gaident.results.estimate import Estimate
 
 __all__ = ["InverseDynamics"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class InverseDynamics:
     """The result of `inverse_dynamics`: what the torque of an axis is made of.
 
@@ -71,7 +68,7 @@ class InverseDynamics:
     inverse_dynamics : Makes it, with an example.
     """
 
-    parameters: dict[str, Estimate]
+    parameters: dict[str, Estimate] = field(hash=False)
     terms: tuple[str, ...]
     coefficients: tuple[float, ...]
     cutoff_hz: float
@@ -98,27 +95,14 @@ class InverseDynamics:
         Below the velocity of standstill dry friction is a straight line through zero: the motion does not say what it is at rest.
         Raises SettingsError where the filter's corner is not below half of the record's sample rate.
         """
-        self._fits(record)
-        motion = motion_of(record, self.cutoff_hz, self.order, self.standstill)
-        return np.asarray(columns_of(self.terms, motion) @ np.array(self.coefficients))
+        return np.asarray(provided("regression_torque")(self, record))
 
     def error(self, records: Record | Sequence[Record]) -> float:
         """Return the relative force error norm(u - u_model)/norm(u) on records with a torque, samples at standstill left out.
 
         Raises RecordError where a record has no torque or does not move, SettingsError as `torque` does.
         """
-        squares = whole = 0.0
-        for record in [records] if isinstance(records, Record) else records:
-            self._fits(record)
-            if record.torque is None:
-                raise RecordError(f"record {record.name!r} has no torque to compare with; log it")
-            step = max(1, round(self.decimation * self.dt / record.dt))
-            rows = rows_of(record, self.terms, self.cutoff_hz, self.order, step, self.standstill)
-            left = rows.torque - rows.of(self.terms) @ np.array(self.coefficients)
-            squares, whole = squares + float(left @ left), whole + float(rows.torque @ rows.torque)
-        if not whole > 0.0:
-            raise RecordError("the records have no motion with a torque: no relative force error; give records that move")
-        return float(np.sqrt(squares / whole))
+        return float(provided("regression_error")(self, [records] if isinstance(records, Record) else list(records)))
 
     def summary(self) -> str:
         """Return what was found and what it is worth; plain text, no line break at the end."""
@@ -129,13 +113,17 @@ class InverseDynamics:
         own = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "parameters"}
         return {**own, "parameters": {name: vars(e) for name, e in self.parameters.items()}}
 
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> InverseDynamics:
+        """The inverse of `to_dict`. Raises GaidentError where the data are something else."""
+        try:
+            lists = {name: tuple(data[name]) for name in ("terms", "coefficients", "not_tried", "digests")}
+            rivals = tuple((tuple(terms), float(worse)) for terms, worse in data["rivals"])
+            parameters = {name: Estimate(**e) for name, e in data["parameters"].items()}
+            return cls(**{**data, **lists, "rivals": rivals, "parameters": parameters})
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise GaidentError(f"the saved regression is damaged: {error!r}; save it again") from error
+
     def __repr__(self) -> str:
         listed = ", ".join(f"{name} {e.value:.4g}" for name, e in self.parameters.items())
         return f"InverseDynamics({listed}; force error {100 * self.force_error:.3g} %)"
-
-    def _fits(self, record: Record) -> None:
-        if not self.cutoff_hz < 0.5 / record.dt:
-            raise SettingsError(
-                f"the record has dt={record.dt:g} s, too slow for the filter of {self.cutoff_hz:g} Hz that was used; "
-                f"fit with cutoff_hz below {0.5 / record.dt:g}"
-            )

@@ -1,0 +1,221 @@
+"""The check by a second method: the inverse-dynamics regression of the same records, and the force error on held-out data.
+
+The regression needs no start, no simulation and no noise model, so what goes astray in a search does not lead it astray.
+Its inertia, dry friction, gravity and stiffness to ground are compared with those of the diagnosis.
+They contradict each other where
+
+    |a - b| > check_deviations sqrt(s_a^2 + s_b^2),   |a - b| > check_share max(|a|, |b|),
+
+and, for a torque, |a - b| > check_torque of the torque's rms.
+The second and third say that the difference matters. Then a note names both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from gaident.data.record import Record
+from gaident.diagnosis.gains import Gains
+from gaident.diagnosis.library.terms import LIBRARY
+from gaident.diagnosis.policy import POLICY
+from gaident.errors import GaidentError
+from gaident.estimation.regression.force_error import ForceError, band_of, effects_before_the_shaft, force_error
+from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
+from gaident.estimation.term import Term
+from gaident.models.model import Model
+from gaident.results.diagnosis import Comparison, Fitness
+from gaident.results.estimate import Estimate
+from gaident.results.inverse_dynamics import InverseDynamics
+
+__all__ = ["Check", "checked"]
+
+Effects = Mapping[str, Mapping[str, Estimate]]
+
+NONE = {"inertia": "kg m^2", "dry friction": "N m", "gravity": "N m", "ground stiffness": "N m/rad"}
+"""What is compared, and its unit."""
+LIKELY = {
+    "inertia": "a delay between the channels of the log, a load that swings on its shaft, or a misfit that passed for noise",
+    "dry friction": "friction that depends on load, angle or temperature, or a constant load or gravity that took its place",
+    "gravity": "too little of a turn, so that a load, a spring or friction of two levels stands in its place",
+    "ground stiffness": "gravity, or friction that returns with every stroke, in its place",
+}
+"""The likely reason of each contradiction, in words."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """The second method's answer: what it found, its force error [N m], the comparison, before and after with their force errors.
+
+    notes: contradictions, in words. reason: why the force error is the figure to go by on this axis, in words; empty where the
+    free run is as good a figure.
+    """
+
+    regression: InverseDynamics | None
+    force_error: float | None
+    comparisons: tuple[Comparison, ...]
+    before: Fitness
+    after: Fitness
+    notes: tuple[str, ...]
+    reason: str
+
+
+def checked(
+    records: Sequence[Record], gains: Gains, model: Model, mechanics: Mapping[str, Estimate], effects: Effects, driven: bool
+) -> Check:
+    """The check of a diagnosis.
+
+    records: as they were fitted; model: the extended one; mechanics: name -> Estimate; effects: effect -> its parameters;
+    driven: whether a torque drives the simulation, for lack of a controller.
+    """
+    nothing = Check(None, None, (), gains.before, gains.after, (), "")
+    if not all(r.torque is not None for r in records):
+        return nothing
+    found = _regression(records, model)
+    before, after, second = _forces(records, gains, found)
+    if found is None:
+        return replace(nothing, before=before, after=after, reason=_reason(effects, driven))
+    comparisons = tuple(_compared(found, mechanics, effects, after.torque_rms or 0.0, bool(effects_before_the_shaft(model))))
+    verdict = _verdict(after.force_error, second)
+    notes = tuple(_sentence(c) for c in comparisons if c.differs)
+    notes = (*notes[:-1], notes[-1] + verdict) if notes else _lost(after, second)
+    return Check(found, second, comparisons, before, after, notes, _reason(effects, driven))
+
+
+def _regression(records: Sequence[Record], model: Model) -> InverseDynamics | None:
+    """None where the records do not show one."""
+    try:
+        return inverse_dynamics(list(records), cutoff_hz=band_of(model, records, below=POLICY.rigid_band))
+    except GaidentError:
+        return None
+
+
+def _forces(records: Sequence[Record], gains: Gains, found: InverseDynamics | None) -> tuple[Fitness, Fitness, float | None]:
+    """(before, after, force error of the regression), all over the same samples of the held-out data, through the same filter."""
+    judged = [(r, first) for r, first in gains.judged if r.torque is not None]
+    if len(judged) < len(gains.judged):
+        return gains.before, gains.after, None
+    rows, firsts = [r for r, _ in judged], [first for _, first in judged]
+    cutoff = band_of(gains.extended, rows)
+
+    def of(model: Model | InverseDynamics) -> ForceError | None:
+        try:
+            error = force_error(model, rows, cutoff_hz=cutoff, first=firsts)
+        except GaidentError:
+            return None
+        return error if math.isfinite(error.rms) else None
+
+    def fitness(plain: Fitness, model: Model) -> Fitness:
+        error = of(model)
+        if error is None:
+            return plain
+        return replace(plain, force_error=error.rms, torque_rms=error.torque_rms, force_floor=error.noise_floor)
+
+    second = None
+    if found is not None:
+        try:
+            part = [r[:first] for r, first in judged] if any(firsts) else list(records)
+            second = of(inverse_dynamics(part, terms=found.terms, cutoff_hz=found.cutoff_hz))
+        except GaidentError:
+            second = None
+    return fitness(gains.before, gains.mechanism), fitness(gains.after, gains.extended), None if second is None else second.rms
+
+
+def _compared(
+    found: InverseDynamics, mechanics: Mapping[str, Estimate], effects: Effects, torque: float, ahead: bool
+) -> list[Comparison]:
+    """What both have; ahead: effects stand between the logged torque and the shaft, of which the regression knows nothing."""
+    own, other = _of_diagnosis(mechanics, effects), _of_regression(found)
+    rows = []
+    for name, unit in NONE.items():
+        a, b = own.get(name), other.get(name)
+        if a is None or b is None or a.value == b.value == 0.0:
+            continue
+        apart = abs(a.value - b.value)
+        size = max(abs(a.value), abs(b.value))
+        surely = apart > POLICY.check_deviations * math.hypot(a.std, b.std)
+        matters = apart > POLICY.check_share * size and (unit != "N m" or apart > POLICY.check_torque * torque)
+        rows.append(Comparison(name, a, b, surely and matters and not ahead))
+    return rows
+
+
+def _of_diagnosis(mechanics: Mapping[str, Estimate], effects: Effects) -> dict[str, Estimate]:
+    found = {name: Estimate(0.0, 0.0, NONE[name]) for name in ("dry friction", "gravity", "ground stiffness")}
+    found |= {name.replace("_", " "): e for name, e in mechanics.items() if name.replace("_", " ") in NONE}
+    for effect, parameters in effects.items():
+        term = LIBRARY[effect]
+        if term.levels and "rate" not in parameters:
+            found["dry friction"] = _level(parameters)
+        elif term.levels:
+            del found["dry friction"]  # it drifts: a mean over the record is no parameter
+        elif _is_gravity(term):
+            found["gravity"] = parameters["amplitude"]
+    return found
+
+
+def _of_regression(found: InverseDynamics) -> dict[str, Estimate]:
+    """Without what it could not try, and without gravity or a spring where the other of the two stands."""
+    parameters = found.parameters
+    rows = {"inertia": parameters["inertia"]}
+    untold = {text.partition(":")[0] for text in found.not_tried}
+    if any(name.startswith("coulomb") for name in parameters):
+        rows["dry friction"] = _level({name.replace("coulomb", "torque"): e for name, e in parameters.items()})
+    elif "coulomb" not in untold:
+        rows["dry friction"] = Estimate(0.0, 0.0, NONE["dry friction"])
+    pair = {"gravity": "gravity_amplitude", "ground stiffness": "spring"}
+    there = [name for name, key in pair.items() if key in parameters]
+    for name, key in pair.items():
+        if key in parameters:
+            rows[name] = parameters[key]
+        elif not there and {"gravity": "gravity", "ground stiffness": "spring"}[name] not in untold:
+            rows[name] = Estimate(0.0, 0.0, NONE[name])
+    return rows
+
+
+def _level(parameters: Mapping[str, Estimate]) -> Estimate:
+    """Of dry friction: its torque, or the mean of its two levels."""
+    if "torque" in parameters:
+        return parameters["torque"]
+    up, down = parameters["torque_positive"], parameters["torque_negative"]
+    return Estimate(0.5 * (up.value + down.value), 0.5 * math.hypot(up.std, down.std), up.unit)
+
+
+def _is_gravity(term: Term) -> bool:
+    return term.harmonic == "torque" and term.orders == (1, 1)
+
+
+def _verdict(own: float | None, second: float | None) -> str:
+    """Which of the two explains the held-out torque better, in words."""
+    if own is None or second is None:
+        return ""
+    better = "the regression" if second < own else "the diagnosed model"
+    if abs(own - second) < POLICY.check_share * max(own, second):
+        return f" On the held-out data both leave about the same of the torque ({second:.3g} and {own:.3g} N m)."
+    return f" On the held-out data {better} leaves less of the torque: {second:.3g} N m the regression, {own:.3g} N m the model."
+
+
+def _sentence(c: Comparison) -> str:
+    a, b = (f"{e.value:.3g} +- {e.std:.2g} {e.unit}" for e in (c.diagnosis, c.regression))
+    mine = f"the diagnosis has no {c.name}" if c.diagnosis.value == 0.0 else f"the {c.name} of the diagnosis is {a}"
+    other = "finds none of it" if c.regression.value == 0.0 else f"says {b}"
+    text = f"Two methods disagree: {mine}, the inverse-dynamics regression of the same records {other}, which is more than both "
+    return f"{text}deviations. Likely: {LIKELY[c.name]}."
+
+
+def _lost(after: Fitness, second: float | None) -> tuple[str, ...]:
+    """A note where the regression explains the held-out torque far better than the diagnosed model."""
+    own = after.force_error
+    if own is None or second is None or own < POLICY.loses * max(second, after.force_floor or 0.0):
+        return ()
+    shares = [f"{100.0 * x / after.torque_rms:.3g} %" for x in (own, second)] if after.torque_rms else ["more", "less"]
+    return (
+        f"Two methods disagree: on the held-out data the diagnosed model leaves {shares[0]} of the torque, the inverse-dynamics "
+        f"regression of the same records {shares[1]}. Where the parameters differ, trust those of the regression.",
+    )
+
+
+def _reason(effects: Effects, driven: bool) -> str:
+    if any(_is_gravity(LIBRARY[e]) for e in effects):
+        return "gravity acts on this axis, and a free run that is a little off falls to another side"
+    return "the torque drives the simulation, and a free run adds up what is small in every sample" if driven else ""

@@ -1,0 +1,266 @@
+"""The force error: the torque that was there, minus the torque that a model needs for the measured motion.
+
+    e(n) = F[F[s](n) - m(n)],   m the torque under which the model moves as F[w], F[theta]
+    force_error = sqrt(mean e(n)^2)   over the samples in motion
+
+F is the zero-phase filter of the inverse-dynamics regression: what makes m has passed it once, and so has s.
+Both pass it once more.
+s is the torque at the shaft: the logged torque behind the model's actuator, and behind its sensor's filter, which acts alike.
+
+m is found by simulation: a stiff PI loop leads the mechanism, with its effects at shaft and coupling, along the filtered motion.
+Its torque is m. Without effects that is inverse filtering, m = w/G.
+
+The force error needs no start and adds nothing up: where an axis integrates, or falls under gravity, a free run drifts away from
+the record by what is small in every sample, and this figure does not.
+Theory: docs/theory/inverse-dynamics.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.data.torque_kind import MEASURED
+from gaident.errors import ModelError, RecordError, SettingsError
+from gaident.estimation.regression.motion import Motion, cutoff_of, low_passed, motion_of, noise_share, torque_noise
+from gaident.models.model import Model
+from gaident.models.simulate import run, simulate
+from gaident.results.inverse_dynamics import InverseDynamics
+
+__all__ = ["ForceError", "band_of", "effects_before_the_shaft", "force_error", "needed_torque"]
+
+Vector = NDArray[np.float64]
+TorqueOf = Callable[[Record], Vector]
+
+ORDER = 4
+LOOP = 0.4
+"""Gain of the stiff loop, of the one that takes an integrator to its command in a single step."""
+INTEGRAL = 0.02
+"""Of the proportional gain, in each step: what friction and gravity leave of the error is gone within the filter's time."""
+STEPS = 200
+"""Steps of the stiff loop in 1/cutoff: its bandwidth is 0.4 * 200/(2 pi) = 13 times the cutoff."""
+EDGE = 2.0
+"""Times 1/cutoff at both ends of a record that are left out: filters and the stiff loop start there."""
+BELOW = 0.5
+"""Of the lowest antiresonance: the highest cutoff where a load swings on a shaft."""
+
+
+@dataclass(frozen=True)
+class ForceError:
+    """The force error of a model on records.
+
+    Attributes
+    ----------
+    rms : float
+        Root mean square of logged torque minus needed torque [N m].
+    torque_rms : float
+        Root mean square of the torque at the shaft over the same samples [N m].
+    noise_floor : float
+        What noise of the sensor, and of a measured torque, leave of `rms` at most [N m].
+    cutoff_hz : float
+        Corner of the filter that all channels passed [Hz].
+    order : int
+        Order of the filter in each direction.
+    samples : int
+        Samples in motion, over which the figures are taken.
+
+    See Also
+    --------
+    force_error : Makes it.
+    """
+
+    rms: float
+    torque_rms: float
+    noise_floor: float
+    cutoff_hz: float
+    order: int
+    samples: int
+
+    @property
+    def percent(self) -> float:
+        """Of the torque's rms [%]."""
+        return 100.0 * self.rms / self.torque_rms if self.torque_rms > 0.0 else math.nan
+
+
+def force_error(
+    model: Model | InverseDynamics | TorqueOf,
+    records: Record | Sequence[Record],
+    *,
+    cutoff_hz: float | None = None,
+    order: int = ORDER,
+    first: int | Sequence[int] = 0,
+) -> ForceError:
+    """How far the torque of records is from the torque that a model needs for their motion.
+
+    Parameters
+    ----------
+    model : Model or InverseDynamics or callable
+        A Model with p = 1, positive gain and stable zeros, an InverseDynamics, or a function that gives the needed torque [N m]
+        of a record, an array (n,).
+    records : Record or sequence of Record
+        One Record or several of one sample time, each with its torque.
+    cutoff_hz : float, optional
+        Corner of the filter [Hz]. None: what `inverse_dynamics` would choose, at most half of the model's lowest antiresonance.
+    order : int
+        Order of the Butterworth filter, 1 to 10; it runs forward and backward.
+    first : int or sequence of int
+        Sample of each record from which the error counts, one number or one for each record.
+
+    Returns
+    -------
+    ForceError
+        Frozen: `rms`, `torque_rms`, `percent`, `noise_floor`, the filter and the number of samples.
+
+    Raises
+    ------
+    RecordError
+        No torque, or nothing that moves from `first` on.
+    ModelError
+        A model that cannot be led along a motion: another p, a gain that is not positive, an unstable zero.
+    SettingsError
+        A setting out of its range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gaident as ga
+    >>> t = 1e-3 * np.arange(4000)
+    >>> w, a = 5 * np.sin(5 * t), 25 * np.cos(5 * t)
+    >>> rec = ga.Record(1e-3, velocity=w, torque=2e-3 * a + 0.01 * w + 0.1 * np.sign(w))
+    >>> round(ga.force_error(ga.OneMass(J=2e-3, D=0.01).model(), rec).rms, 2)
+    0.1
+    """
+    given = [records] if isinstance(records, Record) else list(records)
+    firsts = [first] * len(given) if isinstance(first, int) else list(first)
+    if not given or not all(isinstance(r, Record) and r.torque is not None for r in given):
+        raise RecordError("records: give one Record or several, each with its torque, which the force error compares")
+    if len(firsts) != len(given):
+        raise SettingsError(f"first has {len(firsts)} numbers for {len(given)} records; give one number, or one for each record")
+    if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= 10:
+        raise SettingsError(f"order={order!r}: give a whole number from 1 to 10, the filter's order in each direction")
+    cutoff = band_of(model, given, int(order)) if cutoff_hz is None else float(cutoff_hz)
+    if not 0.0 < cutoff < 0.5 / given[0].dt:
+        raise SettingsError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {0.5 / given[0].dt:g} Hz, or None")
+    left = whole = floor = 0.0
+    count = 0
+    for rec, start in zip(given, firsts, strict=True):
+        motion = motion_of(rec, cutoff, int(order))
+        kept = in_motion(motion, cutoff, start)
+        at_shaft, needed = _torques(model, rec, motion, cutoff, int(order))
+        e = low_passed(at_shaft - needed, rec.dt, cutoff, int(order))[kept]
+        s = low_passed(at_shaft, rec.dt, cutoff, int(order))[kept]
+        n = int(np.count_nonzero(kept))
+        left, whole, count = left + float(e @ e), whole + float(s @ s), count + n
+        floor += n * _noise_power(model, rec, motion, cutoff, int(order))
+    if count == 0:
+        raise RecordError("nothing moves from `first` on, so there is no force error; give records that move")
+    rms, size, least = (float(np.sqrt(x / count)) for x in (left, whole, floor))
+    return ForceError(rms if math.isfinite(rms) else math.inf, size, least, cutoff, int(order), count)
+
+
+def needed_torque(model: Model, rec: Record, cutoff_hz: float, order: int = ORDER) -> Vector:
+    """The torque [N m] with which the model's mechanism moves as the filtered motion of a record, an array (n,).
+
+    Effects of the actuator, and a sensor's filter, act on the torque before and are left out here; see `force_error`. A commanded
+    torque is held over each sample, so its mean over the sample is given; beside a measured torque the value at the sample.
+    Raises ModelError where the model cannot be led along a motion.
+    """
+    return _led(model, rec, motion_of(rec, cutoff_hz, order), cutoff_hz)
+
+
+def band_of(model: object, records: Sequence[Record], order: int = ORDER, below: float = BELOW) -> float:
+    """The cutoff [Hz] over these records: the regression's, at most `below` times the model's lowest antiresonance."""
+    zeros = [abs(z) for z in model.zeros if z.imag > 0.0] if isinstance(model, Model) else []
+    highest = below * min(zeros, default=math.inf) / (2.0 * math.pi)
+    return float(min(highest, *(cutoff_of(r, order) for r in records)))
+
+
+def in_motion(motion: Motion, cutoff_hz: float, first: int = 0) -> NDArray[np.bool_]:
+    """The samples that count: in motion, from `first` on, away from both ends of the record."""
+    kept = ~motion.still
+    edge = math.ceil(EDGE / (cutoff_hz * motion.dt))
+    kept[: max(edge, first)] = kept[max(len(kept) - edge, 0) :] = False
+    return kept
+
+
+def _torques(
+    model: Model | InverseDynamics | TorqueOf, rec: Record, motion: Motion, cutoff_hz: float, order: int
+) -> tuple[Vector, Vector]:
+    """(F[s], m), arrays (n,)."""
+    assert rec.torque is not None and motion.torque is not None
+    if isinstance(model, Model):
+        return low_passed(_at_shaft(model, rec), rec.dt, cutoff_hz, order), _led(model, rec, motion, cutoff_hz)
+    if isinstance(model, InverseDynamics):
+        model = replace(model, cutoff_hz=cutoff_hz, order=order).torque
+    needed = np.asarray(model(rec), dtype=np.float64)
+    if needed.shape != rec.torque.shape:
+        raise SettingsError(f"model gives an array of the shape {needed.shape} for a record of {len(rec)} samples")
+    return motion.torque, needed
+
+
+def effects_before_the_shaft(model: Model) -> list[str]:
+    """Effects between the logged torque and the shaft: of the actuator, and a sensor's filter, which acts like a lag there."""
+    return [e.name for e in model.effects if e.row.place == "actuator" or (e.row.place == "sensor" and not _turns(e.parameters))]
+
+
+def _turns(parameters: object) -> bool:
+    return "order" in parameters  # type: ignore[operator]
+
+
+def _at_shaft(model: Model, rec: Record) -> Vector:
+    """The logged torque behind the actuator [N m], its mean over each sample: an inertia of 1 makes it a velocity's change."""
+    assert rec.torque is not None
+    ahead = effects_before_the_shaft(model)
+    if not ahead:
+        return rec.torque
+    unit = Model(1.0, [0.0], effects=[e for e in model.effects if e.name in ahead])
+    torque = np.append(rec.torque, rec.torque[-1])
+    padded = Record(rec.dt, torque=torque, velocity=np.zeros(len(torque)))
+    return np.asarray(np.diff(simulate(unit, padded)) / rec.dt)
+
+
+def _led(model: Model, rec: Record, motion: Motion, cutoff_hz: float) -> Vector:
+    """The torque of a stiff loop that leads the model's mechanism along a filtered motion."""
+    from scipy.interpolate import CubicSpline
+
+    if model.p != 1 or not model.gain > 0.0 or any(z.real > 0.0 for z in model.zeros):
+        raise ModelError(
+            f"{model.linear!r} cannot be led along a motion, which takes p = 1, a positive gain and stable zeros: give one mass, "
+            "two, or a regression"
+        )
+    out = {*effects_before_the_shaft(model), *(e.name for e in model.effects if e.row.place == "controller")}
+    mechanism = Model(model.gain, model.poles, model.zeros, [e for e in model.effects if e.name not in out])
+    n = len(rec)
+    fine = max(1, math.ceil(STEPS * cutoff_hz * rec.dt))
+    dt = rec.dt / fine
+    grid, at = np.arange(n) * rec.dt, np.arange(n * fine) * dt
+    w = CubicSpline(grid, motion.velocity)
+    kp = LOOP / (model.gain * dt)
+    # The loop follows late by dt/LOOP, so the command leads by as much.
+    command = w(np.minimum(at, grid[-1])) + dt / LOOP * w(np.minimum(at, grid[-1]), 1)
+    position = CubicSpline(grid, motion.position)(np.minimum(at, grid[-1]))
+    lead = Record(dt, command=command, velocity=command, position=position)
+    state = np.zeros(mechanism.order + 2 * any(e.row.place == "plant" for e in mechanism.effects) + 1)
+    state[0] = motion.velocity[0]
+    with np.errstate(all="ignore"):
+        torque = run(mechanism, lead, PI(kp, INTEGRAL * kp / dt), state).torque
+    held = torque.reshape(n, fine)
+    return np.asarray(held[:, 0] if rec.torque_is == MEASURED else held.mean(axis=1))
+
+
+def _noise_power(model: Model | InverseDynamics | TorqueOf, rec: Record, motion: Motion, cutoff_hz: float, order: int) -> float:
+    """Variance of what noise leaves [(N m)^2]: J times that of the acceleration, and that of a measured torque."""
+    if isinstance(model, Model):
+        omega = math.pi * cutoff_hz
+        inertia = abs(float((1.0 / model.linear.frequency_response(omega)).imag)) / omega
+    else:
+        inertia = model.parameters["inertia"].value if isinstance(model, InverseDynamics) else 0.0
+    share = noise_share(rec, cutoff_hz, order)
+    power = share * float(np.mean(motion.acceleration**2)) * inertia**2
+    return power + (torque_noise(rec, cutoff_hz, order) ** 2 if rec.torque_is == MEASURED else 0.0)

@@ -1,0 +1,49 @@
+"""What stands beside a diagnosis by a second method: force errors on held-out data, and the inverse-dynamics regression."""
+
+from __future__ import annotations
+
+from gaident.results.diagnosis import Diagnosis
+from gaident.show.wording import number, sentence, unit, with_std
+
+__all__ = ["comparison_rows", "force_rows", "force_words", "method_words"]
+
+
+def force_rows(dia: Diagnosis, axis: str) -> list[tuple[str, str, str]]:
+    """(what, force error, percentage of the torque's rms); empty where no torque is logged."""
+    before, after = dia.before, dia.after
+    fits = [("mechanism without effects", before.force_error, before.torque_rms)]
+    if dia.model.effects:
+        fits.append(("extended model", after.force_error, after.torque_rms))
+    fits.append(("inverse-dynamics regression", dia.regression_force_error, after.torque_rms or before.torque_rms))
+    rows = [(what, number(error), f"{100.0 * error / size:.1f}") for what, error, size in fits if error is not None and size]
+    if rows and after.force_floor is not None:
+        rows.append(("what noise leaves", number(after.force_floor), ""))
+    return rows
+
+
+def force_words(dia: Diagnosis, axis: str) -> str:
+    """What the force error is, and where it is the figure to go by."""
+    text = "The logged torque minus the torque that the model needs for the measured motion."
+    if dia.force_reason:
+        text += f" It is the figure to go by here: {dia.force_reason}."
+    return sentence(text, axis)
+
+
+def comparison_rows(dia: Diagnosis, axis: str) -> list[tuple[str, str, str, str, str]]:
+    """(what, by the diagnosis, by the regression, unit, remark)."""
+    rows = []
+    for c in dia.comparisons:
+        remark = "they disagree" if c.differs else ""
+        values = with_std(c.diagnosis.value, c.diagnosis.std), with_std(c.regression.value, c.regression.std)
+        rows.append((sentence(c.name, axis), *values, unit(c.regression.unit, axis), remark))
+    return rows
+
+
+def method_words(dia: Diagnosis, axis: str) -> str:
+    """How the regression was made; empty where there is none."""
+    found = dia.regression
+    if found is None:
+        return ""
+    terms = ", ".join(name.replace("_", " ") for name in found.terms)
+    text = f"Least squares of the torque on {terms}, without simulation: all channels through a Butterworth filter of order "
+    return sentence(f"{text}{found.order} at {found.cutoff_hz:.3g} Hz, forward and backward; {found.samples} rows.", axis)

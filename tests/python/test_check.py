@@ -1,0 +1,139 @@
+"""The check of a diagnosis by a second method: it agrees with the truth, contradicts what is wrong, else keeps silent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from drive_rig import Plant, library, rig
+from gaident.diagnosis.check import Check, checked
+from gaident.diagnosis.gains import Gains
+from gaident.results.diagnosis import Fitness
+
+try:
+    library()
+except RuntimeError as missing:
+    pytest.skip(str(missing), allow_module_level=True)
+
+PLANT = Plant(J=3e-4, D=1.5e-3, kp=0.03, ki=1.9, dt=1e-3)
+TIME = 1e-3 * np.arange(6000)
+COMMAND = 30.0 * np.sin(2.0 * np.pi * 1.3 * TIME) + 10.0 * np.sin(2.0 * np.pi * 3.1 * TIME)
+FRICTION = {"torque": 0.05}
+SWING = {"amplitude": 0.08, "phase": 0.4}
+
+
+def record(**effects: dict[str, float]) -> ga.Record:
+    rec = rig(PLANT, COMMAND, effects, noise="white", seed=3, position_logged=True)
+    return ga.Record(rec.dt, velocity=rec.velocity, torque=rec.torque, position=rec.position)
+
+
+def estimates(effects: dict[str, dict[str, float]]) -> dict[str, dict[str, ga.Estimate]]:
+    units = {"torque": "N m", "amplitude": "N m", "phase": "rad", "width": "N m", "limit": "N m"}
+    return {e: {n: ga.Estimate(v, 0.01 * v, units[n]) for n, v in p.items()} for e, p in effects.items()}
+
+
+def check_of(
+    rec: ga.Record, inertia: float = 3e-4, share: float = 0.01, driven: bool = False, **effects: dict[str, float]
+) -> Check:
+    """The check of a diagnosis that says this."""
+    bare = ga.OneMass(inertia, PLANT.D).model()
+    model = bare
+    for name, values in effects.items():
+        model = model.with_effect(name, **values)
+    fitness = Fitness(1.0, 0.0, 0.1)
+    gains = Gains(fitness, fitness, (0.0, 0.0), "the rest", {}, ((rec, 4200),), bare, model)
+    mechanics = {"inertia": ga.Estimate(inertia, share * inertia, "kg m^2")}
+    return checked([rec], gains, model, mechanics, estimates(effects), driven)
+
+
+def rows(check: Check) -> dict[str, Any]:
+    return {c.name: c for c in check.comparisons}
+
+
+def test_at_the_truth_both_agree_and_nothing_is_noted() -> None:
+    check = check_of(record(coulomb_friction=FRICTION, unbalance=SWING), coulomb_friction=FRICTION, unbalance=SWING)
+    assert set(rows(check)) == {"inertia", "dry friction", "gravity"}
+    assert not any(c.differs for c in check.comparisons) and check.notes == ()
+    assert check.regression is not None and set(check.regression.terms) >= {"inertia", "coulomb", "gravity"}
+    assert check.before.force_error > 5.0 * check.after.force_error > 5.0 * 0.7 * check.after.force_floor
+    assert check.after.force_error < check.force_error < 0.02 * check.after.torque_rms
+    assert check.after.force_percent == pytest.approx(100.0 * check.after.force_error / check.after.torque_rms)
+    assert "gravity" in check.reason
+
+
+def test_a_wrong_inertia_is_contradicted_with_both_numbers() -> None:
+    check = check_of(record(coulomb_friction=FRICTION), inertia=9e-4, coulomb_friction=FRICTION)
+    (note,) = check.notes
+    assert rows(check)["inertia"].differs and not rows(check)["dry friction"].differs
+    assert "the inertia of the diagnosis is 0.0009 +- 9e-06 kg m^2" in note and "says 0.0003" in note
+    assert "Likely: a delay between the channels" in note and "the regression leaves less of the torque" in note
+
+
+def test_a_friction_that_the_diagnosis_has_not_is_contradicted() -> None:
+    check = check_of(record(coulomb_friction=FRICTION))
+    (note,) = check.notes
+    assert "the diagnosis has no dry friction" in note and "says 0.05" in note
+
+
+def test_gravity_that_the_diagnosis_has_and_the_motion_has_not_is_contradicted() -> None:
+    check = check_of(record(coulomb_friction=FRICTION), coulomb_friction=FRICTION, unbalance=SWING)
+    assert rows(check)["gravity"].differs
+    assert any("finds none of it" in note for note in check.notes)
+
+
+def test_behind_an_actuator_the_logged_torque_is_not_comparable() -> None:
+    width = {"width": 0.05}
+    check = check_of(record(torque_dead_band=width), torque_dead_band=width)
+    assert check.notes == () and not any(c.differs for c in check.comparisons)
+    assert check.after.force_error < 0.2 * check.before.force_error
+
+
+def test_a_model_that_loses_to_the_regression_is_told_so_whatever_its_deviations() -> None:
+    """Inertia and friction so uncertain that they contradict nothing, and a model that leaves most of the torque."""
+    rec = record(coulomb_friction=FRICTION)
+    check = check_of(rec, inertia=6e-3, share=0.9, coulomb_friction=FRICTION)
+    (note,) = check.notes
+    assert not any(c.differs for c in check.comparisons)
+    assert "the diagnosed model leaves" in note and "trust those of the regression" in note
+
+
+def test_friction_of_two_levels_is_compared_by_its_mean() -> None:
+    levels = {"torque_positive": 0.04, "torque_negative": 0.06, "viscous_positive": 0.0, "viscous_negative": 0.0}
+    rec = record(asymmetric_friction=levels)
+    check = check_of(rec)
+    assert rows(check)["dry friction"].regression.value == pytest.approx(0.05, rel=0.05)
+
+
+def test_without_a_torque_there_is_no_check() -> None:
+    rec = rig(PLANT, COMMAND, {}, noise="white", seed=3, torque_logged=False)
+    check = check_of(rec)
+    assert check.regression is None and check.comparisons == () and check.after.force_error is None
+
+
+def test_what_does_not_move_has_no_regression_and_no_force_error() -> None:
+    rng = np.random.default_rng(0)
+    rec = ga.Record(1e-3, velocity=1e-3 * rng.standard_normal(5000), torque=1e-3 * rng.standard_normal(5000))
+    check = check_of(rec, driven=True)
+    assert check.notes == ()
+
+
+def test_a_diagnosis_carries_it_and_its_file_too(tmp_path: Any) -> None:
+    rec = record(coulomb_friction=FRICTION)
+    dia = ga.diagnose(rec)
+    assert [f.effect for f in dia.findings] == ["coulomb_friction"]
+    assert dia.regression is not None and dia.regression.digests
+    assert dia.before.force_error > 5.0 * dia.after.force_error and not any("disagree" in note for note in dia.notes)
+    text = dia.summary()
+    assert "Force error, on the last 30 %" in text and "figure to go by here" in " ".join(text.split())
+    assert "Check by inverse-dynamics regression" in text
+    dia.save(tmp_path / "dia.json")
+    back = ga.load(tmp_path / "dia.json")
+    assert isinstance(back, ga.Diagnosis)
+    assert back.comparisons == dia.comparisons and back.after == dia.after and back.force_reason == dia.force_reason
+    assert back.regression_force_error == dia.regression_force_error
+    assert back.regression.to_dict() == dia.regression.to_dict()
+    assert replace(back, seconds=0.0).summary() == replace(dia, seconds=0.0).summary()
