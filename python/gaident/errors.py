@@ -32,6 +32,8 @@ class GaidentError(ValueError):
 
     Attributes
     ----------
+    message : object
+        The message as it was given.
     marked : str
         The message with its references to arguments, to be built into another one.
 
@@ -46,6 +48,7 @@ class GaidentError(ValueError):
     """
 
     def __init__(self, message: object = "") -> None:
+        self.message = message
         self.marked = str(message)
         super().__init__("".join(map(str, self.parts)))
 

@@ -244,8 +244,8 @@ def test_experiment_writes_the_command_of_a_first_record(here: Path, capsys: pyt
     Path("d.toml").write_text("dt = 1e-3\n[limits]\nspeed = 100\ntorque = 2\nduration = 2\n")
     assert main(["experiment", "--drive", "d.toml", "--out", "first.csv"]) == 0
     said = capsys.readouterr().out
-    assert "written: first.csv" in said and "give kp (--kp, or in the drive file) to keep both" in said
-    assert "give the inertia (--inertia LOW HIGH, or in the drive file) to" in said
+    assert "written: first.csv" in said and "give kp to keep both" in said
+    assert "To give them: --kp and --inertia LOW HIGH, or the drive file.\n" in said
     held = ga.read_columns("first.csv")
     assert len(held["time [s]"]) <= 2000 and np.abs(held["command [rad/s]"]).max() <= 100
     assert main(["experiment", "--drive", "d.toml"]) == 0

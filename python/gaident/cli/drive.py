@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+from gaident.axis import Text, say
 from gaident.checks import one_of
 from gaident.control.pi import LOOPS, PI
 from gaident.data.record import Record
@@ -62,21 +63,23 @@ def read_all(drive: Drive, logs: Sequence[str], controller: PI | None, measured:
     return records
 
 
-def reading_notes(drive: Drive, records: Sequence[Record]) -> list[str]:
+def reading_notes(drive: Drive, records: Sequence[Record]) -> list[Text]:
     """What to keep in mind about how the logs were read, in plain sentences."""
     notes = []
     guessed = [rec.name for rec in records if rec.torque_is == MEASURED and "torque_is" not in drive.general]
     if guessed:
-        notes.append(
-            f"The torque of {', '.join(guessed)} is taken as measured, as the name of its column says; where it is the "
-            "controller's command, say so with --torque-is commanded."
+        text = (
+            "The {torque} of {} is taken as measured, as the name of its column says; where it is the controller's command, say "
+            "so with --torque-is commanded."
         )
+        notes.append(say(text, ", ".join(guessed)))
     cutoff = drive.general.get("velocity_cutoff_hz")
     if cutoff is not None:
-        notes.append(
-            f"The velocity alone went through a low-pass of {cutoff:g} Hz, and what drives the model did not: that biases the "
-            "inertia of a fast axis. Leave velocity_cutoff_hz out; the velocity is then the plain difference of the position."
+        text = (
+            "The velocity alone went through a low-pass of {:g} Hz, and what drives the model did not: that biases the {inertia} "
+            "of a fast axis. Leave velocity_cutoff_hz out; the velocity is then the plain difference of the position."
         )
+        notes.append(say(text, cutoff))
     return notes
 
 
