@@ -56,6 +56,8 @@ UNITS: dict[str, str] = {
     "N m s^2/rad^2": "N s^2/m^2",
     "kg m^2": "kg",
     "1/turn": "1/m",
+    "N m/A": "N/A",
+    "N m/V": "N/V",
     "rad/s/(N m)": "m/s/N",
     **{f"rad/s^{k}/(N m)": f"m/s^{k}/N" for k in range(2, 30)},  # gains of models, one more than poles in excess of zeros
 }

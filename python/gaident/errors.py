@@ -77,7 +77,19 @@ class RecordError(GaidentError):
 
 
 class ReadError(GaidentError):
-    """A log file cannot be read as asked."""
+    """A log file cannot be read as asked.
+
+    fault: what is wrong, without the place and the remedy, where the error was made by `at`; else "".
+    """
+
+    fault = ""
+
+    @classmethod
+    def at(cls, place: str, fault: str, remedy: str) -> ReadError:
+        """place: file and line; fault: what is wrong there; remedy: what to do."""
+        error = cls(f"{place}: {fault}; {remedy}")
+        error.fault = fault
+        return error
 
 
 class ControllerError(GaidentError):

@@ -20,6 +20,7 @@ from gaident.cli import main
 from gaident.data.guess import guess_channels, unit_from_position, unit_from_velocity
 from gaident.data.listing import columns
 from gaident.drive.drive_file import read_drive_file
+from gaident.messages import Message, shortest
 from gaident.show.progress_bar import Progress
 
 SAMPLES = Path(__file__).parent / "samples"
@@ -307,6 +308,21 @@ class Terminal(io.StringIO):
         return True
 
 
+SEARCHING = Message("generation 120, best fitness 9.107e+05, species (1, 2) of 12 leads", "gen. 120, best 9.107e+05, (1,2) of 12")
+
+
+def test_a_search_says_how_far_it_is_in_long_and_in_short() -> None:
+    from test_plots import one_mass_record
+
+    rec, controller = one_mass_record()
+    heard: list[str] = []
+    ga.identify(rec, controller, trials=30, progress=lambda _, message: heard.append(message))
+    pattern = r"generation \d+, best fitness [\d.e+-]+, species \(\d, \d\) of \d+ leads"
+    long = [m for m in heard if re.fullmatch(pattern, m)]
+    assert long and all(re.fullmatch(r"gen\. \d+, best [\d.e+-]+, \(\d,\d\) of \d+", shortest(m)) for m in long)
+    assert all(re.findall(r"[\d.e+-]*\d", m) == re.findall(r"[\d.e+-]*\d", shortest(m)) for m in long)
+
+
 def test_progress_is_drawn_on_a_terminal_and_nowhere_else(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("rich")
     monkeypatch.setenv("COLUMNS", "120")
@@ -325,7 +341,7 @@ def test_progress_is_drawn_on_a_terminal_and_nowhere_else(monkeypatch: pytest.Mo
     stream = Terminal()
     with Progress(stream) as show:
         assert show is not None
-        show(0.25, "generation 120, best fitness 9.107e+05, species (1, 2) of 12 leads")
+        show(0.25, SEARCHING)
     # In 80 columns generation, best fitness and the species that leads are all there.
     drawn = stream.getvalue()
     assert re.search(r"━━━ +25% \d:\d\d:\d\d \d+ s left gen\. 120, best 9\.107e\+05, \(1,2\) of 12\n", drawn) and "…" not in drawn
@@ -333,7 +349,7 @@ def test_progress_is_drawn_on_a_terminal_and_nowhere_else(monkeypatch: pytest.Mo
     stream = Terminal()
     with Progress(stream) as show:
         assert show is not None
-        show(0.25, "generation 120, best fitness 9.107e+05, species (1, 2) of 12 leads")
+        show(0.25, SEARCHING)
     assert re.search(r"━━━ +25% \d:\d\d:\d\d \d+ s left gen\. 120, best [\d.e+]*…", stream.getvalue())
     with Progress(io.StringIO()) as show:
         assert show is None
