@@ -163,7 +163,7 @@ def missing_reversals(velocity: Vector, dhat: Vector, torque: Vector, dt: float,
         low.append(Trace(ms, w, "", roles[name], dash=dash, width=1.5))
     text = (
         "The average reversal, the new direction positive. Dry friction jumps at 0; backlash leaves a spike that comes later the "
-        "slower the reversal; presliding friction turns round gradually."
+        "slower the reversal; presliding friction changes gradually."
     )
     upright = (Mark(0.0, ""),) if top else ()
     panels = (

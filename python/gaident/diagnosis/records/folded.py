@@ -22,8 +22,8 @@ Matrix = NDArray[np.float64]
 FOLDED = Text("the sensor shows the speed without its sign")
 
 ADVICE = say(
-    "No cause can be named: the sensor shows the speed without its sign. The velocity turns back at zero while the {torque} "
-    "stays as it is, so that the direction of motion is not known; log a signed velocity, or the position."
+    "No cause can be named: the sensor shows the speed without its sign. The velocity falls to zero and rises again while the "
+    "{torque} stays as it is, so that the direction of motion is not known; log a signed velocity, or the position."
 )
 
 STEEP = 0.15  # of the slopes that are common: what is no rest

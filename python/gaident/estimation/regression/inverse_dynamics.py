@@ -220,7 +220,7 @@ def _refused(records: Sequence[Record], rows: Sequence[Rows], axis: str) -> dict
         )
         refused |= dict.fromkeys(("viscous_by_direction", "coulomb", "coulomb_by_direction"), why)
     if axis == "linear":
-        refused["gravity"] = Text("a linear axis has no angle")
+        refused["gravity"] = Text("on a linear axis gravity is the same everywhere, and part of the offset")
     elif travel < SIXTH_OF_A_TURN:
         refused["gravity"] = Text(
             f"the travel is {travel:.2g} rad, and gravity shows from a sixth of a turn on, {SIXTH_OF_A_TURN:.3g} rad"
