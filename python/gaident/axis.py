@@ -24,7 +24,6 @@ __all__ = [
     "Text",
     "called",
     "checked_axis",
-    "each",
     "identifier_words",
     "joined",
     "linear_sentences",
@@ -48,7 +47,6 @@ UNITS: dict[str, str] = {
     "rad/s": "m/s",
     "rad/s^2": "m/s^2",
     "N m": "N",
-    "(N m)": "N",  # in a denominator
     "N m/rad": "N/m",
     "N m/rad^3": "N/m^3",
     "N m s/rad": "N s/m",
@@ -91,6 +89,8 @@ _ROTARY, _LINEAR = _vocabulary()
 class Text(str):
     """A sentence in the words of a rotary axis, which holds the same of a linear axis too; `say` makes it.
 
+    Words that only one place needs are a Text for a field of `say`: Text("several turns", "long strokes").
+
     What a string method gives is a plain string and has lost the other sentence: build with `say` and `joined`.
     """
 
@@ -105,11 +105,6 @@ class Text(str):
     def begun(self) -> Text:
         """With a capital at its beginning."""
         return Text(self[:1].upper() + self[1:], self.linear[:1].upper() + self.linear[1:])
-
-
-def each(rotary: str, linear: str) -> Text:
-    """Words that only one place needs, for a field of `say`."""
-    return Text(rotary, linear)
 
 
 def say(template: str, *values: object, **named: object) -> Text:

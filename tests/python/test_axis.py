@@ -22,7 +22,6 @@ from gaident.axis import (
     WORDS,
     Text,
     called,
-    each,
     identifier_words,
     joined,
     linear_sentences,
@@ -87,7 +86,7 @@ def numbers(text: str) -> list[str]:
 
 
 def test_a_sentence_is_made_for_both_axes_from_the_same_numbers() -> None:
-    text = say("a limit above {:.3g} {N m}: no more {torque}, {} of {name}", 1.25, each("few turns", "little way"), name="x {y}")
+    text = say("a limit above {:.3g} {N m}: no more {torque}, {} of {name}", 1.25, Text("few turns", "little way"), name="x {y}")
     assert text == "a limit above 1.25 N m: no more torque, few turns of x {y}"
     assert text.linear == "a limit above 1.25 N: no more force, little way of x {y}"
     assert said(text, "rotary") == text and said(text, "linear") == text.linear

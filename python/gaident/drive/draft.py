@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, each, said, say, unit, word
+from gaident.axis import Text, said, say, unit, word
 from gaident.data.formats.units import Constants, factor, needed_constant
 from gaident.data.guess import Guess, guess_channels, position_and_velocity, unit_from_position, unit_from_velocity
 from gaident.data.listing import Listing
@@ -252,7 +252,7 @@ class _Draft:
     def _space(self) -> list[str]:
         return [
             "[space]                   # where to look, if you know; what is not given is derived from the data",
-            _line("# inertia = [1e-4, 5e-3]", said(each("total inertia at the motor, kg m^2", "total mass, kg"), self.axis)),
+            _line("# inertia = [1e-4, 5e-3]", said(Text("total inertia at the motor, kg m^2", "total mass, kg"), self.axis)),
             _line("# resonance_hz = [5, 200]", "where the mechanism may resonate"),
         ]
 
@@ -264,7 +264,7 @@ class _Draft:
                 lines.append(_line(f"# {name} = 1.0", unit(rotary, self.axis)))
             else:
                 lines.append(_line(f"# {name} = {largest:.3g}", f"{unit(rotary, self.axis)}; the largest of this log"))
-        lines.append(_line("# travel = 100.0", said(each("rad; left out: it may turn freely", "m"), self.axis)))
+        lines.append(_line("# travel = 100.0", said(Text("rad; left out: it may turn freely", "m"), self.axis)))
         lines.append(_line("# duration = 5.0", "s"))
         return lines
 

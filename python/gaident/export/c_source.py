@@ -19,7 +19,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from gaident.axis import checked_axis, each, said, say, velocity_unit
+from gaident.axis import Text, checked_axis, said, say, velocity_unit
 from gaident.checks import real_number
 from gaident.control import core
 from gaident.control.pi import PI
@@ -186,7 +186,7 @@ def _file(model: Model, dt: float, controller: PI | None, name: str, found: dict
 
 def _head(model: Model, dt: float, controller: PI | None, name: str, version: str, drive: str, axis: str) -> list[str]:
     loop = "the drive alone" if controller is None else f"{controller.loop} loop, kp {controller.kp:g}, ki {controller.ki:g}"
-    units = each(
+    units = Text(
         "SI units of a rotary axis; a linear axis reads m for rad and N for N m.",
         "SI units of a linear axis; where the runtime below says rad and N m, read m and N.",
     )

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import each, said, say, turns, unit, velocity_unit, word
+from gaident.axis import Text, said, say, turns, unit, velocity_unit, word
 from gaident.show.chart import Band, Chart, Mark, Panel, Trace, cloud, series
 from gaident.show.diagnosis_numbers import binned_mean, branches, order_lines, reversal_averages, spectrum
 
@@ -107,7 +107,7 @@ def missing_over_velocity(velocity: Vector, dhat: Vector, dt: float, std: float,
     text = (
         f"What must be added to the model's {word('torque', axis)} so that it moves as measured. A step at standstill is dry "
         "friction, a slope viscous friction, a hump beside standstill Stribeck friction, an even offset a load; a gap between "
-        f"the two branches is {said(each('an inertia', 'a mass'), axis)} that is not right, or a delay."
+        f"the two branches is {said(Text('an inertia', 'a mass'), axis)} that is not right, or a delay."
     )
     low, high = robust_limits(dhat)
     limits = (min(low, -2.6 * std), max(high, 2.6 * std))
@@ -133,7 +133,7 @@ def missing_orders(position: Vector, dhat: Vector, velocity: Vector, axis: str, 
         "passes the dashed level is more than chance."
     )
     if not len(lines.order):
-        none = Panel(y, (), note=said(say("{} travelled: too {}", turns(travel), each("few", "little")), axis))
+        none = Panel(y, (), note=said(say("{} travelled: too {}", turns(travel), Text("few", "little")), axis))
         return Chart("missing-orders", name, (none,), text, height=320)
     reached = f"{said(turns(travel, 3), axis)} travelled"
     trace = Trace(lines.order / scale, lines.amplitude, reached, "faster", width=1.0)

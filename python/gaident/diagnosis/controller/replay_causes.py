@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, each, joined, say
+from gaident.axis import Text, joined, say
 from gaident.control.filtering import filtered, rate_limited
 from gaident.control.pi import PI
 from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
@@ -287,7 +287,7 @@ def _named(controller: PI, gains: _Gains, dt: float, start: float, shift: int, s
 def _check_unit(factor: float) -> Text:
     units = say("check the units of the {torque}, of the speeds and of the gains")
     if abs(factor * RPM - 1.0) <= SAME:
-        return each("speeds in rpm seem to be taken for rad/s; check their unit", units.linear)
+        return Text("speeds in rpm seem to be taken for rad/s; check their unit", units.linear)
     return units
 
 

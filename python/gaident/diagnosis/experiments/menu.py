@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, each, say
+from gaident.axis import Text, say
 from gaident.diagnosis.experiments.commands import dithered, rest, strokes, triangles
 from gaident.diagnosis.library.excited import EXCITED
 
@@ -146,7 +146,7 @@ MENU: tuple[tuple[str, Builder, tuple[str, ...], Text], ...] = tuple((name, buil
     ("triangle across zero", _triangles,
      say("a speed that sweeps through zero draws the whole friction curve, accelerating and decelerating.")),
     ("reversals", reversals,
-     say("with small and with large {torque}, a gap takes time, a dead band {torque}, a bristle {}.", each("angle", "travel"))),
+     say("with small and with large {torque}, a gap takes time, a dead band {torque}, a bristle {}.", Text("angle", "travel"))),
     ("random signal at speed", prbs_moving,
      say("a binary signal on a constant speed, dry friction out of the way, shows the dynamics up to half the sampling rate.")),
     ("random signal at standstill", _prbs_standing,
@@ -155,7 +155,7 @@ MENU: tuple[tuple[str, Builder, tuple[str, ...], Text], ...] = tuple((name, buil
      say("a limit of {torque}, integral or slope holds the largest back, and the others not.")),
     ("slow constant speeds", _constant_slow,
      say("{} at three of them: a {torque} ripple keeps its {torque}, a sensor's ripple grows with speed.",
-         each("several turns", "long strokes"))),
+         Text("several turns", "long strokes"))),
     ("holds up and down", _holds,
      say("{angles} approached from both sides: the mean {torque} there is load or gravity, half the difference friction.")),
     ("repeated segment", _repeat,

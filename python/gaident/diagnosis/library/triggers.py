@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import TURN, Text, each, joined, order, say, turns
+from gaident.axis import TURN, Text, joined, order, say, turns
 from gaident.control.pi import PI
 from gaident.models.model import Model
 
@@ -128,7 +128,7 @@ def _speed(motions: Sequence[Motion]) -> dict[str, Text]:
 
 def _travel(motions: Sequence[Motion]) -> dict[str, Text]:
     travel = max(float(np.ptp(m.position)) for m in motions)
-    moved = each(f"{math.degrees(travel):.2g} degrees of travel", f"{travel:.2g} m of travel")
+    moved = Text(f"{math.degrees(travel):.2g} degrees of travel", f"{travel:.2g} m of travel")
     why = {}
     if travel < LEAST_TURN:
         why["unbalance"] = say("{}: over so little it is a constant load", moved)

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 
 from gaident.axis import said, unit, velocity_unit, word
+from gaident.models.factors import gain_unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.show.diagnosis_summary import (
@@ -188,14 +189,10 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     parts += [tag("h3", f"{word('Torque', axis)} to velocity, linear part")]
     roots = [(kind, r, "unstable" if r.real > 0.0 and kind == "pole" else "") for kind, group in
              (("pole", dia.model.poles), ("zero", dia.model.zeros)) for r in group if r.imag >= 0.0]  # fmt: skip
-    parts.append(tag("p", "Gain K = ", number(dia.model.gain, 5), " ", typeset(unit(_gain_unit(dia.model.p), axis)), "."))
+    parts.append(tag("p", "Gain K = ", number(dia.model.gain, 5), " ", typeset(unit(gain_unit(dia.model.p), axis)), "."))
     parts.append(roots_table(roots))
     parts.append(response_part(view, drawn))
     return Section("parameters", "Parameters", *parts)
-
-
-def _gain_unit(p: int) -> str:
-    return "rad/s^2/(N m)" if p == 1 else f"rad/s^{1 + p}/(N m)" if p else "rad/s/(N m)"
 
 
 def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
