@@ -46,7 +46,7 @@ from gaident.drive.draft import draft
 from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.identification.notes import open_loop_notes
 from gaident.reporting import report_page
-from gaident.results.diagnosis import Finding
+from gaident.results.finding import Finding
 from gaident.show.report import parts
 from report_cases import diagnosed
 from test_diagnosis_evidence import CONTROLLER, DT, ONE_MASS, TWO_MASS, changed, drive
