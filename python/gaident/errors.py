@@ -79,14 +79,41 @@ class RecordError(GaidentError):
 class ReadError(GaidentError):
     """A log file cannot be read as asked.
 
-    fault: what is wrong, without the place and the remedy, where the error was made by `at`; else "".
+    Attributes
+    ----------
+    fault : str
+        What is wrong, without the place and the remedy, where the error was made by `at`; else "".
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> error = ga.errors.ReadError.at("a.csv, line 3", "time column 't' does not increase", "sort the log")
+    >>> print(error)
+    a.csv, line 3: time column 't' does not increase; sort the log
+    >>> error.fault
+    "time column 't' does not increase"
     """
 
     fault = ""
 
     @classmethod
     def at(cls, place: str, fault: str, remedy: str) -> ReadError:
-        """place: file and line; fault: what is wrong there; remedy: what to do."""
+        """Make the error from its parts.
+
+        Parameters
+        ----------
+        place : str
+            File and line.
+        fault : str
+            What is wrong there.
+        remedy : str
+            What to do.
+
+        Returns
+        -------
+        ReadError
+            The error, to be raised.
+        """
         error = cls(f"{place}: {fault}; {remedy}")
         error.fault = fault
         return error

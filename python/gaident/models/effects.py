@@ -44,6 +44,8 @@ class Row(NamedTuple):
         What the parameters have to meet among themselves; empty if nothing.
     own : bool
         Whether it is user-defined, registered from Python.
+    says : Text
+        The meaning without what the table says after it, for sentences.
 
     See Also
     --------
