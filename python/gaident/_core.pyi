@@ -201,7 +201,7 @@ def discrete(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(alpha, beta) of equation (7), powers of z^-1."""
 
-def effect_table() -> list[tuple[str, str, str, tuple[tuple[str, str, float, float, float, bool], ...], bool, bool, str]]:
+def effect_table() -> list[tuple[str, str, str, tuple[tuple[str, str, float, float, float, bool], ...], bool, bool, str, str]]:
     """(name, place, meaning, parameters, simulated, needs two masses, relation) of every effect."""
 
 def broken_relation(name: str, values: Sequence[float]) -> str:

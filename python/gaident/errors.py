@@ -32,6 +32,8 @@ class GaidentError(ValueError):
 
     Attributes
     ----------
+    message : object
+        The message as it was given.
     marked : str
         The message with its references to arguments, to be built into another one.
 
@@ -46,6 +48,7 @@ class GaidentError(ValueError):
     """
 
     def __init__(self, message: object = "") -> None:
+        self.message = message
         self.marked = str(message)
         super().__init__("".join(map(str, self.parts)))
 
@@ -74,7 +77,46 @@ class RecordError(GaidentError):
 
 
 class ReadError(GaidentError):
-    """A log file cannot be read as asked."""
+    """A log file cannot be read as asked.
+
+    Attributes
+    ----------
+    fault : str
+        What is wrong, without the place and the remedy, where the error was made by `at`; else "".
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> error = ga.errors.ReadError.at("a.csv, line 3", "time column 't' does not increase", "sort the log")
+    >>> print(error)
+    a.csv, line 3: time column 't' does not increase; sort the log
+    >>> error.fault
+    "time column 't' does not increase"
+    """
+
+    fault = ""
+
+    @classmethod
+    def at(cls, place: str, fault: str, remedy: str) -> ReadError:
+        """Make the error from its parts.
+
+        Parameters
+        ----------
+        place : str
+            File and line.
+        fault : str
+            What is wrong there.
+        remedy : str
+            What to do.
+
+        Returns
+        -------
+        ReadError
+            The error, to be raised.
+        """
+        error = cls(f"{place}: {fault}; {remedy}")
+        error.fault = fault
+        return error
 
 
 class ControllerError(GaidentError):

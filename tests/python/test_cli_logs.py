@@ -20,6 +20,7 @@ from gaident.cli import main
 from gaident.data.guess import guess_channels, unit_from_position, unit_from_velocity
 from gaident.data.listing import columns
 from gaident.drive.drive_file import read_drive_file
+from gaident.messages import Message, shortest
 from gaident.show.progress_bar import Progress
 
 SAMPLES = Path(__file__).parent / "samples"
@@ -244,8 +245,8 @@ def test_experiment_writes_the_command_of_a_first_record(here: Path, capsys: pyt
     Path("d.toml").write_text("dt = 1e-3\n[limits]\nspeed = 100\ntorque = 2\nduration = 2\n")
     assert main(["experiment", "--drive", "d.toml", "--out", "first.csv"]) == 0
     said = capsys.readouterr().out
-    assert "written: first.csv" in said and "give kp (--kp, or in the drive file) to keep both" in said
-    assert "give the inertia (--inertia LOW HIGH, or in the drive file) to" in said
+    assert "written: first.csv" in said and "give kp to keep both" in said
+    assert "To give them: --kp and --inertia LOW HIGH, or the drive file.\n" in said
     held = ga.read_columns("first.csv")
     assert len(held["time [s]"]) <= 2000 and np.abs(held["command [rad/s]"]).max() <= 100
     assert main(["experiment", "--drive", "d.toml"]) == 0
@@ -307,6 +308,21 @@ class Terminal(io.StringIO):
         return True
 
 
+SEARCHING = Message("generation 120, best fitness 9.107e+05, species (1, 2) of 12 leads", "gen. 120, best 9.107e+05, (1,2) of 12")
+
+
+def test_a_search_says_how_far_it_is_in_long_and_in_short() -> None:
+    from test_plots import one_mass_record
+
+    rec, controller = one_mass_record()
+    heard: list[str] = []
+    ga.identify(rec, controller, trials=30, progress=lambda _, message: heard.append(message))
+    pattern = r"generation \d+, best fitness [\d.e+-]+, species \(\d, \d\) of \d+ leads"
+    long = [m for m in heard if re.fullmatch(pattern, m)]
+    assert long and all(re.fullmatch(r"gen\. \d+, best [\d.e+-]+, \(\d,\d\) of \d+", shortest(m)) for m in long)
+    assert all(re.findall(r"[\d.e+-]*\d", m) == re.findall(r"[\d.e+-]*\d", shortest(m)) for m in long)
+
+
 def test_progress_is_drawn_on_a_terminal_and_nowhere_else(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("rich")
     monkeypatch.setenv("COLUMNS", "120")
@@ -325,7 +341,7 @@ def test_progress_is_drawn_on_a_terminal_and_nowhere_else(monkeypatch: pytest.Mo
     stream = Terminal()
     with Progress(stream) as show:
         assert show is not None
-        show(0.25, "generation 120, best fitness 9.107e+05, species (1, 2) of 12 leads")
+        show(0.25, SEARCHING)
     # In 80 columns generation, best fitness and the species that leads are all there.
     drawn = stream.getvalue()
     assert re.search(r"━━━ +25% \d:\d\d:\d\d \d+ s left gen\. 120, best 9\.107e\+05, \(1,2\) of 12\n", drawn) and "…" not in drawn
@@ -333,7 +349,7 @@ def test_progress_is_drawn_on_a_terminal_and_nowhere_else(monkeypatch: pytest.Mo
     stream = Terminal()
     with Progress(stream) as show:
         assert show is not None
-        show(0.25, "generation 120, best fitness 9.107e+05, species (1, 2) of 12 leads")
+        show(0.25, SEARCHING)
     assert re.search(r"━━━ +25% \d:\d\d:\d\d \d+ s left gen\. 120, best [\d.e+]*…", stream.getvalue())
     with Progress(io.StringIO()) as show:
         assert show is None

@@ -21,7 +21,6 @@ from gaident.diagnosis.records.lattice import lattice_step, rounding_step
 from gaident.diagnosis.selection.offset import Offset
 from gaident.errors import ModelError, RecordError
 from gaident.estimation.state_space import discretised, disturbed
-from gaident.show.wording import sentence
 
 DT = 1e-3
 CONTROLLER = ga.PI(kp=0.02, ki=0.5)
@@ -247,7 +246,7 @@ def test_dry_friction_and_load_show_with_their_sign_and_size() -> None:
 def test_an_offset_is_told_in_the_units_of_the_axis() -> None:
     text = Offset(0.512, 31.0, 0.0421).sentence
     assert "load of 0.512 N m in" in text and "0.042 N m of it is left" in text
-    assert "load of 0.512 N in" in sentence(text, "linear") and "0.042 N of it is left" in sentence(text, "linear")
+    assert "load of 0.512 N in" in text.linear and "0.042 N of it is left" in text.linear
 
 
 def test_a_true_model_misses_nothing_beyond_its_deviation() -> None:

@@ -80,14 +80,14 @@ def test_an_order_line_stands_at_its_order_with_its_amplitude() -> None:
 
 def test_reversals_are_averaged_in_the_new_direction() -> None:
     found = reversal_averages(VELOCITY, FRICTION, np.repeat([0.1, 0.5], N // 2), DT)
-    assert set(found.groups) == {"small torque", "large torque"}
+    assert set(found.groups) == {"small", "large"}
     assert sum(count for *_, count in found.groups.values()) in (10, 11)
     for mean, spread, w, _ in found.groups.values():
         assert len(mean) == len(found.time) == 101
         np.testing.assert_allclose(mean[:45], 0.05, atol=1e-12)
         np.testing.assert_allclose(mean[56:], -0.05, atol=1e-12)
         assert spread.max() < 0.06 and w[0] < 0.0 < w[-1]
-    assert np.ptp(found.groups["large torque"][2]) > 3.0 * np.ptp(found.groups["small torque"][2])
+    assert np.ptp(found.groups["large"][2]) > 3.0 * np.ptp(found.groups["small"][2])
     assert reversal_averages(30.0 + VELOCITY[:900], FRICTION[:900], FRICTION[:900], DT).groups == {}
     one = reversal_averages(VELOCITY[:500], FRICTION[:500], FRICTION[:500], DT)
     assert [count for *_, count in one.groups.values()] == [1]

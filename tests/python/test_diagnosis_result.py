@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from gaident.axis import say
 from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.diagnosis.explain.wording import evidence_of
 from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.results.diagnosis import Comparison, Fitness
 from gaident.results.finding import Finding
-from gaident.show.wording import certainty, sentence
+from gaident.show.wording import certainty
 
 GOLDEN = Path(__file__).parent / "golden" / "diagnosis.txt"
 DT = 1e-3
@@ -80,14 +81,16 @@ def fake() -> Any:
                 0.2,
                 55.0,
                 None,
-                "Torque ripple n times per turn, or velocity ripple: one of these is there, beyond doubt (the model without it "
-                "is 55 BIC units worse); these data do not say which.",
+                say(
+                    "{Torque} ripple n times {per turn}, or velocity ripple: one of these is there, beyond doubt (the model "
+                    "without it is 55 BIC units worse); these data do not say which."
+                ),
             ),
         ),
-        not_testable={"backlash": "the torque never changes its sign: the coupling stays on one flank"},
+        not_testable={"backlash": say("the {torque} never changes its sign: the coupling stays on one flank")},
         one_sided={
-            "torque_saturation": "a limit above 1.25 N m would not have shown: no more torque was asked for",
-            "command_rate_limit": "a limit above 2e+04 rad/s^2 would not have shown: no command rises faster",
+            "torque_saturation": say("a limit above {} {N m} would not have shown: no more {torque} was asked for", 1.25),
+            "command_rate_limit": say("a limit above {} {rad/s^2} would not have shown: no command rises faster", "2e+04"),
         },
         model=SimpleNamespace(effects=("coulomb_friction", "cogging"), poles=(-1.0, -1.0 + 2.0j, -1.0 - 2.0j)),
         before=Fitness(0.5, 97.1, 0.1, 0.0511, 0.184, 0.0021),
@@ -110,7 +113,7 @@ def fake() -> Any:
             "resonance": (27.103, 27.414),
             "resonance_damping": (0.088083, 0.0836),
         },
-        notes=("The closest description leaves an error of 0.1 rad/s at 0.02 N m.",),
+        notes=(say("The closest description leaves an error of {} {rad/s} at {} {N m}.", 0.1, 0.02),),
         controller=CONTROLLER,
         seed=3,
         seconds=1.234,
@@ -227,19 +230,6 @@ def test_a_pair_that_does_not_swing_is_no_resonance() -> None:
     text = summary(result)
     assert "resonance  " not in text and "damping ratio" not in text
     assert "a second pair of poles that does not swing" in text
-
-
-def test_sentences_of_a_linear_axis() -> None:
-    assert sentence("The logged torque departs by 0.2 N m; inertia; 5 rad/s.", "linear") == (
-        "The logged force departs by 0.2 N; mass; 5 m/s."
-    )
-    assert sentence("torque saturation or load torque", "linear") == "torque saturation or load torque"
-    assert sentence("the axis turns forwards only", "linear") == "the axis moves forwards only"
-    assert sentence("57.3 degrees of travel", "linear") == "1 m of travel"
-    assert sentence("orders below 3 need more than the 0.5 turns travelled", "linear") == (
-        "orders below 0.48 1/m need more than the 3.1 m travelled"
-    )
-    assert sentence("57.3 degrees of travel", "rotary") == "57.3 degrees of travel"
 
 
 def test_the_file_holds_the_whole_result(dia: ga.Diagnosis, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 import gaident as ga
 from gaident.results.estimate import Estimate
 from gaident.show import identification_summary, mechanics_comparison
-from gaident.show.wording import number, structure_words, table, unit, with_std
+from gaident.show.wording import number, structure_words, table, with_std
 
 GOLDEN = Path(__file__).parent / "golden" / "identification.txt"
 
@@ -165,10 +165,7 @@ def test_value_with_std(value: float, std: float | None, text: str) -> None:
 def test_wording() -> None:
     assert number(-0.0) == "0"
     assert table([("a", "", "b"), ("ccc", "", "d")]) == ["  a    b", "  ccc  d"]
-    assert [unit(u, "linear") for u in ga.TwoMass.UNITS.values()][:5] == ["kg", "N s/m", "kg", "N s/m", "N/m"]
     assert structure_words(1, 0) == "one mass"
-    with pytest.raises(ga.GaidentError, match="axis is 'round'"):
-        unit("N m", "round")
 
 
 def test_real_result_and_its_copy_from_a_file_read_alike(tmp_path: Path) -> None:

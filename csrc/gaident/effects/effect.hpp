@@ -91,7 +91,7 @@ struct EffectParameter {
 struct EffectInfo {
     const char* name;
     Place place;
-    const char* meaning;
+    const char* meaning;  // one clause; {torque}, {per turn}: a linear axis has other words, see python/gaident/axis.py
     std::span<const EffectParameter> parameters;
     bool simulated = true;
     bool needs_two_masses = false;
@@ -99,6 +99,7 @@ struct EffectInfo {
     bool (*identity)(const double*) = nullptr;  // where being neutral is a relation between parameters
     bool (*allowed)(const double*) = nullptr;   // a relation that parameters have to meet,
     const char* relation = "";                  // in words
+    const char* remark = "";                    // what the table says after the meaning
 
     constexpr int count() const { return static_cast<int>(parameters.size()); }
 

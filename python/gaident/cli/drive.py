@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+from gaident.axis import Text, say
 from gaident.checks import one_of
 from gaident.control.pi import LOOPS, PI
 from gaident.data.record import Record
@@ -73,15 +74,16 @@ def read_all(drive: Drive, logs: Sequence[str], controller: PI | None, measured:
     return records
 
 
-def reading_notes(drive: Drive, records: Sequence[Record]) -> list[str]:
+def reading_notes(drive: Drive, records: Sequence[Record]) -> list[Text]:
     """What to keep in mind about how the logs were read, in plain sentences."""
     notes = []
     guessed = [rec.name for rec in records if rec.torque_is == MEASURED and "torque_is" not in drive.general]
     if guessed:
-        notes.append(
-            f"The torque of {', '.join(guessed)} is taken as measured, as the name of its column says; where it is the "
-            "controller's command, say so with --torque-is commanded."
+        text = (
+            "The {torque} of {} is taken as measured, as the name of its column says; where it is the controller's command, say "
+            "so with --torque-is commanded."
         )
+        notes.append(say(text, ", ".join(guessed)))
     return notes
 
 

@@ -7,8 +7,8 @@ import re
 from collections.abc import Callable
 from typing import Any
 
+from gaident.axis import AXES
 from gaident.data.torque_kind import TORQUE_KINDS
-from gaident.show.wording import AXES
 
 __all__ = ["SHELLS", "add_log_commands", "add_log_options", "number"]
 

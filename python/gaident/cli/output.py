@@ -36,7 +36,7 @@ __all__ = [
 
 def csv_text(rec: Record, result: Run | None, axis: str) -> str:
     """The run, or without one the record itself, as `gaident` reads it again."""
-    from gaident.show.wording import unit, velocity_unit
+    from gaident.axis import unit, velocity_unit
 
     v = velocity_unit(axis)
     columns = {"time [s]": rec.time}

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import say
 from gaident.control import core
 from gaident.control.filtering import clamped_sum
 from gaident.control.pi import PI
@@ -40,9 +41,9 @@ def pi_block(e: Vector, dt: float, controller: PI, last: float, integral: float)
 
 
 HOLDS = {
-    "held": "the integrator held while the torque is limited",
-    "held_back": "the integrator held while the torque is limited and the error would drive it further",
-    "tracked": "the integrator set back to what the limited torque leaves of it",
+    "held": say("the integrator held while the {torque} is limited"),
+    "held_back": say("the integrator held while the {torque} is limited and the error would drive it further"),
+    "tracked": say("the integrator set back to what the limited {torque} leaves of it"),
 }
 """Ways in which a controller keeps its integrator from winding up at the torque limit."""
 

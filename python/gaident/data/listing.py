@@ -218,13 +218,15 @@ class _Gathered:
         self.even = self.rise > 0.0 and bool(np.all(np.abs(values - expected) <= 0.02 * self.rise))
 
     def _pass_time(self, block: Table, values: NDArray[np.float64]) -> None:
+        if not len(values):
+            return
         try:
             if self.axis is None:
                 unit = self.column.unit
                 self.axis = TimeAxis(self.column, factor("time", unit) if unit else stamp_unit(float(values[0])))
             self.axis.push(block, block.numbers(next(c for c in block.columns if c.key == self.column.key), "time"))
-        except (ReadError, IndexError) as error:
-            self.irregular = str(error).split(": ", 1)[-1].split(";")[0]
+        except ReadError as error:
+            self.irregular = error.fault or str(error)
 
     def step(self, table: Table) -> float | None:
         """The sample time of this time column [s]; None where it is irregular."""

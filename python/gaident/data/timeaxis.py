@@ -61,7 +61,7 @@ class TimeAxis:
     def sample_time(self, table: Table) -> float:
         """dt [s]: (t(n-1) - t(0)) / (n - 1)."""
         if self.count < 2:
-            raise ReadError(f"{table.path}: time column {self.column.key!r} has {self.count} value; give a longer log")
+            raise ReadError.at(table.path, f"time column {self.column.key!r} has {self.count} value", "give a longer log")
         # The mean is free of the rounding that the median keeps; 12 digits drop the noise of the division.
         mean = (self.last - self.start) / (self.count - 1) * self.second
         return float(f"{mean:.12g}")
@@ -73,10 +73,10 @@ class TimeAxis:
             if steps.min() == 0.0 and steps.max() > 0.0:
                 _too_coarse(table, self.column, float(steps[steps > 0.0].min()))
             row = int(np.argmin(steps > 0.0)) + 1
-            raise ReadError(
-                f"{table.path}, {table.place(row - shift)}: time column {self.column.key!r} does not increase "
-                f"({t[row - 1]:.12g}, then {t[row]:.12g}); sort the log, "
-                f"or give {arg('dt')} and set {NO_TIME}"
+            raise ReadError.at(
+                f"{table.path}, {table.place(row - shift)}",
+                f"time column {self.column.key!r} does not increase ({t[row - 1]:.12g}, then {t[row]:.12g})",
+                f"sort the log, or give {arg('dt')} and set {NO_TIME}",
             )
         usual = self.step or median  # of the first block
         deviation = np.abs(steps - usual)
@@ -151,9 +151,10 @@ def _bare(name: str) -> str:
 
 
 def _too_coarse(table: Table, column: Column, printed: float) -> None:
-    raise ReadError(
-        f"{table.path}: time column {column.key!r} is printed in steps of {printed:g}, too coarse to "
-        f"tell the sample time; export more digits, or give {arg('dt')} [s] and set {NO_TIME}"
+    raise ReadError.at(
+        table.path,
+        f"time column {column.key!r} is printed in steps of {printed:g}, too coarse to tell the sample time",
+        f"export more digits, or give {arg('dt')} [s] and set {NO_TIME}",
     )
 
 
@@ -165,12 +166,11 @@ def _refuse(table: Table, column: Column, t: NDArray[np.float64], step: int, dt:
         if bridged
         else "split the log there into two"
     )
-    raise ReadError(
-        f"{table.path}, {table.place(step + 1 - shift)}: time column {column.key!r} is irregular: from "
-        f"{t[step]:.12g} to "
-        f"{t[step + 1]:.12g} it jumps by {t[step + 1] - t[step]:.6g}, elsewhere by "
-        f"{usual:.6g}; {even}; if the samples are in truth evenly spaced, "
-        f"give {arg('dt', format(dt, '.6g'))} and set {NO_TIME}"
+    raise ReadError.at(
+        f"{table.path}, {table.place(step + 1 - shift)}",
+        f"time column {column.key!r} is irregular: from {t[step]:.12g} to {t[step + 1]:.12g} it jumps by "
+        f"{t[step + 1] - t[step]:.6g}, elsewhere by {usual:.6g}",
+        f"{even}; if the samples are in truth evenly spaced, give {arg('dt', format(dt, '.6g'))} and set {NO_TIME}",
     )
 
 

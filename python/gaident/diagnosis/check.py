@@ -16,6 +16,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from gaident.axis import Text, joined, say, unit_text
 from gaident.data.record import Record
 from gaident.diagnosis.gains import Gains
 from gaident.diagnosis.library.terms import LIBRARY
@@ -57,8 +58,8 @@ class Check:
     comparisons: tuple[Comparison, ...]
     before: Fitness
     after: Fitness
-    notes: tuple[str, ...]
-    reason: str
+    notes: tuple[Text, ...]
+    reason: Text
 
 
 def checked(
@@ -69,7 +70,7 @@ def checked(
     records: as they were fitted; model: the extended one; mechanics: name -> Estimate; effects: effect -> its parameters;
     driven: whether a torque drives the simulation, for lack of a controller.
     """
-    nothing = Check(None, None, (), gains.before, gains.after, (), "")
+    nothing = Check(None, None, (), gains.before, gains.after, (), Text(""))
     if not all(r.torque is not None for r in records):
         return nothing
     found = _regression(records, model)
@@ -79,7 +80,7 @@ def checked(
     comparisons = tuple(_compared(found, mechanics, effects, after.torque_rms or 0.0, bool(effects_before_the_shaft(model))))
     verdict = _verdict(after.force_error, second)
     notes = tuple(_sentence(c) for c in comparisons if c.differs)
-    notes = (*notes[:-1], notes[-1] + verdict) if notes else _lost(after, second)
+    notes = (*notes[:-1], joined("", (notes[-1], verdict))) if notes else _lost(after, second)
     return Check(found, second, comparisons, before, after, notes, _reason(effects, driven))
 
 
@@ -185,37 +186,45 @@ def _is_gravity(term: Term) -> bool:
     return term.harmonic == "torque" and term.orders == (1, 1)
 
 
-def _verdict(own: float | None, second: float | None) -> str:
+def _verdict(own: float | None, second: float | None) -> Text:
     """Which of the two explains the held-out torque better, in words."""
     if own is None or second is None:
-        return ""
+        return Text("")
     better = "the regression" if second < own else "the diagnosed model"
     if abs(own - second) < POLICY.check_share * max(own, second):
-        return f" On the held-out data both leave about the same of the torque ({second:.3g} and {own:.3g} N m)."
-    return f" On the held-out data {better} leaves less of the torque: {second:.3g} N m the regression, {own:.3g} N m the model."
+        return say(" On the held-out data both leave about the same of the {torque} ({:.3g} and {:.3g} {N m}).", second, own)
+    text = " On the held-out data {} leaves less of the {torque}: {:.3g} {N m} the regression, {:.3g} {N m} the model."
+    return say(text, better, second, own)
 
 
-def _sentence(c: Comparison) -> str:
-    a, b = (f"{e.value:.3g} +- {e.std:.2g} {e.unit}" for e in (c.diagnosis, c.regression))
-    mine = f"the diagnosis has no {c.name}" if c.diagnosis.value == 0.0 else f"the {c.name} of the diagnosis is {a}"
-    other = "finds none of it" if c.regression.value == 0.0 else f"says {b}"
-    text = f"Two methods disagree: {mine}, the inverse-dynamics regression of the same records {other}, which is more than both "
-    return f"{text}deviations. Likely: {LIKELY[c.name]}."
+def _sentence(c: Comparison) -> Text:
+    a, b = (say("{:.3g} +- {:.2g} {}", e.value, e.std, unit_text(e.unit)) for e in (c.diagnosis, c.regression))
+    name = say("{inertia}") if c.name == "inertia" else Text(c.name)
+    mine = say("the diagnosis has no {}", name) if c.diagnosis.value == 0.0 else say("the {} of the diagnosis is {}", name, a)
+    other = Text("finds none of it") if c.regression.value == 0.0 else say("says {}", b)
+    text = (
+        "Two methods disagree: {}, the inverse-dynamics regression of the same records {}, which is more than both deviations. "
+        "Likely: {}."
+    )
+    return say(text, mine, other, LIKELY[c.name])
 
 
-def _lost(after: Fitness, second: float | None) -> tuple[str, ...]:
+def _lost(after: Fitness, second: float | None) -> tuple[Text, ...]:
     """A note where the regression explains the held-out torque far better than the diagnosed model."""
     own = after.force_error
     if own is None or second is None or own < POLICY.loses * max(second, after.force_floor or 0.0):
         return ()
     shares = [f"{100.0 * x / after.torque_rms:.3g} %" for x in (own, second)] if after.torque_rms else ["more", "less"]
-    return (
-        f"Two methods disagree: on the held-out data the diagnosed model leaves {shares[0]} of the torque, the inverse-dynamics "
-        f"regression of the same records {shares[1]}. Where the parameters differ, trust those of the regression.",
+    text = (
+        "Two methods disagree: on the held-out data the diagnosed model leaves {} of the {torque}, the inverse-dynamics "
+        "regression of the same records {}. Where the parameters differ, trust those of the regression."
     )
+    return (say(text, *shares),)
 
 
-def _reason(effects: Effects, driven: bool) -> str:
+def _reason(effects: Effects, driven: bool) -> Text:
     if any(_is_gravity(LIBRARY[e]) for e in effects):
-        return "gravity acts on this axis, and a free run that is a little off falls to another side"
-    return "the torque drives the simulation, and a free run adds up what is small in every sample" if driven else ""
+        return Text("gravity acts on this axis, and a free run that is a little off falls to another side")
+    if not driven:
+        return Text("")
+    return say("the {torque} drives the simulation, and a free run adds up what is small in every sample")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, called, say
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
@@ -150,7 +151,7 @@ class _Work:
 
     def __post_init__(self) -> None:
         self.controller = self.logged.controller
-        self.notes = [*self.logged.notes, *open_loop_notes(self.records, self.controller)]
+        self.notes: list[Text] = [*self.logged.notes, *open_loop_notes(self.records, self.controller)]
         hit = [self._spikes(r) for r in self.records]
         clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
         self.clean = tuple(clean)
@@ -192,7 +193,7 @@ class _Work:
             not_testable = dict.fromkeys(LIBRARY, FOLDED)
             self.notes.append(ADVICE)
         if self.data.torque_measured:
-            behind = "the torque was measured behind the actuator, which it does not show"
+            behind = say("the {torque} was measured behind the actuator, which it does not show")
             not_testable |= {t.name: behind for t in LIBRARY.values() if t.place == "actuator"}
         out = {*not_testable, *self.at_controller.decided}
         allowed = [t for t in LIBRARY.values() if t.name not in out and (self.controller is not None or not t.in_controller)]
@@ -229,12 +230,12 @@ class _Work:
         if driver is None and after.rmse > POLICY.free_run_ratio * after.noise_floor > 0.0:
             # A noise filter removes a slow misfit completely; the free run shows it.
             driver = self.left.strongest or "time"
-            times = f"The free run misses the velocity by {after.rmse / after.noise_floor:.0f} times its noise. "
-            self.notes.append(
-                times
-                + "In these data that passes for a torque disturbance, but is far too large for noise: a controller or a limit "
-                "that is not the one given here, or a load that changes in time."
+            text = (
+                "The free run misses the velocity by {:.0f} times its noise. In these data that passes for a {torque} "
+                "disturbance, but is far too large for noise: a controller or a limit that is not the one given here, or a load "
+                "that changes in time."
             )
+            self.notes.append(say(text, after.rmse / after.noise_floor))
         space = self.found.space
         causes = []
         for e in self.final.effects:
@@ -276,14 +277,17 @@ class _Work:
             verdict = "partly explained" if real else "unexplained"
             dropped = [e.replace("_", " ") for e in self.final.effects if e not in causes]
             if dropped:
-                self.notes.append(
-                    f"The closest description is {' and '.join(dropped)}, but it leaves an error that depends on {driver}: "
-                    "no effect of the library fits, so none is named."
+                text = (
+                    "The closest description is {}, but it leaves an error that depends on {}: no effect of the library fits, so "
+                    "none is named."
                 )
+                self.notes.append(say(text, " and ".join(dropped), called(driver)))
         check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None)
         self.notes += check.notes
         if self.final.parameters.held and LOAD.name in self.final.effects:
-            self.notes.append("The axis is held by a spring: its tension where the record starts is part of the constant load.")
+            self.notes.append(
+                Text("The axis is held by a spring: its tension where the record starts is part of the constant load.")
+            )
         ambiguous = [f for f in real if f.alternatives]
         proposal = None
         if ambiguous:
@@ -345,10 +349,8 @@ class _Work:
             if not gains.harmful:
                 return gains
             effect = gains.harmful[-1]
-            self.notes.append(
-                f"{effect.replace('_', ' ').capitalize()} would come closer to these records, but makes the held-out data worse: "
-                "it is not accepted."
-            )
+            text = "{} would come closer to these records, but makes the held-out data worse: it is not accepted."
+            self.notes.append(say(text, effect.replace("_", " ").capitalize()))
             self._settle(self.found.space.without(self.final, effect))
 
     def _alternatives(self, effect: str, rivals: Sequence[Rival], even: bool) -> tuple[str, ...]:
@@ -373,17 +375,19 @@ class _Work:
         total = sum(len(r) for r in self.records)
         if self.spoiled:
             fraction = self.spoiled / total
-            text = f"{self.spoiled} of {total} samples leave the signal and come back; they are left out of every fit."
+            samples = "{} of {} samples leave the signal and come back; they are left out of every fit."
             found.append(
                 Finding(
                     OUTLIERS,
                     {"fraction": Estimate(fraction, float(np.sqrt(self.spoiled) / total), "1")},
-                    evidence=text,
+                    evidence=say(samples, self.spoiled, total),
                     is_noise=True,
                 )
             )
         if self.step > 0.0:
-            text = f"All velocities lie on a lattice of {self.step:.4g} rad/s: the resolution of the encoder or of the log."
+            text = say(
+                "All velocities lie on a lattice of {:.4g} {rad/s}: the resolution of the encoder or of the log.", self.step
+            )
             found.append(Finding(QUANTISATION, {"step": Estimate(self.step, 0.0, "rad/s")}, evidence=text, is_noise=True))
         return found
 
@@ -391,8 +395,6 @@ class _Work:
         """Whether the records say how large an effect is; else its name would rest on nothing, and a note says so."""
         if any(e.identifiable and not e.at_bound for e in parameters.values()):
             return True
-        self.notes.append(
-            f"{effect.replace('_', ' ').capitalize()} comes closer to these records, but they do not determine one of its "
-            "parameters: it is not named."
-        )
+        text = "{} comes closer to these records, but they do not determine one of its parameters: it is not named."
+        self.notes.append(say(text, effect.replace("_", " ").capitalize()))
         return False

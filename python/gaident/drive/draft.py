@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, said, say, unit, word
 from gaident.data.formats.units import Constants, factor, needed_constant
 from gaident.data.guess import Guess, guess_channels, position_and_velocity, unit_from_position, unit_from_velocity
 from gaident.data.listing import Listing
@@ -21,12 +22,11 @@ from gaident.errors import ReadError
 __all__ = ["DriveDraft", "draft"]
 
 _SI = {"command": "rad/s", "velocity": "rad/s", "torque": "N m", "position": "rad"}
-_SI_LINEAR = {"command": "m/s", "velocity": "m/s", "torque": "N", "position": "m"}
 _CONSTANTS = {
-    "rated_torque": ("2.4", "N m at 100 %"),
-    "torque_constant": ("0.05", "N m/A"),
-    "torque_per_volt": ("0.24", "N m/V"),
-    "counts_per_turn": ("4096", "encoder counts per turn of the motor"),
+    "rated_torque": ("2.4", say("{N m} at 100 %")),
+    "torque_constant": ("0.05", say("{N m/A}")),
+    "torque_per_volt": ("0.24", say("{N m/V}")),
+    "counts_per_turn": ("4096", Text("encoder counts per turn of the motor")),
 }
 _COMMENT = 26  # column where comments begin
 
@@ -80,7 +80,7 @@ class _Draft:
         self.listing, self.guess, self.values = listing, guess, values
         self.fill: list[str] = []
         self.units = {channel: column.unit for channel, column in guess.channels.items()}
-        self.linear = any(_is_linear(channel, unit) for channel, unit in self.units.items())
+        self.axis = "linear" if any(_is_linear(channel, unit) for channel, unit in self.units.items()) else "rotary"
         torque = guess.channels.get("torque")
         self.torque_is = None if torque is None else kind_of_torque((torque.name, *torque.names))
         self.dt = (
@@ -107,9 +107,9 @@ class _Draft:
         position, velocity = (self.values.get(held[channel].name) for channel in ("position", "velocity"))
         if size is None or position is None or velocity is None or len(position) != len(velocity):
             return
-        unit = unit_from_position(velocity, position * size, self.dt, self.linear)
-        if unit is not None:
-            self.compared["velocity"] = unit, "position"
+        found = unit_from_position(velocity, position * size, self.dt, self.axis == "linear")
+        if found is not None:
+            self.compared["velocity"] = found, "position"
 
     def _compare_command(self) -> None:
         """The unit of the command by comparison with the velocity, which follows it."""
@@ -122,9 +122,9 @@ class _Draft:
             return
         if not (np.isfinite(command).all() and np.isfinite(velocity).all()):
             return
-        unit = unit_from_velocity(command, velocity * size, self.linear)
-        if unit is not None:
-            self.compared["command"] = unit, "velocity"
+        found = unit_from_velocity(command, velocity * size, self.axis == "linear")
+        if found is not None:
+            self.compared["command"] = found, "velocity"
 
     def done(self) -> DriveDraft:
         top, columns, units = self._top(), self._columns(), self._units()
@@ -146,8 +146,8 @@ class _Draft:
     def _top(self) -> list[str]:
         lines = [
             _line(
-                'axis = "linear"' if self.linear else 'axis = "rotary"',
-                'or "rotary"' if self.linear else 'or "linear": m, m/s, N, kg',
+                f'axis = "{self.axis}"',
+                'or "linear": m, m/s, N, kg' if self.axis == "rotary" else 'or "rotary"',
             )
         ]
         time = self.guess.time
@@ -162,17 +162,21 @@ class _Draft:
         else:
             source = f"from the column {_quoted(time.name)}" if time is not None else "as the file states"
             lines.append(_line(f"# dt = {self.dt:.9g}", f"s, {source}; needed for logs without it, and for gaident experiment"))
-        for name in dict.fromkeys(needed_constant(channel, unit) for channel, unit in self.units.items() if unit):
+        for name in dict.fromkeys(needed_constant(channel, stated) for channel, stated in self.units.items() if stated):
             if name is not None:
                 value, meaning = _CONSTANTS[name]
-                which = next(ch for ch, unit in self.units.items() if unit and needed_constant(ch, unit) == name)
-                lines.append(self._todo(f"# {name} = {value}", name, f"{meaning}; the {which} is logged in {self.units[which]}"))
+                which = next(c for c, stated in self.units.items() if stated and needed_constant(c, stated) == name)
+                lines.append(
+                    self._todo(
+                        f"# {name} = {value}", name, f"{said(meaning, self.axis)}; the {which} is logged in {self.units[which]}"
+                    )
+                )
         if "torque" in self.guess.channels:
-            meaning = '"commanded": by the controller; "measured": a current times a constant'
+            kinds = '"commanded": by the controller; "measured": a current times a constant'
             if self.torque_is is not None:
-                lines.append(_line(f"torque_is = {_quoted(self.torque_is)}", f"as its column's name says; {meaning}"))
+                lines.append(_line(f"torque_is = {_quoted(self.torque_is)}", f"as its column's name says; {kinds}"))
             else:
-                lines.append(self._todo('# torque_is = "measured"', "torque_is", f"{meaning}; commanded is taken"))
+                lines.append(self._todo('# torque_is = "measured"', "torque_is", f"{kinds}; commanded is taken"))
         lines.append(
             _line("# gear_ratio = 10.0", 'turns of the motor per turn of the load, with load_side = ["position"], what was')
         )
@@ -203,23 +207,20 @@ class _Draft:
             lines.append(self._todo('# command = "..."', "command", text) if needed else _line('# command = "..."', text))
         if "torque" not in self.guess.channels:
             needed = "command" not in self.guess.channels
-            text = f"the controller's torque (or current), for open loop{others}"
+            text = f"the controller's {word('torque', self.axis)} (or current), for open loop{others}"
             lines.append(self._todo('# torque = "..."', "torque", text) if needed else _line('# torque = "..."', text))
         return lines
 
     def _units(self) -> list[str]:
         lines = []
-        si = _SI_LINEAR if self.linear else _SI
+        si = {channel: unit(rotary, self.axis) for channel, rotary in _SI.items()}
         for channel in self.guess.channels:
-            unit = self.units[channel]
-            if unit is not None and _factor(channel, unit) is None:
-                lines.append(
-                    self._todo(
-                        f'# {channel} = "{si[channel]}"', f"units.{channel}", f"the log says {_quoted(unit)}, which is not known"
-                    )
-                )
-            elif unit is not None:
-                lines.append(_line(f"{channel} = {_quoted(unit)}", "as the log says"))
+            stated = self.units[channel]
+            if stated is not None and _factor(channel, stated) is None:
+                text = f"the log says {_quoted(stated)}, which is not known"
+                lines.append(self._todo(f'# {channel} = "{si[channel]}"', f"units.{channel}", text))
+            elif stated is not None:
+                lines.append(_line(f"{channel} = {_quoted(stated)}", "as the log says"))
             elif channel in self.compared:
                 known, other = self.compared[channel]
                 lines.append(_line(f"{channel} = {_quoted(known)}", f"by comparison with the {other}"))
@@ -235,38 +236,35 @@ class _Draft:
         return lines
 
     def _controller(self) -> list[str]:
-        unit = "N m s/rad", "N m/rad"
-        if self.linear:
-            unit = "N s/m", "N/m"
         text = "as set in the drive"
         if "torque" in self.guess.channels:
             text += '; or loop = "open"'
         mark = self._todo if "command" in self.guess.channels else lambda line, _, comment: _line(line, comment)
+        torque = word("torque", self.axis)
         return [
             "[controller]",
-            mark("# kp = 0.0232", "controller.kp", f"{unit[0]}; proportional gain {text}"),
-            mark("# ki = 1.367", "controller.ki", f"{unit[1]}; integral gain"),
-            _line('# loop = "sampled"', 'a digital drive; or "continuous"; or "open": the torque drives the model'),
+            mark("# kp = 0.0232", "controller.kp", f"{unit('N m s/rad', self.axis)}; proportional gain {text}"),
+            mark("# ki = 1.367", "controller.ki", f"{unit('N m/rad', self.axis)}; integral gain"),
+            _line('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model'),
             _line("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
         ]
 
     def _space(self) -> list[str]:
         return [
             "[space]                   # where to look, if you know; what is not given is derived from the data",
-            _line("# inertia = [1e-4, 5e-3]", "total mass, kg" if self.linear else "total inertia at the motor, kg m^2"),
+            _line("# inertia = [1e-4, 5e-3]", said(Text("total inertia at the motor, kg m^2", "total mass, kg"), self.axis)),
             _line("# resonance_hz = [5, 200]", "where the mechanism may resonate"),
         ]
 
     def _limits(self) -> list[str]:
         lines = ["[limits]                  # what an experiment may do, for `gaident experiment`"]
-        for name, channels, unit in (("speed", ("velocity", "command"), "rad/s"), ("torque", ("torque",), "N m")):
+        for name, channels, rotary in (("speed", ("velocity", "command"), "rad/s"), ("torque", ("torque",), "N m")):
             largest = self._largest(channels)
             if largest is None:
-                lines.append(_line(f"# {name} = 1.0", f"{'m/s' if self.linear and name == 'speed' else unit}"))
+                lines.append(_line(f"# {name} = 1.0", unit(rotary, self.axis)))
             else:
-                text = f"{_SI_LINEAR[channels[0]] if self.linear else unit}; the largest of this log"
-                lines.append(_line(f"# {name} = {largest:.3g}", text))
-        lines.append(_line("# travel = 100.0", "m" if self.linear else "rad; left out: it may turn freely"))
+                lines.append(_line(f"# {name} = {largest:.3g}", f"{unit(rotary, self.axis)}; the largest of this log"))
+        lines.append(_line("# travel = 100.0", said(Text("rad; left out: it may turn freely", "m"), self.axis)))
         lines.append(_line("# duration = 5.0", "s"))
         return lines
 

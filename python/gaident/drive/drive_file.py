@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from gaident.axis import AXES
 from gaident.checks import known_keys, one_of, real_number
 from gaident.control.pi import PI
 from gaident.data.readers import read
@@ -20,7 +21,6 @@ from gaident.errors import ControllerError, ReadError, SettingsError, SpaceError
 from gaident.identification.space import derive_space
 from gaident.models.search_space import SearchSpace
 from gaident.results.experiment import Limits
-from gaident.show.wording import AXES
 
 __all__ = ["COLUMNS", "KEYS", "Drive", "axes_in", "read_drive_file", "unfilled_of"]
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import say
 from gaident.control.filtering import recursion
 from gaident.control.pi import PI
 from gaident.errors import ModelError
@@ -106,7 +107,7 @@ def steady_covariance(A: Complex, H: Complex, Q: Complex) -> Complex:
     P: Complex = steady_covariances(A[None], H, Q[None])[0]
     if not np.all(np.isfinite(P)):
         raise ModelError(
-            "a missing torque does not show in this model's velocity: it has a zero at 0, or a pole that no torque moves"
+            say("a missing {torque} does not show in this model's velocity: it has a zero at 0, or a pole that no {torque} moves")
         )
     return P
 

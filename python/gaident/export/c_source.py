@@ -19,6 +19,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from gaident.axis import Text, checked_axis, said, say, velocity_unit
 from gaident.checks import real_number
 from gaident.control import core
 from gaident.control.pi import PI
@@ -35,21 +36,28 @@ FINEST = 16  # substeps that the core takes at most by itself
 
 
 def write_c(
-    model: Model, path: str | os.PathLike[str] | None, dt: float, controller: PI | None, name: str | None, substeps: int | None
+    model: Model,
+    path: str | os.PathLike[str] | None,
+    dt: float,
+    controller: PI | None,
+    name: str | None,
+    substeps: int | None,
+    axis: str = "rotary",
 ) -> str:
     """Writes the file, where a path is given, and returns its text; see `Model.to_c`."""
     if name is None:
         name = re.sub(r"\W", "_", Path(path).stem) if path is not None else "drive"
         name = f"drive_{name}" if not name or name[0].isdigit() else name
-    text = c_source(model, dt, controller, name, substeps)
+    text = c_source(model, dt, controller, name, substeps, axis)
     if path is not None:
         write_whole(path, text.encode())
     return text
 
 
-def c_source(model: Model, dt: float, controller: PI | None, name: str, substeps: int | None) -> str:
+def c_source(model: Model, dt: float, controller: PI | None, name: str, substeps: int | None, axis: str = "rotary") -> str:
     """The text of the file; `name` begins every name that it declares. Raises ModelError where it cannot be written."""
     _checked(model, dt, controller, name, substeps)
+    checked_axis(axis)
     steps = substeps or (FINEST if any(e.name in TURNING for e in model.effects) else 0)
     try:
         found: dict[str, Any] = core.recurrence(model.core(), dt, controller, steps, 0.0)
@@ -61,7 +69,7 @@ def c_source(model: Model, dt: float, controller: PI | None, name: str, substeps
             f"with effects ({names}) the continuous loop is the difference of two simulations, which makes no recurrence for a "
             'controller: use PI(..., loop="sampled"), or controller=None for the drive alone'
         )
-    return _file(model, dt, controller, name, found)
+    return _file(model, dt, controller, name, found, axis)
 
 
 def _checked(model: Model, dt: float, controller: PI | None, name: str, substeps: int | None) -> None:
@@ -126,25 +134,27 @@ def _runtime(file: str) -> str:
     return files("gaident.export").joinpath(file).read_text(encoding="utf-8").strip("\n")
 
 
-def _file(model: Model, dt: float, controller: PI | None, name: str, found: dict[str, Any]) -> str:
+def _file(model: Model, dt: float, controller: PI | None, name: str, found: dict[str, Any], axis: str) -> str:
+    def in_units(text: str) -> str:
+        return said(say(text), axis)
 
     table, length = _table(dt, controller, name, found)
-    angle = ["    double angle; /* rad, of the motor, from 0 */"] if found["substeps"] else []
-    drive = "command [rad/s]" if controller is not None else "torque [N m]"
+    angle = [in_units("    double angle; /* {rad}, of the motor, from 0 */")] if found["substeps"] else []
+    drive = in_units("command [{rad/s}]" if controller is not None else "{torque} [{N m}]")
     return "\n".join(
         [
-            *_head(model, dt, controller, name, version(), drive),
+            *_head(model, dt, controller, name, version(), drive, axis),
             f"#ifndef {name.upper()}_DECLARED",
             f"#define {name.upper()}_DECLARED",
             "",
             _runtime("runtime.h"),
             "",
             "typedef struct {",
-            "    double velocity; /* rad/s, as the sensor shows it */",
-            "    double torque; /* N m, as the controller issues it */",
+            in_units("    double velocity; /* {rad/s}, as the sensor shows it */"),
+            in_units("    double torque; /* {N m}, as the controller issues it */"),
             *angle,
             "    gaident_memory memory;",
-            f"    double issued[{length}]; /* N m, torques on their way */",
+            f"    double issued[{length}]; {in_units('/* {N m}, {torques} on their way */')}",
             f"}} {name}_state;",
             "",
             f"void {name}_reset({name}_state *s);",
@@ -174,12 +184,16 @@ def _file(model: Model, dt: float, controller: PI | None, name: str, found: dict
     )
 
 
-def _head(model: Model, dt: float, controller: PI | None, name: str, version: str, drive: str) -> list[str]:
+def _head(model: Model, dt: float, controller: PI | None, name: str, version: str, drive: str, axis: str) -> list[str]:
     loop = "the drive alone" if controller is None else f"{controller.loop} loop, kp {controller.kp:g}, ki {controller.ki:g}"
+    units = Text(
+        "SI units of a rotary axis; a linear axis reads m for rad and N for N m.",
+        "SI units of a linear axis; where the runtime below says rad and N m, read m and N.",
+    )
     lines = [
-        f"/* {name}: {drive} to motor velocity [rad/s], every {_number(dt)} s ({loop}).",
+        f"/* {name}: {drive} to motor velocity [{velocity_unit(axis)}], every {_number(dt)} s ({loop}).",
         " *",
-        " * SI units of a rotary axis; a linear axis reads m for rad and N for N m.",
+        " * " + said(units, axis),
         f" * Written by gaident {version}. C99, standard library only.",
         " *",
         f" *   gain  {_number(model.gain)}",

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import TORQUE
+from gaident.axis import say
 from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_torque
 from gaident.data.record import Record
@@ -70,8 +71,10 @@ def measured_response(rec: Record, controller: PI | None = None) -> FrequencyRes
     """
     if controller is not None and (rec.command is None or _constant(rec.command)):
         raise RecordError(
-            "the command of this loop never changes: torque and velocity then show minus the inverse of the controller as much "
-            "as the drive; use a record whose command changes after its start"
+            say(
+                "the command of this loop never changes: {torque} and velocity then show minus the inverse of the controller as "
+                "much as the drive; use a record whose command changes after its start"
+            )
         )
     torque = rec.torque
     if torque is None:
@@ -79,7 +82,8 @@ def measured_response(rec: Record, controller: PI | None = None) -> FrequencyRes
             raise RecordError(f"the record has no torque, and no controller to make it from: give {TORQUE} or PI(...)")
         torque = pi_torque(rec.command, rec.velocity, rec.dt, controller)
     if _constant(torque):
-        raise RecordError("the torque never changes, so that it excites no frequency; use a record whose torque changes")
+        text = "the {torque} never changes, so that it excites no frequency; use a record whose {torque} changes"
+        raise RecordError(say(text))
     return _estimate(torque, rec.velocity, rec.command, rec.dt)
 
 

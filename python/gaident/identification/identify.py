@@ -24,6 +24,7 @@ from gaident.identification.notes import record_notes, warnings_of
 from gaident.identification.parts import search_parts
 from gaident.identification.selection import MARGIN, Candidate
 from gaident.identification.space import derive_space
+from gaident.messages import Message
 from gaident.models.mechanics import mechanics_from_model
 from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
@@ -201,10 +202,11 @@ class _Work:
         def report(done: int, best: float, species: int, leading: tuple[int, int]) -> None:
             assert progress is not None
             fraction = done / (done + usual) if self.settings.species else done / total
-            which = (
-                "" if species == 0 else f", {species} species" if leading[0] < 0 else f", species {leading} of {species} leads"
-            )
-            progress(min(1.0, fraction), f"generation {done}, best fitness {best:.4g}{which}")
+            which = short = "" if species == 0 else f", {species} species"
+            if species and leading[0] >= 0:
+                which, short = f", species {leading} of {species} leads", f", ({leading[0]},{leading[1]}) of {species}"
+            text = f"generation {done}, best fitness {best:.4g}{which}"
+            progress(min(1.0, fraction), Message(text, f"gen. {done}, best {best:.4g}{short}"))
 
         return self.searched.search(
             ranges=self.ranges,

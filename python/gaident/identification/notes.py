@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from gaident.axis import Text, say
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.identification.selection import MARGIN
@@ -66,23 +67,25 @@ def _shaft_notes(mechanics: OneMass | TwoMass) -> list[str]:
     return [f"The mechanics without shaft damping contradict the model by {100 * found:.2g} +- {100 * std:.2g} %: {remedy}."]
 
 
-def open_loop_notes(records: Sequence[Record], controller: PI | None) -> list[str]:
+def open_loop_notes(records: Sequence[Record], controller: PI | None) -> list[Text]:
     """A sentence where a record's torque is that of a loop, u = C (r - w - noise): no input that is independent of the noise."""
     if controller is not None or all(rec.command is None for rec in records):
         return []
     return [
-        "The log has a command, but no gains were given: its torque drives the model, and noise that goes through the loop "
-        "biases the result; give the gains of the controller."
+        say(
+            "The log has a command, but no gains were given: its {torque} drives the model, and noise that goes through the loop "
+            "biases the result; give the gains of the controller."
+        )
     ]
 
 
-def record_notes(records: Sequence[Record], controller: PI | None, initial_state: str) -> list[str]:
+def record_notes(records: Sequence[Record], controller: PI | None, initial_state: str) -> list[Text]:
     """What is doubtful about the records themselves: their input, and how they begin."""
     begun = [n for r in records if (n := doubtful_start(r, controller))] if initial_state == "auto" else []
     return [*reading_notes(records), *open_loop_notes(records, controller), *begun]
 
 
-def reading_notes(records: Sequence[Record]) -> list[str]:
+def reading_notes(records: Sequence[Record]) -> list[Text]:
     """What was noticed when the logs were read, each sentence once, with the name of its record where there are several."""
     told = ((f"{r.name}: " if len(records) > 1 and r.name else "", note) for r in records for note in r.notes)
-    return list(dict.fromkeys(f"{name}{note}" for name, note in told))
+    return [Text(sentence) for sentence in dict.fromkeys(f"{name}{note}" for name, note in told)]

@@ -15,6 +15,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from gaident import _core
+from gaident.axis import Text, say
 from gaident.checks import known_keys, one_of, real_number
 from gaident.errors import ModelError
 from gaident.models.own_effects import OWN, PLACES, Function, Own, Parameter, Signals, checked
@@ -43,6 +44,8 @@ class Row(NamedTuple):
         What the parameters have to meet among themselves; empty if nothing.
     own : bool
         Whether it is user-defined, registered from Python.
+    says : Text
+        The meaning without what the table says after it, for sentences.
 
     See Also
     --------
@@ -57,6 +60,7 @@ class Row(NamedTuple):
     needs_two_masses: bool
     relation: str  # what the parameters have to meet among themselves, empty if nothing
     own: bool = False  # registered from Python
+    says: Text = Text("")  # the meaning without what the table says after it, for sentences
 
     def to_dict(self) -> dict[str, Any]:
         """Return the row for JSON."""
@@ -95,8 +99,10 @@ class Table(tuple[Row, ...]):
 @lru_cache(maxsize=1)
 def _built_in() -> tuple[Row, ...]:
     rows = []
-    for name, place, meaning, parameters, simulated, two, relation in _core.effect_table():
-        rows.append(Row(name, place, tuple(Parameter(*p) for p in parameters), meaning, simulated, two, relation))
+    for name, place, meaning, parameters, simulated, two, relation, remark in _core.effect_table():
+        says = say(meaning)
+        whole = say("{}; {}", says, say(remark)) if remark else says
+        rows.append(Row(name, place, tuple(Parameter(*p) for p in parameters), whole, simulated, two, relation, says=says))
     return tuple(rows)
 
 
@@ -116,7 +122,10 @@ def table() -> Table:
     >>> row.place, [(p.name, p.unit, p.bounds) for p in row.parameters]
     ('shaft', [('torque', 'N m', '>= 0')])
     """
-    own = (Row(o.name, PLACES[o.acts], o.parameters, o.meaning, True, False, "", own=True) for o in OWN.values())
+    own = (
+        Row(o.name, PLACES[o.acts], o.parameters, o.meaning, True, False, "", own=True, says=Text(o.meaning))
+        for o in OWN.values()
+    )
     return Table((*_built_in(), *own))
 
 

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gaident.axis import Text, say, unit_text
 from gaident.checks import known_keys, one_of, real_number
 from gaident.errors import ModelError
 from gaident.models import two_mass
@@ -68,7 +69,7 @@ class OneMass:
         return _one_mass(model, None)
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Text, ...]:
         """What is not physical, one sentence each; a damping may be negative by two standard deviations."""
         return _notes(self, ("J",), ("D",), 0.0)
 
@@ -206,7 +207,7 @@ class TwoMass:
         return _root(self.KG / self.JL + self.KG / self.JM) if self.JL and self.JM else float("nan")
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Text, ...]:
         """What is not physical, one sentence each; a damping may be negative by two standard deviations."""
         rounding = 1e-9 * abs(self.JM * self.KG) ** 0.5
         return _notes(self, ("JM", "JL", "KG"), ("DM", "DL", "DG"), rounding)
@@ -330,14 +331,15 @@ def _check(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str,
     object.__setattr__(drive, "std", dict(drive.std))
 
 
-def _notes(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str, ...], rounding: float) -> tuple[str, ...]:
+def _notes(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str, ...], rounding: float) -> tuple[Text, ...]:
     found = []
     for name in positive + not_negative:
-        value, text = getattr(drive, name), f"{name} = {getattr(drive, name):.4g} {drive.UNITS[name]}"
+        value = getattr(drive, name)
+        text = say("{} = {:.4g} {}", name, value, unit_text(drive.UNITS[name]))
         if name in positive and value <= 0.0:
-            found.append(f"{text} is not positive")
+            found.append(say("{} is not positive", text))
         elif name in not_negative and value < -max(2.0 * drive.std.get(name, 0.0), rounding):
-            found.append(f"{text} is negative")
+            found.append(say("{} is negative", text))
     return tuple(found)
 
 

@@ -302,6 +302,7 @@ class Model:
         *,
         name: str | None = None,
         substeps: int | None = None,
+        axis: str = "rotary",
     ) -> str:
         """Write the model as one C99 file without dependencies, a recurrence of fixed step.
 
@@ -321,6 +322,8 @@ class Model:
             Beginning of every C name; None: that of the file.
         substeps : int, optional
             Steps per sample of a model with effects; None: as many as it needs.
+        axis : str, optional
+            "rotary", or "linear" for units of m and N in the file's comments.
 
         Returns
         -------
@@ -330,9 +333,12 @@ class Model:
         Raises
         ------
         ModelError
-            For user-defined effects, effects in the continuous loop, p = 0 outside it, and a dt, name or substeps that are none.
+            For user-defined effects, effects in the continuous loop, p = 0 outside it,
+            and a dt, name or substeps that are none.
+        SettingsError
+            For another axis.
         """
-        text: str = provided("write_c")(self, path, dt, controller, name, substeps)
+        text: str = provided("write_c")(self, path, dt, controller, name, substeps, axis)
         return text
 
     def to_dict(self) -> dict[str, Any]:

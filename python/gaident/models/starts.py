@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, say
 from gaident.control.pi import PI
 from gaident.data.record import Record
 
@@ -56,16 +57,16 @@ def starts_moving(rec: Record, controller: PI | None) -> bool:
     return _first_is_motion(rec, controller) and not _constant_input(rec, controller)
 
 
-def doubtful_start(rec: Record, controller: PI | None) -> str | None:
+def doubtful_start(rec: Record, controller: PI | None) -> Text | None:
     """A sentence where a record's input is constant and its first velocity is not that of rest."""
     if not (_constant_input(rec, controller) and _first_is_motion(rec, controller)):
         return None
     name = f"Record {rec.name}" if rec.name else "The record"
-    return (
-        f"{name} starts at {rec.velocity[0]:.4g} rad/s while its input never changes: taken as a step from rest at its "
-        "first sample. If the step came earlier, give the record from before it; if the drive is not a digital one, "
-        "give its loop "
-        "as continuous."
+    return say(
+        "{} starts at {:.4g} {rad/s} while its input never changes: taken as a step from rest at its first sample. If the step "
+        "came earlier, give the record from before it; if the drive is not a digital one, give its loop as continuous.",
+        name,
+        rec.velocity[0],
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from gaident.axis import checked_axis, said
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.explain.evidence import velocity_curve
@@ -15,7 +16,6 @@ from gaident.reporting.runs import run_of
 from gaident.results.diagnosis import Diagnosis
 from gaident.show import plots, response_plots
 from gaident.show.diagnosis_plots import plot_evidence
-from gaident.show.wording import unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,11 +25,11 @@ __all__ = ["plot_bode", "plot_diagnosis"]
 
 def plot_diagnosis(dia: Diagnosis, records: Sequence[Record], axis: str = "rotary") -> Figure:
     """Six panels of the longest record; axis="linear" for m and N. Raises SettingsError for another axis."""
-    unit("N m", axis)
+    checked_axis(axis)
     rec = max(records, key=len)
     run = run_of(dia, rec)
     if run.dhat is None or run.torque is None:
-        raise GaidentError(f"there is no picture of {rec.name or 'the record'}: {' '.join(run.notes)}")
+        raise GaidentError(f"there is no picture of {rec.name or 'the record'}: {' '.join(said(n, axis) for n in run.notes)}")
     return plot_evidence(
         run.time,
         run.measured,

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import checked_axis, message_of
 from gaident.data.record import Record
 from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.errors import GaidentError
@@ -19,7 +20,6 @@ from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.show.report.page import page
 from gaident.show.report.views import View
-from gaident.show.wording import unit
 from gaident.version import version
 
 __all__ = ["report", "report_page"]
@@ -91,7 +91,7 @@ def report_page(
 
 def view_of(result: Diagnosis | Identification, records: Records, validation: Records, axis: str) -> View:
     """What a page shows beside the result: the records with what the models make of them."""
-    unit("N m", axis)
+    checked_axis(axis)
     if not isinstance(result, Diagnosis | Identification):
         raise GaidentError(f"result is {type(result).__name__}: give a Diagnosis or an Identification")
     given = _records(records, result.records, "records")
@@ -101,7 +101,7 @@ def view_of(result: Diagnosis | Identification, records: Records, validation: Re
     fitted = [rec for rec in given if rec.digest in result.digests] or list(given)
     longest = max(fitted, key=len, default=None)
     curve = response = None
-    missing = ""
+    missing: str = ""
     if longest is not None:
         if isinstance(result, Diagnosis):
             curve = velocity_curve(result, float(longest.velocity.min()), float(longest.velocity.max()))
@@ -111,7 +111,7 @@ def view_of(result: Diagnosis | Identification, records: Records, validation: Re
             used = result.as_used(longest) if isinstance(result, Diagnosis) else longest
             response = response_of(used, result.model, result.controller)
         except GaidentError as error:
-            missing = str(error)
+            missing = message_of(error)
     return View(tuple(runs), curve, response, missing, axis, _made_with())
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import message_of, say
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.experiments.excitation import position_of
@@ -53,7 +54,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
         missing = missing_torque(linear, cleaned(rec, hit), controller, torque)
         dhat, std = missing.dhat, float(np.median(missing.std))
     except GaidentError as error:
-        notes.append(f"The missing torque cannot be worked out: {error}")
+        notes.append(say("The missing {torque} cannot be worked out: {}", message_of(error)))
     return Run(
         name=rec.name,
         digest=digest,

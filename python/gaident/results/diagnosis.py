@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from gaident.axis import linear_sentences, restored
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import GaidentError, check_schema
@@ -346,7 +347,12 @@ class Diagnosis:
             "regression_force_error": self.regression_force_error,
             "comparisons": [asdict(c) for c in self.comparisons],
             "force_reason": self.force_reason,
+            "linear_axis": linear_sentences(self._sentences()),
         }
+
+    def _sentences(self) -> list[str]:
+        """Everything that is said in words."""
+        return [*self.notes, *(f.evidence for f in self.findings), *self.not_testable.values(), *self.one_sided.values()]
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Diagnosis:
@@ -356,6 +362,7 @@ class Diagnosis:
         """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
         try:
+            linear = data.get("linear_axis", {})  # files of gaident 0.1.0 lack it: their sentences are those of a rotary axis
             return cls(
                 verdict=data["verdict"],
                 findings=tuple(
@@ -364,11 +371,12 @@ class Diagnosis:
                             **f,
                             "parameters": {n: Estimate(**e) for n, e in f["parameters"].items()},
                             "alternatives": tuple(f["alternatives"]),
+                            "evidence": restored(f["evidence"], linear),
                         }
                     )
                     for f in data["findings"]
                 ),
-                not_testable=data["not_testable"],
+                not_testable={effect: restored(why, linear) for effect, why in data["not_testable"].items()},
                 model=Model.from_dict(data["model"]),
                 before=Fitness(**data["before"]),
                 after=Fitness(**data["after"]),
@@ -378,7 +386,7 @@ class Diagnosis:
                 held_out=data["held_out"],
                 base_shift={n: (v[0], v[1]) for n, v in data["base_shift"].items()},
                 left=data["left"],
-                notes=tuple(data["notes"]),
+                notes=tuple(restored(note, linear) for note in data["notes"]),
                 identification=Identification.from_dict(data["identification"]),
                 controller=None if data["controller"] is None else PI.from_dict(data["controller"]),
                 seed=data["seed"],
@@ -394,8 +402,8 @@ class Diagnosis:
                 torque_logged=data.get("torque_logged", False),
                 loop_follows=data.get("loop_follows", True),
                 line=None if data.get("line") is None else (data["line"][0], data["line"][1]),
-                one_sided=data.get("one_sided", {}),
                 log_shifts=data.get("log_shifts", {}),
+                one_sided={effect: restored(sizes, linear) for effect, sizes in data.get("one_sided", {}).items()},
                 mechanics={n: Estimate(**e) for n, e in data.get("mechanics", {}).items()},
                 regression=None if data.get("regression") is None else InverseDynamics.from_dict(data["regression"]),
                 regression_force_error=data.get("regression_force_error"),

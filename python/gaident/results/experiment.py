@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import linear_sentences, restored
 from gaident.checks import real_number
 from gaident.control.pi import PI
 from gaident.data.record import Record
@@ -131,13 +132,15 @@ class Proposal:
             "separates": list(self.separates),
             "margin": self.margin,
             "reason": self.reason,
+            "linear_axis": linear_sentences([self.reason]),
         }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Proposal:
         """Return the proposal of what `to_dict` gave."""
         command = np.asarray(data["command"], dtype=np.float64)
-        return cls(command, float(data["dt"]), tuple(data["separates"]), float(data["margin"]), str(data["reason"]))
+        reason = restored(str(data["reason"]), data.get("linear_axis", {}))
+        return cls(command, float(data["dt"]), tuple(data["separates"]), float(data["margin"]), reason)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Proposal):

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, say
+
 __all__ = ["FrequencyResponse", "Responses"]
 
 Vector = NDArray[np.float64]
@@ -32,14 +34,15 @@ class FrequencyResponse:
     resolution: float
 
     @property
-    def sentence(self) -> str:
+    def sentence(self) -> Text:
         """How it was estimated and what to doubt."""
         how = f"{self.windows} half-overlapping windows, resolution {self.resolution:.2g} Hz"
         if self.instrument:
-            return f"Joint input-output estimate: cross spectra with the command, free of the loop's bias by noise; {how}."
-        return (
-            f"H1 estimate from torque to velocity; {how}. If a controller made this torque out of the noisy velocity, the "
-            "estimate is biased towards minus the inverse of the controller where the coherence is low."
+            return Text(f"Joint input-output estimate: cross spectra with the command, free of the loop's bias by noise; {how}.")
+        return say(
+            "H1 estimate from {torque} to velocity; {}. If a controller made this {torque} out of the noisy velocity, the "
+            "estimate is biased towards minus the inverse of the controller where the coherence is low.",
+            how,
         )
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import linear_sentences, restored
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import GaidentError, check_schema
@@ -277,6 +278,7 @@ class Identification:
             "samples": self.samples,
             "digests": list(self.digests),
             "initial_states": {d: list(s) for d, s in self.initial_states.items()},
+            "linear_axis": linear_sentences(self.warnings),
         }
 
     @classmethod
@@ -299,7 +301,7 @@ class Identification:
                 structures=tuple(Structure(**s) for s in data["structures"]),
                 trials=tuple(TrialOutcome(**{**t, "history": tuple(t["history"])}) for t in data["trials"]),
                 adequacy=Adequacy(**data["adequacy"]),
-                warnings=tuple(data["warnings"]),
+                warnings=tuple(restored(w, data.get("linear_axis", {})) for w in data["warnings"]),
                 space=SearchSpace.from_dict(data["space"]),
                 settings=Settings.from_dict(data["settings"]),
                 seed=data["seed"],

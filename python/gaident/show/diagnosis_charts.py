@@ -12,9 +12,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, said, say, turns, unit, velocity_unit, word
 from gaident.show.chart import Band, Chart, Mark, Panel, Trace, cloud, series
 from gaident.show.diagnosis_numbers import binned_mean, branches, order_lines, reversal_averages, spectrum
-from gaident.show.wording import unit, velocity_unit
 
 __all__ = [
     "Curve",
@@ -25,7 +25,6 @@ __all__ = [
     "missing_reversals",
     "residual_spectrum",
     "std_band",
-    "torque_word",
     "velocity_panel",
 ]
 
@@ -106,9 +105,9 @@ def missing_over_velocity(velocity: Vector, dhat: Vector, dt: float, std: float,
     if curve is not None:
         traces.append(Trace(curve[0], curve[1], curve[2], "effect", width=2.5))
     text = (
-        f"What must be added to the model's {torque_word(axis)} so that it moves as measured. A step at standstill is dry "
+        f"What must be added to the model's {word('torque', axis)} so that it moves as measured. A step at standstill is dry "
         "friction, a slope viscous friction, a hump beside standstill Stribeck friction, an even offset a load; a gap between "
-        "the two branches is an inertia that is not right, or a delay."
+        f"the two branches is {said(Text('an inertia', 'a mass'), axis)} that is not right, or a delay."
     )
     low, high = robust_limits(dhat)
     limits = (min(low, -2.6 * std), max(high, 2.6 * std))
@@ -129,14 +128,14 @@ def missing_orders(position: Vector, dhat: Vector, velocity: Vector, axis: str, 
     lines = order_lines(position if rotary else position * (math.tau / scale), dhat, velocity, top_order)
     name, y = "order [per turn]" if rotary else "lines [1/m]", f"amplitude [{unit('N m', axis)}]"
     text = (
-        f"Lines per {'turn' if rotary else 'metre'} of the missing {torque_word(axis)}, without what depends on the velocity "
+        f"Lines per {'turn' if rotary else 'metre'} of the missing {word('torque', axis)}, without what depends on the velocity "
         f"alone. {'Once per turn is an unbalance, whole multiples are cogging or the sensor.' if rotary else ''} Only what "
         "passes the dashed level is more than chance."
     )
     if not len(lines.order):
-        none = Panel(y, (), note=f"{lines.turns:.2g} turns travelled: too few")
+        none = Panel(y, (), note=said(say("{} travelled: too {}", turns(travel), Text("few", "little")), axis))
         return Chart("missing-orders", name, (none,), text, height=320)
-    reached = f"{lines.turns:.3g} turns travelled" if rotary else f"{travel:.3g} m travelled"
+    reached = f"{said(turns(travel, 3), axis)} travelled"
     trace = Trace(lines.order / scale, lines.amplitude, reached, "faster", width=1.0)
     level = Trace(lines.order / scale, lines.level, "1 % level of chance", "noise", dash="dash", width=1.8)
     marked: list[float] = []
@@ -153,18 +152,18 @@ def missing_orders(position: Vector, dhat: Vector, velocity: Vector, axis: str, 
 def missing_reversals(velocity: Vector, dhat: Vector, torque: Vector, dt: float, axis: str) -> Chart:
     """The average reversal, the new direction positive; without a trace, and with a note, where there is none."""
     found = reversal_averages(velocity, dhat, torque, dt)
-    ms = 1e3 * found.time
-    roles = {"small torque": "faster", "large torque": "linear", "all": "faster"}
+    ms, torque_word = 1e3 * found.time, word("torque", axis)
+    roles = {"small": "faster", "large": "linear", "all": "faster"}
     top, low = [], []
     for name, (mean, spread, w, count) in found.groups.items():
-        dash: Literal["solid", "dash"] = "dash" if name == "large torque" else "solid"
-        label = f"{name.replace('torque', torque_word(axis))}: {count} reversal{'s' * (count > 1)}"
+        dash: Literal["solid", "dash"] = "dash" if name == "large" else "solid"
+        label = f"{name if name == 'all' else f'{name} {torque_word}'}: {count} reversal{'s' * (count > 1)}"
         top.append(Trace(ms, mean, "", roles[name], "area", spread=spread))
         top.append(Trace(ms, mean, label, roles[name], width=1.8, dash=dash))
         low.append(Trace(ms, w, "", roles[name], dash=dash, width=1.5))
     text = (
         "The average reversal, the new direction positive. Dry friction jumps at 0; backlash leaves a spike that comes later the "
-        "slower the reversal; presliding friction turns round gradually."
+        "slower the reversal; presliding friction changes gradually."
     )
     upright = (Mark(0.0, ""),) if top else ()
     panels = (
@@ -189,9 +188,4 @@ def robust_limits(values: Vector) -> tuple[float, float]:
 
 def missing_label(axis: str) -> str:
     """Title of the axis of the missing torque."""
-    return f"missing {torque_word(axis)} [{unit('N m', axis)}]"
-
-
-def torque_word(axis: str) -> str:
-    """What drives the axis."""
-    return "torque" if axis == "rotary" else "force"
+    return f"missing {word('torque', axis)} [{unit('N m', axis)}]"

@@ -76,8 +76,8 @@ class OrderLines:
 class Reversals:
     """Averages over reversals, turned so that the new direction is positive; time [s] from the reversal, shape (n,).
 
-    Per group ("small torque", "large torque", or "all"): mean and standard deviation of torque and mean velocity, (n,) each,
-    and how many reversals. none: why there is no group, "" where there is one.
+    Per group ("small" and "large", by the torque around the reversal, or "all"): mean and standard deviation of torque and mean
+    velocity, (n,) each, and how many reversals. none: why there is no group, "" where there is one.
     """
 
     time: Vector
@@ -189,8 +189,8 @@ def reversal_averages(velocity: Vector, torque: Vector, drive_torque: Vector, dt
     sizes = [size for *_, size in found]
     split = math.sqrt(min(sizes) * max(sizes)) if found else 0.0
     several = len(found) >= 4 and max(sizes) > 1.5 * min(sizes)
-    for name in ("small torque", "large torque") if several else ("all",):
-        chosen = [(c, s) for c, s, size in found if not several or (size <= split) == (name == "small torque")]
+    for name in ("small", "large") if several else ("all",):
+        chosen = [(c, s) for c, s, size in found if not several or (size <= split) == (name == "small")]
         if chosen:
             d = np.array([s * torque[c - half : c + half + 1] for c, s in chosen])
             v = np.array([s * velocity[c - half : c + half + 1] for c, s in chosen])

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import word
 from gaident.show.chart import Chart, Panel
 from gaident.show.diagnosis_charts import (
     Curve,
@@ -19,7 +20,6 @@ from gaident.show.diagnosis_charts import (
     missing_over_velocity,
     missing_reversals,
     residual_spectrum,
-    torque_word,
     velocity_panel,
 )
 from gaident.show.draw import chart_figure, grid_figure
@@ -40,7 +40,7 @@ def plot_torque_velocity(
     std: of dhat [N m], drawn as the band that zero cannot be told from. curve: (velocity, torque, label) of a named effect.
     """
     chart = missing_over_velocity(velocity, dhat, dt, std or 0.0, curve, axis)
-    return chart_figure(chart, 7.5, 4.8, [f"Missing {torque_word(axis)} against velocity"])
+    return chart_figure(chart, 7.5, 4.8, [f"Missing {word('torque', axis)} against velocity"])
 
 
 def plot_orders(position: Vector, dhat: Vector, velocity: Vector, highest: float | None = None, axis: str = "rotary") -> Figure:
@@ -83,7 +83,7 @@ def plot_evidence(
     position [rad]; drive_torque, the controller's [N m]; noise_std [rad/s]; curve as in `plot_torque_velocity`; arrays (n,).
     """
     dt = float(time[1] - time[0])
-    missing = f"Missing {torque_word(axis)}"
+    missing = f"Missing {word('torque', axis)}"
     after = None if extended is None else measured - extended
     over_time, over_frequency = _residual(time, measured - simulated, noise_std, after, axis)
     charts = (
@@ -120,4 +120,4 @@ def _over_time(panel: Panel) -> Chart:
 
 
 def _lines_per(axis: str) -> str:
-    return f"Missing {torque_word(axis)}: lines per {'turn' if axis == 'rotary' else 'metre'}"
+    return f"Missing {word('torque', axis)}: lines per {'turn' if axis == 'rotary' else 'metre'}"

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import textwrap
 
+from gaident.axis import Text, identifier_words, said, say, unit, velocity_unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
-from gaident.show.wording import certainty, number, sentence, table, unit, velocity_unit, with_std
+from gaident.show.wording import certainty, number, table, with_std
 
 __all__ = [
     "TESTED_UP_TO",
@@ -28,11 +29,11 @@ __all__ = [
 
 WIDTH = 100
 TESTED_UP_TO = "Tested up to what these records asked for"
-LINEAR = {"N m s^2/rad^2": "N s^2/m^2", "N m/rad^3": "N/m^3", "rad/s": "m/s", "rad": "m"}
+NOT_OF_THE_AXIS = ("phase", "frequency", "zero_frequency")  # an angle within a period and angular frequencies: rad on any axis
 DRIVERS = {
     "velocity": "on the velocity",
     "position": "on the position",
-    "torque": "on the torque",
+    "torque": say("on the {torque}"),
     "command": "on the command",
     "time": "on time",
     "past": "on the path before (hysteresis, play, elasticity)",
@@ -42,7 +43,7 @@ DRIVERS = {
 def diagnosis_summary(dia: Diagnosis, axis: str = "rotary") -> str:
     """What is wrong, why, the gain, what could not be tested, what to measure next; no line break at the end.
 
-    dia: a Diagnosis, or anything with its attributes. axis: "rotary", or "linear" for units of m and N.
+    dia: a Diagnosis, or anything with its attributes. axis: "rotary", or "linear" for words and units of m and N.
     """
     sections = [
         _verdict(dia, axis),
@@ -81,7 +82,7 @@ def _verdict(dia: Diagnosis, axis: str) -> list[str]:
     head = " ".join(filter(None, (verdict_words(dia), left_words(dia, axis))))
     lines = [f"Verdict: {dia.verdict}", *_wrapped(head)]
     for note in dia.notes:
-        lines += _wrapped(sentence(note, axis))
+        lines += _wrapped(said(note, axis))
     return lines
 
 
@@ -89,12 +90,11 @@ def left_words(dia: Diagnosis, axis: str) -> str:
     """What the error that is left depends on; empty where nothing significant is left."""
     if dia.driver is None:
         return ""
-    text = f"What is left depends {DRIVERS[dia.driver]}"
+    like: Text | str = ""
     if dia.line is not None:
         frequency, amplitude = dia.line
-        kind = "torque" if axis == "rotary" else "force"
-        text += f": like a {kind} of {number(frequency, 3)} Hz and {number(amplitude, 2)} {unit('N m', axis)} at the motor"
-    return f"{text}."
+        like = say(": like a {torque} of {} Hz and {} {N m} at the motor", number(frequency, 3), number(amplitude, 2))
+    return said(say("What is left depends {}{}.", DRIVERS[dia.driver], like), axis)
 
 
 def verdict_words(dia: Diagnosis) -> str:
@@ -125,7 +125,7 @@ def _causes(dia: Diagnosis, axis: str) -> list[str]:
             continue
         lines.append(words(f.effect) + "".join(f", or {words(a)}" for a in f.alternatives))
         lines += table([parameter_row(n, e, axis) for n, e in f.parameters.items()], "    ")
-        lines += _wrapped(sentence(f.evidence, axis), "    ")
+        lines += _wrapped(said(f.evidence, axis), "    ")
         if f.p_value is not None:
             lines += _wrapped(chance_words(f, dia.bootstrap), "    ")
     return ["What was found", *(line if line.startswith(" ") else f"  {line}" for line in lines)] if lines else []
@@ -144,10 +144,10 @@ def parameter_row(name: str, e: Estimate, axis: str) -> tuple[str, str, str, str
     value, std, u = e.value, e.std, e.unit
     if axis == "linear" and u == "1/turn":  # a turn is 2 pi m
         value, std, u = value / math.tau, std / math.tau, "1/m"
-    elif axis == "linear" and name not in ("phase", "frequency", "zero_frequency"):
-        u = LINEAR.get(u) or unit(u, axis)
+    elif name not in NOT_OF_THE_AXIS:
+        u = unit(u, axis)
     remark = "at a bound" if e.at_bound else "" if e.identifiable else "not determined"
-    return words(name), with_std(value, std), "" if u == "1" else u, remark
+    return identifier_words(name, axis), with_std(value, std), "" if u == "1" else u, remark
 
 
 def _gain(dia: Diagnosis, axis: str) -> list[str]:
@@ -166,7 +166,7 @@ def _gain(dia: Diagnosis, axis: str) -> list[str]:
         text = "The simulated controller is not the drive's (see above): these figures include its errors."
         lines += _wrapped(text, "  ")
     if extended and dia.before.rmse > 0.0:
-        lines += _wrapped(sentence(fall_words(dia), axis), "  ")
+        lines += _wrapped(said(fall_words(dia), axis), "  ")
         steps = [f"{words(f.effect)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
         if len(steps) > 1:
             lines += _wrapped(f"One after the other, each of what was left before it: {', '.join(steps)}.", "  ")
@@ -198,24 +198,25 @@ def fall_words(dia: Diagnosis) -> str:
     fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)
     low, high = (100.0 * x for x in dia.gain_interval)
     if fall < -1.0:
-        why = (
-            "the simulated controller is not the drive's"
-            if not dia.loop_follows
-            else "the effects were found on the error of the model driven by the torque; closed over this controller (its gains, "
-            "rule and limits) or over other records they do not hold"
-        )
-        return f"The error of the velocity grows by {-fall:.0f} %: this comparison is not valid, {why}."
+        why = Text("the simulated controller is not the drive's")
+        if dia.loop_follows:
+            why = say(
+                "the effects were found on the error of the model driven by the {torque}; closed over this controller (its "
+                "gains, rule and limits) or over other records they do not hold"
+            )
+        return say("The error of the velocity grows by {:.0f} %: this comparison is not valid, {}.", -fall, why)
     if fall < 1.0:
         if dia.before.rmse < 1.2 * dia.before.noise_floor:
-            hidden = ": it is at the noise with and without"
+            hidden = Text(": it is at the noise with and without")
         elif dia.controller is None:
-            hidden = ""
+            hidden = Text("")
+        elif dia.torque_logged:
+            hidden = say(": the loop's integrator hides this effect in the velocity, the {torque} shows it")
         else:
-            hidden = ": the loop's integrator hides this effect in the velocity"
-            hidden += ", the torque shows it" if dia.torque_logged else ""
-        return f"The error of the velocity hardly changes ({-fall:+.1f} %){hidden}."
+            hidden = Text(": the loop's integrator hides this effect in the velocity")
+        return say("The error of the velocity hardly changes ({:+.1f} %){}.", -fall, hidden)
     interval = f" (95 % interval {low:.0f} to {high:.0f} %)" if math.isfinite(low) else ""
-    return f"The error falls by {fall:.0f} %{interval}."
+    return say("The error falls by {:.0f} %{}.", fall, interval)
 
 
 def _mechanics(dia: Diagnosis, axis: str) -> list[str]:
@@ -236,7 +237,7 @@ def _mechanics(dia: Diagnosis, axis: str) -> list[str]:
 
 def mechanical_name(name: str, axis: str) -> str:
     """A parameter of the mechanism as it is written; what belongs to the row above is indented."""
-    return "  its damping ratio" if name.endswith("_damping") else sentence(words(name), axis)
+    return "  its damping ratio" if name.endswith("_damping") else identifier_words(name, axis)
 
 
 def _base(dia: Diagnosis, axis: str) -> list[str]:
@@ -254,21 +255,21 @@ def _record(dia: Diagnosis, axis: str) -> list[str]:
     lines = []
     for f in dia.findings:
         if f.is_noise:
-            lines += _wrapped(f"{words(f.effect)}: {sentence(f.evidence, axis)}", "  ", "  ")
+            lines += _wrapped(f"{words(f.effect)}: {said(f.evidence, axis)}", "  ", "  ")
     return ["About the record", *lines] if lines else []
 
 
 def _untested(dia: Diagnosis, axis: str) -> list[str]:
     lines = []
     for effect, reason in dia.not_testable.items():
-        lines += _wrapped(f"{words(effect)}: {sentence(reason, axis)}", "  ", "  ")
+        lines += _wrapped(f"{words(effect)}: {said(reason, axis)}", "  ", "  ")
     return ["Not testable with this record", *lines] if lines else []
 
 
 def _tested_up_to(dia: Diagnosis, axis: str) -> list[str]:
     lines = []
     for effect, sizes in dia.one_sided.items():
-        lines += _wrapped(f"{words(effect)}: {sentence(sizes, axis)}", "  ", "  ")
+        lines += _wrapped(f"{words(effect)}: {said(sizes, axis)}", "  ", "  ")
     return [TESTED_UP_TO, *lines] if lines else []
 
 
@@ -277,15 +278,15 @@ def _next(dia: Diagnosis, axis: str) -> list[str]:
     if p is None:
         return []
     size = f"The command: {len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s."
-    return ["Next experiment", *_wrapped(sentence(next_words(dia, p), axis), "  "), f"  {size}"]
+    return ["Next experiment", *_wrapped(said(next_words(dia, p), axis), "  "), f"  {size}"]
 
 
-def next_words(dia: Diagnosis, p: Proposal) -> str:
+def next_words(dia: Diagnosis, p: Proposal) -> Text:
     """Why the experiment p comes next, what it tells apart and how surely."""
     margin = f", {certainty(p.margin)} ({p.margin:.0f} BIC units, 10 are enough)" if math.isfinite(p.margin) else ""
-    text = f"{p.reason} It tells {' from '.join(map(words, p.separates))}{margin}."
+    text = say("{} It tells {}{}.", p.reason, " from ".join(map(words, p.separates)), margin)
     rest = dict.fromkeys(a for f in dia.findings for a in f.alternatives if a not in p.separates)
-    return f"{text} It was not chosen for {' or '.join(map(words, rest))}." if rest else text
+    return say("{} It was not chosen for {}.", text, " or ".join(map(words, rest))) if rest else text
 
 
 def _how(dia: Diagnosis) -> list[str]:

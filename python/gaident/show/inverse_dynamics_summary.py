@@ -6,8 +6,9 @@ import textwrap
 from collections.abc import Mapping
 from typing import Protocol
 
+from gaident.axis import identifier_words, said, velocity_unit, word
 from gaident.results.estimate import Estimate
-from gaident.show.wording import number, sentence, table, velocity_unit, with_std
+from gaident.show.wording import number, table, with_std
 
 __all__ = ["inverse_dynamics_summary"]
 
@@ -67,13 +68,13 @@ def inverse_dynamics_summary(found: Regression) -> str:
 
 
 def _wrapped(text: str, axis: str) -> list[str]:
-    return textwrap.wrap(sentence(text, axis), WIDTH, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
+    return textwrap.wrap(said(text, axis), WIDTH, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
 
 
 def _parameters(found: Regression) -> list[str]:
     rows = [
         (
-            sentence(name.replace("_", " "), found.axis),
+            identifier_words(name, found.axis),
             with_std(e.value, e.std),
             e.unit,
             "" if e.identifiable else "not determined",
@@ -87,7 +88,7 @@ def _errors(found: Regression) -> list[str]:
     rows = [("in-sample", f"{number(100.0 * found.force_error, 3)} %")]
     held_out = number(100.0 * found.force_error_held_out, 3)
     rows.append((f"on {found.held_out}", "" if held_out == "-" else f"{held_out} %"))
-    return [sentence("Relative torque error", found.axis), *table(rows)]
+    return [f"Relative {word('torque', found.axis)} error", *table(rows)]
 
 
 def _method(found: Regression) -> list[str]:
@@ -106,12 +107,12 @@ def _method(found: Regression) -> list[str]:
 def _choice(found: Regression) -> list[str]:
     lines = []
     for terms, worse in found.rivals:
-        listed = ", ".join(name.replace("_", " ") for name in terms)
+        listed = ", ".join(identifier_words(name, found.axis) for name in terms)
         which = "worse" if worse > 0.0 else "better"
         lines += _wrapped(f"{listed}: {number(abs(worse), 2)} BIC units {which}", found.axis)
     lines = ["Other sets of terms within 10 BIC units", *lines] if lines else []
     if found.not_tried:
         lines += ["Not tried"]
         for text in found.not_tried:
-            lines += _wrapped(text.replace("_", " "), found.axis)
+            lines += _wrapped(text, found.axis)
     return lines

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import unit, velocity_unit, word
 from gaident.data.record import Record
 from gaident.models.model import Model
 from gaident.results.identification import Identification
 from gaident.show.draw import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, chart_figure, line, new_figure, tidy
 from gaident.show.search_charts import convergence_chart, roots_chart, structures_chart
-from gaident.show.wording import structure_words, unit, velocity_unit
+from gaident.show.wording import structure_words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,7 +61,7 @@ def plot_identification(idn: Identification, records: Sequence[Record], axis: st
     grid[0, 0].set_ylabel(f"velocity [{v}]")
     grid[1, 0].set_ylabel(f"residual [{v}]")
     if open_loop:
-        grid[2, 0].set_ylabel(f"{'torque' if axis == 'rotary' else 'force'} [{u}]")
+        grid[2, 0].set_ylabel(f"{word('torque', axis)} [{u}]")
     for ax in grid[:2, 0]:  # above the axes, where no line is covered
         ax.legend(
             loc="lower left",
@@ -128,12 +129,11 @@ def plot_bode(
         bottom.plot(f * scale, np.degrees(np.unwrap(np.angle(response))), **style)
     top.set_xscale("log")
     top.set_yscale("log")
-    u = unit("N m", axis)
-    top.set_ylabel(f"magnitude [{velocity_unit(axis)}/{'(N m)' if u == 'N m' else u}]")
+    top.set_ylabel(f"magnitude [{unit('rad/s/(N m)', axis)}]")
     bottom.set_ylabel("phase [deg]")
     bottom.set_xlabel("frequency [Hz]" if hz else "frequency [rad/s]")
     bottom.yaxis.set_major_locator(MultipleLocator(45.0))
-    top.set_title(f"{'Torque' if axis == 'rotary' else 'Force'} to velocity")
+    top.set_title(f"{word('Torque', axis)} to velocity")
     if labels is not None or len(listed) > 1:
         top.legend()
     tidy(fig)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import re
 import sys
 import time
 from collections.abc import Callable
@@ -11,14 +10,12 @@ from html import escape
 from types import TracebackType
 from typing import TextIO
 
+from gaident.messages import Message, shortest
+
 __all__ = ["Progress", "progress"]
 
 _QUIET = 0.3  # s of work before anything is drawn
 _FRACTION = 0.02  # of the work: before that no time left is told
-
-
-# What is said of a search in 80 columns: gen. 120, best 9.107e+05, (1,2) of 12
-_SHORT = (("generation ", "gen. "), ("best fitness ", "best "), (r"species \((\d+), (\d+)\) of (\d+) leads", r"(\1,\2) of \3"))
 
 
 class Progress:
@@ -45,7 +42,8 @@ class Progress:
             self.bar = _NotebookBar() if _in_notebook() else _TerminalBar(self.stream)
         done = min(max(fraction, 0.0), 1.0)
         left = passed * (1.0 - done) / done if done > _FRACTION else None
-        self.bar.update(done, message, "" if left is None else f"about {_clock(left)} left")
+        remains = "" if left is None else Message(f"about {_clock(left)} left", f"{_clock(left)} left")
+        self.bar.update(done, message, remains)
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None) -> None:
         if self.bar is not None:
@@ -77,9 +75,7 @@ class _TerminalBar:
         # Where the line is too short, rich would shorten bar, percentage and time too: the words give way, then the message.
         width = self.bar.console.width - self.taken
         if len(left) + len(message) > width:
-            left = left.removeprefix("about ")
-            for words, short in _SHORT:
-                message = re.sub(words, short, message)
+            left, message = shortest(left), shortest(message)
         room = max(0, width - len(left))
         shown = message if len(message) <= room else message[: max(0, room - 1)].rstrip() + "…"[:room]
         self.bar.update(self.task, completed=done, message=shown, left=left)

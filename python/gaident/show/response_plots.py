@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import said, unit, word
 from gaident.results.frequency import Responses
 from gaident.show.chart import Chart, Panel, Trace
 from gaident.show.draw import chart_figure
-from gaident.show.wording import unit, velocity_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ def phase_line(response: NDArray[np.complex128]) -> NDArray[np.float64]:
 def plot_response(responses: Responses, hz: bool = False, axis: str = "rotary", title: str = "") -> Figure:
     """Magnitude, phase and coherence from torque to velocity as a Figure, see `response_chart`."""
     way = "joint input-output, by the command" if responses.measured.instrument else "H1: biased where a loop's noise is large"
-    head = title or f"{'Torque' if axis == 'rotary' else 'Force'} to velocity ({way})"
+    head = title or f"{word('Torque', axis)} to velocity ({way})"
     return chart_figure(response_chart(responses, axis, hz), 7.5, 6.6, [head])
 
 
@@ -51,15 +51,14 @@ def response_chart(r: Responses, axis: str, hz: bool = True) -> Chart:
     size.append(Trace(scale * r.fine, np.abs(r.model), "its linear part, exact", "linear", width=1.0, dash="dash"))
     phase.append(Trace(scale * r.fine, phase_line(r.model), "", "linear", width=1.0, dash="dash"))
     chance = Trace(scale * m.frequency, m.threshold, "reached by chance, 1 of 20", "noise", dash="dash")
-    per = unit("N m", axis)
     none = "" if len(f) else "the record shows nothing here: its coherence is nowhere above chance"
     panels = (
-        Panel(f"magnitude [{velocity_unit(axis)}/{'(N m)' if ' ' in per else per}]", tuple(size), log=True, height=1.6),
+        Panel(f"magnitude [{unit('rad/s/(N m)', axis)}]", tuple(size), log=True, height=1.6),
         Panel("phase [deg]", tuple(phase), limits=(-200.0, 200.0), ticks=(-180.0, -90.0, 0.0, 90.0, 180.0), note=none),
         Panel("coherence", (Trace(scale * m.frequency, m.coherence, "", "faster"), chance), limits=(0.0, 1.05), height=0.7),
     )
     hidden = int(np.sum(~sure))
-    text = f"{m.sentence} Bars: 2 standard deviations."
+    text = f"{said(m.sentence, axis)} Bars: 2 standard deviations."
     if hidden:
         text += f" {hidden} of {len(sure)} points are not drawn, as their coherence is what chance gives (dashed)."
     text += " Friction and other nonlinear effects bend the record's response; the model estimated the same way has them too."

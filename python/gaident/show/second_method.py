@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from gaident.axis import said, say, unit
 from gaident.results.diagnosis import Diagnosis
-from gaident.show.wording import number, sentence, unit, with_std
+from gaident.show.wording import number, with_std
 
 __all__ = ["comparison_rows", "force_rows", "force_words", "method_words"]
 
@@ -23,10 +24,10 @@ def force_rows(dia: Diagnosis, axis: str) -> list[tuple[str, str, str]]:
 
 def force_words(dia: Diagnosis, axis: str) -> str:
     """What the force error is, and where it is the figure to go by."""
-    text = "The logged torque minus the torque that the model needs for the measured motion."
+    text = say("The logged {torque} minus the {torque} that the model needs for the measured motion.")
     if dia.force_reason:
-        text += f" It is the figure to go by here: {dia.force_reason}."
-    return sentence(text, axis)
+        text = say("{} It is the figure to go by here: {}.", text, dia.force_reason)
+    return said(text, axis)
 
 
 def comparison_rows(dia: Diagnosis, axis: str) -> list[tuple[str, str, str, str, str]]:
@@ -35,7 +36,7 @@ def comparison_rows(dia: Diagnosis, axis: str) -> list[tuple[str, str, str, str,
     for c in dia.comparisons:
         remark = "they disagree" if c.differs else ""
         values = with_std(c.diagnosis.value, c.diagnosis.std), with_std(c.regression.value, c.regression.std)
-        rows.append((sentence(c.name, axis), *values, unit(c.regression.unit, axis), remark))
+        rows.append((said(c.name, axis), *values, unit(c.regression.unit, axis), remark))
     return rows
 
 
@@ -44,6 +45,9 @@ def method_words(dia: Diagnosis, axis: str) -> str:
     found = dia.regression
     if found is None:
         return ""
+    text = (
+        "Least squares of the {torque} on {}, without simulation: all channels through a Butterworth filter of order {} at "
+        "{:.3g} Hz, forward and backward; {} rows."
+    )
     terms = ", ".join(name.replace("_", " ") for name in found.terms)
-    text = f"Least squares of the torque on {terms}, without simulation: all channels through a Butterworth filter of order "
-    return sentence(f"{text}{found.order} at {found.cutoff_hz:.3g} Hz, forward and backward; {found.samples} rows.", axis)
+    return said(say(text, terms, found.order, found.cutoff_hz, found.samples), axis)

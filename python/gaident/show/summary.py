@@ -6,11 +6,12 @@ import math
 import textwrap
 from collections.abc import Mapping
 
+from gaident.axis import identifier_words, said, unit, velocity_unit, word
 from gaident.control.pi import PI
 from gaident.models.mechanics import Mechanics, TwoMass
 from gaident.results.estimate import Estimate
 from gaident.results.identification import Identification
-from gaident.show.wording import number, structure_words, table, unit, velocity_unit, with_std
+from gaident.show.wording import number, structure_words, table, with_std
 
 __all__ = [
     "flags_of",
@@ -32,7 +33,7 @@ def identification_summary(idn: Identification, axis: str = "rotary") -> str:
     """
     sections = [
         _verdict(idn, axis),
-        _warnings(idn),
+        _warnings(idn, axis),
         _mechanics(idn, axis),
         _model(idn, axis),
         _structures(idn),
@@ -77,8 +78,7 @@ def _verdict(idn: Identification, axis: str) -> list[str]:
 def _loop(controller: PI | None, axis: str) -> str:
     torque = unit("N m", axis)
     if controller is None:
-        driven = "torque" if axis == "rotary" else "force"
-        return f"open loop, {driven} [{torque}] to velocity [{velocity_unit(axis)}]"
+        return f"open loop, {word('torque', axis)} [{torque}] to velocity [{velocity_unit(axis)}]"
     parts = [
         f"{controller.loop} loop, PI with kp {number(controller.kp)} {unit('N m s/rad', axis)}",
         f"ki {number(controller.ki)} {unit('N m/rad', axis)}",
@@ -86,7 +86,7 @@ def _loop(controller: PI | None, axis: str) -> str:
     for name in ("torque_limit", "integrator_limit"):
         limit = getattr(controller, name)
         if limit is not None:
-            parts.append(f"{name.replace('_', ' ')} {number(limit)} {torque}")
+            parts.append(f"{identifier_words(name, axis)} {number(limit)} {torque}")
     return ", ".join(parts)
 
 
@@ -158,13 +158,13 @@ def _mechanics(idn: Identification, axis: str) -> list[str]:
         )
         lines += [f"  {line}" for line in textwrap.wrap(inconsistency_words(m), WIDTH - 2)]
     if damped is not None:
-        lines += [f"  with shaft damping: {note}" for note in damped.notes]
+        lines += [f"  with shaft damping: {said(note, axis)}" for note in damped.notes]
     return lines
 
 
 def meaning_of(name: str, two_masses: bool, axis: str) -> str:
     """What a letter of the mechanics table stands for."""
-    mass = "mass" if axis == "linear" else "inertia"
+    mass = word("inertia", axis)
     words = {
         "JM": f"{mass} of the motor's side",
         "DM": "viscous damping of the motor's side",
@@ -227,10 +227,10 @@ def _span(low: float, high: float) -> str:
     return f"{number(low)}..{number(high)}"
 
 
-def _warnings(idn: Identification) -> list[str]:
+def _warnings(idn: Identification, axis: str) -> list[str]:
     # What falsifies the model stands at the top already.
     notes = [w for w in idn.warnings if w != idn.adequacy.sentence]
     lines = []
     for note in notes:
-        lines += textwrap.wrap(note, WIDTH, initial_indent="  - ", subsequent_indent="    ")
+        lines += textwrap.wrap(said(note, axis), WIDTH, initial_indent="  - ", subsequent_indent="    ")
     return ["Keep in mind", *lines] if lines else []

@@ -1,80 +1,11 @@
-"""How numbers, units, structures and tables are written."""
+"""How numbers, structures and tables are written."""
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from gaident.errors import SettingsError
-
-__all__ = ["AXES", "certainty", "number", "sentence", "structure_words", "table", "unit", "velocity_unit", "with_std"]
-
-AXES = ("rotary", "linear")
-
-# Longest first: "N m s/rad" must not be read as "N m".
-_LINEAR = (
-    ("N m s/rad", "N s/m"),
-    ("N m/rad", "N/m"),
-    ("kg m^2", "kg"),
-    ("rad/s^", "m/s^"),
-    ("rad/s/(", "m/s/("),
-    ("(N m)", "N"),
-    ("N m", "N"),
-)
-_LINEAR_WORDS = (
-    ("rad/s", "m/s"),
-    (r"(?<!load )\btorque\b(?! saturation| dead band| lag)", "force"),
-    (r"(?<!load )\bTorque\b(?! saturation| dead band| lag)", "Force"),
-    (r"\bturns (forwards|backwards|slower)", r"moves \1"),
-    (r"\baxis turns\b", "axis moves"),
-    (r"\binertia\b", "mass"),
-)
-# (an angle in words, metres or 1/m for each, how it is then written); a turn of a linear axis is 2 pi m
-_LINEAR_ANGLES = (
-    (r"(?P<value>[\d.e+-]+) degrees of travel", math.radians(1.0), "{:.2g} m of travel"),
-    (r"(?P<value>[\d.e+-]+) turns travelled", math.tau, "{:.2g} m travelled"),
-    (r"\borders below (?P<value>\d+)", 1.0 / math.tau, "orders below {:.2g} 1/m"),
-    (r"\borders above (?P<value>\d+)", 1.0 / math.tau, "orders above {:.2g} 1/m"),
-    (r"\bperiod of order (?P<value>\d+) or less", 1.0 / math.tau, "period of order {:.2g} 1/m or less"),
-)
-
-
-def unit(text: str, axis: str = "rotary") -> str:
-    """The unit of a torque, inertia, damping, stiffness or gain as the axis has it; roots stay in rad/s.
-
-    Raises SettingsError for an axis that is neither "rotary" nor "linear".
-    """
-    if axis not in AXES:
-        raise SettingsError(f"axis is {axis!r}: it must be one of {', '.join(map(repr, AXES))}")
-    if axis == "linear":
-        for rotary, linear in _LINEAR:
-            text = text.replace(rotary, linear)
-    return text
-
-
-def velocity_unit(axis: str = "rotary") -> str:
-    """rad/s or m/s."""
-    return "rad/s" if unit("N m", axis) == "N m" else "m/s"
-
-
-def sentence(text: str, axis: str = "rotary") -> str:
-    """A plain sentence with the units and words of the axis; names of effects ("torque saturation") stay.
-
-    Raises SettingsError for another axis.
-    """
-    text = unit(text, axis)
-    if axis == "rotary":
-        return text
-    for rotary, linear in _LINEAR_WORDS:
-        text = re.sub(rotary, linear, text)
-    for pattern, factor, of_metres in _LINEAR_ANGLES:
-        text = re.sub(pattern, _in_metres(factor, of_metres), text)
-    return text
-
-
-def _in_metres(factor: float, written: str) -> Callable[[re.Match[str]], str]:
-    return lambda found: written.format(float(found["value"]) * factor)
+__all__ = ["certainty", "number", "structure_words", "table", "with_std"]
 
 
 def certainty(bic: float) -> str:

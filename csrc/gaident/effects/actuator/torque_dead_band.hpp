@@ -10,7 +10,7 @@ struct TorqueDeadBand {
     static constexpr EffectInfo info{
         .name = "torque_dead_band",
         .place = Place::actuator,
-        .meaning = "torques below this (half) width do nothing, larger ones lose it",
+        .meaning = "{torques} below this (half) width do nothing, larger ones lose it",
         .parameters = parameters,
     };
     static constexpr Hooks hooks = Hooks::actuator | Hooks::substeps;

@@ -12,7 +12,7 @@ struct TorqueLag {
     static constexpr EffectInfo info{
         .name = "torque_lag",
         .place = Place::actuator,
-        .meaning = "the torque follows its command with a first-order lag",
+        .meaning = "the {torque} follows its command with a first-order lag",
         .parameters = parameters,
     };
     static constexpr Hooks hooks = Hooks::actuator_dynamics | Hooks::begin;

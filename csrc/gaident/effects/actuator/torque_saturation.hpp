@@ -10,7 +10,7 @@ struct TorqueSaturation {
     static constexpr EffectInfo info{
         .name = "torque_saturation",
         .place = Place::actuator,
-        .meaning = "the actuator gives no more torque than this",
+        .meaning = "the actuator gives no more {torque} than this",
         .parameters = parameters,
     };
     static constexpr Hooks hooks = Hooks::actuator;

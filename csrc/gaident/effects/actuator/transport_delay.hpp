@@ -17,7 +17,7 @@ struct TransportDelay {
     static constexpr EffectInfo info{
         .name = "transport_delay",
         .place = Place::actuator,
-        .meaning = "the torque acts later than it was commanded",
+        .meaning = "the {torque} acts later than it was commanded",
         .parameters = parameters,
     };
     static constexpr Hooks hooks = Hooks::actuator_dynamics | Hooks::possible;

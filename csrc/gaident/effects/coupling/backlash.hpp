@@ -19,9 +19,10 @@ struct Backlash {
     static constexpr EffectInfo info{
         .name = "backlash",
         .place = Place::coupling,
-        .meaning = "play between motor and load; gap is its full width",
+        .meaning = "play between motor and load",
         .parameters = parameters,
         .needs_two_masses = true,
+        .remark = "gap is its full width",
     };
     static constexpr Hooks hooks = Hooks::coupling;
 

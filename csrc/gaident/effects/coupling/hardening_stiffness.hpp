@@ -10,7 +10,7 @@ struct HardeningStiffness {
     static constexpr EffectInfo info{
         .name = "hardening_stiffness",
         .place = Place::coupling,
-        .meaning = "coupling that grows stiffer with its twist",
+        .meaning = "coupling that grows stiffer with its {twist}",
         .parameters = parameters,
         .needs_two_masses = true,
     };

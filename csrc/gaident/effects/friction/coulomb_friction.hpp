@@ -11,8 +11,9 @@ struct CoulombFriction {
     static constexpr EffectInfo info{
         .name = "coulomb_friction",
         .place = Place::shaft,
-        .meaning = "dry friction of constant size; holds still below it",
+        .meaning = "dry friction of constant size",
         .parameters = parameters,
+        .remark = "holds still below it",
     };
     static constexpr Hooks hooks = Hooks::law;
 

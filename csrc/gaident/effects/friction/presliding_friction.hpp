@@ -18,7 +18,7 @@ struct PreslidingFriction {
     static constexpr EffectInfo info{
         .name = "presliding_friction",
         .place = Place::shaft,
-        .meaning = "friction that is a spring over small angles before it slides (Dahl)",
+        .meaning = "friction that is a spring over small motions before it slides (Dahl)",
         .parameters = parameters,
     };
     static constexpr Hooks hooks = Hooks::friction | Hooks::after_friction | Hooks::substeps;

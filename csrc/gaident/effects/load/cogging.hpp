@@ -14,7 +14,7 @@ struct Cogging {
     static constexpr EffectInfo info{
         .name = "cogging",
         .place = Place::shaft,
-        .meaning = "torque ripple n times per turn: slots and magnets, belts, gears",
+        .meaning = "{torque} ripple n times {per turn}: slots and magnets, belts, gears",
         .parameters = parameters,
         .turns = true,
     };

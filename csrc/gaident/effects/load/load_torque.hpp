@@ -10,8 +10,9 @@ struct LoadTorque {
     static constexpr EffectInfo info{
         .name = "load_torque",
         .place = Place::shaft,
-        .meaning = "constant load; positive brakes positive rotation",
+        .meaning = "constant load",
         .parameters = parameters,
+        .remark = "positive brakes positive {rotation}",
     };
     static constexpr Hooks hooks = Hooks::torque;
 

@@ -10,7 +10,7 @@ struct Unbalance {
     static constexpr EffectInfo info{
         .name = "unbalance",
         .place = Place::shaft,
-        .meaning = "load once per turn: gravity on an eccentric load",
+        .meaning = "load {once per turn}: gravity on an eccentric load",
         .parameters = parameters,
         .turns = true,
     };

@@ -10,9 +10,10 @@ struct Outliers {
     static constexpr EffectInfo info{
         .name = "outliers",
         .place = Place::record,
-        .meaning = "isolated wrong samples (noise); found and masked, not simulated",
+        .meaning = "isolated wrong samples (noise)",
         .parameters = parameters,
         .simulated = false,
+        .remark = "found and masked, not simulated",
     };
     static constexpr Hooks hooks = Hooks::none;
 };

@@ -14,7 +14,7 @@ struct VelocityRipple {
     static constexpr EffectInfo info{
         .name = "velocity_ripple",
         .place = Place::sensor,
-        .meaning = "periodic error of the angle sensor, n times per turn",
+        .meaning = "periodic error of the {angle} sensor, n times {per turn}",
         .parameters = parameters,
         .turns = true,
     };

@@ -9,6 +9,7 @@ from dataclasses import replace
 from itertools import starmap
 from pathlib import Path
 
+from gaident.axis import velocity_unit
 from gaident.cli.commands.report import write_report
 from gaident.cli.drive import drive_of, read_all, reading_notes
 from gaident.cli.options import PICTURES
@@ -23,7 +24,7 @@ from gaident.results.identification import Identification
 from gaident.results.store import load
 from gaident.show.diagnosis_summary import either, words
 from gaident.show.progress_bar import Progress
-from gaident.show.wording import number, table, velocity_unit
+from gaident.show.wording import number, table
 
 __all__ = ["diagnose_command"]
 

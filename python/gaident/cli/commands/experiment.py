@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import sys
 
+from gaident.axis import said
 from gaident.cli.drive import drive_of
 from gaident.cli.output import print_json, proposal_csv, target_of, write
 from gaident.diagnosis.experiments.first_experiment import first_experiment
 from gaident.errors import SettingsError
-from gaident.show.wording import sentence
 
 __all__ = ["experiment_command"]
 
@@ -22,19 +22,20 @@ def experiment_command(args: argparse.Namespace) -> None:
         raise SettingsError("dt is missing: give --dt (or dt in the drive file), the sample time of the command in seconds")
     inertia = drive.space_values.get("inertia")
     heaviest = None if inertia is None else inertia[1]  # what its ramps ask for must not exceed the torque
-    proposal = first_experiment(dt, drive.limits(), heaviest, drive.controller_values.get("kp"))
+    kp = drive.controller_values.get("kp")
+    proposal = first_experiment(dt, drive.limits(), heaviest, kp)
     if args.json:
         print_json({"schema": "gaident/experiment", "schema_version": 1, **proposal.to_dict()})
         return
     text = proposal_csv(proposal, drive.axis)
-    said = sentence(proposal.reason, drive.axis)
-    for missing, option in (("kp", "--kp"), ("the inertia", "--inertia LOW HIGH"), ("the mass", "--inertia LOW HIGH")):
-        said = said.replace(f"give {missing} to", f"give {missing} ({option}, or in the drive file) to")
-    said = f"{len(proposal.command)} samples, {len(proposal.command) * proposal.dt:.3g} s: {said}"
+    options = [option for value, option in ((kp, "--kp"), (inertia, "--inertia LOW HIGH")) if value is None]
+    remedy = f" To give {'them' if len(options) > 1 else 'it'}: {' and '.join(options)}, or the drive file." if options else ""
+    reason = f"{said(proposal.reason, drive.axis)}{remedy}"
+    told = f"{len(proposal.command)} samples, {len(proposal.command) * proposal.dt:.3g} s: {reason}"
     if target is None:
         print(text, end="")
         if not args.quiet:
-            print(said, file=sys.stderr)  # what it may ask of the axis, beside the CSV
+            print(told, file=sys.stderr)  # what it may ask of the axis, beside the CSV
         return
     write(target, text.encode())
-    print(f"{said}\nwritten: {target}")
+    print(f"{told}\nwritten: {target}")

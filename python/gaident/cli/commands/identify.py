@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 
+from gaident.axis import say
 from gaident.cli.drive import drive_of, read_all, reading_notes
 from gaident.cli.options import PICTURES
 from gaident.cli.output import apart, draw, naming, print_json, summary_of, target_of
@@ -45,7 +46,7 @@ def identify_command(args: argparse.Namespace) -> None:
         )
     # What the logs say of the controller, which the search takes as given.
     off = [
-        (f"{name}: " if len(records) > 1 else "") + said.sentence + _instead(said, controller)
+        say("{}{}{}", f"{name}: " if len(records) > 1 else "", said.sentence, _instead(said, controller))
         for name, said in _replayed(records, controller)
     ]
     idn = replace(idn, warnings=(*reading_notes(drive, records), *off, *idn.warnings))

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from gaident.axis import velocity_unit
 from gaident.cli.drive import drive_of, read_all
 from gaident.cli.output import csv_targets, csv_text, print_json, write
 from gaident.control.pi import PI
@@ -22,7 +23,6 @@ from gaident.models.simulation_input import AnyModel
 from gaident.models.starts import starts_moving
 from gaident.results.identification import Identification
 from gaident.results.store import load
-from gaident.show.wording import velocity_unit
 
 __all__ = ["simulate_command"]
 

@@ -158,22 +158,21 @@ class Table:
         where = f"{channel} column {column.key!r}"
         values = column.whole()
         if values.dtype.kind not in "iufb":
-            raise ReadError(
-                f"{self.path}: {where} holds no real numbers (dtype {values.dtype}); name another column, or save its real part"
+            raise ReadError.at(
+                self.path, f"{where} holds no real numbers (dtype {values.dtype})", "name another column, or save its real part"
             )
         bad = first_not_finite(values.astype(np.float64, copy=False))
         if column.bad is not None and (bad is None or column.bad[0] <= bad):
             row, text = column.bad
             apart = f", or, where channels have times of their own, put them on one axis with {arg('resample')} [s]"
-            raise ReadError(
-                f"{self.path}, {self.place(row)}: {where} "
-                f"{'is empty' if not text else f'holds {text!r}, not a number'}"
-                f"{_comma_hint(text)}; correct or remove that {'line' if self.lines is not None else 'value'}"
-                f"{'' if text else apart}"
+            raise ReadError.at(
+                f"{self.path}, {self.place(row)}",
+                f"{where} {'is empty' if not text else f'holds {text!r}, not a number'}{_comma_hint(text)}",
+                f"correct or remove that {'line' if self.lines is not None else 'value'}{'' if text else apart}",
             )
         if bad is not None:
-            raise ReadError(
-                f"{self.path}, {self.place(bad)}: {where} holds {values[bad]}; cut the log before it, or correct the value"
+            raise ReadError.at(
+                f"{self.path}, {self.place(bad)}", f"{where} holds {values[bad]}", "cut the log before it, or correct the value"
             )
         return values.astype(np.float64, copy=False)
 

@@ -179,9 +179,10 @@ def factor(quantity: str, unit: str | float, constants: Constants | None = None)
         raise ReadError(f"units: {quantity}={unit!r} is neither text nor a number; give one of {listed}, or a factor")
     row = _UNITS[quantity].get(_spelling(unit))
     if row is None:
-        raise ReadError(
-            f"units: {unit!r} is no unit of {quantity}{_guess(quantity, unit)}; known are {listed}; "
-            f"or give the factor to SI as a number, {arg('units', '0.5', quantity)}"
+        raise ReadError.at(
+            "units",
+            f"{unit!r} is no unit of {quantity}{_guess(quantity, unit)}",
+            f"known are {listed}; or give the factor to SI as a number, {arg('units', '0.5', quantity)}",
         )
     if row.constant is None:
         return row.factor

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, say, unit_text
 from gaident.control.pi import PI
 from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
 from gaident.data.record import Record
@@ -57,7 +58,7 @@ class AsLogged:
     """
 
     controller: PI | None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Text, ...] = ()
     replays: Mapping[str, Replay] = field(default_factory=dict)
 
 
@@ -79,11 +80,16 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
         return as_given
     kp, ki = (float(g) for g in gains.mean(axis=0))
     if all(r.cause == "integration_rule" for r in off):
-        used = f"All simulations use kp = {kp:.4g} N m s/rad, with which a trapezoidal integral makes the same torque."
+        same = "All simulations use kp = {:.4g} {N m s/rad}, with which a trapezoidal integral makes the same {torque}."
+        used = say(same, kp)
     else:
-        used = (
-            f"All simulations use these (kp = {kp:.4g} N m s/rad, ki = {ki:.4g} N m/rad, trapezoidal integral) instead of the "
-            f"given ones ({controller.kp:.4g} and {controller.ki:.4g})."
+        used = say(
+            "All simulations use these (kp = {:.4g} {N m s/rad}, ki = {:.4g} {N m/rad}, trapezoidal integral) instead of the "
+            "given ones ({:.4g} and {:.4g}).",
+            kp,
+            ki,
+            controller.kp,
+            controller.ki,
         )
     return AsLogged(replace(controller, kp=kp, ki=ki), (off[0].sentence, used))
 
@@ -107,7 +113,7 @@ def _replay_error(rec: Record, controller: PI) -> float:
 
 def controller_findings(
     data: DataSet, scales: Scales, known: Mapping[str, Replay]
-) -> tuple[list[Finding], AtController, list[str]]:
+) -> tuple[list[Finding], AtController, list[Text]]:
     """(findings, what is decided, notes). Without a logged torque nothing is decided here.
 
     known: digest of a record -> its replay with the controller of `data`; records that are not in it are replayed.
@@ -120,7 +126,8 @@ def controller_findings(
     if not off:
         return [], AtController(DECIDED), []
     said = [(rec.name or f"a record of {len(rec)} samples", r) for rec, r in zip(data.read, replays, strict=True)]
-    notes = list(dict.fromkeys(f"{name}: {r.sentence}" if len(said) > 1 else r.sentence for name, r in said if not r.follows))
+    texts = (say("{}: {}", name, r.sentence) if len(said) > 1 else r.sentence for name, r in said if not r.follows)
+    notes = list(dict.fromkeys(texts))
     plain = data.replayed_error({})
     floor = len(plain) * max(max(r.resolution for r in replays), 1e-9 * scales.torque) ** 2
     shown = _limits_shown(off, controller)
@@ -134,10 +141,15 @@ def controller_findings(
     if cost < CLOSE * before or cost < 4.0 * floor or white_noise(left, data.torque):
         parameter = next(r for r in table() if r.name == effect).parameters[0]
         name, unit = parameter.name, parameter.unit
-        text = (
-            f"The logged torque does not follow from command and velocity (rms {np.sqrt(before / n):.3g} N m); with "
-            f"{name} {value:.4g} {unit} of the {effect.replace('_', ' ')} it does, to {np.sqrt(cost / n):.2g} N m rms. "
-            "No model of the plant is involved."
+        text = say(
+            "The logged {torque} does not follow from command and velocity (rms {:.3g} {N m}); with {} {:.4g} {} of the {} it "
+            "does, to {:.2g} {N m} rms. No model of the plant is involved.",
+            np.sqrt(before / n),
+            name,
+            value,
+            unit_text(unit),
+            effect.replace("_", " "),
+            np.sqrt(cost / n),
         )
         finding = _finding(effect, name, Estimate(value, _std(data, term, value, cost), unit), before, cost, floor, n, text)
         at = AtController(DECIDED, {effect: {name: value}})
@@ -161,8 +173,8 @@ def _limits_shown(off: Sequence[Replay], controller: PI) -> PI | None:
 
 
 def _limit_findings(
-    data: DataSet, shown: PI, off: Sequence[Replay], plain: Vector, floor: float, notes: list[str]
-) -> tuple[list[Finding], AtController, list[str]]:
+    data: DataSet, shown: PI, off: Sequence[Replay], plain: Vector, floor: float, notes: list[Text]
+) -> tuple[list[Finding], AtController, list[Text]]:
     """What the limits that the log shows are findings of; the note that the replay wrote is their evidence."""
     given = data.controller
     assert given is not None
@@ -179,15 +191,17 @@ def _limit_findings(
         if value is None or value == was:
             continue
         at.effects[effect] = {"limit": value}
-        name = "plateau of the logged torque" if effect == SATURATION else "highest integral that the log shows"
-        text = f"{off[0].sentence} The limit is the {name}; no model of the plant is involved."
+        name = say("plateau of the logged {torque}") if effect == SATURATION else Text("highest integral that the log shows")
+        text = say("{} The limit is the {}; no model of the plant is involved.", off[0].sentence, name)
         std = max(*(r.resolution for r in off), float(np.sqrt(after / n)))
         findings.append(_finding(effect, "limit", Estimate(value, std, "N m"), before, after, floor, n, text))
     if held:
         notes = [] if findings else notes
         notes.append(
-            "The simulated controller does not hold its integrator at the limit: its free run winds up where the drive's does "
-            "not, and says nothing about the mechanics there."
+            Text(
+                "The simulated controller does not hold its integrator at the limit: its free run winds up where the drive's "
+                "does not, and says nothing about the mechanics there."
+            )
         )
     return findings, at, notes
 
@@ -203,7 +217,9 @@ def _left_with(data: DataSet, controller: PI) -> float:
     return total
 
 
-def _finding(effect: str, name: str, estimate: Estimate, before: float, after: float, floor: float, n: int, text: str) -> Finding:
+def _finding(
+    effect: str, name: str, estimate: Estimate, before: float, after: float, floor: float, n: int, text: Text
+) -> Finding:
     gain = float(n * np.log(before / max(after, floor, 1e-300)) - np.log(n))
     return Finding(effect, {name: estimate}, (), 1.0 - float(np.sqrt(min(after / before, 1.0))), gain, None, text)
 

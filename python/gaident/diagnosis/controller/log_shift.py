@@ -24,6 +24,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, called, joined, say
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
@@ -52,7 +53,7 @@ class Aligned:
 
     records: tuple[Record, ...]
     held: tuple[Record, ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Text, ...] = ()
     shifts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     given: Mapping[str, Record] = field(default_factory=dict)
 
@@ -72,7 +73,7 @@ class Aligned:
 
 def aligned(records: Sequence[Record], held: Sequence[Record], controller: PI | None) -> Aligned:
     """The records without shifts of their logs, those that the controller's law shows beyond doubt."""
-    notes: dict[str, None] = dict.fromkeys(reading_notes((*records, *held)))
+    notes: dict[Text, None] = dict.fromkeys(reading_notes((*records, *held)))
     shifts: dict[str, Mapping[str, int]] = {}
     given: dict[str, Record] = {}
 
@@ -80,7 +81,7 @@ def aligned(records: Sequence[Record], held: Sequence[Record], controller: PI | 
         moves, note = _of_law(rec, controller) if controller is not None else ({}, _of_motion(rec))
         if note:
             name = f"{rec.name}: " if len(records) + len(held) > 1 and rec.name else ""
-            notes[f"{name}{note}"] = None
+            notes[joined("", (name, note))] = None
         moved = rec.shifted(**moves) if moves else rec
         if moves:
             shifts[rec.digest] = moves
@@ -90,20 +91,20 @@ def aligned(records: Sequence[Record], held: Sequence[Record], controller: PI | 
     return Aligned(tuple(map(one, records)), tuple(map(one, held)), tuple(notes), shifts, given)
 
 
-def _of_law(rec: Record, controller: PI | None) -> tuple[Mapping[str, int], str]:
+def _of_law(rec: Record, controller: PI | None) -> tuple[Mapping[str, int], Text]:
     """(channel -> samples by which it is moved, note) of a record with a controller; ({}, "") where there is no shift."""
     if controller is None or rec.torque is None or rec.command is None:
-        return {}, ""
+        return {}, Text("")
     said = replay(rec, controller)
     if said.follows is not False:
-        return {}, ""
+        return {}, Text("")
     a, b = _shift_of_law(rec, controller)
     if (a, b) == (0, 0):
-        return {}, ""
+        return {}, Text("")
     moves = _moves(rec, a, b)
     after = replay(rec.shifted(**moves), controller)
     if after.follows is False and after.cause in ("", "shift"):
-        return {}, ""
+        return {}, Text("")
     lag = torque_lag(rec)
     if rec.torque_is == MEASURED and b > 0 and not (lag is not None and lag.lag > b - 0.25):
         return {}, _measured_note(b, lag)
@@ -165,47 +166,52 @@ def _samples(k: float) -> str:
     return f"{abs(k):.3g} sample{'' if abs(k) == 1 else 's'}"
 
 
-def _moved_note(moves: Mapping[str, int], b: int, lag: TorqueLag | None) -> str:
-    late = [f"the {name} {_samples(k)} {'late' if k < 0 else 'early'}" for name, k in moves.items() if name != "position"]
+def _moved_note(moves: Mapping[str, int], b: int, lag: TorqueLag | None) -> Text:
+    late = [
+        say("the {} {} {}", called(name), _samples(k), "late" if k < 0 else "early")
+        for name, k in moves.items()
+        if name != "position"
+    ]
     done = ", ".join(f"{name} by {k:+d}" for name, k in moves.items())
-    text = (
-        f"The log wrote {' and '.join(late)} against the rest: only so does the torque follow from command and velocity through "
-        f"the controller. The channels were moved ({done}), and everything below is of that."
+    text = say(
+        "The log wrote {} against the rest: only so does the {torque} follow from command and velocity through the controller. "
+        "The channels were moved ({}), and everything below is of that.",
+        joined(" and ", late),
+        done,
     )
     if b < 0:
-        return f"{text} As logged, the controller would have acted before it measured."
+        return say("{} As logged, the controller would have acted before it measured.", text)
     if b > 0 and (lag is None or lag.lag < b - 0.5):
-        same = f"A drive that computes for {_samples(b)} makes the same log; that delay would show below as a transport delay."
-        return f"{text} {same}"
+        same = "{} A drive that computes for {} makes the same log; that delay would show below as a transport delay."
+        return say(same, text, _samples(b))
     return text
 
 
-def _measured_note(b: int, lag: TorqueLag | None) -> str:
+def _measured_note(b: int, lag: TorqueLag | None) -> Text:
     text = (
-        f"The measured torque is {_samples(b)} behind the controller's, exactly: the log may have written it late, or the drive "
-        "needs that long. "
+        "The measured {torque} is {} behind the controller's, exactly: the log may have written it late, or the drive needs that "
+        "long. {}; nothing was moved. Where you know that it is the log, read it with shift torque={}."
     )
-    where = (
-        "The motion does not tell which"
-        if lag is None
-        else f"The motion puts it {_samples(lag.lag)} {'behind' if lag.lag > 0 else 'before'} its place"
-    )
-    return f"{text}{where}; nothing was moved. Where you know that it is the log, read it with shift torque={-b}."
+    where = "The motion does not tell which"
+    if lag is not None:
+        where = f"The motion puts it {_samples(lag.lag)} {'behind' if lag.lag > 0 else 'before'} its place"
+    return say(text, _samples(b), where, -b)
 
 
-def _of_motion(rec: Record) -> str:
+def _of_motion(rec: Record) -> Text:
     """What the motion says of a torque in open loop, where no law proves anything: a note, "" where there is nothing to say."""
     lag = torque_lag(rec)
     if lag is None or abs(lag.lag) - 3.0 * lag.std < 0.5 or abs(lag.lag) < 0.75:
-        return ""
-    k = round(lag.lag)
-    remedy = f"where you know that it is the log, read it with shift torque={-k}. Nothing was moved."
+        return Text("")
+    remedy = f"where you know that it is the log, read it with shift torque={-round(lag.lag)}. Nothing was moved."
     if lag.lag > 0.0:
-        return (
-            f"The motion comes {_samples(lag.lag)} before the logged torque that makes it, which no axis does: the log wrote the "
-            f"torque late (or the velocity early), or the torque was filtered on its way into the log; {remedy}"
+        text = (
+            "The motion comes {} before the logged {torque} that makes it, which no axis does: the log wrote the {torque} late "
+            "(or the velocity early), or the {torque} was filtered on its way into the log; {}"
         )
-    return (
-        f"The motion follows the logged torque by {_samples(lag.lag)} more than an axis needs: a delay of the drive or of the "
-        f"velocity's sensor, or a log that wrote the torque early; without a controller the data cannot tell; {remedy}"
-    )
+    else:
+        text = (
+            "The motion follows the logged {torque} by {} more than an axis needs: a delay of the drive or of the velocity's "
+            "sensor, or a log that wrote the {torque} early; without a controller the data cannot tell; {}"
+        )
+    return say(text, _samples(lag.lag), remedy)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import TORQUE
+from gaident.axis import Text, say
 from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_torque
 from gaident.data.record import Record
@@ -54,7 +55,7 @@ class Replay:
     cause: str
     value: float
     departs: int | None
-    sentence: str
+    sentence: Text
     controller: PI | None = None
 
 
@@ -69,14 +70,15 @@ def replay(rec: Record, controller: PI | None) -> Replay:
         if logged is None:
             raise RecordError(f"the record has no torque and nothing to make it from: give {TORQUE}, or a command and PI(...)")
         why = "open loop, there is no controller" if controller is None else "the record has no command"
-        return _unchecked(logged, None, f"The logged torque cannot be checked: {why}.")
+        return _unchecked(logged, None, say("The logged {torque} cannot be checked: {}.", why))
     replayed = pi_torque(rec.command, rec.velocity, rec.dt, controller)
     if logged is None:
-        return _unchecked(replayed, replayed, "No torque is logged: it is replayed from command and velocity, unchecked.")
+        text = say("No {torque} is logged: it is replayed from command and velocity, unchecked.")
+        return _unchecked(replayed, replayed, text)
     return _compared(rec, rec.command, controller, logged, replayed)
 
 
-def _unchecked(torque: Vector, replayed: Vector | None, sentence: str) -> Replay:
+def _unchecked(torque: Vector, replayed: Vector | None, sentence: Text) -> Replay:
     resolution = 0.0 if torque is replayed else lattice_step(torque)
     return Replay(torque, replayed, np.nan, np.nan, resolution, None, "", np.nan, None, sentence)
 
@@ -87,28 +89,35 @@ def _compared(rec: Record, command: Vector, controller: PI, logged: Vector, repl
     off = logged - replayed
     rms, maximum = float(np.sqrt(np.mean(off**2))), float(np.abs(off).max())
     figures = (logged, replayed, rms, maximum, resolution)
-    head = "The logged torque follows from command and velocity through this controller"
+    head = say("The logged {torque} follows from command and velocity through this controller")
     if maximum <= tolerance:
-        to = f"to {maximum:.1g} N m" + (f" (its resolution is {resolution:.2g} N m)" if resolution > 0.0 else "")
-        return Replay(*figures, True, "", np.nan, None, f"{head}, {to}.")
+        known = say(" (its resolution is {:.2g} {N m})", resolution) if resolution > 0.0 else ""
+        return Replay(*figures, True, "", np.nan, None, say("{}, to {:.1g} {N m}{}.", head, maximum, known))
     if rounded_command(off, command, rec.dt, controller):
-        return Replay(*figures, True, "", np.nan, None, f"{head}, to {maximum:.1g} N m, which is the rounding of the log.")
+        text = say("{}, to {:.1g} {N m}, which is the rounding of the log.", head, maximum)
+        return Replay(*figures, True, "", np.nan, None, text)
     if noise := white_noise(off, logged):
-        text = f"{head} up to white noise of {noise:.2g} N m rms: it is a measured torque, or a coarsely rounded one."
+        measured = "{} up to white noise of {:.2g} {N m} rms: it is a measured {torque}, or a coarsely rounded one."
+        text = say(measured, head, noise)
         return Replay(*figures, True, "", np.nan, None, text)
     found = explain(command, rec.velocity, rec.dt, controller, logged, tolerance)
     if found is not None and found.cause == "initial_integral":
-        return Replay(*figures, True, found.cause, found.value, None, f"{head}, {found.sentence}")
+        return Replay(*figures, True, found.cause, found.value, None, say("{}, {}", head, found.sentence))
     departs = int(np.argmax(np.abs(off) > tolerance))
-    head = (
-        "The logged torque does not follow from command and velocity through this controller: it departs first at sample "
-        f"{departs} ({departs * rec.dt:.4g} s), by {rms:.2g} N m rms and {maximum:.2g} N m at most"
+    head = say(
+        "The logged {torque} does not follow from command and velocity through this controller: it departs first at sample "
+        "{} ({:.4g} s), by {:.2g} {N m} rms and {:.2g} {N m} at most",
+        departs,
+        departs * rec.dt,
+        rms,
+        maximum,
     )
     if found is not None:
-        return Replay(*figures, False, found.cause, found.value, departs, f"{head}. {found.sentence}", found.controller)
-    text = (
-        f"{head}, and none of the simple reasons explains it (start of the integrator, gains, scale, sign, rule of integration, "
-        "shift by samples, limits). Is this the controller, and are these the signals it saw?"
+        return Replay(*figures, False, found.cause, found.value, departs, say("{}. {}", head, found.sentence), found.controller)
+    text = say(
+        "{}, and none of the simple reasons explains it (start of the integrator, gains, scale, sign, rule of integration, "
+        "shift by samples, limits). Is this the controller, and are these the signals it saw?",
+        head,
     )
     return Replay(*figures, False, "", np.nan, departs, text)
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, joined, say
 from gaident.control.filtering import filtered, rate_limited
 from gaident.control.pi import PI
 from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
@@ -38,7 +39,7 @@ class Explanation:
     torque: Vector
     cause: str
     value: float
-    sentence: str
+    sentence: Text
     edge: int = 0
     changes: int = 1  # how many settings differ from the configured controller; the fewer the better
     controller: PI | None = None
@@ -121,7 +122,7 @@ def white_noise(off: Vector, logged: Vector) -> float:
 def _start(case: _Case) -> Iterator[Explanation]:
     """A record that starts under load: the integral is not 0 where it begins."""
     start = float(np.median(case.logged - case.torque(case.controller)))
-    sentence = f"with {start:.4g} N m in the integrator at the record's start: the record begins under load."
+    sentence = say("with {:.4g} {N m} in the integrator at the record's start: the record begins under load.", start)
     yield Explanation(case.torque(case.controller, start), "initial_integral", start, sentence)
 
 
@@ -138,7 +139,7 @@ def _limits(case: _Case) -> Iterator[Explanation]:
             acting = _acting(torque, limit)
             if share and acting < PLATEAU:  # the log's largest torque may have another reason
                 continue
-            sentence = f"It does with {words}a torque limit of {limit:.4g} N m, which acts at {acting} samples."
+            sentence = say("It does with {}a {torque} limit of {:.4g} {N m}, which acts at {} samples.", words, limit, acting)
             yield Explanation(torque, "torque_limit", limit, sentence, controller=alike)
     proportional = controller.kp * (case.command - case.velocity)
     for torque_limit in (controller.torque_limit, highest):
@@ -148,9 +149,9 @@ def _limits(case: _Case) -> Iterator[Explanation]:
             continue
         limited = replace(controller, torque_limit=torque_limit, integrator_limit=clamp)
         torque = case.torque(limited)
-        more = "" if torque_limit == controller.torque_limit else f" and a torque limit of {torque_limit:.4g} N m"
+        more = "" if torque_limit == controller.torque_limit else say(" and a {torque} limit of {:.4g} {N m}", torque_limit)
         acting = int(np.sum(np.abs(torque - proportional) >= 0.999 * clamp))
-        sentence = f"It does with the integral clamped to {clamp:.4g} N m{more}; the clamp acts at {acting} samples."
+        sentence = say("It does with the integral clamped to {:.4g} {N m}{}; the clamp acts at {} samples.", clamp, more, acting)
         yield Explanation(torque, CLAMP, clamp, sentence, controller=limited)
 
 
@@ -192,7 +193,8 @@ def _held(case: _Case) -> Iterator[Explanation]:
                 acting = _acting(torque, limit)
                 if acting < PLATEAU:
                     continue
-                sentence = f"It does with {integral}{words} (anti-windup): the limit of {limit:.4g} N m acts at {acting} samples."
+                held = "It does with {}{} (anti-windup): the limit of {:.4g} {N m} acts at {} samples."
+                sentence = say(held, integral, words, limit, acting)
                 alike = _trapezoidal(limited, share, case.dt)
                 yield Explanation(torque, "anti_windup", limit, sentence, controller=alike)
 
@@ -219,7 +221,7 @@ def _rate(case: _Case) -> Iterator[Explanation]:
     for start in (float(case.command[0]), 0.0):
         limited = rate_limited(case.command, rate, case.dt, start)
         torque = pi_torque(limited, case.velocity, case.dt, case.controller)
-        sentence = f"It does with the command limited to a slope of {rate:.4g} rad/s^2 ahead of the controller."
+        sentence = say("It does with the command limited to a slope of {:.4g} {rad/s^2} ahead of the controller.", rate)
         yield Explanation(torque, RATE_LIMIT, rate, sentence)
 
 
@@ -252,7 +254,8 @@ def _fitted(case: _Case) -> Iterator[Explanation]:
 def _named(controller: PI, gains: _Gains, dt: float, start: float, shift: int, share: float, torque: Vector) -> Explanation:
     """Says what of a fitted controller differs from the configured one."""
     kp, ki = gains
-    differs, cause, value = [], "", np.nan
+    differs: list[str] = []
+    cause, value = "", np.nan
     if shift:
         age = "older" if shift > 0 else "newer"
         differs.append(f"command and velocity {abs(shift)} sample{'s' if abs(shift) > 1 else ''} {age} than the log's")
@@ -265,26 +268,27 @@ def _named(controller: PI, gains: _Gains, dt: float, start: float, shift: int, s
     if any(abs(f - 1.0) > SAME for f in factors) or fitted_kp:
         if max(factors) - min(factors) <= SAME * abs(factors[0]) and not fitted_kp:
             turned = " (a reversed sign)" if factors[0] < 0.0 else ""
-            differs.append(f"its torque multiplied by {factors[0]:.5g}{turned}: {_check_unit(factors[0])}")
+            differs.append(say("its {torque} multiplied by {:.5g}{}: {}", factors[0], turned, _check_unit(factors[0])))
             cause, value = "scale", factors[0]
         else:
-            differs.append(f"kp = {kp:.4g} N m s/rad and ki = {ki:.4g} N m/rad")
+            differs.append(say("kp = {:.4g} {N m s/rad} and ki = {:.4g} {N m/rad}", kp, ki))
             cause, value = "gains", np.nan
     if abs(start) > 1e-3 * float(np.abs(torque).max()):
-        differs.append(f"an integral that starts at {start:.4g} N m")
+        differs.append(say("an integral that starts at {:.4g} {N m}", start))
         if not cause:
             cause, value = "initial_integral", start
-    sentence = f"It does with {', and '.join(differs) or 'these gains'}."
+    sentence = say("It does with {}.", joined(", and ", differs or ["these gains"]))
     same_kp = kp + share * ki * dt  # of a trapezoidal integral
     known = cause in ("gains", "scale", "integration_rule") and same_kp >= 0.0 and ki >= 0.0 and same_kp + ki > 0.0
     found = replace(controller, kp=same_kp, ki=ki) if known else None
     return Explanation(torque, cause or "gains", value, sentence, abs(shift), len(differs) + 2 * (cause == "gains"), found)
 
 
-def _check_unit(factor: float) -> str:
+def _check_unit(factor: float) -> Text:
+    units = say("check the units of the {torque}, of the speeds and of the gains")
     if abs(factor * RPM - 1.0) <= SAME:
-        return "speeds in rpm seem to be taken for rad/s; check their unit"
-    return "check the units of the torque, of the speeds and of the gains"
+        return Text("speeds in rpm seem to be taken for rad/s; check their unit", units.linear)
+    return units
 
 
 def _sum(e: Vector, share: float) -> Vector:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import TURN, Text, say, turns
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.library.triggers import Motion, not_testable, one_sided
@@ -59,19 +60,27 @@ class Excitation:
     revolutions: float
     steps: tuple[float, ...]
     repeated: bool
-    not_testable: Mapping[str, str]
-    one_sided: Mapping[str, str]
+    not_testable: Mapping[str, Text]
+    one_sided: Mapping[str, Text]
 
     @property
-    def sentence(self) -> str:
+    def sentence(self) -> Text:
         """The figures in words."""
         moving = [v for v in self.speeds if v]
         held = f"{len(moving)} speed{'s' if len(moving) != 1 else ''} held" if moving else "no speed held"
         share = f" ({100.0 * self.torque_share:.0f} % of the limit)" if math.isfinite(self.torque_share) else ""
-        return (
-            f"{self.duration:.3g} s, up to {self.highest_speed:.4g} rad/s and {self.highest_torque:.3g} N m{share}; {held}, "
-            f"{self.reversals} reversal{'s' if self.reversals != 1 else ''}, {self.revolutions:.3g} turns, "
-            f"{self.slow:.2g} s slow and {self.standstill:.2g} s at rest."
+        return say(
+            "{:.3g} s, up to {:.4g} {rad/s} and {:.3g} {N m}{}; {}, {} reversal{}, {}, {:.2g} s slow and {:.2g} s at rest.",
+            self.duration,
+            self.highest_speed,
+            self.highest_torque,
+            share,
+            held,
+            self.reversals,
+            "s" if self.reversals != 1 else "",
+            turns(self.revolutions * TURN, 3),
+            self.slow,
+            self.standstill,
         )
 
 
@@ -101,7 +110,7 @@ def excitation(records: Record | Sequence[Record], controller: PI | None = None,
         torque_share=math.nan if limit is None else torque / limit,
         torque_reversals=sum(_changes(m.torque, m.torque_floor) for m in motions),
         opposed=opposed / moving if moving else 0.0,
-        revolutions=max(float(np.ptp(m.position)) for m in motions) / math.tau,
+        revolutions=max(float(np.ptp(m.position)) for m in motions) / TURN,
         steps=_distinct([s for m in motions for s in m.jumps], 0.05 * max(top, 1e-300)),
         repeated=any(m.repeated for m in motions),
         not_testable=not_testable(motions, controller, model),

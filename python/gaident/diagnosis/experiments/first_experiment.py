@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, joined, say
 from gaident.checks import real_number
 from gaident.control.pi import PI
 from gaident.data.record import Record
@@ -42,17 +43,18 @@ LEAST_SAMPLES = 400
 
 @dataclass(frozen=True, eq=False)
 class MenuItem:
-    """One experiment of the menu: name, command [rad/s] (n,), the effects it is good at, one line why."""
+    """One experiment of the menu: name, command [rad/s] (n,), the effects it is good at, why: it goes on from the name."""
 
     name: str
     command: Vector
     dt: float
     separates: tuple[str, ...]
-    reason: str
+    reason: Text
 
     def proposal(self, separates: Sequence[str], margin: float) -> Proposal:
         """This item as a proposal for the rivals `separates`."""
-        return Proposal(self.command, self.dt, tuple(separates), margin, self.reason)
+        reason = say("{}: {}", self.name.capitalize(), self.reason)
+        return Proposal(self.command, self.dt, tuple(separates), margin, reason)
 
 
 def first_experiment(dt: float, limits: Limits, inertia: float | None = None, kp: float | None = None) -> Proposal:
@@ -108,29 +110,30 @@ def first_experiment(dt: float, limits: Limits, inertia: float | None = None, kp
     return Proposal(command, dt, tuple(names), math.nan, _first_reason(command, limits, inertia, bench))
 
 
-def _first_reason(command: Vector, limits: Limits, inertia: float | None, b: Bench) -> str:
+def _first_reason(command: Vector, limits: Limits, inertia: float | None, b: Bench) -> Text:
     """What the first experiment is for, and which of the limits it cannot promise to keep."""
     jump = largest_jump(command, AT_ONCE)
-    parts = ["No record yet: this triggers every effect, as far as travel allows."]
+    parts = [Text("No record yet: this triggers every effect, as far as travel allows.")]
     if b.kp is not None:
-        asked = f"{b.kp * jump:.3g} of {limits.torque:.3g} N m"
-        parts = [
+        text = (
             "No record yet: this triggers every effect but torque saturation, as far as travel allows: its largest jump, of "
-            f"{jump:.3g} rad/s, asks for {asked}."
-        ]
+            "{:.3g} {rad/s}, asks for {:.3g} of {:.3g} {N m}."
+        )
+        parts = [say(text, jump, b.kp * jump, limits.torque)]
     else:
         top = float(np.abs(command).max())
-        parts.append(
-            f"Torque and speed limit are not promised: its largest jump, of {jump:.3g} rad/s, asks for kp times that, more than "
-            f"{limits.torque:.3g} N m where kp is above {limits.torque / jump:.3g} N m s/rad, and may overshoot its "
-            f"{top:.3g} rad/s; give kp to keep both."
+        text = (
+            "{Torque} and speed limit are not promised: its largest jump, of {:.3g} {rad/s}, asks for kp times that, more than "
+            "{:.3g} {N m} where kp is above {:.3g} {N m s/rad}, and may overshoot its {:.3g} {rad/s}; give kp to keep both."
         )
+        parts.append(say(text, jump, limits.torque, limits.torque / jump, top))
     if inertia is None:
-        parts.append(
-            f"Its ramps of up to {b.slope:.3g} rad/s^2 ask for the inertia times that, and overshoot by as much divided by kp "
-            "where they end; give the inertia to size them by torque and speed limit."
+        text = (
+            "Its ramps of up to {:.3g} {rad/s^2} ask for the {inertia} times that, and overshoot by as much divided by kp where "
+            "they end; give the {inertia} to size them by {torque} and speed limit."
         )
-    return " ".join(parts)
+        parts.append(say(text, b.slope))
+    return joined(" ", parts)
 
 
 def candidate_commands(dt: float, limits: Limits, inertia: float | None = None, kp: float | None = None) -> list[MenuItem]:

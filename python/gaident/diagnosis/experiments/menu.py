@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, say
 from gaident.diagnosis.experiments.commands import dithered, rest, strokes, triangles
 from gaident.diagnosis.library.excited import EXCITED
 
@@ -139,28 +140,29 @@ def _creep(b: Bench) -> Vector:
     return triangles((0.001 * b.speed, 0.003 * b.speed, 0.01 * b.speed), b.seconds / 3.0, b.travel, b.dt)
 
 
-MENU: tuple[tuple[str, Builder, tuple[str, ...], str], ...] = tuple((name, build, EXCITED[name], why) for name, build, why in (
+MENU: tuple[tuple[str, Builder, tuple[str, ...], Text], ...] = tuple((name, build, EXCITED[name], why) for name, build, why in (
     ("slow stairs", slow_stairs,
-     "Slow levels with rests show how friction behaves from standstill on."),
+     say("slow levels with rests show how friction behaves from standstill on.")),
     ("triangle across zero", _triangles,
-     "A speed that sweeps through zero draws the whole friction curve, accelerating and decelerating."),
+     say("a speed that sweeps through zero draws the whole friction curve, accelerating and decelerating.")),
     ("reversals", reversals,
-     "Reversals with small and with large torque: a gap takes time, a dead band torque, a bristle angle."),
+     say("with small and with large {torque}, a gap takes time, a dead band {torque}, a bristle {}.", Text("angle", "travel"))),
     ("random signal at speed", prbs_moving,
-     "A binary signal on a constant speed, dry friction out of the way, shows the dynamics up to half the sampling rate."),
+     say("a binary signal on a constant speed, dry friction out of the way, shows the dynamics up to half the sampling rate.")),
     ("random signal at standstill", _prbs_standing,
-     "A binary signal around standstill, in three amplitudes: friction and play show as what changes with the amplitude."),
+     say("a binary signal around standstill, in three amplitudes: friction and play show as what changes with the amplitude.")),
     ("steps of three sizes", steps,
-     "Steps of three sizes: a limit of torque, integral or slope holds the largest back, and the others not."),
+     say("a limit of {torque}, integral or slope holds the largest back, and the others not.")),
     ("slow constant speeds", _constant_slow,
-     "Several turns at three slow speeds: a torque ripple keeps its torque, a sensor's ripple grows with speed."),
+     say("{} at three of them: a {torque} ripple keeps its {torque}, a sensor's ripple grows with speed.",
+         Text("several turns", "long strokes"))),
     ("holds up and down", _holds,
-     "Angles approached from both sides: the mean torque there is load or gravity, half the difference friction."),
+     say("{angles} approached from both sides: the mean {torque} there is load or gravity, half the difference friction.")),
     ("repeated segment", _repeat,
-     "One motion, made cold and again after a warm-up: only what depends on time differs."),
+     say("one motion, made cold and again after a warm-up: only what depends on time differs.")),
     ("speeds mixed in time", speed_ladder,
-     "Speeds up to the highest, in mixed order and both directions, draw drag against speed."),
+     say("up to the highest, in mixed order and both directions, they draw drag against speed.")),
     ("creep below break-away", _creep,
-     "A torque that rises slowly below break-away: a bristle gives way like a spring, dry friction holds."),
+     say("a {torque} that rises slowly below break-away: a bristle gives way like a spring, dry friction holds.")),
 ))  # fmt: skip
-"""(name, builder, effects that it is good at, why) of each command."""
+"""(name, builder, effects that it is good at, why: a sentence that goes on from the name) of each command."""

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, say
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import COMMANDED, MEASURED
@@ -97,7 +98,7 @@ def propose(
     data: DataSet,
     count: float,
     elsewhere: Mapping[str, Mapping[str, float]],
-) -> tuple[Proposal | None, list[str]]:
+) -> tuple[Proposal | None, list[Text]]:
     """(the experiment that separates the rivals of ambiguous findings, None where there is none; what to say beside it).
 
     rivals: effect -> (its gain, the explanations in its place); final: the diagnosed model; count: samples behind its cost;
@@ -116,8 +117,11 @@ def propose(
         return None, notes
     names = tuple(dict.fromkeys(name for effect, rival in pairs for name in (effect, rival.effect)))
     if data.controller is None or data.command is None:
-        remedy = "give the controller, and a log with the velocity command"
-        return None, [*notes, f"Without a controller no command can be worked out that tells {_listed(names)} apart: {remedy}."]
+        text = (
+            "Without a controller no command can be worked out that tells {} apart: give the controller, and a log with the "
+            "velocity command."
+        )
+        return None, [*notes, say(text, _listed(names))]
     kind = None if not data.torque_logged else MEASURED if data.torque_measured else COMMANDED
     bench = _Bench(data.controller, final.noise, max(final.cost / count, 1e-300), kind, elsewhere)
     items = menu(data, final)
@@ -142,10 +146,10 @@ def propose(
         if most < T:
             best, most = items[i], T
     if best is None or most < CLEAR:
-        return None, [*notes, f"No experiment of the menu within the limits of these records tells {_listed(names)} apart."]
+        text = "No experiment of the menu within the limits of these records tells {} apart."
+        return None, [*notes, say(text, _listed(names))]
     n = len(best.command)
-    proposal = best.proposal(names, float(n * np.log1p(most / n)))
-    return replace(proposal, reason=f"{best.name.capitalize()}: {best.reason[0].lower()}{best.reason[1:]}"), notes
+    return best.proposal(names, float(n * np.log1p(most / n))), notes
 
 
 def at_rest(fit: Fit, data: DataSet) -> tuple[Hypothesis, Vector]:

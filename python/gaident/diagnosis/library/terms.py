@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, say
 from gaident.control.filtering import rate_limited
 from gaident.control.pi import PI
 from gaident.data.record import Record
@@ -59,14 +60,14 @@ HIGHEST_ORDER = 64
 FRICTION = "dry friction"
 """The family of dry friction and its generalisations: a model holds one of them."""
 
-EQUIVALENT: dict[frozenset[str], str] = {
-    frozenset({"torque_lag", "velocity_filter"}): (
-        "Torque lag and velocity filter act alike on every record of command, torque and velocity, whatever the command: log the "
-        "measured motor current (it shows a lag) or the raw encoder angle (it shows a filter) beside them."
+EQUIVALENT: dict[frozenset[str], Text] = {
+    frozenset({"torque_lag", "velocity_filter"}): say(
+        "Torque lag and velocity filter act alike on every record of command, {torque} and velocity, whatever the command: log "
+        "the measured motor current (it shows a lag) or the raw encoder {angle} (it shows a filter) beside them."
     ),
-    frozenset({"load_torque", "asymmetric_friction"}): (
-        "A constant load and dry friction of two levels are the same torque while the axis turns, whatever the command: repeat "
-        "the record with the load taken off or the axis turned over, only a load changes with that."
+    frozenset({"load_torque", "asymmetric_friction"}): say(
+        "A constant load and dry friction of two levels are the same {torque} while the axis {turns}, whatever the command: "
+        "repeat the record with the load taken off or the axis turned over, only a load changes with that."
     ),
 }
 """Equivalence classes: effects that no record of command, velocity and torque tells apart, and what else would."""

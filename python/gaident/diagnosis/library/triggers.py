@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import TURN, Text, joined, order, say, turns
 from gaident.control.pi import PI
 from gaident.diagnosis.library.terms import HIGHEST_ORDER, friction_family
 from gaident.models.model import Model
@@ -17,7 +18,6 @@ __all__ = ["Motion", "not_testable", "one_sided"]
 
 Vector = NDArray[np.float64]
 
-TURN = math.tau
 LEAST_TURN = math.pi / 3.0  # rad of travel below which a once-per-turn torque is a constant and a spring
 REACHED = 0.999  # of a limit of the controller: from there on it was reached
 
@@ -45,40 +45,41 @@ class Motion:
     repeated: bool
 
 
-def not_testable(motions: Sequence[Motion], controller: PI | None, model: Model | None) -> dict[str, str]:
+def not_testable(motions: Sequence[Motion], controller: PI | None, model: Model | None) -> dict[str, Text]:
     """Effect -> why these records say nothing about it; effects that were triggered are not in it."""
-    why: dict[str, str] = {}
+    why: dict[str, Text] = {}
     for part in (_speed(motions), _travel(motions), _torque(motions), _loop(motions, controller), _structure(model)):
         for effect, reason in part.items():
             why.setdefault(effect, reason)
     return why
 
 
-def one_sided(motions: Sequence[Motion], controller: PI | None) -> dict[str, str]:
+def one_sided(motions: Sequence[Motion], controller: PI | None) -> dict[str, Text]:
     """Effect -> which sizes of it could not have shown in these records; what stands there is tested, but not beyond."""
     limit, clamp = (math.inf, math.inf) if controller is None else controller.limits
     highest = max(float(np.abs(m.torque).max()) for m in motions)
     own = highest > REACHED * limit
-    why = "the controller's own limit lets no more through" if own else "no more torque was asked for"
-    notes = {"torque_saturation": f"a limit above {highest:.3g} N m would not have shown: {why}"}
+    why = Text("the controller's own limit lets no more through") if own else say("no more {torque} was asked for")
+    notes = {"torque_saturation": say("a limit above {:.3g} {N m} would not have shown: {}", highest, why)}
     if controller is not None:
         integral = max((_integral(m, controller) for m in motions), default=0.0)
         if integral > 0.0:
             own = integral > REACHED * clamp
-            why = "the controller's own clamp lets it go no higher" if own else "the integral went no higher"
-            notes["integrator_clamp"] = f"a clamp above {integral:.3g} N m would not have shown: {why}"
+            why = Text("the controller's own clamp lets it go no higher" if own else "the integral went no higher")
+            notes["integrator_clamp"] = say("a clamp above {:.3g} {N m} would not have shown: {}", integral, why)
         slope = max((float(np.abs(np.diff(m.command)).max()) / m.dt for m in motions if m.command is not None), default=0.0)
         if slope > 0.0:
-            notes["command_rate_limit"] = f"a limit above {slope:.3g} rad/s^2 would not have shown: no command rises faster"
+            rate = say("a limit above {:.3g} {rad/s^2} would not have shown: no command rises faster", slope)
+            notes["command_rate_limit"] = rate
     travel = max(float(np.ptp(m.position)) for m in motions)
     least = math.ceil(TURN / travel) if travel > 0.0 else HIGHEST_ORDER
     fastest = math.floor(0.8 * math.pi / max(_slowest(m) * m.dt for m in motions)) if any(_slowest(m) for m in motions) else None
     for effect in ("cogging", "velocity_ripple"):
-        parts = [f"orders below {least} need more than the {travel / TURN:.2g} turns travelled"] if least > 2 else []
+        parts = [say("orders below {} need more than the {} travelled", order(least), turns(travel))] if least > 2 else []
         if fastest is not None and fastest < HIGHEST_ORDER:
-            parts.append(f"orders above {fastest} are faster than the sampling even at the slowest speed held")
+            parts.append(say("orders above {} are faster than the sampling even at the slowest speed held", order(fastest)))
         if parts and least <= HIGHEST_ORDER:
-            notes[effect] = "; ".join(parts)
+            notes[effect] = joined("; ", parts)
     return notes
 
 
@@ -102,70 +103,75 @@ def _monotone(m: Motion, apart: float) -> bool:
     return not m.repeated and bool(np.all(steps > -apart) or np.all(steps < apart))
 
 
-def _speed(motions: Sequence[Motion]) -> dict[str, str]:
+def _speed(motions: Sequence[Motion]) -> dict[str, Text]:
     top = max(float(np.abs(m.smooth).max()) for m in motions)
     if not any(np.any(m.moving) for m in motions):
         moving = ("quadratic_drag", "unbalance", "cogging", "backlash", "hardening_stiffness", "velocity_ripple")
-        return dict.fromkeys((*friction_family(), *moving), "the axis does not move")
+        return dict.fromkeys((*friction_family(), *moving), Text("the axis does not move"))
     why = {}
     forward = any(np.any(m.moving & (m.smooth > 0.0)) for m in motions)
     backward = any(np.any(m.moving & (m.smooth < 0.0)) for m in motions)
     if not (forward and backward):
-        why["asymmetric_friction"] = f"the axis turns {'forwards' if forward else 'backwards'} only"
+        why["asymmetric_friction"] = say("the axis {turns} {} only", "forwards" if forward else "backwards")
     slowest = min(float(np.abs(m.velocity).min()) for m in motions)
     if slowest > 0.1 * top:
-        why["stribeck_friction"] = f"the axis never turns slower than {slowest:.3g} rad/s"
+        why["stribeck_friction"] = say("the axis never {turns} slower than {:.3g} {rad/s}", slowest)
     if slowest > max(m.velocity_floor for m in motions):
-        why["presliding_friction"] = why["lugre_friction"] = f"the axis neither stands nor reverses (slowest {slowest:.3g} rad/s)"
+        restless = say("the axis neither stands nor reverses (slowest {:.3g} {rad/s})", slowest)
+        why["presliding_friction"] = why["lugre_friction"] = restless
     speeds = sorted({round(abs(v) / (0.1 * top)) for m in motions for v in m.held if v})
     near = sum(int(np.sum(np.abs(np.abs(m.smooth[m.moving]) - top) < 0.15 * top)) for m in motions)
     if len(speeds) < 2 and near > 0.5 * sum(int(np.sum(m.moving)) for m in motions):
-        why["quadratic_drag"] = f"one speed only ({top:.3g} rad/s): its drag is viscous friction there"
+        why["quadratic_drag"] = say("one speed only ({:.3g} {rad/s}): its drag is viscous friction there", top)
     if all(_monotone(m, 0.05 * top) for m in motions):
-        why["friction_drift"] = "no speed is held early and late, nor are speeds mixed in time: a drift would be drag"
+        why["friction_drift"] = Text("no speed is held early and late, nor are speeds mixed in time: a drift would be drag")
     return why
 
 
-def _travel(motions: Sequence[Motion]) -> dict[str, str]:
+def _travel(motions: Sequence[Motion]) -> dict[str, Text]:
     travel = max(float(np.ptp(m.position)) for m in motions)
+    moved = Text(f"{math.degrees(travel):.2g} degrees of travel", f"{travel:.2g} m of travel")
     why = {}
     if travel < LEAST_TURN:
-        why["unbalance"] = f"{math.degrees(travel):.2g} degrees of travel: over so little it is a constant load"
+        why["unbalance"] = say("{}: over so little it is a constant load", moved)
     if travel < TURN / HIGHEST_ORDER:
         for effect in ("cogging", "velocity_ripple"):
-            why[effect] = f"{math.degrees(travel):.2g} degrees of travel hold no period of order {HIGHEST_ORDER} or less"
+            why[effect] = say("{} hold no period of order {} or less", moved, order(HIGHEST_ORDER))
     return why
 
 
-def _torque(motions: Sequence[Motion]) -> dict[str, str]:
+def _torque(motions: Sequence[Motion]) -> dict[str, Text]:
     why = {}
     changes = any(np.any(m.torque > m.torque_floor) and np.any(m.torque < -m.torque_floor) for m in motions)
     if not changes:
-        why["backlash"] = "the torque never changes its sign: the coupling stays on one flank"
+        why["backlash"] = say("the {torque} never changes its sign: the coupling stays on one flank")
         least = min(float(np.abs(m.torque).min()) for m in motions)
         highest = max(float(np.abs(m.torque).max()) for m in motions)
         if least > 0.1 * highest:
-            why["torque_dead_band"] = f"the torque never comes near zero (least {least:.2g} N m): a dead band is a constant load"
+            near = "the {torque} never comes near zero (least {:.2g} {N m}): a dead band is a constant load"
+            why["torque_dead_band"] = say(near, least)
     if all(float(np.ptp(m.torque)) == 0.0 for m in motions):
-        constant = "the torque never changes"
+        constant = say("the {torque} never changes")
         for effect in ("transport_delay", "torque_lag", "torque_saturation", "extra_resonance", "hardening_stiffness"):
             why[effect] = constant
     return why
 
 
-def _loop(motions: Sequence[Motion], controller: PI | None) -> dict[str, str]:
+def _loop(motions: Sequence[Motion], controller: PI | None) -> dict[str, Text]:
     if controller is None or all(m.command is None for m in motions):
-        return dict.fromkeys(("integrator_clamp", "command_rate_limit"), "no controller and no command are known: open loop")
+        return dict.fromkeys(
+            ("integrator_clamp", "command_rate_limit"), Text("no controller and no command are known: open loop")
+        )
     why = {}
     if controller.ki == 0.0:
-        why["integrator_clamp"] = "the controller has no integral part"
+        why["integrator_clamp"] = Text("the controller has no integral part")
     if not any(m.jumps or (m.command is not None and np.any(np.diff(m.command) != 0.0)) for m in motions):
-        why["command_rate_limit"] = "the command never changes"
+        why["command_rate_limit"] = Text("the command never changes")
     return why
 
 
-def _structure(model: Model | None) -> dict[str, str]:
+def _structure(model: Model | None) -> dict[str, Text]:
     if model is None or any(pole.imag > 0.0 for pole in model.poles):
         return {}
-    reason = f"the model ({model.p},{model.q}) shows no shaft resonance, so that there is no coupling to have it"
+    reason = Text(f"the model ({model.p},{model.q}) shows no shaft resonance, so that there is no coupling to have it")
     return dict.fromkeys(("backlash", "hardening_stiffness"), reason)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, say
 from gaident.data.record import Record
 from gaident.models.starts import noise_std
 
@@ -18,11 +19,11 @@ __all__ = ["ADVICE", "FOLDED", "folded"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-FOLDED = "the sensor shows the speed without its sign"
+FOLDED = Text("the sensor shows the speed without its sign")
 
-ADVICE = (
-    "No cause can be named: the sensor shows the speed without its sign. The velocity turns back at zero while the torque stays "
-    "as it is, so that the direction of motion is not known; log a signed velocity, or the position."
+ADVICE = say(
+    "No cause can be named: the sensor shows the speed without its sign. The velocity falls to zero and rises again while the "
+    "{torque} stays as it is, so that the direction of motion is not known; log a signed velocity, or the position."
 )
 
 STEEP = 0.15  # of the slopes that are common: what is no rest

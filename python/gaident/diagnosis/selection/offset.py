@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gaident.axis import Text, say
 from gaident.diagnosis.library.terms import EVEN_FRICTION, LOAD, TWO_LEVELS
 from gaident.diagnosis.selection.moves import Moves
 from gaident.estimation.objective import Fit
@@ -33,12 +34,14 @@ class Offset:
     left: float
 
     @property
-    def sentence(self) -> str:
+    def sentence(self) -> Text:
         """What looks like an offset, in words."""
-        return (
-            f"Even dry friction with a constant load of {self.load:.3g} N m in its place would leave the model "
-            f"{self.behind:.0f} BIC units worse: what looks like an offset is mostly viscous friction that depends on the "
-            f"direction, {self.left:.2g} N m of it is left."
+        return say(
+            "Even dry friction with a constant load of {:.3g} {N m} in its place would leave the model {:.0f} BIC units worse: "
+            "what looks like an offset is mostly viscous friction that depends on the direction, {:.2g} {N m} of it is left.",
+            self.load,
+            self.behind,
+            self.left,
         )
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import Text, checked_axis, say, turns
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.estimation.regression.motion import cutoff_of, noise_share
@@ -107,8 +108,7 @@ def inverse_dynamics(
     {'inertia': 0.002, 'viscous': 0.01, 'coulomb': 0.1}
     """
     records = _checked(rec, "rec")
-    if axis not in ("rotary", "linear"):
-        raise SettingsError(f"axis is {axis!r}: it must be 'rotary' or 'linear'")
+    checked_axis(axis)
     if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= 10:
         raise SettingsError(f"order={order!r}: give a whole number from 1 to 10, the filter's order in each direction")
     nyquist = 0.5 / records[0].dt
@@ -161,7 +161,7 @@ def inverse_dynamics(
         force_error_held_out=float("nan"),
         held_out="",
         rivals=_rivals(scores, chosen),
-        not_tried=() if asked is not None else tuple(f"{name}: {reason}" for name, reason in refused.items()),
+        not_tried=() if asked is not None else tuple(say("{}: {}", name, reason) for name, reason in refused.items()),
         digests=tuple(r.digest for r in records),
     )
     if rank < len(theta):
@@ -208,23 +208,25 @@ def _known_terms(terms: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in TERMS if name in names)
 
 
-def _refused(records: Sequence[Record], rows: Sequence[Rows], axis: str) -> dict[str, str]:
+def _refused(records: Sequence[Record], rows: Sequence[Rows], axis: str) -> dict[str, Text]:
     """Term -> why these records cannot show it."""
     velocity = np.concatenate([r.of(("viscous",))[:, 0] for r in rows])
     travel = max(r.travel for r in rows)
-    refused: dict[str, str] = {}
+    refused: dict[str, Text] = {}
     slower = min(np.count_nonzero(velocity > 0.0), np.count_nonzero(velocity < 0.0))
     if slower < max(10, LEAST_SHARE * len(velocity)):
-        why = "the velocity hardly changes its sign: dry friction and a constant torque cannot be told apart, offset is both"
+        why = say(
+            "the velocity hardly changes its sign: dry friction and a constant {torque} cannot be told apart, offset is both"
+        )
         refused |= dict.fromkeys(("viscous_by_direction", "coulomb", "coulomb_by_direction"), why)
     if axis == "linear":
-        refused["gravity"] = "a linear axis has no angle"
+        refused["gravity"] = Text("on a linear axis gravity is the same everywhere, and part of the offset")
     elif travel < SIXTH_OF_A_TURN:
-        refused["gravity"] = (
+        refused["gravity"] = Text(
             f"the travel is {travel:.2g} rad, and gravity shows from a sixth of a turn on, {SIXTH_OF_A_TURN:.3g} rad"
         )
     if axis == "rotary" and travel > MOST_OF_A_SPRING:
-        refused["spring"] = f"the travel is {travel / (2.0 * np.pi):.3g} turns, and a spring to ground ends after ten"
+        refused["spring"] = say("the travel is {}, and a spring to ground ends after ten", turns(travel, 3))
     return refused
 
 

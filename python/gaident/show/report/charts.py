@@ -7,11 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gaident.axis import unit, velocity_unit, word
 from gaident.show.chart import BINS, Chart, Panel, Trace, series
-from gaident.show.diagnosis_charts import error_panel, missing_label, missing_orders, std_band, torque_word, velocity_panel
+from gaident.show.diagnosis_charts import error_panel, missing_label, missing_orders, std_band, velocity_panel
 from gaident.show.diagnosis_numbers import over_period, smoothed
 from gaident.show.report.views import Run, Vector
-from gaident.show.wording import number, unit, velocity_unit
+from gaident.show.wording import number
 
 __all__ = [
     "command_chart",
@@ -24,7 +25,7 @@ __all__ = [
 
 def run_chart(run: Run, noise: float, key: str, axis: str) -> Chart:
     """Measured against simulated velocity, below it what is left, below that the torque."""
-    kind = torque_word(axis)
+    kind = word("torque", axis)
     text = "Error: measured minus simulated. Drag (or use the figure's buttons) to zoom all panels, double-click to come back."
     errors = _errors(run)
     limits, said = _error_limits([e for e in errors if e is not None])
@@ -78,7 +79,7 @@ def missing_over_time(run: Run, dhat: Vector, key: str, axis: str) -> Chart:
         series(run.time, slow, "mean over 1 % of the record", "ink", width=1.8),
     )
     text = (
-        f"The missing {torque_word(axis)} over time. What grows or fades while the motion repeats itself drifts, as friction "
+        f"The missing {word('torque', axis)} over time. What grows or fades while the motion repeats itself drifts, as friction "
         "does with temperature. Zooms together with the velocity above."
     )
     return Chart(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from gaident.axis import velocity_unit
 from gaident.results.experiment import Proposal
-from gaident.show.wording import velocity_unit
 
 __all__ = ["proposal_csv"]
 

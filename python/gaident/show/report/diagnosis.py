@@ -6,6 +6,8 @@ import base64
 import math
 from collections.abc import Callable, Mapping
 
+from gaident.axis import said, unit, velocity_unit, word
+from gaident.models.factors import gain_unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.show.diagnosis_summary import (
@@ -41,7 +43,6 @@ from gaident.show.report.parts import (
 )
 from gaident.show.report.views import View
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
-from gaident.show.wording import sentence, unit, velocity_unit
 
 __all__ = ["chapters", "headline", "mark", "tiles"]
 
@@ -107,7 +108,7 @@ def percent(share: float) -> str:
 def chapters(dia: Diagnosis, view: View, drawn: Charts) -> list[Section]:
     """All of them."""
     noise = dia.after.noise_floor
-    left = typeset(sentence(left_words(dia, view.axis), view.axis))
+    left = typeset(left_words(dia, view.axis))
     return [
         measured_section(view, noise, drawn),
         missing_section(view, noise, drawn, tag("p", left) if left else ""),
@@ -142,7 +143,7 @@ def _causes(dia: Diagnosis, view: View) -> Section:
         parts.append(
             box(
                 tag("h3", name, " ", tag("small", "cannot be told apart" if f.alternatives else "named")),
-                tag("p", typeset(sentence(f.evidence, axis))),
+                tag("p", typeset(said(f.evidence, axis))),
                 table(("parameter", "value", "unit", ""), [rows]) if rows else "",
                 tag("p", tag("small", typeset(figures))),
                 tag("p", tag("small", typeset(chance_words(f, dia.bootstrap)))) if f.p_value is not None else "",
@@ -154,7 +155,7 @@ def _causes(dia: Diagnosis, view: View) -> Section:
     noise = [f for f in dia.findings if f.is_noise]
     if noise:
         parts.append(tag("h3", "About the record"))
-        parts.append(tag("ul", *(tag("li", tag("b", words(f.effect)), ": ", typeset(sentence(f.evidence, axis))) for f in noise)))
+        parts.append(tag("ul", *(tag("li", tag("b", words(f.effect)), ": ", typeset(said(f.evidence, axis))) for f in noise)))
     return Section("cause", "Cause and evidence", *parts)
 
 
@@ -186,17 +187,13 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
         parts.append(tag("p", tag("small", "± is one standard deviation, the colour of the noise taken into account.")))
     if any(not f.is_noise for f in dia.findings):
         parts.append(tag("p", "The parameters of the effects stand with their cause above."))
-    parts += [tag("h3", "Torque to velocity, linear part" if axis == "rotary" else "Force to velocity, linear part")]
+    parts += [tag("h3", f"{word('Torque', axis)} to velocity, linear part")]
     roots = [(kind, r, "unstable" if r.real > 0.0 and kind == "pole" else "") for kind, group in
              (("pole", dia.model.poles), ("zero", dia.model.zeros)) for r in group if r.imag >= 0.0]  # fmt: skip
-    parts.append(tag("p", "Gain K = ", number(dia.model.gain, 5), " ", typeset(unit(_gain_unit(dia.model.p), axis)), "."))
+    parts.append(tag("p", "Gain K = ", number(dia.model.gain, 5), " ", typeset(unit(gain_unit(dia.model.p), axis)), "."))
     parts.append(roots_table(roots))
     parts.append(response_part(view, drawn))
     return Section("parameters", "Parameters", *parts)
-
-
-def _gain_unit(p: int) -> str:
-    return "rad/s^2/(N m)" if p == 1 else f"rad/s^{1 + p}/(N m)" if p else "rad/s/(N m)"
 
 
 def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
@@ -219,7 +216,7 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     if not dia.loop_follows:
         parts.append(box(tag("p", "The simulated controller is not the drive's: these figures include its errors."), kind="warn"))
     if extended and dia.before.rmse > 0.0:
-        parts.append(tag("p", typeset(sentence(fall_words(dia), axis))))
+        parts.append(tag("p", typeset(said(fall_words(dia), axis))))
     parts += _force(dia, axis)
     held = next((r for r in view.runs if r.used == "held out"), None) or next(
         (r for r in view.runs if r.held_from is not None), None
@@ -234,9 +231,11 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
         parts.append(needs_record(view, "The curves of what was held out need the record."))
     if dia.left:
         found = sorted(dia.left.items(), key=lambda item: -item[1])
-        lines: list[Row] = [(DRIVERS.get(k, k), typeset(f"{g:.0f}"), "most" if k == dia.driver else "") for k, g in found]
+        lines: list[Row] = [
+            (said(DRIVERS.get(k, k), axis), typeset(f"{g:.0f}"), "most" if k == dia.driver else "") for k, g in found
+        ]
         parts.append(tag("h3", "What the rest depends on"))
-        verdict = "Nothing of it is significant." if dia.driver is None else typeset(sentence(left_words(dia, axis), axis))
+        verdict = "Nothing of it is significant." if dia.driver is None else typeset(left_words(dia, axis))
         parts.append(tag("p", verdict, " BIC units gained by a free function of each; below 0 it is not worth its parameters."))
         parts.append(table(("", "BIC units", ""), [lines]))
     return Section("gain", "Before and after", *parts)
@@ -272,7 +271,7 @@ def _untested(dia: Diagnosis, view: View) -> Section:
 
 def _reasons(why: Mapping[str, str], head: str, axis: str) -> Html:
     """A table of effects with a sentence on each."""
-    rows: list[Row] = [(words(effect), typeset(sentence(reason, axis))) for effect, reason in why.items()]
+    rows: list[Row] = [(words(effect), typeset(said(reason, axis))) for effect, reason in why.items()]
     return tag("div", table(("effect", head), [rows]), class_="text")
 
 
@@ -289,7 +288,7 @@ def _next(dia: Diagnosis, view: View, drawn: Charts) -> Section:
             text = "None is proposed: see the notes under the verdict."
         return Section("next", title, tag("p", text))
     low, high = p.reach
-    v, place = velocity_unit(axis), "rad" if axis == "rotary" else "m"
+    v, place = velocity_unit(axis), unit("rad", axis)
     size = {
         "length": f"{len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s",
         "highest speed": typeset(f"{float(abs(p.command).max()):.4g} {v}"),
@@ -302,7 +301,7 @@ def _next(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     return Section(
         "next",
         title,
-        tag("p", typeset(sentence(next_words(dia, p), axis))),
+        tag("p", typeset(said(next_words(dia, p), axis))),
         facts(size),
         tag("p", link),
         tag("p", tag("small", "Check speed and travel against the axis' limits before it runs.")),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from gaident.axis import unit, velocity_unit, word
 from gaident.models.mechanics import TwoMass
 from gaident.results.estimate import Estimate
 from gaident.results.identification import Identification
@@ -27,7 +28,7 @@ from gaident.show.report.views import View
 from gaident.show.search_charts import convergence_chart, roots_chart, structures_chart
 from gaident.show.summary import flags_of, inconsistency_words, meaning_of, stem_of
 from gaident.show.wording import number as plain_number
-from gaident.show.wording import structure_words, unit, velocity_unit
+from gaident.show.wording import structure_words
 
 __all__ = ["chapters", "headline", "mark", "tiles"]
 
@@ -98,8 +99,8 @@ def _parameters(idn: Identification, view: View, drawn: Charts) -> Section:
     else:
         parts.append(tag("h3", "The mechanism"))
         if idn.falsified or idn.adequacy.undecided:
-            word = "falsified: these are bent by what the model lacks" if idn.falsified else "undecided: take these with reserve"
-            parts.append(box(tag("p", f"The linear model is {word}."), kind="warn"))
+            doubt = "falsified: these are bent by what the model lacks" if idn.falsified else "undecided: take these with reserve"
+            parts.append(box(tag("p", f"The linear model is {doubt}."), kind="warn"))
         damped = m.with_shaft_damping if isinstance(m, TwoMass) else None
         rows: list[Row] = []
         for name, rotary in m.UNITS.items():
@@ -116,7 +117,7 @@ def _parameters(idn: Identification, view: View, drawn: Charts) -> Section:
             words = (f"Resonance {high} Hz, antiresonance {low} Hz (undamped)", inconsistency_words(m))
             parts.append(tag("p", typeset("; ".join(filter(None, words)) + ".")))
     gain = idn.parameters["gain"]
-    parts.append(tag("h3", "Torque to velocity" if axis == "rotary" else "Force to velocity"))
+    parts.append(tag("h3", f"{word('Torque', axis)} to velocity"))
     parts.append(
         tag("p", "Gain K = ", estimate(gain.value, gain.std), " ", typeset(unit(gain.unit, axis)), ". ", flags_of([gain]))
     )

@@ -13,7 +13,6 @@ from gaident.show.report import diagnosis, identification
 from gaident.show.report.live import figure, script_json
 from gaident.show.report.parts import Charts, box, sentences, title_of
 from gaident.show.report.views import View
-from gaident.show.wording import sentence
 
 __all__ = ["page"]
 
@@ -34,7 +33,7 @@ def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
     verdict = tag(
         "section",
         tag("p", tag("span", f"{head_of.sign} {head_of.word}", class_="badge"), class_="badges"),
-        tag("p", typeset(sentence(head_of.headline, view.axis)), class_="headline"),
+        tag("p", typeset(head_of.headline), class_="headline"),
         tag("div", tiles, class_="tiles"),
         box(tag("b", "Keep in mind"), sentences(head_of.notes, view.axis), kind="quiet") if head_of.notes else "",
         class_=f"verdict {head_of.kind}",

@@ -8,16 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gaident.axis import identifier_words, said, unit, velocity_unit, word
 from gaident.control.pi import PI
 from gaident.show.chart import Chart
-from gaident.show.diagnosis_charts import missing_over_velocity, missing_reversals, residual_spectrum, torque_word
+from gaident.show.diagnosis_charts import missing_over_velocity, missing_reversals, residual_spectrum
 from gaident.show.draw import picture
 from gaident.show.html import Html, Row, joined, number, png_uri, table, tag, typeset
 from gaident.show.report import charts
 from gaident.show.report.views import Run, View
 from gaident.show.response_plots import response_chart
 from gaident.show.wording import number as plain_number
-from gaident.show.wording import sentence, unit, velocity_unit, with_std
+from gaident.show.wording import with_std
 
 __all__ = [
     "Charts",
@@ -82,7 +83,7 @@ def box(*inside: str, kind: str = "") -> Html:
 
 def sentences(texts: Sequence[str], axis: str) -> Html:
     """A list of plain sentences of the library, in the axis' units."""
-    return tag("ul", *(tag("li", typeset(sentence(t, axis))) for t in texts)) if texts else Html()
+    return tag("ul", *(tag("li", typeset(said(t, axis))) for t in texts)) if texts else Html()
 
 
 def estimate(value: float, std: float | None) -> Html:
@@ -136,7 +137,7 @@ def missing_section(view: View, noise: float, drawn: Charts, *before: str) -> Se
     """What is wrong: the missing torque over velocity, place, reversals, time; the error over frequency."""
     run, axis = view.longest, view.axis
     if run is None:
-        text = f"The missing {torque_word(axis)} over velocity, position and time needs the record."
+        text = f"The missing {word('torque', axis)} over velocity, position and time needs the record."
         return Section("wrong", "What is wrong", *before, needs_record(view, text))
     parts: list[str] = list(before)
     if len(view.runs) > 1:
@@ -146,12 +147,12 @@ def missing_section(view: View, noise: float, drawn: Charts, *before: str) -> Se
             tag("p", "Shown for ", tag("b", run.name or f"record {view.runs.index(run) + 1}"), f", {which} of those fitted.")
         )
     if run.dhat is None:
-        parts.append(box(tag("p", f"The missing {torque_word(axis)} could not be worked out, see above."), kind="quiet"))
+        parts.append(box(tag("p", f"The missing {word('torque', axis)} could not be worked out, see above."), kind="quiet"))
     else:
         parts.append(tag("h3", "Against the velocity"))
         parts.append(drawn.put(missing_over_velocity(run.measured, run.dhat, run.dt, run.std, view.curve, axis)))
     if run.dhat is not None and float(np.abs(run.dhat).max()) <= 2.0 * run.std:
-        text = f"None of the missing {torque_word(axis)} can be told from zero: there is no more to show."
+        text = f"None of the missing {word('torque', axis)} can be told from zero: there is no more to show."
         parts.append(tag("p", text))
     elif run.dhat is not None:
         if run.torque is not None:
@@ -173,7 +174,7 @@ def response_part(view: View, drawn: Charts) -> Html:
     if view.response is not None:
         return drawn.put(response_chart(view.response, view.axis))
     if view.no_response:
-        return box(tag("p", typeset(f"No frequency response is drawn: {view.no_response}.")), kind="quiet")
+        return box(tag("p", typeset(f"No frequency response is drawn: {said(view.no_response, view.axis)}.")), kind="quiet")
     return needs_record(view, "The frequency response needs the record.")
 
 
@@ -198,7 +199,7 @@ def _hash(digest: str) -> Html:
 def controller_words(controller: PI | None, axis: str) -> str:
     """The loop that was simulated."""
     if controller is None:
-        kind = torque_word(axis)
+        kind = word("torque", axis)
         return f"none: open loop, {kind} [{unit('N m', axis)}] to velocity [{velocity_unit(axis)}]"
     parts = [
         f"{controller.loop} PI, kp {plain_number(controller.kp)} {unit('N m s/rad', axis)}",
@@ -206,7 +207,7 @@ def controller_words(controller: PI | None, axis: str) -> str:
     ]
     for name in ("torque_limit", "integrator_limit"):
         if getattr(controller, name) is not None:
-            parts.append(f"{name.replace('_', ' ')} {plain_number(getattr(controller, name))} {unit('N m', axis)}")
+            parts.append(f"{identifier_words(name, axis)} {plain_number(getattr(controller, name))} {unit('N m', axis)}")
     return ", ".join(parts)
 
 
