@@ -11,13 +11,13 @@ the corner that a jump of friction makes there.
 White noise of a variance f (`floor`) is then added to the error of every hypothesis alike, as if it had been on the velocity: H
 is that of e plus this noise, and V/N becomes V/N + f |h|^2, h the impulse response of H^-1.
 
-*Output errors*: the plain errors count (H = 1), with the information of their independent samples (see `criterion.py`). That is
-what is left where the errors are a misfit and no stationary noise.
+*Output errors*: the same filter for every hypothesis, none (H = 1) or a prefilter (see `prefilter.py`), with the information of
+the independent samples (see `criterion.py`). That is what is left where the errors are a misfit and no stationary noise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol, TypeVar
@@ -30,6 +30,7 @@ from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import HIGHEST, ON_TOP, WHITE, NoiseFilter, ShaftNoise, autoregression
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import Predictor
+from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.projection import WORST, project_out, sums_of_squares
 from gaident.estimation.term import Term
 
@@ -112,6 +113,10 @@ class NoiseFamily(Protocol):
         """Independent samples among so many."""
         ...
 
+    def prefiltered(self, E: Matrix, lengths: Sequence[int]) -> Matrix:
+        """Rows of plain errors behind the filter that all hypotheses share."""
+        ...
+
     def estimated(self, objective: Objective, error: Vector, closed: bool) -> NoiseFilter:
         """The filter of one row of plain errors."""
         ...
@@ -127,6 +132,10 @@ class Innovations:
     def information(self, count: float) -> float:
         """All samples count."""
         return count
+
+    def prefiltered(self, E: Matrix, lengths: Sequence[int]) -> Matrix:
+        """As they are."""
+        return E
 
     def estimated(self, objective: Objective, error: Vector, closed: bool) -> NoiseFilter:
         """An autoregression, or noise at the shaft with a short one behind it, whichever has the lower BIC."""
@@ -148,14 +157,19 @@ class Innovations:
 
 @dataclass(frozen=True, eq=False)
 class OutputErrors:
-    """Plain errors; samples: how many of them are independent."""
+    """Plain errors behind one prefilter, None: as they are; samples: how many of them are independent."""
 
     samples: float
+    prefilter: Prefilter | None = None
     floor = 0.0
 
     def information(self, count: float) -> float:
         """No more than there are."""
         return min(self.samples, count)
+
+    def prefiltered(self, E: Matrix, lengths: Sequence[int]) -> Matrix:
+        """Behind the prefilter."""
+        return E if self.prefilter is None else self.prefilter.of(E, lengths)
 
     def estimated(self, objective: Objective, error: Vector, closed: bool) -> NoiseFilter:
         """None: the errors count as they are."""
@@ -211,9 +225,13 @@ class Objective:
         """The plain error of a fit."""
         return self.once(("error", fit.hypothesis, fit.x.tobytes()), lambda: self.errors(fit.hypothesis, fit.x[None, :])[0])
 
+    def plain_errors(self, fit: Fit) -> Vector:
+        """Those of a fit under no noise model, 0 where samples do not count."""
+        return self.whitened(self.error(fit)[None, :], WHITE)[0]
+
     def whitened(self, E: Matrix, noise: NoiseFilter) -> Matrix:
         """Rows of whitened errors; samples that do not count are 0."""
-        V = noise.of(self.bridged(E), self.lengths)
+        V = noise.of(self.family.prefiltered(self.bridged(E), self.lengths), self.lengths)
         with np.errstate(invalid="ignore"):
             return np.multiply(V, self.counted, out=None if V is E else V)
 
@@ -307,6 +325,10 @@ class Objective:
         """A fit of this cost."""
         worth = self.bic(cost, noise, hypothesis.parameters.size) if cost < WORST else np.inf
         return Fit(hypothesis, x, noise, cost, worth, converged)
+
+    def rescored(self, fit: Fit) -> Fit:
+        """A fit of the same cost under a family of other information."""
+        return self.fitted(fit.hypothesis, fit.x, fit.noise, fit.cost, fit.converged)
 
     def under(self, family: NoiseFamily) -> Objective:
         """The same data and weights under another noise family."""

@@ -198,10 +198,6 @@ class ModelSpace:
             return fit
         return self.refitted(fit.hypothesis.driven_by(predictor), fit.x, 8)
 
-    def seen_plainly(self, fit: Fit, predictor: Predictor) -> Fit:
-        """A model fitted to the plain errors of another predictor, from where it stands."""
-        return ls.fit(self.objective, fit.hypothesis.driven_by(predictor), fit.x, WHITE, 12)
-
     def refitted(self, hypothesis: Hypothesis, x: Vector, iterations: int = 12) -> Fit:
         """Plain least squares from x, then under a noise model of its own."""
         return ls.reestimated(self.objective, ls.fit(self.objective, hypothesis, x, WHITE, iterations))
@@ -211,9 +207,16 @@ class ModelSpace:
         return ls.reestimated(self.objective, ls.fit(self.objective, hypothesis, x, fit.noise, iterations))
 
     def finished(self, fit: Fit) -> Fit:
-        """A short fit taken to the end under its own noise model, and under the predictors that may say more."""
+        """A short fit taken to the end, under the predictors that may say more."""
+        return self.seen_best(self.completed(fit))
+
+    def completed(self, fit: Fit) -> Fit:
+        """A short fit taken to the end under its own noise model."""
         fit = fit if fit.converged else ls.fit(self.objective, fit.hypothesis, fit.x, fit.noise, 8)
-        fit = ls.reestimated(self.objective, fit)
+        return ls.reestimated(self.objective, fit)
+
+    def seen_best(self, fit: Fit) -> Fit:
+        """A fit under the predictor, of those that may say more, that says most."""
         views: list[Predictor] = []
         if fit.predictor.closed and self.whitens and not self.data.loop_only:
             # Parameters found in closed loop may be a good start for the open loop, whose errors show more.

@@ -79,21 +79,21 @@ class Moves(ModelSpace):
         fits: list[Fit] = []
         simple = next((t for t in now.parameters.terms if t.family), None)
         if simple is not None:
-            self._generalisations(test, now, simple)
+            self._generalisations(test, now, now, simple)
         else:
             for first in [t for t in addable if t.family and not t.nested]:
                 # The simplest of a family first: its generalisations are tried at its level.
                 start = next((s for s in test.ranked(WHITE) if s.term is first), None)
                 if start is not None:
                     fits.append(self.refitted(start.hypothesis, start.starts[0], 8))
-                    self._generalisations(test, fits[-1], first)
+                    self._generalisations(test, now, fits[-1], first)
         if not test.trials:
             return []
         rankings = [test.ranked(WHITE), test.ranked(None)] if self.whitens else [test.ranked(WHITE)]
         if self.whitens and self.quiet(now):
-            # Where nothing but noise is left the linearised gains are near enough.
-            hopes = [s.hope for noise in (now.noise, None) for s in test.ranked(noise)]
-            if max(hopes, default=0.0) < 0.5 * self.penalty:
+            # Where nothing but noise is left the linearised gains are near enough: only what promises something is fitted.
+            rankings = [[s for s in ranking if s.hope > 0.5 * self.penalty] for ranking in rankings]
+            if not any(rankings):
                 return self._best(fits)
         done = {f.parameters.terms[-1] for f in fits}
         short: dict[Term, Fit] = {}
@@ -106,7 +106,9 @@ class Moves(ModelSpace):
         reach = self.policy.hopeless * self.objective.information
         near = [f for f in short.values() if f.bic < now.bic + reach]
         best = sorted(near, key=lambda f: f.bic)[: self.policy.finished]
-        fits += [self.finished(f) for f in best]
+        best = sorted((self.completed(f) for f in best), key=self.score)
+        reach = self.policy.beam_reach * self.penalty
+        fits += [self.seen_best(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
         fits += [f for fit in fits for f in self.resettled(fit)]
         return self._best(fits)
 
@@ -119,8 +121,11 @@ class Moves(ModelSpace):
             found = sorted(found, key=self.score)
         return found
 
-    def _generalisations(self, test: ScoreTest, source: Fit, simple: Term) -> None:
-        """The rest of a family in the place of one of its members, at its level and at one that its own fit may have missed."""
+    def _generalisations(self, test: ScoreTest, now: Fit, source: Fit, simple: Term) -> None:
+        """The rest of a family in the place of one of its members, at its level and at one that its own fit may have missed.
+
+        now: the model that candidates extend; source: the fit with the member, the same one where it is there already.
+        """
         parameters = source.parameters.without(simple.name)
         x = source.parameters.removed(source.x, simple.name)
         wanted = [t for t in self.allowed if t.family == simple.family and simple.name in t.nested]
@@ -128,7 +133,11 @@ class Moves(ModelSpace):
         torque = parameters.scales.torque
         for friction in {max(level, 1e-4 * torque), max(level, MISSED * torque)}:
             scales = replace(parameters.scales, friction=friction)
-            test.add(Hypothesis(replace(parameters, scales=scales), source.predictor), x, wanted)
+            bare = Hypothesis(replace(parameters, scales=scales), source.predictor)
+            if source is now:
+                test.replace(source, simple.name, bare, x, wanted)
+            else:
+                test.add(bare, x, wanted)
 
     def resettled(self, fit: Fit) -> list[Fit]:
         """The two masses with the resonance that was found as their own, alone or with a simple effect beside it.

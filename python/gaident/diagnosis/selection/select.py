@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.library.terms import EVEN_FRICTION
 from gaident.diagnosis.policy import POLICY
-from gaident.diagnosis.selection.bases import Task, linear_bases, noise_floor, plain_bases, regressed
+from gaident.diagnosis.selection.bases import PlainView, Task, linear_bases, noise_floor, plain_bases, plain_view
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
@@ -33,7 +33,6 @@ from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import chi_square_bound, effective_samples, specification_statistic
 from gaident.estimation.noise_model import WHITE, ShaftNoise
 from gaident.estimation.objective import Fit, Innovations, Objective, OutputErrors
-from gaident.estimation.projection import WORST
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 
@@ -109,47 +108,48 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     """Steps 1 to 3; where the linear model leaves a large misfit, step 2 first: step 1 may then be needless."""
     task, bases = linear_bases(task)
     space = task.space()
+    plain = plain_view(task)
     if task.data.torque_measured:
         # Noise on the input makes a whitened inertia too large, whatever the noise model; at the slow end there is little of it.
-        return _Found(*_plainly(task, bases, note), np.inf, 0.0)
+        return _Found(*_plainly(plain, bases, note), np.inf, 0.0)
     plainly: tuple[Moves, Fit, Fit] | None = None
     if min(space.ratio(b) for b in bases) > POLICY.misfit_ratio:
-        plainly = _plainly(task, bases, note)
+        plainly = _plainly(plain, bases, note)
         as_whitened = _as_innovations(space, plainly[2])
-        statistic, bound = _specification(space, as_whitened, plainly[2])
+        statistic, bound = _specification(space, plain.objective, as_whitened, plainly[2])
         if statistic > bound:
             return _Found(*plainly, statistic, bound)
     base, final = _explored(task, space, bases)
-    statistic, bound = _specification(space, final)
+    statistic, bound = _specification(space, plain.objective, final)
     if plainly is None and (statistic > bound or not space.runs_free(final)):
-        plainly = _plainly(task, bases, note)
+        plainly = _plainly(plain, bases, note)
     if plainly is not None:
         again = _improved(space, _as_innovations(space, plainly[2]), final)
         if again is not final:
             base, final = _bare(space, again), again
-        statistic, bound = _specification(space, final, plainly[2])
+        statistic, bound = _specification(space, plain.objective, final, plainly[2])
     whitened = _Found(space, base, final, statistic, bound)
     if plainly is not None and statistic > bound:
         return _Found(*plainly, statistic, bound, whitened)
     return whitened
 
 
-def _plainly(task: Task, bases: Sequence[Fit], note: Callable[[str], None]) -> tuple[Moves, Fit, Fit]:
+def _plainly(plain: PlainView, bases: Sequence[Fit], note: Callable[[str], None]) -> tuple[Moves, Fit, Fit]:
     """Step 2: (the space of output errors, linear fit, selected model).
 
-    The information is that of the linear model's plain errors: those of a better model are more.
+    The information is that of the errors which the best linear model or the regressed axis leaves: those of a better model are
+    more.
     """
     note("looking at the plain errors")
-    starts = plain_bases(task.under(OutputErrors(1.0)), bases)
+    starts = plain_bases(plain.task, bases)
     least = min(starts, key=lambda f: f.cost)
-    information = effective_samples(task.objective.error(least) * task.objective.counted)
-    plain = task.under(OutputErrors(information))
-    space = plain.space()
-    fitted = [plain.objective.fitted(f.hypothesis, f.x, f.noise, f.cost, f.converged) for f in starts]
-    base, final = _explored(plain, space, fitted)
-    start = regressed(plain, least.predictor)
-    if start is not None and start.cost < WORST:
-        final = _improved(space, start, final)
+    axis = plain.regressed(least.predictor)
+    samples = [effective_samples(plain.objective.plain_errors(f)) for f in (least, axis) if f is not None]
+    task = plain.worth(max(samples))
+    space = task.space()
+    base, final = _explored(task, space, [task.objective.rescored(f) for f in starts])
+    if axis is not None:
+        final = _improved(space, task.objective.rescored(axis), final)
         base = base if base.parameters.masses == final.parameters.masses else _bare(space, final)
     return space, base, final
 
@@ -216,24 +216,23 @@ def _as_innovations(space: Moves, fit: Fit) -> Fit:
     return space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit)))
 
 
-def _specification(space: Moves, fit: Fit, other: Fit | None = None) -> tuple[float, float]:
+def _specification(space: Moves, plainly: Objective, fit: Fit, other: Fit | None = None) -> tuple[float, float]:
     """(H of the specification test, its bound): the plain errors of the whitened and of the plain estimate.
 
-    The plain estimate is that of the same model, and of the one that output errors selected where that holds another cause: what
-    whitened errors have selected may be no model that a plain estimate could start from.
+    plainly: the objective of output errors. The plain estimate is that of the same model, and of the one that output errors
+    selected where that holds another cause: what whitened errors have selected may be no model that a plain estimate could start
+    from.
     """
-    objective = space.objective
     found = 0.0
     bound = chi_square_bound(fit.parameters.size, space.policy.specification_level)
-    views = [ls.fit(objective, fit.hypothesis, fit.x, WHITE, 12)]
-    pairs = [(fit, views[0])]
+    pairs = [(fit, ls.fit(plainly, fit.hypothesis, fit.x, WHITE, 12))]
     if other is not None and set(other.effects) - set(fit.effects):  # a cause that whitening hid
-        seen = space.seen_plainly(fit, other.predictor)
+        seen = ls.fit(plainly, fit.hypothesis.driven_by(other.predictor), fit.x, WHITE, 12)
         if other.cost < space.policy.overrules * seen.cost:
             pairs.append((seen, other))
     for whitened, plain in pairs:
-        errors = [objective.error(f) * objective.counted for f in (whitened, plain)]
-        information = min(effective_samples(errors[1]), objective.count)
+        errors = [plainly.plain_errors(f) for f in (whitened, plain)]
+        information = min(effective_samples(errors[1]), plainly.count)
         whole, least = (float(e @ e) for e in errors)
         found = max(found, specification_statistic(whole, least, information))
     return found, bound
@@ -247,6 +246,8 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     if isinstance(family, Innovations) and family.shaft is not None:
         shaft = ShaftNoise(outline.base.parameters.linear(outline.base.x), data.dt, data.controller)
         family = Innovations(shaft, family.floor)
+    if isinstance(family, OutputErrors) and family.prefilter is not None:
+        family = replace(family, prefilter=replace(family.prefilter, dt=data.dt))
     objective = Objective(data, task.objective.weight, family, task.objective.measured, task.objective.counter)
     task = replace(task, objective=objective)
     space = task.space()
@@ -256,7 +257,9 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     final = _beam(space).run([final])
     if base.parameters.masses != final.parameters.masses:
         base = _bare(space, final)
-    statistic, bound = _specification(space, final) if space.whitens else (outline.statistic, outline.bound)
+    statistic, bound = outline.statistic, outline.bound
+    if space.whitens:
+        statistic, bound = _specification(space, plain_view(task).objective, final)
     return _Found(space, base, final, statistic, bound)
 
 
