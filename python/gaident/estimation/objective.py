@@ -227,7 +227,8 @@ class Objective:
 
     def plain_errors(self, fit: Fit) -> Vector:
         """Those of a fit under no noise model, 0 where samples do not count."""
-        return self.whitened(self.error(fit)[None, :], WHITE)[0]
+        (row,) = self.whitened(self.error(fit)[None, :], WHITE)
+        return np.asarray(row)
 
     def whitened(self, E: Matrix, noise: NoiseFilter) -> Matrix:
         """Rows of whitened errors; samples that do not count are 0."""

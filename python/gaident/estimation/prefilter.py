@@ -51,7 +51,8 @@ class Prefilter:
     def _of(self, E: Matrix) -> Matrix:
         from scipy.signal import sosfiltfilt
 
-        smooth = sosfiltfilt(self._sections, E, axis=1, padlen=min(3 * (2 * self.order + 1), E.shape[1] - 1))
+        settled = int(2.0 / (self.cutoff * self.dt))  # samples, two periods of the cutoff
+        smooth = sosfiltfilt(self._sections, E, axis=1, padlen=min(settled, E.shape[1] - 1))
         return np.asarray((np.gradient(smooth, self.dt, axis=1) + self.corner * smooth) / self._gain)
 
     @cached_property
