@@ -192,8 +192,10 @@ def plain_view(task: Task) -> PlainView:
     axis = _axis(task.data)
     if axis is None:
         return PlainView(task.under(OutputErrors(1.0)), None)
-    corner = _corner({name: e.value for name, e in axis.parameters.items()})
-    return PlainView(task.under(OutputErrors(1.0, Prefilter(axis.dt, corner, axis.cutoff_hz, axis.order))), axis)
+    values = {name: e.value for name, e in axis.parameters.items()}
+    weight = Prefilter(axis.dt, _corner(values), axis.cutoff_hz, axis.order)
+    inertia = values["inertia"] if task.data.torque_measured else None
+    return PlainView(task.under(OutputErrors(1.0, weight, inertia)), axis)
 
 
 def _axis(data: DataSet) -> InverseDynamics | None:

@@ -123,7 +123,7 @@ class ScoreTest:
     def _base(self, hypothesis: Hypothesis, x: Vector) -> _Base:
         key = hypothesis, x.tobytes()
         if key not in self._bases:
-            _, J, error = self.objective.linearised(hypothesis, x, WHITE)
+            J, error = self.objective.sensitivities(hypothesis, x)
             self._bases[key] = _Base(hypothesis, x, error, J)
         return self._bases[key]
 
