@@ -33,12 +33,6 @@ class Policy:
     short_record: float = _row(
         200.0, "samples", "a record this short doubles the penalty: its noise filter is uncertain itself", CLEAN
     )
-    misfit_penalty: float = _row(
-        10.0,
-        "BIC units",
-        "for output errors: 2 ln of about 150 candidates (Chen and Chen 2008)",
-        REAL,
-    )
     material_share: float = _row(
         0.1,
         "1",

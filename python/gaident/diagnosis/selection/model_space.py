@@ -72,9 +72,8 @@ class ModelSpace:
     @property
     def penalty(self) -> float:
         """BIC units that an effect costs."""
-        if not self.whitens:
-            return self.policy.misfit_penalty
-        return self.policy.effect_penalty * (1.0 + self.policy.short_record / self.objective.count)
+        short = self.policy.short_record / self.objective.count if self.whitens else 0.0
+        return self.policy.effect_penalty * (1.0 + short)
 
     @property
     def margin(self) -> float:

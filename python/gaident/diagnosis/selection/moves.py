@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
-from gaident.diagnosis.selection.mechanisms import as_one_mass, as_two_masses, is_mechanism
+from gaident.diagnosis.selection.mechanisms import as_one_mass, as_two_masses, is_mechanism, swings
 from gaident.diagnosis.selection.model_space import ModelSpace, words
 from gaident.diagnosis.selection.score_test import ScoreTest
 from gaident.estimation import least_squares as ls
@@ -94,7 +94,7 @@ class Moves(ModelSpace):
             # Where nothing but noise is left the linearised gains are near enough: only what promises something is fitted.
             rankings = [[s for s in ranking if s.hope > 0.5 * self.penalty] for ranking in rankings]
             if not any(rankings):
-                return self._best(fits)
+                return self._best(now, fits)
         done = {f.parameters.terms[-1] for f in fits}
         short: dict[Term, Fit] = {}
         for ranking in rankings:
@@ -110,10 +110,14 @@ class Moves(ModelSpace):
         reach = self.policy.beam_reach * self.penalty
         fits += [self.seen_best(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
         fits += [f for fit in fits for f in self.resettled(fit)]
-        return self._best(fits)
+        return self._best(now, fits)
 
-    def _best(self, fits: Sequence[Fit]) -> list[Fit]:
-        """Those that are mechanisms, best first, seen in the loop where the best one is."""
+    def _best(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
+        """Those that are mechanisms, best first, seen in the loop where the best one is.
+
+        A second mass that an effect has become swings on a shaft: what does not describes some other thing.
+        """
+        fits = [f for f in fits if f.parameters.masses == now.parameters.masses or swings(f)]
         found = sorted((f for f in fits if f.cost < WORST and is_mechanism(f.parameters, f.x)), key=self.score)
         if found and found[0].predictor.closed:
             count = self.policy.screened

@@ -221,7 +221,7 @@ def _specification(space: Moves, plainly: Objective, fit: Fit, other: Fit | None
 
     plainly: the objective of output errors. The plain estimate is that of the same model, and of the one that output errors
     selected where that holds another cause: what whitened errors have selected may be no model that a plain estimate could start
-    from.
+    from. H is 0 where the whitened estimate's plain errors are no larger than noise.
     """
     found = 0.0
     bound = chi_square_bound(fit.parameters.size, space.policy.specification_level)
@@ -232,6 +232,8 @@ def _specification(space: Moves, plainly: Objective, fit: Fit, other: Fit | None
             pairs.append((seen, other))
     for whitened, plain in pairs:
         errors = [plainly.plain_errors(f) for f in (whitened, plain)]
+        if float(errors[0] @ errors[0]) < plainly.count * (space.policy.noise_ratio * plainly.data.noise) ** 2:
+            continue  # weighed as torques, too, it leaves noise
         information = min(effective_samples(errors[1]), plainly.count)
         whole, least = (float(e @ e) for e in errors)
         found = max(found, specification_statistic(whole, least, information))
