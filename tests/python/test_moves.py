@@ -217,7 +217,7 @@ def test_the_score_counts_what_an_effect_contains_a_mass_once_and_orders_that_we
     assert cost(bench.fit(masses=2)) == pytest.approx(1.0)
     assert cost(bench.fit(RIPPLE)) * space.penalty == pytest.approx(space.penalty + 2.0 * np.log(8.0))
     assert space.penalty == pytest.approx(POLICY.effect_penalty * (1.0 + POLICY.short_record / space.objective.count))
-    assert Bench(plain=True).space.penalty == POLICY.misfit_penalty
+    assert Bench(plain=True).space.penalty == POLICY.effect_penalty
 
 
 def test_the_key_is_of_the_model_whatever_the_order_and_the_same_for_equivalent_effects() -> None:
