@@ -331,8 +331,8 @@ class Objective:
         return X, np.where(steps > 0.0, h, 0.0)
 
     def plain(self, rows: Matrix, error: Vector) -> float:
-        """Sum of squared plain errors, beside what the rows can explain."""
-        rest = project_out(self.whitened(rows, WHITE), self.whitened(error[None, :], WHITE))[0]
+        """Sum of squared errors of the free run, before all filters, beside what the rows can explain."""
+        rest = project_out(self.bridged(rows) * self.counted, self.bridged(error[None, :]) * self.counted)[0]
         return float(rest @ rest)
 
     def bic(self, cost: float, noise: NoiseFilter, numbers: int) -> float:

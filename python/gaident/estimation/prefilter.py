@@ -8,11 +8,12 @@ Where a model is not exact, what is minimised decides what comes out. A prefilte
 The free run of a rigid axis integrates every torque that the model lacks: e = d/(J s + B). Its errors are slow, and a long
 record holds few of them that are independent. With
 
-    L(s) = (s + B/J) F(s)
+    L(s) = (s + c) F(s)
 
-e_L is the lacking torque d over the inertia, as in the inverse-dynamics regression, but of a simulation: every effect, several
-masses and a closed loop take part in it. F is the zero-phase low-pass of that regression: differences of a sampled velocity say
-nothing above its cutoff. L is fixed for all hypotheses, and scaled so that white noise keeps its variance.
+and c = B/J, e_L is the lacking torque d over the inertia, as in the inverse-dynamics regression, but of a simulation: every
+effect, several masses and a closed loop take part in it. A larger c counts the velocity as well; `balance` gives the one at
+which both count alike. F is the zero-phase low-pass of that regression: differences of a sampled velocity say nothing above its
+cutoff. L is fixed for all hypotheses, and scaled so that white noise keeps its variance.
 
 L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999.
 """
@@ -29,6 +30,7 @@ from numpy.typing import NDArray
 
 __all__ = ["Prefilter"]
 
+Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 
@@ -36,7 +38,7 @@ Matrix = NDArray[np.float64]
 class Prefilter:
     """L(s) = (s + corner) F(s), F a Butterworth low-pass of this order, forward and backward.
 
-    dt: sample time [s]; corner: B/J [rad/s]; cutoff: of F [Hz], below half the sampling frequency.
+    dt: sample time [s]; corner: c [rad/s]; cutoff: of F [Hz], below half the sampling frequency.
     """
 
     dt: float
@@ -48,12 +50,21 @@ class Prefilter:
         """Rows of L e, each record by itself. E: rows of velocity errors of all records [rad/s]."""
         return np.concatenate([self._of(part) for part in np.split(E, np.cumsum(lengths)[:-1], axis=1)], axis=1)
 
+    def balance(self, error: Vector, lengths: Sequence[int]) -> float:
+        """The corner [rad/s] at which an error behind the low-pass has as much power in its slope as in itself."""
+        smooth = [self._smooth(part[None, :]) for part in np.split(error, np.cumsum(lengths)[:-1])]
+        slope = sum(float(np.sum(np.gradient(e, self.dt, axis=1) ** 2)) for e in smooth)
+        return float(np.sqrt(slope / max(sum(float(np.sum(e**2)) for e in smooth), 1e-300)))
+
     def _of(self, E: Matrix) -> Matrix:
+        smooth = self._smooth(E)
+        return np.asarray((np.gradient(smooth, self.dt, axis=1) + self.corner * smooth) / self._gain)
+
+    def _smooth(self, E: Matrix) -> Matrix:
         from scipy.signal import sosfiltfilt
 
         settled = int(2.0 / (self.cutoff * self.dt))  # samples, two periods of the cutoff
-        smooth = sosfiltfilt(self._sections, E, axis=1, padlen=min(settled, E.shape[1] - 1))
-        return np.asarray((np.gradient(smooth, self.dt, axis=1) + self.corner * smooth) / self._gain)
+        return np.asarray(sosfiltfilt(self._sections, E, axis=1, padlen=min(settled, E.shape[1] - 1)))
 
     @cached_property
     def _sections(self) -> Any:

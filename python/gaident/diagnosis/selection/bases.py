@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -174,7 +174,7 @@ class PlainView:
         task, data = self.task, self.task.data
         values = {name: e.value for name, e in self.axis.parameters.items()}
         slowest = 1.0 / max(r.duration for r in data.records)
-        rigid_axis = Model(1.0 / values["inertia"], [-max(_corner(values), slowest)])
+        rigid_axis = Model(1.0 / values["inertia"], [-max(_corner(self.axis), slowest)])
         parameters = Parameterisation.of(rigid_axis, task.scales, data.moving)
         x = parameters.base_vector(rigid_axis)
         for term, own in of_inverse_dynamics(values).items():
@@ -188,14 +188,21 @@ class PlainView:
 
 
 def plain_view(task: Task) -> PlainView:
-    """The task under output errors."""
-    axis = _axis(task.data)
-    if axis is None:
-        return PlainView(task.under(OutputErrors(1.0)), None)
-    values = {name: e.value for name, e in axis.parameters.items()}
-    weight = Prefilter(axis.dt, _corner(values), axis.cutoff_hz, axis.order)
-    inertia = values["inertia"] if task.data.torque_measured else None
-    return PlainView(task.under(OutputErrors(1.0, weight, inertia)), axis)
+    """The task under output errors.
+
+    Their corner is where the error of the regressed axis has as much power in its slope as in itself: free run and torque then
+    count alike. Of a measured torque an inertia up to two deviations above that of the regression is free.
+    """
+    plain = PlainView(task.under(OutputErrors(1.0)), _axis(task.data))
+    fit = plain.regressed(task.predictor())
+    if plain.axis is None or fit is None:
+        return PlainView(plain.task, None)
+    axis, objective = plain.axis, plain.objective
+    inertia = axis.parameters["inertia"]
+    weight = Prefilter(axis.dt, 0.0, axis.cutoff_hz, axis.order)
+    weight = replace(weight, corner=max(weight.balance(objective.plain_errors(fit), objective.lengths), _corner(axis)))
+    heaviest = inertia.value + 2.0 * inertia.std if task.data.torque_measured else None
+    return PlainView(task.under(OutputErrors(1.0, weight, heaviest)), axis)
 
 
 def _axis(data: DataSet) -> InverseDynamics | None:
@@ -208,7 +215,8 @@ def _axis(data: DataSet) -> InverseDynamics | None:
     return found if found.parameters["inertia"].value > 0.0 else None
 
 
-def _corner(values: Mapping[str, float]) -> float:
-    """B/J [rad/s]."""
+def _corner(axis: InverseDynamics) -> float:
+    """B/J [rad/s], with the smaller B of two directions."""
+    values = {name: e.value for name, e in axis.parameters.items()}
     viscous = values.get("viscous", min(values.get("viscous_positive", 0.0), values.get("viscous_negative", 0.0)))
     return max(viscous / values["inertia"], 0.0)
