@@ -197,14 +197,6 @@ def test_an_effect_that_is_there_is_worth_it_and_one_that_is_not_is_none() -> No
     assert not there.space.worth(there.fit(A, B), there.fit(A))
 
 
-@pytest.mark.parametrize(("after", "worth"), [(0.9, True), (1.2, True), (1.3, False), (float("nan"), True)])
-def test_a_model_that_needs_another_torque_is_not_worth_it(after: float, worth: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """However well it follows the velocity; without a logged torque, or without a force error, that is no question."""
-    monkeypatch.setattr(model_space.ModelSpace, "force_error", lambda self, fit: after if fit.effects else 1.0)
-    bench = Bench({"a": (0.3,)})
-    assert bench.space.worth(bench.fit(A), bench.fit()) is worth
-
-
 def test_an_effect_is_worth_it_from_its_penalty_on() -> None:
     """The gain in BIC grows with the square of the amplitude: below the penalty it is not worth it, above it is."""
     gains = {}
@@ -230,7 +222,7 @@ def test_the_score_counts_what_an_effect_contains_a_mass_once_and_orders_that_we
     assert cost(bench.fit(masses=2)) == pytest.approx(1.0)
     assert cost(bench.fit(RIPPLE)) * space.penalty == pytest.approx(space.penalty + 2.0 * np.log(8.0))
     assert space.penalty == pytest.approx(POLICY.effect_penalty * (1.0 + POLICY.short_record / space.objective.count))
-    assert Bench(plain=True).space.penalty == POLICY.misfit_penalty
+    assert Bench(plain=True).space.penalty == POLICY.effect_penalty
 
 
 def test_the_key_is_of_the_model_whatever_the_order_and_the_same_for_equivalent_effects() -> None:

@@ -33,12 +33,6 @@ class Policy:
     short_record: float = _row(
         200.0, "samples", "a record this short doubles the penalty: its noise filter is uncertain itself", CLEAN
     )
-    misfit_penalty: float = _row(
-        10.0,
-        "BIC units",
-        "for output errors: 2 ln of about 150 candidates (Chen and Chen 2008)",
-        REAL,
-    )
     material_share: float = _row(
         0.1,
         "1",
@@ -49,9 +43,6 @@ class Policy:
         0.5, "1", "the same beside a gap or a hard coupling: no model foresees an impact", PAIRS
     )
     most_of_a_spring: float = _row(62.8, "rad", "of travel: what turns more than ten times no spring holds to the ground", REAL)
-    another_torque: float = _row(
-        1.25, "1", "force error over that of the simpler model: above, an effect explains a motion and not the drive", REAL
-    )
     overrules: float = _row(0.5, "1", "of the plain error that a cause which whitening hid may leave at most", REAL)
     rival_margin: float = _row(10.0, "BIC units", "closer explanations are not told apart (Kass and Raftery 1995)", SIZES)
     rival_short: float = _row(400.0, "samples", "a record this short doubles the margin", SIZES)

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
-from gaident.estimation.regression.force_error import band_of
 from gaident.estimation.term import Term
 from gaident.models.drive_torque import torque_of
 from gaident.models.starts import noise_std, starts_moving
@@ -124,11 +123,6 @@ class DataSet:
     def travel(self) -> float:
         """The largest travel of a record [rad]."""
         return max(float(np.ptp(angle_of(r))) for r in self.driven)
-
-    @cached_property
-    def torque_band(self) -> float:
-        """Corner of the filter behind which torques are compared [Hz], that of the inverse-dynamics regression."""
-        return band_of(None, self.driven)
 
     @cached_property
     def time(self) -> Vector:

@@ -27,7 +27,7 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
     limits, steps = hypothesis.parameters.limits(), hypothesis.parameters.steps()
     x = np.clip(x, *limits)
     damping, converged = 1e-2, False
-    v, J, _ = objective.linearised(hypothesis, x, noise)
+    v, J = objective.linearised(hypothesis, x, noise)
     cost = min(float(v @ v), WORST) if np.all(np.isfinite(v)) else WORST
     count = max(objective.count, 1.0)
     for _ in range(iterations):
@@ -60,7 +60,7 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
         if fall < SETTLED * cost / count:
             converged = True
             break
-        v, J, _ = objective.linearised(hypothesis, x, noise)
+        v, J = objective.linearised(hypothesis, x, noise)
     return objective.fitted(hypothesis, x, noise, cost, converged)
 
 
@@ -89,7 +89,7 @@ def scored(objective: Objective, found: Fit) -> Fit:
 
 def _scored(objective: Objective, found: Fit) -> Fit:
     noise = objective.own_noise(found)
-    v = objective.whitened(objective.error(found)[None, :], noise)[0]
+    v = objective.weighed(found, noise)
     return objective.fitted(found.hypothesis, found.x, noise, float(v @ v), found.converged)
 
 

@@ -11,13 +11,13 @@ the corner that a jump of friction makes there.
 White noise of a variance f (`floor`) is then added to the error of every hypothesis alike, as if it had been on the velocity: H
 is that of e plus this noise, and V/N becomes V/N + f |h|^2, h the impulse response of H^-1.
 
-*Output errors*: the plain errors count (H = 1), with the information of their independent samples (see `criterion.py`). That is
-what is left where the errors are a misfit and no stationary noise.
+*Output errors*: the same filter for every hypothesis, none (H = 1) or a prefilter (see `prefilter.py`), with the information of
+the independent samples (see `criterion.py`). That is what is left where the errors are a misfit and no stationary noise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol, TypeVar
@@ -30,6 +30,7 @@ from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import HIGHEST, ON_TOP, WHITE, NoiseFilter, ShaftNoise, autoregression
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import Predictor
+from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.projection import WORST, project_out, sums_of_squares
 from gaident.estimation.term import Term
 
@@ -112,6 +113,10 @@ class NoiseFamily(Protocol):
         """Independent samples among so many."""
         ...
 
+    def prefiltered(self, E: Matrix, lengths: Sequence[int], inertias: Vector | None = None) -> Matrix:
+        """Rows of plain errors behind a filter that no hypothesis estimates; inertias: of each row."""
+        ...
+
     def estimated(self, objective: Objective, error: Vector, closed: bool) -> NoiseFilter:
         """The filter of one row of plain errors."""
         ...
@@ -127,6 +132,10 @@ class Innovations:
     def information(self, count: float) -> float:
         """All samples count."""
         return count
+
+    def prefiltered(self, E: Matrix, lengths: Sequence[int], inertias: Vector | None = None) -> Matrix:
+        """As they are."""
+        return E
 
     def estimated(self, objective: Objective, error: Vector, closed: bool) -> NoiseFilter:
         """An autoregression, or noise at the shaft with a short one behind it, whichever has the lower BIC."""
@@ -148,14 +157,29 @@ class Innovations:
 
 @dataclass(frozen=True, eq=False)
 class OutputErrors:
-    """Plain errors; samples: how many of them are independent."""
+    """Plain errors behind one prefilter, None: as they are; samples: how many of them are independent.
+
+    inertia: where the torque is measured, that of the regression [kg m^2], which noise on the torque does not bias. Compared as
+    velocities, errors of a noisy torque get smaller with a heavier axis that follows it less; as torques they do not. A lighter
+    axis gains nothing: one that dry friction holds has no torque error at all.
+    """
 
     samples: float
+    prefilter: Prefilter | None = None
+    inertia: float | None = None
     floor = 0.0
 
     def information(self, count: float) -> float:
         """No more than there are."""
         return min(self.samples, count)
+
+    def prefiltered(self, E: Matrix, lengths: Sequence[int], inertias: Vector | None = None) -> Matrix:
+        """Behind the prefilter, times J over that of the regression where the torque is measured."""
+        if self.prefilter is None:
+            return E
+        if self.inertia is None or inertias is None:
+            return self.prefilter.of(E, lengths)
+        return self.prefilter.of(E, lengths) * np.maximum(inertias / self.inertia, 1.0)[:, None]
 
     def estimated(self, objective: Objective, error: Vector, closed: bool) -> NoiseFilter:
         """None: the errors count as they are."""
@@ -211,9 +235,18 @@ class Objective:
         """The plain error of a fit."""
         return self.once(("error", fit.hypothesis, fit.x.tobytes()), lambda: self.errors(fit.hypothesis, fit.x[None, :])[0])
 
-    def whitened(self, E: Matrix, noise: NoiseFilter) -> Matrix:
-        """Rows of whitened errors; samples that do not count are 0."""
-        V = noise.of(self.bridged(E), self.lengths)
+    def plain_errors(self, fit: Fit) -> Vector:
+        """Those of a fit under no noise model, 0 where samples do not count."""
+        return self.weighed(fit, WHITE)
+
+    def weighed(self, fit: Fit, noise: NoiseFilter) -> Vector:
+        """The errors of a fit under a noise filter; its cost is their sum of squares."""
+        rows = self.whitened(self.error(fit)[None, :], noise, fit.parameters.inertias(fit.x[None, :]))
+        return np.asarray(rows[0])
+
+    def whitened(self, E: Matrix, noise: NoiseFilter, inertias: Vector | None = None) -> Matrix:
+        """Rows of whitened errors, of models with these inertias [kg m^2]; samples that do not count are 0."""
+        V = noise.of(self.family.prefiltered(self.bridged(E), self.lengths, inertias), self.lengths)
         with np.errstate(invalid="ignore"):
             return np.multiply(V, self.counted, out=None if V is E else V)
 
@@ -294,10 +327,23 @@ class Objective:
 
     def costs(self, hypothesis: Hypothesis, X: Matrix, noise: NoiseFilter) -> Vector:
         """V of each row; WORST where a model diverges."""
-        return sums_of_squares(self.whitened(self.errors(hypothesis, X), noise))
+        V = self.whitened(self.errors(hypothesis, X), noise, hypothesis.parameters.inertias(X))
+        return sums_of_squares(V)
 
-    def linearised(self, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter) -> tuple[Vector, Matrix, Vector]:
-        """(v, J, plain errors) at x: J[j] = dv/dx_j, forward differences; rows of entries that are not moved are 0."""
+    def linearised(self, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter) -> tuple[Vector, Matrix]:
+        """(v, J) at x: J[j] = dv/dx_j, forward differences; rows of entries that are not moved are 0."""
+        X, h = self._neighbours(hypothesis, x)
+        V = self.whitened(self.errors(hypothesis, X), noise, hypothesis.parameters.inertias(X))
+        return V[0], _slopes(V, h)
+
+    def sensitivities(self, hypothesis: Hypothesis, x: Vector) -> tuple[Matrix, Vector]:
+        """(J, e) at x: J[j] = de/dx_j of the errors before all filters, 0 for samples that do not count; e as it is."""
+        X, h = self._neighbours(hypothesis, x)
+        E = self.errors(hypothesis, X)
+        return _slopes(self.bridged(E) * self.counted, h), E[0]
+
+    def _neighbours(self, hypothesis: Hypothesis, x: Vector) -> tuple[Matrix, Vector]:
+        """(rows: x, and x with each entry moved that is moved, steps: 0 for entries that are not)."""
         parameters = hypothesis.parameters
         steps, limits = parameters.steps(), parameters.limits()
         moved = np.flatnonzero(steps > 0.0)
@@ -305,16 +351,11 @@ class Objective:
         h = np.where(x + h > limits[1], -h, h)
         X = np.repeat(x[None, :], len(moved) + 1, axis=0)
         X[np.arange(1, len(moved) + 1), moved] += h[moved]
-        E = self.errors(hypothesis, X)
-        V = self.whitened(E, noise)
-        J = np.zeros((parameters.size, V.shape[1]))
-        with np.errstate(invalid="ignore", over="ignore"):
-            J[moved] = (V[1:] - V[0]) / h[moved][:, None]
-        return V[0], J, E[0]
+        return X, np.where(steps > 0.0, h, 0.0)
 
     def plain(self, rows: Matrix, error: Vector) -> float:
-        """Sum of squared plain errors, beside what the rows can explain."""
-        rest = project_out(self.whitened(rows, WHITE), self.whitened(error[None, :], WHITE))[0]
+        """Sum of squared errors of the free run, before all filters, beside what the rows can explain."""
+        rest = project_out(self.bridged(rows) * self.counted, self.bridged(error[None, :]) * self.counted)[0]
         return float(rest @ rest)
 
     def bic(self, cost: float, noise: NoiseFilter, numbers: int) -> float:
@@ -331,6 +372,10 @@ class Objective:
         worth = self.bic(cost, noise, hypothesis.parameters.size) if cost < WORST else np.inf
         return Fit(hypothesis, x, noise, cost, worth, converged)
 
+    def rescored(self, fit: Fit) -> Fit:
+        """A fit of the same cost under a family of other information."""
+        return self.fitted(fit.hypothesis, fit.x, fit.noise, fit.cost, fit.converged)
+
     def under(self, family: NoiseFamily) -> Objective:
         """The same data and weights under another noise family."""
         return Objective(self.data, self.weight, family, self.measured, self.counter)
@@ -338,3 +383,12 @@ class Objective:
     def weighted(self, weight: Vector) -> Objective:
         """The same with other samples left out."""
         return Objective(self.data, weight, self.family, self.measured, self.counter)
+
+
+def _slopes(V: Matrix, h: Vector) -> Matrix:
+    """Rows of differences over the steps h, 0 where there is none. V: the row at x, and one for each step."""
+    J = np.zeros((len(h), V.shape[1]))
+    moved = np.flatnonzero(h)
+    with np.errstate(invalid="ignore", over="ignore"):
+        J[moved] = (V[1:] - V[0]) / h[moved][:, None]
+    return J

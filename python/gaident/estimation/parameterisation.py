@@ -185,6 +185,14 @@ class Parameterisation:
         values[:, 1:] = X[:, 1 : self.base] * np.array(self.units)
         return values
 
+    def inertias(self, X: Matrix) -> Vector:
+        """Inertia of the whole axis of each row of x [kg m^2]: 1/K, of two masses with the shaft locked."""
+        values = self.base_values(X)
+        gain = np.abs(values[:, 0])
+        if self.masses == 2:
+            gain = gain * np.abs(values[:, 5]) / np.maximum(np.abs(values[:, 3]), 1e-300)
+        return np.asarray(1.0 / np.maximum(gain, 1e-300))
+
     def effect_values(self, X: Matrix, effect: str) -> Matrix:
         """Rows of an effect's parameters, in the order of the effects table."""
         return self.term(effect).natural(X[:, self.slot(effect)])

@@ -60,7 +60,7 @@ def _jackknife(objective: Objective, fit: Fit) -> Vector:
 
 
 def _at_one_point(objective: Objective, fit: Fit) -> Matrix:
-    v, J, _ = objective.linearised(fit.hypothesis, fit.x, fit.noise)
+    v, J = objective.linearised(fit.hypothesis, fit.x, fit.noise)
     moved = np.flatnonzero(fit.parameters.steps() > 0.0)
     sizes = np.sqrt(np.einsum("ij,ij->i", J, J))
     cov = np.zeros((len(fit.x), len(fit.x)))

@@ -85,7 +85,7 @@ class _Bench:
         if refitted:
             cost = fitted(objective, hypothesis, x, self.noise, ITERATIONS).cost
         else:
-            v, J, _ = objective.linearised(hypothesis, x, self.noise)
+            v, J = objective.linearised(hypothesis, x, self.noise)
             rest = project_out(J, v[None, :])[0]
             cost = float(rest @ rest) if np.all(np.isfinite(rest)) else WORST
         return cost / self.variance

@@ -19,14 +19,16 @@ from gaident.estimation.noise_model import WHITE, ShaftNoise
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
+from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.projection import WORST
 from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
 from gaident.models.simulate import simulate
+from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["Task", "linear_bases", "noise_floor", "plain_bases", "regressed"]
+__all__ = ["PlainView", "Task", "linear_bases", "noise_floor", "plain_bases", "plain_view"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,34 +145,82 @@ def noise_floor(task: Task, one: Fit) -> float:
     return floor
 
 
-def regressed(task: Task, predictor: Predictor) -> Fit | None:
-    """The rigid axis of the inverse-dynamics regression, fitted to the plain errors; None where the records do not show one.
+@dataclass(frozen=True, eq=False)
+class PlainView:
+    """A selection by output errors: the task, and the rigid axis that was regressed where the records show one.
 
-    The regression needs no start: where the cost of a simulation is multimodal, as with gravity, it gives the start.
+    With it the errors are weighed as torques (`estimation/prefilter.py`).
     """
-    data = task.data
+
+    task: Task
+    axis: InverseDynamics | None
+
+    @property
+    def objective(self) -> Objective:
+        return self.task.objective
+
+    def worth(self, samples: float) -> Task:
+        """The task with so many independent samples."""
+        family = self.objective.family
+        assert isinstance(family, OutputErrors)
+        return self.task.under(replace(family, samples=samples))
+
+    def regressed(self, predictor: Predictor) -> Fit | None:
+        """The regressed axis, fitted to the plain errors; None where there is none.
+
+        The regression needs no start: where a simulation has valleys, as with gravity, it says where to begin.
+        """
+        if self.axis is None:
+            return None
+        task, data = self.task, self.task.data
+        values = {name: e.value for name, e in self.axis.parameters.items()}
+        slowest = 1.0 / max(r.duration for r in data.records)
+        inertia, damping, stiffness = values["inertia"], max(_corner(self.axis), slowest), values.get("spring", 0.0)
+        rigid_axis = Model(1.0 / inertia, [-damping])
+        if stiffness > 0.0:
+            rigid_axis = Model(1.0 / inertia, quadratic_roots(damping, stiffness / inertia), [0.0])
+        parameters = Parameterisation.of(rigid_axis, task.scales, data.moving)
+        x = parameters.base_vector(rigid_axis)
+        for term, own in of_inverse_dynamics(values).items():
+            if term in task.allowed:
+                low, high = np.array(term.limits(parameters.scales)).T
+                x = np.concatenate([x, np.clip(term.coordinates(own), low, high)])
+                parameters = parameters.extended(term)
+        x = np.concatenate([x, np.zeros(sum(parameters.starts))])
+        fit = ls.fit(task.objective, Hypothesis(parameters, predictor), x, WHITE, 20)
+        return fit if fit.cost < WORST else None
+
+
+def plain_view(task: Task) -> PlainView:
+    """The task under output errors.
+
+    Their corner is where the error of the regressed axis has as much power in its slope as in itself: free run and torque then
+    count alike. Of a measured torque an inertia up to two deviations above that of the regression is free.
+    """
+    plain = PlainView(task.under(OutputErrors(1.0)), _axis(task.data))
+    fit = plain.regressed(task.predictor())
+    if plain.axis is None or fit is None:
+        return PlainView(plain.task, None)
+    axis, objective = plain.axis, plain.objective
+    inertia = axis.parameters["inertia"]
+    weight = Prefilter(axis.dt, 0.0, axis.cutoff_hz, axis.order)
+    weight = replace(weight, corner=max(weight.balance(objective.plain_errors(fit), objective.lengths), _corner(axis)))
+    heaviest = inertia.value + 2.0 * inertia.std if task.data.torque_measured else None
+    return PlainView(task.under(OutputErrors(1.0, weight, heaviest)), axis)
+
+
+def _axis(data: DataSet) -> InverseDynamics | None:
     if not data.torque_logged:
         return None
     try:
         found = inverse_dynamics(list(data.records))
     except (RecordError, SettingsError):
         return None
-    values = {name: e.value for name, e in found.parameters.items()}
+    return found if found.parameters["inertia"].value > 0.0 else None
+
+
+def _corner(axis: InverseDynamics) -> float:
+    """B/J [rad/s], with the smaller B of two directions."""
+    values = {name: e.value for name, e in axis.parameters.items()}
     viscous = values.get("viscous", min(values.get("viscous_positive", 0.0), values.get("viscous_negative", 0.0)))
-    inertia = values.get("inertia", 0.0)
-    if not inertia > 0.0:
-        return None
-    slowest = 1.0 / max(r.duration for r in data.records)
-    damping, stiffness = max(viscous / inertia, slowest), values.get("spring", 0.0)
-    rigid_axis = Model(1.0 / inertia, [-damping])
-    if stiffness > 0.0:
-        rigid_axis = Model(1.0 / inertia, quadratic_roots(damping, stiffness / inertia), [0.0])
-    parameters = Parameterisation.of(rigid_axis, task.scales, data.moving)
-    x = parameters.base_vector(rigid_axis)
-    for term, own in of_inverse_dynamics(values).items():
-        if term in task.allowed:
-            low, high = np.array(term.limits(parameters.scales)).T
-            x = np.concatenate([x, np.clip(term.coordinates(own), low, high)])
-            parameters = parameters.extended(term)
-    x = np.concatenate([x, np.zeros(sum(parameters.starts))])
-    return ls.fit(task.objective, Hypothesis(parameters, predictor), x, WHITE, 20)
+    return max(viscous / values["inertia"], 0.0)

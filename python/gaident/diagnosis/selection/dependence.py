@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from gaident.control.filtering import clamped_sum
 from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.selection.line import torque_of_line
-from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Innovations, Objective
 from gaident.estimation.prediction import coupling_response, twist
 from gaident.estimation.projection import project_out
@@ -62,7 +61,7 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
     which is fitted again without the family, is uncertain by less.
     """
     data, parameters, x = objective.data, fit.parameters, fit.x
-    _, J, error = objective.linearised(fit.hypothesis, x, WHITE)
+    J, error = objective.sensitivities(fit.hypothesis, x)
     w = objective.measured - error
     room = max(len(w) // 16, 4)  # numbers for a family; from 290 samples on there is room for all
     torques: dict[str, Matrix] = {

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.library.terms import RESONANCE
 from gaident.estimation.dataset import DataSet
-from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import LOST, Fit, Hypothesis, Objective
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.projection import project_out
@@ -128,7 +127,7 @@ def resonant(objective: Objective, one: Fit) -> list[Model]:
     longer = one.hypothesis.extended(RESONANCE)
     rows = np.array(RESONANCE.starts(one.parameters.scales))
     X = np.vstack([one.parameters.inserted(one.x, z) for z in rows])
-    _, J, _ = objective.linearised(one.hypothesis, one.x, WHITE)
+    J, _ = objective.sensitivities(one.hypothesis, one.x)
     E = objective.errors(longer, X)
     finite = np.all(np.abs(E) < LOST, axis=1)
     rest = project_out(J, np.where(finite[:, None], E, 0.0))

@@ -19,13 +19,11 @@ from numpy.typing import NDArray
 from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
 from gaident.diagnosis.policy import POLICY, Policy
 from gaident.diagnosis.selection.mechanisms import as_two_masses
-from gaident.errors import GaidentError
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
-from gaident.estimation.regression.force_error import force_error
 from gaident.estimation.term import Term
 
 __all__ = ["ModelSpace", "words"]
@@ -74,9 +72,8 @@ class ModelSpace:
     @property
     def penalty(self) -> float:
         """BIC units that an effect costs."""
-        if not self.whitens:
-            return self.policy.misfit_penalty
-        return self.policy.effect_penalty * (1.0 + self.policy.short_record / self.objective.count)
+        short = self.policy.short_record / self.objective.count if self.whitens else 0.0
+        return self.policy.effect_penalty * (1.0 + short)
 
     @property
     def margin(self) -> float:
@@ -117,36 +114,12 @@ class ModelSpace:
     def worth(self, fuller: Fit, simpler: Fit) -> bool:
         """The decision: whether a fuller model is worth its effects against a simpler one."""
         simpler = self.in_view_of(simpler, fuller)
-        if not self.score(fuller) < self.score(simpler) or self.needs_another_torque(simpler, fuller):
+        if not self.score(fuller) < self.score(simpler):
             return False
         more = [t for t in fuller.parameters.terms if t.name not in simpler.effects]
         if any(set(t.nested) & set(simpler.effects) for t in more) and not self.in_both_views(simpler, fuller):
             return False
         return self.material(simpler, fuller)
-
-    def needs_another_torque(self, simpler: Fit, fuller: Fit) -> bool:
-        """Whether a model needs a torque that is further from the logged one than that of a simpler model.
-
-        A free run judges the velocity alone. A large inertia that swings under gravity, or on a spring, from where a record
-        starts may follow it better than the drive's own does, whatever the torque: it explains a motion and not the drive.
-        """
-        if not self.data.torque_logged:
-            return False
-        before, after = (self.force_error(f) for f in (simpler, fuller))
-        return bool(after > self.policy.another_torque * before)
-
-    def force_error(self, fit: Fit) -> float:
-        """Force error of a model on the records that it is fitted to [N m]; nan where it has none."""
-
-        def computed() -> float:
-            model, records = fit.parameters.model(fit.x), list(self.data.driven)
-            try:
-                return force_error(model, records, cutoff_hz=self.data.torque_band).rms
-            except GaidentError:
-                return float("nan")
-
-        found: float = self.objective.once(("force", fit.key), computed)
-        return found
 
     def in_view_of(self, fit: Fit, other: Fit) -> Fit:
         """The fit as the other's predictor sees it, where that is better: models are compared under the same predictors."""
@@ -182,7 +155,7 @@ class ModelSpace:
         """
         if not set(plain.effects) - set(whitened.effects):
             return False
-        without = self.seen_plainly(whitened, plain.predictor)
+        without = ls.fit(self.objective, whitened.hypothesis.driven_by(plain.predictor), whitened.x, WHITE, 12)
         return plain.cost < self.policy.overrules * without.cost and self.score(plain) < self.score(without) - self.margin
 
     def plain_cost(self, fit: Fit) -> float:
@@ -237,10 +210,6 @@ class ModelSpace:
             return fit
         return self.refitted(fit.hypothesis.driven_by(predictor), fit.x, 8)
 
-    def seen_plainly(self, fit: Fit, predictor: Predictor) -> Fit:
-        """A model fitted to the plain errors of another predictor, from where it stands."""
-        return ls.fit(self.objective, fit.hypothesis.driven_by(predictor), fit.x, WHITE, 12)
-
     def refitted(self, hypothesis: Hypothesis, x: Vector, iterations: int = 12) -> Fit:
         """Plain least squares from x, then under a noise model of its own."""
         return ls.reestimated(self.objective, ls.fit(self.objective, hypothesis, x, WHITE, iterations))
@@ -250,9 +219,16 @@ class ModelSpace:
         return ls.reestimated(self.objective, ls.fit(self.objective, hypothesis, x, fit.noise, iterations))
 
     def finished(self, fit: Fit) -> Fit:
-        """A short fit taken to the end under its own noise model, and under the predictors that may say more."""
+        """A short fit taken to the end, under the predictors that may say more."""
+        return self.seen_best(self.completed(fit))
+
+    def completed(self, fit: Fit) -> Fit:
+        """A short fit taken to the end under its own noise model."""
         fit = fit if fit.converged else ls.fit(self.objective, fit.hypothesis, fit.x, fit.noise, 8)
-        fit = ls.reestimated(self.objective, fit)
+        return ls.reestimated(self.objective, fit)
+
+    def seen_best(self, fit: Fit) -> Fit:
+        """A fit under the predictor, of those that may say more, that says most."""
         views: list[Predictor] = []
         if fit.predictor.closed and self.whitens and not self.data.loop_only:
             # Parameters found in closed loop may be a good start for the open loop, whose errors show more.

@@ -23,7 +23,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
-from gaident.diagnosis.selection.mechanisms import as_held, as_one_mass, as_two_masses, held, is_mechanism, moved_to, released
+from gaident.diagnosis.selection.mechanisms import (
+    as_held,
+    as_one_mass,
+    as_two_masses,
+    held,
+    is_mechanism,
+    moved_to,
+    released,
+    swings,
+)
 from gaident.diagnosis.selection.model_space import ModelSpace, words
 from gaident.diagnosis.selection.score_test import ScoreTest
 from gaident.estimation import least_squares as ls
@@ -64,7 +73,7 @@ class Moves(ModelSpace):
             return []
         key = "add", now.key, self.allowed
         self.grown.setdefault((now.parameters.kind, frozenset(now.effects)), []).append(now)
-        return self.objective.once(key, lambda: self._best([*self.hold(now), *self._add(now)]))
+        return self.objective.once(key, lambda: self._best(now, [*self.hold(now), *self._add(now)]))
 
     def known(self, fit: Fit) -> Fit:
         """A fit of the same model that was grown already, where it is no worse by what swaps a place: its growth is known."""
@@ -80,22 +89,22 @@ class Moves(ModelSpace):
         fits: list[Fit] = []
         simple = next((t for t in now.parameters.terms if t.family), None)
         if simple is not None:
-            self._generalisations(test, now, simple)
+            self._generalisations(test, now, now, simple)
         else:
             for first in [t for t in addable if t.family and not t.nested]:
                 # The simplest of a family first: its generalisations are tried at its level.
                 start = next((s for s in test.ranked(WHITE) if s.term is first), None)
                 if start is not None:
                     fits.append(self.refitted(start.hypothesis, start.starts[0], 8))
-                    self._generalisations(test, fits[-1], first)
+                    self._generalisations(test, now, fits[-1], first)
         if not test.trials:
             return []
         rankings = [test.ranked(WHITE), test.ranked(None)] if self.whitens else [test.ranked(WHITE)]
         if self.whitens and self.quiet(now):
-            # Where nothing but noise is left the linearised gains are near enough.
-            hopes = [s.hope for noise in (now.noise, None) for s in test.ranked(noise)]
-            if max(hopes, default=0.0) < 0.5 * self.penalty:
-                return self._best(fits)
+            # Where nothing but noise is left the linearised gains are near enough: only what promises something is fitted.
+            rankings = [[s for s in ranking if s.hope > 0.5 * self.penalty] for ranking in rankings]
+            if not any(rankings):
+                return self._best(now, fits)
         done = {f.parameters.terms[-1] for f in fits}
         short: dict[Term, Fit] = {}
         for ranking in rankings:
@@ -107,12 +116,18 @@ class Moves(ModelSpace):
         reach = self.policy.hopeless * self.objective.information
         near = [f for f in short.values() if f.bic < now.bic + reach]
         best = sorted(near, key=lambda f: f.bic)[: self.policy.finished]
-        fits += [self.finished(f) for f in best]
+        best = sorted((self.completed(f) for f in best), key=self.score)
+        reach = self.policy.beam_reach * self.penalty
+        fits += [self.seen_best(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
         fits += [f for fit in fits for f in self.resettled(fit)]
-        return self._best(fits)
+        return self._best(now, fits)
 
-    def _best(self, fits: Sequence[Fit]) -> list[Fit]:
-        """Those that are mechanisms, best first, seen in the loop where the best one is."""
+    def _best(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
+        """Those that are mechanisms, best first, seen in the loop where the best one is.
+
+        A second mass that an effect has become swings on a shaft: what does not describes some other thing.
+        """
+        fits = [f for f in fits if f.parameters.masses == now.parameters.masses or swings(f)]
         found = sorted((f for f in fits if f.cost < WORST and is_mechanism(f.parameters, f.x)), key=self.score)
         if found and found[0].predictor.closed:
             count = self.policy.screened
@@ -120,8 +135,11 @@ class Moves(ModelSpace):
             found = sorted(found, key=self.score)
         return found
 
-    def _generalisations(self, test: ScoreTest, source: Fit, simple: Term) -> None:
-        """The rest of a family in the place of one of its members, at its level and at one that its own fit may have missed."""
+    def _generalisations(self, test: ScoreTest, now: Fit, source: Fit, simple: Term) -> None:
+        """The rest of a family in the place of one of its members, at its level and at one that its own fit may have missed.
+
+        now: the model that candidates extend; source: the fit with the member, the same one where it is there already.
+        """
         parameters = source.parameters.without(simple.name)
         x = source.parameters.removed(source.x, simple.name)
         wanted = [t for t in self.allowed if t.family == simple.family and simple.name in t.nested]
@@ -129,7 +147,11 @@ class Moves(ModelSpace):
         torque = parameters.scales.torque
         for friction in {max(level, 1e-4 * torque), max(level, MISSED * torque)}:
             scales = replace(parameters.scales, friction=friction)
-            test.add(Hypothesis(replace(parameters, scales=scales), source.predictor), x, wanted)
+            bare = Hypothesis(replace(parameters, scales=scales), source.predictor)
+            if source is now:
+                test.replace(source, simple.name, bare, x, wanted)
+            else:
+                test.add(bare, x, wanted)
 
     def hold(self, fit: Fit) -> list[Fit]:
         """One mass with its effects, held by a spring to the ground; none where a spring promises too little.
@@ -139,7 +161,7 @@ class Moves(ModelSpace):
         data = self.data
         if fit.parameters.kind != "one mass" or data.travel > self.policy.most_of_a_spring:
             return []
-        _, J, error = self.objective.linearised(fit.hypothesis, fit.x, WHITE)
+        J, error = self.objective.sensitivities(fit.hypothesis, fit.x)
         response = fit.predictor.torque_response(fit.parameters, fit.x, np.vstack([-data.angle, np.ones(len(data.angle))]))
         best, stiffness = 0.0, 0.0
         for noise in (WHITE, fit.noise):

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.selection.mechanisms import evenly_damped
-from gaident.estimation.least_squares import fit
+from gaident.estimation import least_squares as ls
 from gaident.estimation.noise_model import WHITE, NoiseFilter
-from gaident.estimation.objective import LOST, Hypothesis, Objective
+from gaident.estimation.objective import LOST, Fit, Hypothesis, Objective
 from gaident.estimation.prediction import ClosedLoop
 from gaident.estimation.projection import orthonormal_rows, project_out
 from gaident.estimation.term import Term
@@ -59,12 +59,18 @@ class _Trial:
     rows: Matrix  # start coordinates; for harmonics the orders
     errors: Matrix  # plain errors; for harmonics the two columns of each order, what the error loses per unit
     base: _Base
+    onto: tuple[Hypothesis, Vector]  # the model and its x that the coordinates are added to
     columns: bool
+
+    def start(self, coordinates: Vector) -> Vector:
+        """The x of the candidate."""
+        hypothesis, x = self.onto
+        return hypothesis.parameters.inserted(x, coordinates)
 
 
 @dataclass(frozen=True, eq=False)
 class _Base:
-    """The model that candidates extend: x, plain error and sensitivities."""
+    """The model that candidates are compared with: x, plain error and sensitivities."""
 
     hypothesis: Hypothesis
     x: Vector
@@ -88,6 +94,7 @@ class ScoreTest:
     def __init__(self, objective: Objective) -> None:
         self.objective, self.data = objective, objective.data
         self.trials: list[_Trial] = []
+        self._bases: dict[tuple[Hypothesis, bytes], _Base] = {}
         self._beyond: dict[_Base, tuple[int, NoiseFilter]] = {}
         self._views: dict[tuple[_Base, NoiseFilter, bool], _View] = {}
         self._screened: dict[tuple[_Trial, _View], Screened] = {}
@@ -98,7 +105,7 @@ class ScoreTest:
         if valleys and self.data.loopable and not hypothesis.predictor.closed:
             # A replayed torque that ignores a limit of the controller has biased the mechanism; the closed loop has not.
             inside = hypothesis.driven_by(ClosedLoop(self.data, hypothesis.predictor.own_angle))
-            held = x if self.data.torque_logged else fit(self.objective, inside, x, WHITE, 8).x
+            held = x if self.data.torque_logged else ls.fit(self.objective, inside, x, WHITE, 8).x
             self.add(inside, held, valleys)
             terms = [t for t in terms if not t.in_coupling]
         self._add(hypothesis, x, terms)
@@ -106,24 +113,42 @@ class ScoreTest:
         if between:
             self._add(hypothesis, evenly_damped(hypothesis.parameters, x), between)
 
-    def _add(self, hypothesis: Hypothesis, x: Vector, terms: Sequence[Term]) -> None:
-        _, J, error = self.objective.linearised(hypothesis, x, WHITE)
-        base = _Base(hypothesis, x, error, J)
-        parameters = hypothesis.parameters
+    def replace(self, simple: Fit, effect: str, hypothesis: Hypothesis, x: Vector, terms: Sequence[Term]) -> None:
+        """Candidates in the place of an effect that each of them contains.
+
+        simple: the fit with the effect, which they are compared with; hypothesis, x: without it, what they are added to.
+        """
+        self._add(hypothesis, x, terms, (simple, effect))
+
+    def _base(self, hypothesis: Hypothesis, x: Vector) -> _Base:
+        key = hypothesis, x.tobytes()
+        if key not in self._bases:
+            J, error = self.objective.sensitivities(hypothesis, x)
+            self._bases[key] = _Base(hypothesis, x, error, J)
+        return self._bases[key]
+
+    def _add(self, hypothesis: Hypothesis, x: Vector, terms: Sequence[Term], instead: tuple[Fit, str] | None = None) -> None:
+        base = self._base(hypothesis, x) if instead is None else self._base(instead[0].hypothesis, instead[0].x)
+        parameters, onto = hypothesis.parameters, (hypothesis, x)
         for term in terms:
             longer = hypothesis.extended(term)
             if term.harmonic:
-                orders, columns = self._columns(hypothesis, x, term, error)
+                orders, columns = self._columns(hypothesis, x, term, base.error)
                 if len(orders):
-                    self.trials.append(_Trial(term, longer, orders[:, None], columns, base, True))
+                    self.trials.append(_Trial(term, longer, orders[:, None], columns, base, onto, True))
                 continue
             rows = np.array(term.starts(parameters.scales))
             if rows.size == 0:
                 continue
+            if instead is not None:  # the coordinates that both have, beyond the level
+                fit, effect = instead
+                known = fit.x[fit.parameters.slot(effect)]
+                for i, place in list(enumerate(term.shared.get(effect, ())))[1:]:
+                    rows[:, place] = known[i]
             low, high = np.array(term.limits(parameters.scales)).T
             rows = np.clip(rows, low, high)
             X = np.vstack([parameters.inserted(x, z) for z in rows])
-            self.trials.append(_Trial(term, longer, rows, self.objective.errors(longer, X), base, False))
+            self.trials.append(_Trial(term, longer, rows, self.objective.errors(longer, X), base, onto, False))
 
     def _columns(self, hypothesis: Hypothesis, x: Vector, term: Term, error: Vector) -> tuple[Vector, Matrix]:
         """(orders, columns): what the plain error loses per unit of the two components, pairs of rows per order."""
@@ -212,13 +237,13 @@ class ScoreTest:
         else:
             costs = np.where(finite, _along(V - rest, rest, t.term.proportional), np.inf)
             order = np.argsort(costs)
-            starts = tuple(t.base.hypothesis.parameters.inserted(t.base.x, row) for row in _start_rows(t, V, rest, order[:3]))
+            starts = tuple(t.start(row) for row in _start_rows(t, V, rest, order[:3]))
             costs = costs[order]
-        cost, size = max(float(costs[0]), 1e-300), t.term.size
+        cost, size = max(float(costs[0]), 1e-300), t.hypothesis.parameters.size - t.base.hypothesis.parameters.size
         if not np.isfinite(cost):  # every start diverges
             return Screened(t.term, t.hypothesis, starts, view.noise, -np.inf, -np.inf)
         fall = n * np.log(max(power, 1e-300) / cost) - size * np.log(n)
-        bic = self.objective.bic(cost, view.noise, t.base.hypothesis.parameters.size + size)
+        bic = self.objective.bic(cost, view.noise, t.hypothesis.parameters.size)
         return Screened(t.term, t.hypothesis, starts, view.noise, float(fall), float(view.own - bic))
 
     def _without(self, base: _Base, noise: NoiseFilter | None) -> float:
@@ -272,4 +297,4 @@ def _start_rows(t: _Trial, V: Matrix, rest: Vector, order: NDArray[np.intp]) -> 
 def _harmonic_start(t: _Trial, V: Matrix, rest: Vector, i: int) -> Vector:
     z: Vector = np.asarray(np.linalg.lstsq(V[2 * i : 2 * i + 2].T, rest, rcond=None)[0], dtype=np.float64)
     coordinates: Vector = z if t.term.size == 2 else np.concatenate([z, t.rows[i]])
-    return t.base.hypothesis.parameters.inserted(t.base.x, coordinates)
+    return t.start(coordinates)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.library.terms import EVEN_FRICTION
 from gaident.diagnosis.policy import POLICY
-from gaident.diagnosis.selection.bases import Task, linear_bases, noise_floor, plain_bases, regressed
+from gaident.diagnosis.selection.bases import PlainView, Task, linear_bases, noise_floor, plain_bases, plain_view
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
@@ -34,7 +34,6 @@ from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import Specification, chi_square_bound, effective_samples, specification_statistic
 from gaident.estimation.noise_model import WHITE, ShaftNoise
 from gaident.estimation.objective import Fit, Innovations, Objective, OutputErrors
-from gaident.estimation.projection import WORST
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 
@@ -103,46 +102,47 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     """Steps 1 to 4; where the linear model leaves a large misfit, step 2 first: step 1 may then be needless."""
     task, bases = linear_bases(task)
     space = task.space()
+    plain = plain_view(task)
     if task.data.torque_measured:
         # Noise on the input makes a whitened inertia too large, whatever the noise model; at the slow end there is little of it.
-        return _Found(*_plainly(task, bases, note), None)
+        return _Found(*_plainly(plain, bases, note), None)
     plainly: tuple[Moves, Fit, Fit] | None = None
     if min(space.ratio(b) for b in bases) > POLICY.misfit_ratio:
-        plainly = _plainly(task, bases, note)
-        test = specification(space, _as_innovations(space, plainly[2]))
+        plainly = _plainly(plain, bases, note)
+        test = specification(space, plain.objective, _as_innovations(space, plainly[2]))
         if test.contradicts:
             return _Found(*plainly, test)
     base, final = _explored(task, space, bases)
-    test = specification(space, final)
+    test = specification(space, plain.objective, final)
     if plainly is None and (test.contradicts or not space.runs_free(final)):
-        plainly = _plainly(task, bases, note)
+        plainly = _plainly(plain, bases, note)
     if plainly is not None:
         again = _improved(space, _as_innovations(space, plainly[2]), final)
         if again is not final:
             base, final = _bare(space, again), again
-        test = specification(space, final)
+        test = specification(space, plain.objective, final)
     whitened = _Found(space, base, final, test)
     if plainly is not None and (test.contradicts or plainly[0].hidden(final, plainly[2])):
         return _Found(*plainly, test, whitened)
     return whitened
 
 
-def _plainly(task: Task, bases: Sequence[Fit], note: Callable[[str], None]) -> tuple[Moves, Fit, Fit]:
+def _plainly(plain: PlainView, bases: Sequence[Fit], note: Callable[[str], None]) -> tuple[Moves, Fit, Fit]:
     """Step 2: (the space of output errors, linear fit, selected model).
 
-    The information is that of the linear model's plain errors: those of a better model are more.
+    The information is that of the errors which the best linear model or the regressed axis leaves: those of a better model are
+    more.
     """
     note("looking at the plain errors")
-    starts = plain_bases(task.under(OutputErrors(1.0)), bases)
+    starts = plain_bases(plain.task, bases)
     least = min(starts, key=lambda f: f.cost)
-    information = effective_samples(task.objective.error(least) * task.objective.counted)
-    plain = task.under(OutputErrors(information))
-    space = plain.space()
-    fitted = [plain.objective.fitted(f.hypothesis, f.x, f.noise, f.cost, f.converged) for f in starts]
-    base, final = _explored(plain, space, fitted)
-    start = regressed(plain, least.predictor)
-    if start is not None and start.cost < WORST:
-        final = _improved(space, start, final)
+    axis = plain.regressed(least.predictor)
+    samples = [effective_samples(plain.objective.plain_errors(f)) for f in (least, axis) if f is not None]
+    task = plain.worth(max(samples))
+    space = task.space()
+    base, final = _explored(task, space, [task.objective.rescored(f) for f in starts])
+    if axis is not None:
+        final = _improved(space, task.objective.rescored(axis), final)
         base = base if base.parameters.kind == final.parameters.kind else _bare(space, final)
     return space, base, final
 
@@ -209,18 +209,20 @@ def _as_innovations(space: Moves, fit: Fit) -> Fit:
     return space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit)))
 
 
-def specification(space: Moves, fit: Fit) -> Specification:
+def specification(space: Moves, plainly: Objective, fit: Fit) -> Specification:
     """The specification test: the plain errors of the whitened and of the plain estimate of one model.
 
-    What no estimate moves by slope, the order of a harmonic, is the same in both and no degree of freedom.
+    plainly: the objective of output errors. What no estimate moves by slope, the order of a harmonic, is the same in both and no
+    degree of freedom. H is 0 where the whitened estimate's plain errors are no larger than noise.
     """
-    objective = space.objective
-    plain = ls.fit(objective, fit.hypothesis, fit.x, WHITE, 12)
-    errors = [objective.error(f) * objective.counted for f in (fit, plain)]
-    information = min(effective_samples(errors[1]), objective.count)
+    plain = ls.fit(plainly, fit.hypothesis, fit.x, WHITE, 12)
+    errors = [plainly.plain_errors(f) for f in (fit, plain)]
+    information = min(effective_samples(errors[1]), plainly.count)
     whole, least = (float(e @ e) for e in errors)
     freedom = int(np.count_nonzero(fit.parameters.steps()))
     bound = chi_square_bound(freedom, space.policy.specification_level)
+    if whole < plainly.count * (space.policy.noise_ratio * plainly.data.noise) ** 2:
+        return Specification(0.0, bound)
     return Specification(specification_statistic(whole, least, information), bound)
 
 
@@ -232,6 +234,8 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     if isinstance(family, Innovations) and family.shaft is not None:
         shaft = ShaftNoise(outline.base.parameters.linear(outline.base.x), data.dt, data.controller)
         family = Innovations(shaft, family.floor)
+    if isinstance(family, OutputErrors) and family.prefilter is not None:
+        family = replace(family, prefilter=replace(family.prefilter, dt=data.dt))
     objective = Objective(data, task.objective.weight, family, task.objective.measured, task.objective.counter)
     task = replace(task, objective=objective)
     space = task.space()
@@ -241,7 +245,7 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     final = _beam(space).run([final])
     if base.parameters.kind != final.parameters.kind:
         base = _bare(space, final)
-    test = specification(space, final) if space.whitens else outline.specification
+    test = specification(space, plain_view(task).objective, final) if space.whitens else outline.specification
     return _Found(space, base, final, test)
 
 
