@@ -14,7 +14,6 @@ import pytest
 from numpy.typing import NDArray
 
 import gaident as ga
-from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.selection import model_space, moves, score_test
 from gaident.diagnosis.selection.moves import Moves
 from gaident.estimation import least_squares as ls
@@ -24,6 +23,7 @@ from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.term import Scales, Term
+from gaident.policy.table import POLICY
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

@@ -18,7 +18,6 @@ from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
 from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, TWO_LEVELS, conditional_classes
 from gaident.diagnosis.mechanics import mechanics_of, moved
-from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.records.arguments import ProgressCallback, checked, noise_std_of, records_of
 from gaident.diagnosis.records.folded import ADVICE, FOLDED, folded
 from gaident.diagnosis.records.hygiene import cleaned, outliers, quantisation
@@ -34,6 +33,7 @@ from gaident.estimation.uncertainty import estimates_of
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
 from gaident.models.simulate import simulate
+from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis, Finding
 from gaident.results.estimate import Estimate
 from gaident.results.identification import Identification
@@ -42,6 +42,7 @@ from gaident.version import version
 __all__ = ["Diagnosis", "Finding", "diagnose"]
 
 Vector = NDArray[np.float64]
+DIVERGED = 1e6  # no decision: of the velocity; a simulation that leaves so much has diverged
 
 
 def diagnose(
@@ -156,7 +157,7 @@ class _Work:
         """Samples that stand out of the velocity, or out of the linear model's error: a slope of the velocity may hide them."""
         with np.errstate(over="ignore", invalid="ignore"):
             error = rec.velocity - simulate(self.idn.model, rec, self.controller)
-        if np.all(np.abs(error) < 1e6 * np.abs(rec.velocity).max()):
+        if np.all(np.abs(error) < DIVERGED * np.abs(rec.velocity).max()):
             return outliers(rec.velocity, error)
         return outliers(rec.velocity)
 

@@ -32,18 +32,13 @@ from gaident.estimation.objective import Fit, Hypothesis, Objective
 from gaident.estimation.prediction import ClosedLoop, OpenLoop
 from gaident.estimation.projection import WORST, project_out
 from gaident.models.simulate import run
+from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Finding
 from gaident.results.experiment import Limits, Proposal
 
 __all__ = ["propose"]
 
 Vector = NDArray[np.float64]
-
-CLEAR = 25.0  # chi2 from which two explanations are told apart
-SAMPLES = 4000  # of a proposed record at least, where the diagnosed one is shorter
-PAIRS = 3  # of explanations, the closest ones
-REFITTED = 4  # commands whose rivals are really fitted; the others are judged by the linearised fit
-ITERATIONS = 6
 
 
 def _listed(effects: Sequence[str]) -> str:
@@ -80,7 +75,7 @@ class _Bench:
         objective = Objective(data, np.ones(len(record)))
         hypothesis, x = at_rest(rival, data)
         if refitted:
-            cost = fitted(objective, hypothesis, x, self.noise, ITERATIONS).cost
+            cost = fitted(objective, hypothesis, x, self.noise, POLICY.short).cost
         else:
             v, J, _ = objective.linearised(hypothesis, x, self.noise)
             rest = project_out(J, v[None, :])[0]
@@ -109,7 +104,7 @@ def propose(
         for rival in rivals[f.effect][1]
         if not any({f.effect, rival.effect} <= alike for alike in EQUIVALENT)
     ]
-    pairs = sorted(pairs, key=lambda p: p[1].behind)[:PAIRS]
+    pairs = sorted(pairs, key=lambda p: p[1].behind)[: POLICY.starts]
     if not pairs:
         return None, notes
     names = tuple(dict.fromkeys(name for effect, rival in pairs for name in (effect, rival.effect)))
@@ -122,7 +117,7 @@ def propose(
     table = [
         (pair, trial, [_tried(bench, item, trial, False) for item in items]) for pair in pairs for trial in _trials([pair], final)
     ]
-    hopeless = {id(pair) for pair, _, T in table if max(T, default=0.0) < 0.5 * CLEAR}
+    hopeless = {id(pair) for pair, _, T in table if max(T, default=0.0) < POLICY.hope * POLICY.told_apart}
     table = [row for row in table if id(row[0]) not in hopeless]
     pairs = [pair for pair in pairs if id(pair) not in hopeless]
     if pairs:
@@ -130,7 +125,7 @@ def propose(
     trials = [trial for _, trial, _ in table]
     rough = np.min([T for *_, T in table], axis=0) if table and items else np.zeros(0)
     best, most = None, -1.0
-    for i in np.argsort(rough)[::-1][:REFITTED]:
+    for i in np.argsort(rough)[::-1][: POLICY.commands]:
         T = np.inf
         for trial in trials:
             T = min(T, _tried(bench, items[i], trial, True))
@@ -138,7 +133,7 @@ def propose(
                 break
         if most < T:
             best, most = items[i], T
-    if best is None or most < CLEAR:
+    if best is None or most < POLICY.told_apart:
         return None, [*notes, f"No experiment of the menu within the limits of these records tells {_listed(names)} apart."]
     n = len(best.command)
     proposal = best.proposal(names, float(n * np.log1p(most / n)))
@@ -158,7 +153,7 @@ def menu(data: DataSet, fit: Fit) -> list[MenuItem]:
     dt = data.dt
     try:
         limits = Limits.of(data.records, data.controller)
-        limits = replace(limits, duration=max(limits.duration, SAMPLES * dt))
+        limits = replace(limits, duration=max(limits.duration, POLICY.proposed_samples * dt))
         assert data.controller is not None
         return candidate_commands(dt, limits, inertia_of(fit), data.controller.kp or None)
     except GaidentError:

@@ -10,15 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.pi import PI
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.models.model import Model
+from gaident.policy.table import POLICY
 
 __all__ = ["Motion", "not_testable", "one_sided"]
 
 Vector = NDArray[np.float64]
 
-TURN = math.tau
-LEAST_TURN = math.pi / 3.0  # rad of travel below which a once-per-turn torque is a constant and a spring
-HIGHEST_ORDER = 60  # of cogging and encoder ripple that a drive is expected to have
+TURN = math.tau  # no decision: rad
+HIGHEST_ORDER = LIBRARY["cogging"].orders[1]
+"""Of cogging and encoder ripple."""
 FRICTIONS = (
     "coulomb_friction",
     "stribeck_friction",
@@ -75,8 +77,9 @@ def one_sided(motions: Sequence[Motion], controller: PI | None) -> dict[str, str
         if slope > 0.0:
             notes["command_rate_limit"] = f"a limit above {slope:.3g} rad/s^2 would not have shown: no command rises faster"
     travel = max(float(np.ptp(m.position)) for m in motions)
-    least = math.ceil(TURN / travel) if travel > 0.0 else HIGHEST_ORDER
-    fastest = math.floor(0.8 * math.pi / max(_slowest(m) * m.dt for m in motions)) if any(_slowest(m) for m in motions) else None
+    least = math.ceil(POLICY.seen_turn * TURN / travel) if travel > 0.0 else HIGHEST_ORDER
+    per_sample = max(_slowest(m) * m.dt for m in motions)
+    fastest = math.floor(POLICY.seen_band * math.pi / per_sample) if per_sample > 0.0 else None
     for effect in ("cogging", "velocity_ripple"):
         parts = [f"orders below {least} need more than the {travel / TURN:.2g} turns travelled"] if least > 2 else []
         if fastest is not None and fastest < HIGHEST_ORDER:
@@ -110,15 +113,15 @@ def _speed(motions: Sequence[Motion]) -> dict[str, str]:
     if not (forward and backward):
         why["asymmetric_friction"] = f"the axis turns {'forwards' if forward else 'backwards'} only"
     slowest = min(float(np.abs(m.velocity).min()) for m in motions)
-    if slowest > 0.1 * top:
+    if slowest > POLICY.slow * top:
         why["stribeck_friction"] = f"the axis never turns slower than {slowest:.3g} rad/s"
     if slowest > max(m.velocity_floor for m in motions):
         why["presliding_friction"] = why["lugre_friction"] = f"the axis neither stands nor reverses (slowest {slowest:.3g} rad/s)"
-    speeds = sorted({round(abs(v) / (0.1 * top)) for m in motions for v in m.held if v})
-    near = sum(int(np.sum(np.abs(np.abs(m.smooth[m.moving]) - top) < 0.15 * top)) for m in motions)
-    if len(speeds) < 2 and near > 0.5 * sum(int(np.sum(m.moving)) for m in motions):
+    speeds = sorted({round(abs(v) / (POLICY.slow * top)) for m in motions for v in m.held if v})
+    near = sum(int(np.sum(np.abs(np.abs(m.smooth[m.moving]) - top) < POLICY.slow * top)) for m in motions)
+    if len(speeds) < 2 and 2 * near > sum(int(np.sum(m.moving)) for m in motions):
         why["quadratic_drag"] = f"one speed only ({top:.3g} rad/s): its drag is viscous friction there"
-    if all(_monotone(m, 0.05 * top) for m in motions):
+    if all(_monotone(m, POLICY.apart * top) for m in motions):
         why["friction_drift"] = "no speed is held early and late, nor are speeds mixed in time: a drift would be drag"
     return why
 
@@ -126,7 +129,7 @@ def _speed(motions: Sequence[Motion]) -> dict[str, str]:
 def _travel(motions: Sequence[Motion]) -> dict[str, str]:
     travel = max(float(np.ptp(m.position)) for m in motions)
     why = {}
-    if travel < LEAST_TURN:
+    if travel < POLICY.gravity_turn * TURN:
         why["unbalance"] = f"{math.degrees(travel):.2g} degrees of travel: over so little it is a constant load"
     if travel < TURN / HIGHEST_ORDER:
         for effect in ("cogging", "velocity_ripple"):
@@ -141,7 +144,7 @@ def _torque(motions: Sequence[Motion]) -> dict[str, str]:
         why["backlash"] = "the torque never changes its sign: the coupling stays on one flank"
         least = min(float(np.abs(m.torque).min()) for m in motions)
         highest = max(float(np.abs(m.torque).max()) for m in motions)
-        if least > 0.1 * highest:
+        if least > POLICY.slow * highest:
             why["torque_dead_band"] = f"the torque never comes near zero (least {least:.2g} N m): a dead band is a constant load"
     if all(float(np.ptp(m.torque)) == 0.0 for m in motions):
         constant = "the torque never changes"

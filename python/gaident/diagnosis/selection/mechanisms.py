@@ -18,6 +18,7 @@ from gaident.estimation.projection import project_out
 from gaident.estimation.term import Term
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
+from gaident.policy.table import POLICY
 
 __all__ = [
     "as_one_mass",
@@ -88,7 +89,7 @@ def resonant(objective: Objective, one: Fit) -> list[Model]:
     finite = np.all(np.abs(E) < LOST, axis=1)
     rest = project_out(J, np.where(finite[:, None], E, 0.0))
     costs = np.where(finite, np.einsum("ij,ij->i", rest, rest), np.inf)
-    return [_two_masses(longer.parameters, X[i]) for i in np.argsort(costs)[:3]]
+    return [_two_masses(longer.parameters, X[i]) for i in np.argsort(costs)[: POLICY.starts]]
 
 
 def _resonance_of(parameters: Parameterisation) -> Term:
@@ -158,11 +159,12 @@ def is_mechanism(parameters: Parameterisation, x: Vector) -> bool:
 
 
 def swings(fit: Fit) -> bool:
-    """Whether two masses are damped as those on a shaft: e1 < 2 zeta sqrt(e0), f1 < 2 zeta sqrt(f0), zeta = 0.5."""
+    """Whether two masses are damped as those on a shaft: e1 < 2 zeta sqrt(e0), f1 < 2 zeta sqrt(f0)."""
     if fit.parameters.masses == 1:
         return True
     _, _, e1, e0, f1, f0 = fit.parameters.base_values(fit.x[None, :])[0]
-    return bool(e0 > 0.0 and f0 > 0.0 and abs(e1) < np.sqrt(e0) and abs(f1) < np.sqrt(f0))
+    twice = 2.0 * POLICY.swing_damping
+    return bool(e0 > 0.0 and f0 > 0.0 and abs(e1) < twice * np.sqrt(e0) and abs(f1) < twice * np.sqrt(f0))
 
 
 def resonance(fit: Fit) -> float:

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
-from gaident.diagnosis.policy import POLICY, Policy
 from gaident.diagnosis.selection.mechanisms import as_two_masses
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
@@ -25,6 +24,7 @@ from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
 from gaident.estimation.term import Term
+from gaident.policy.table import POLICY, Policy
 
 __all__ = ["ModelSpace", "words"]
 
@@ -147,7 +147,7 @@ class ModelSpace:
     def plain_cost(self, fit: Fit) -> float:
         """Sum of squared plain errors, refitted to these, of the loop where there is one."""
         view = self.closed(fit.predictor) if self.data.loopable and self.data.loop_follows else fit.predictor
-        return ls.fit(self.objective, fit.hypothesis.driven_by(view), fit.x, WHITE, 8).cost
+        return ls.fit(self.objective, fit.hypothesis.driven_by(view), fit.x, WHITE, self.policy.usual).cost
 
     def in_both_views(self, simpler: Fit, fuller: Fit) -> bool:
         """Whether a generalisation is worth its place in its loop, too, and not for its finer simulation.
@@ -194,23 +194,23 @@ class ModelSpace:
         """A model fitted under another predictor."""
         if fit.predictor == predictor:
             return fit
-        return self.refitted(fit.hypothesis.driven_by(predictor), fit.x, 8)
+        return self.refitted(fit.hypothesis.driven_by(predictor), fit.x)
 
     def seen_plainly(self, fit: Fit, predictor: Predictor) -> Fit:
         """A model fitted to the plain errors of another predictor, from where it stands."""
-        return ls.fit(self.objective, fit.hypothesis.driven_by(predictor), fit.x, WHITE, 12)
+        return ls.fit(self.objective, fit.hypothesis.driven_by(predictor), fit.x, WHITE, self.policy.usual)
 
-    def refitted(self, hypothesis: Hypothesis, x: Vector, iterations: int = 12) -> Fit:
+    def refitted(self, hypothesis: Hypothesis, x: Vector, iterations: int = POLICY.usual) -> Fit:
         """Plain least squares from x, then under a noise model of its own."""
         return ls.reestimated(self.objective, ls.fit(self.objective, hypothesis, x, WHITE, iterations))
 
-    def continued(self, hypothesis: Hypothesis, fit: Fit, x: Vector, iterations: int = 8) -> Fit:
+    def continued(self, hypothesis: Hypothesis, fit: Fit, x: Vector, iterations: int = POLICY.usual) -> Fit:
         """From x under the noise model of a fit that it was made of, then under its own."""
         return ls.reestimated(self.objective, ls.fit(self.objective, hypothesis, x, fit.noise, iterations))
 
     def finished(self, fit: Fit) -> Fit:
         """A short fit taken to the end under its own noise model, and under the predictors that may say more."""
-        fit = fit if fit.converged else ls.fit(self.objective, fit.hypothesis, fit.x, fit.noise, 8)
+        fit = fit if fit.converged else ls.fit(self.objective, fit.hypothesis, fit.x, fit.noise, self.policy.usual)
         fit = ls.reestimated(self.objective, fit)
         views: list[Predictor] = []
         if fit.predictor.closed and self.whitens and not self.data.loop_only:

@@ -34,7 +34,8 @@ from gaident.estimation.term import Term
 
 __all__ = ["Moves"]
 
-MISSED = 0.05  # of the largest torque: a level of friction to start from where the fitted one is lower
+MISSED = 0.05  # no decision: of the largest torque, a level of friction to start from where the fitted one is lower
+LEAST = 1e-4  # no decision: the same, of a level that was fitted as 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +86,7 @@ class Moves(ModelSpace):
                 # The simplest of a family first: its generalisations are tried at its level.
                 start = next((s for s in test.ranked(WHITE) if s.term is first), None)
                 if start is not None:
-                    fits.append(self.refitted(start.hypothesis, start.starts[0], 8))
+                    fits.append(self.refitted(start.hypothesis, start.starts[0]))
                     self._generalisations(test, fits[-1], first)
         if not test.trials:
             return []
@@ -93,14 +94,14 @@ class Moves(ModelSpace):
         if self.whitens and self.quiet(now):
             # Where nothing but noise is left the linearised gains are near enough.
             hopes = [s.hope for noise in (now.noise, None) for s in test.ranked(noise)]
-            if max(hopes, default=0.0) < 0.5 * self.penalty:
+            if max(hopes, default=0.0) < self.policy.hope * self.penalty:
                 return self._best(fits)
         done = {f.parameters.terms[-1] for f in fits}
         short: dict[Term, Fit] = {}
         for ranking in rankings:
             for s in [s for s in ranking if s.term not in done][: self.policy.screened]:
                 for x in s.starts[:2]:
-                    fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, 3))
+                    fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, self.policy.glance))
                     if s.term not in short or fit.bic < short[s.term].bic:
                         short[s.term] = fit
         reach = self.policy.hopeless * self.objective.information
@@ -126,7 +127,7 @@ class Moves(ModelSpace):
         wanted = [t for t in self.allowed if t.family == simple.family and simple.name in t.nested]
         level = abs(float(source.x[source.parameters.slot(simple.name)][0]))
         torque = parameters.scales.torque
-        for friction in {max(level, 1e-4 * torque), max(level, MISSED * torque)}:
+        for friction in {max(level, LEAST * torque), max(level, MISSED * torque)}:
             scales = replace(parameters.scales, friction=friction)
             test.add(Hypothesis(replace(parameters, scales=scales), source.predictor), x, wanted)
 
@@ -140,7 +141,7 @@ class Moves(ModelSpace):
             return []
         shorter, y = as_two_masses(fit)
         shorter = shorter.driven_by(OpenLoop(self.data, fit.predictor.own_angle)) if self.whitens else shorter
-        tries = [self.refitted(shorter, y, 20)]
+        tries = [self.refitted(shorter, y, self.policy.long)]
         for t in self.candidates(tries[0]):
             if t.size > 1 or t.place == "shaft":
                 continue
@@ -151,7 +152,7 @@ class Moves(ModelSpace):
             if t.multimodal and self.data.loopable:
                 longer = longer.driven_by(self.closed(longer.predictor))
             X = np.array([shorter.parameters.inserted(y, np.array(row)) for row in rows])
-            tries.append(self.refitted(longer, X[int(np.argmin(self.objective.costs(longer, X, WHITE)))], 20))
+            tries.append(self.refitted(longer, X[int(np.argmin(self.objective.costs(longer, X, WHITE)))], self.policy.long))
         return tries
 
     # Moves that reduce.
@@ -181,14 +182,14 @@ class Moves(ModelSpace):
         level = fit.x[fit.parameters.slot(term.name)][list(term.shared.get(simple.name, (0,)))]
         hypothesis = fit.hypothesis.without(term.name).extended(simple)
         x = hypothesis.parameters.without(simple.name).inserted(fit.parameters.removed(fit.x, term.name), level)
-        return self.continued(hypothesis, fit, x, 12)
+        return self.continued(hypothesis, fit, x)
 
     def demote(self, fit: Fit) -> list[Fit]:
         """Two masses with effects as one mass with these effects."""
         if fit.parameters.masses == 1 or not fit.effects or any(t.in_coupling or t.resonates for t in fit.parameters.terms):
             return []
         hypothesis, x = as_one_mass(fit)
-        return [self.continued(hypothesis, fit, x, 20)]
+        return [self.continued(hypothesis, fit, x, self.policy.long)]
 
     def close(self, fit: Fit) -> list[Fit]:
         """The closed loop's view of a model with dry friction, which holds a simulation to the record between its stops.
@@ -245,8 +246,8 @@ class Moves(ModelSpace):
         limits = np.array(term.limits(fit.parameters.scales)).T
         X = np.repeat(fit.x[None, :], len(rows), axis=0)
         X[:, fit.parameters.slot(term.name)] = np.clip(np.array(rows), *limits)
-        order = np.argsort(self.objective.costs(fit.hypothesis, X, fit.noise))[:3]
-        tries = [ls.scored(self.objective, ls.fit(self.objective, fit.hypothesis, X[i], WHITE, 8)) for i in order]
+        order = np.argsort(self.objective.costs(fit.hypothesis, X, fit.noise))[: self.policy.starts]
+        tries = [ls.scored(self.objective, ls.fit(self.objective, fit.hypothesis, X[i], WHITE, self.policy.usual)) for i in order]
         best = min(tries, key=lambda f: f.bic)
         return self.refitted(best.hypothesis, best.x)
 
@@ -267,5 +268,5 @@ class Moves(ModelSpace):
                 continue
             X = np.array([base.parameters.inserted(base.x, np.array(z)) for z in rows])
             x = X[int(np.argmin(self.objective.costs(hypothesis, X, WHITE)))]
-            found.append(self.evolved(ls.scored(self.objective, ls.fit(self.objective, hypothesis, x, WHITE, 5))))
+            found.append(self.evolved(ls.scored(self.objective, ls.fit(self.objective, hypothesis, x, WHITE, self.policy.short))))
         return found

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.library.terms import EVEN_FRICTION
-from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.selection.bases import Task, linear_bases, noise_floor, plain_bases, regressed
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
@@ -36,6 +35,7 @@ from gaident.estimation.objective import Fit, Innovations, Objective, OutputErro
 from gaident.estimation.projection import WORST
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
+from gaident.policy.table import POLICY
 
 __all__ = ["Selection", "by_whitened_errors", "compared", "selected"]
 
@@ -161,7 +161,7 @@ def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]
         end = _searched(space, base)
         # On a coarse grid a resonance beyond what it shows is some other thing of short times: all samples will tell.
         # Two masses that do not swing describe something else, which one mass leaves for all to see.
-        seen = task.scales.blocks == 1 or resonance(end) < POLICY.seen_resonance * np.pi / task.scales.dt
+        seen = task.scales.blocks == 1 or resonance(end) < POLICY.seen_band * np.pi / task.scales.dt
         if not ends or (swings(end) and seen):
             ends.append((base, end))
         if space.quiet(end) and space.runs_free(end):
@@ -224,8 +224,8 @@ def _specification(space: Moves, fit: Fit, other: Fit | None = None) -> tuple[fl
     """
     objective = space.objective
     found = 0.0
-    bound = chi_square_bound(fit.parameters.size, space.policy.specification_level)
-    views = [ls.fit(objective, fit.hypothesis, fit.x, WHITE, 12)]
+    bound = chi_square_bound(fit.parameters.size, space.policy.noise_level)
+    views = [ls.fit(objective, fit.hypothesis, fit.x, WHITE, space.policy.usual)]
     pairs = [(fit, views[0])]
     if other is not None and set(other.effects) - set(fit.effects):  # a cause that whitening hid
         seen = space.seen_plainly(fit, other.predictor)
@@ -243,7 +243,8 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     """What the coarse grid came to, fitted to all samples, reduced, and grown by what the grid could not show."""
     data, family = task.data, outline.space.objective.family
     if outline.final.parameters.masses == 1:  # no stiff shaft, no fine substeps
-        data = replace(data, finest=max(data.finest, 0.5 * data.dt))
+        coarse = 0.5 * data.dt
+        data = replace(data, finest=max(data.finest, coarse))
     if isinstance(family, Innovations) and family.shaft is not None:
         shaft = ShaftNoise(outline.base.parameters.linear(outline.base.x), data.dt, data.controller)
         family = Innovations(shaft, family.floor)
@@ -262,7 +263,7 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
 
 def _moved(space: Moves, scales: Scales, fit: Fit) -> Fit:
     start = moved(space.data, scales, fit)
-    return space.refitted(start.hypothesis, start.x, 12)
+    return space.refitted(start.hypothesis, start.x)
 
 
 def _bare(space: Moves, final: Fit) -> Fit:
@@ -276,7 +277,7 @@ def _bare(space: Moves, final: Fit) -> Fit:
 def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> Selection:
     """With the rivals of every effect; a better one takes the place, and all are compared again."""
     space, final = found.space, found.final
-    for swaps_left in (2, 1, 0):
+    for swaps_left in range(POLICY.swaps, -1, -1):
         rivals, better = _rivals(space, final, swaps_left > 0, classes, note)
         if better is None:
             break
