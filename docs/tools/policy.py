@@ -45,12 +45,9 @@ The value is the level that the share p = `noise_level` of such records exceeds.
 an exponential tail through the upper tenth (peaks over a threshold; Pickands, J. (1975): Statistical inference using extreme
 order statistics. Annals of Statistics 3, 119-131). Its uncertainty is that of b, 1/sqrt(m) of it.
 
-| statistic | level | largest measured | in the policy |
-|---|---|---|---|
+| statistic | value | largest measured |
+|---|---|---|
 {measured}
-The penalty is set by hand, above its level: real noise is less tidy than simulated noise, and a second effect is looked for
-beside a first that fits less than perfectly.
-
 """
 
 DECIDING = """\
@@ -82,11 +79,8 @@ def page() -> str:
 
 
 def _head() -> str:
-    values = {r.name: r.value for r in rows()}
-    lines = [
-        f"| `{name}` | {found['value']:g} | {found['largest']:.3g} | {values[name]:g} |\n"
-        for name, found in CALIBRATED["numbers"].items()
-    ]
+    numbers = CALIBRATED["numbers"].items()
+    lines = [f"| `{name}` | {found['value']:g} | {found['largest']:.3g} |\n" for name, found in numbers]
     return HEAD.format(command=CALIBRATED["command"], records=CALIBRATED["records"], measured="".join(lines))
 
 

@@ -83,12 +83,7 @@ class Policy:
     """See the module; `rows()` lists all with unit, source and command."""
 
     # Is the gain enough? One criterion: BIC and a penalty for each effect, which stands for the number of candidates tried.
-    effect_penalty: float = gain(
-        25.0,
-        "BIC units",
-        f"above the calibrated {CALIBRATED['numbers']['effect_penalty']['value']:g}: real noise is less tidy",
-        CALIBRATED["command"],
-    )
+    effect_penalty: float = calibrated(GAIN, "effect_penalty", "BIC units", "of each effect, for the number of candidates tried")
     short_record: int = gain(200, "samples", "a record this short doubles the penalty: its noise filter is uncertain", CLEAN)
     misfit_penalty: float = gain(10.0, "BIC units", "for output errors: 2 ln of about 150 candidates (Chen and Chen 2008)", REAL)
     material_share: float = gain(
