@@ -3,6 +3,7 @@
     python bench/blind.py --out results.jsonl [--cases 20] [--workers 2] [--seed 1] [--only GROUP ...] [--effects NAME ...]
     python bench/blind.py --out results.jsonl --report          # tables only, from what is there
     python bench/blind.py --out results.jsonl --limits          # separability limits (slow; once, they keep)
+    python bench/blind.py --calibrate [FILE] [--cases 20]       # writes the calibrated numbers of the policy (blind_calibrate.py)
 
 Every finished case is a line of the file: stop at will, start again and it goes on. Groups for --only:
 
@@ -36,6 +37,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 # ruff: noqa: E402
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "python"))
 
+import blind_calibrate
 import blind_refit
 import numpy as np
 from blind_tables import limits_of, report
@@ -195,6 +197,16 @@ def work(path: Path, jobs: list[tuple[Any, ...]], workers: int) -> None:
             print(f"\ninterrupted; what is done stands in {path}", file=sys.stderr)
 
 
+def calibrate(path: Path, out: Path, cases: int, seed: int, workers: int) -> None:
+    """Measures records that hide nothing and writes the numbers of the policy that follow."""
+    chosen = {blind_calibrate.key_of(cell): cell for cell in cells("clean", cases, seed) if blind_calibrate.wanted(cell)}
+    there = read(out)
+    work(out, [(blind_calibrate.measure, cell) for key, cell in chosen.items() if key not in there], workers)
+    content = blind_calibrate.calibrated({k: line for k, line in read(out).items() if k in chosen}, cases, seed)
+    blind_calibrate.write(path, content)
+    print(json.dumps(content, indent=2))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description="blind tests of gaident.diagnose", epilog=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
@@ -211,10 +223,14 @@ def main() -> None:
     parser.add_argument("--no-oracle", action="store_true")
     parser.add_argument("--limits", action="store_true")
     parser.add_argument("--report", action="store_true")
+    parser.add_argument("--calibrate", nargs="?", type=Path, const=blind_calibrate.OUT, metavar="FILE",
+                        help="write the numbers that records without effects calibrate")  # fmt: skip
     options = parser.parse_args()
     options.out.parent.mkdir(parents=True, exist_ok=True)
     there = read(options.out)
     jobs: list[tuple[Any, ...]] = []
+    if options.calibrate:
+        return calibrate(options.calibrate, options.out, options.cases, options.seed, options.workers)
     if options.limits:
         keys = {
             f"limit/{effect}/{nominal_plants()[index].name}": (effect, index) for effect, index in limit_cells(options.plants)

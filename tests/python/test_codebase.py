@@ -34,12 +34,11 @@ MOST_FILES = 20  # of code in one folder
 # Python: the rooms of gaident, lowest first. A module imports its own room and rooms that stand above its line here, inside
 # functions and for type checks too. A room is a folder, without the folders in it that have a line of their own, or one module.
 ROOMS = [
-    *("arguments", "messages", "errors", "axis", "version", "files", "checks", "providers", "_core"),
+    *("arguments", "messages", "errors", "axis", "version", "files", "checks", "providers", "policy", "_core"),
     *("data/signals", "data/formats", "control", "data", "models", "results"),
     *("show", "show/report", "export", "identification"),
     *("estimation/regression", "estimation"),
     *(
-        "diagnosis/policy",
         "diagnosis/records",
         "diagnosis/library",
         "diagnosis/selection",

@@ -16,7 +16,6 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 import gaident as ga
-from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.selection import model_space, moves, score_test
 from gaident.diagnosis.selection.bootstrap import largest_gains
 from gaident.diagnosis.selection.moves import Moves
@@ -28,6 +27,7 @@ from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.term import Scales, Term
+from gaident.policy.table import POLICY
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -131,7 +131,6 @@ def _no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (moves, model_space):
         monkeypatch.setattr(module, "LIBRARY", LIBRARY)
         monkeypatch.setattr(module, "EQUIVALENT", {frozenset({"lag", "seen"}): ""})
-    monkeypatch.setattr(model_space.ModelSpace, "force_error", lambda self, fit: float("nan"))
     monkeypatch.setattr(model_space, "ClosedLoop", lambda data, own=False: Toy(data, own, True))
     monkeypatch.setattr(score_test, "ClosedLoop", lambda data, own=False: Toy(data, own, True))
     monkeypatch.setattr(model_space, "OpenLoop", Toy)
@@ -264,8 +263,12 @@ def test_a_cause_that_whitening_hid_is_one_by_the_plain_scores_of_two_models() -
     assert not space.hidden(bench.fit(A, B), other), "nor does a model that holds them all"
     # The score is that of the independent samples: of too few of them the same cost says nothing.
     few = replace(space, objective=space.objective.under(OutputErrors(3.0)))
-    assert few.score(few.seen_plainly(other, other.predictor)) > few.score(few.seen_plainly(bench.fit(), other.predictor))
-    assert not few.hidden(bench.fit(), few.seen_plainly(other, other.predictor))
+
+    def few_plainly(fit: Fit) -> Fit:
+        return ls.fit(few.objective, fit.hypothesis.driven_by(other.predictor), fit.x, WHITE, 12)
+
+    assert few.score(few_plainly(other)) > few.score(few_plainly(bench.fit()))
+    assert not few.hidden(bench.fit(), few_plainly(other))
     # Most of what is left without it has to be its work.
     little = Bench({"a": (0.3,)}, extra=0.7 * np.sin(70.0 * S**2), plain=True, noise=0.01)
     assert little.space.score(little.fit(A)) < little.space.score(little.fit(B))
@@ -277,15 +280,17 @@ def test_the_specification_test_is_of_one_model_and_counts_what_a_fit_moves() ->
     bench = Bench({"a": (0.3,)}, noise=0.05)
     fit = bench.fit(A)
     apart = replace(fit, x=fit.x + np.array([0.2, 0.0, 0.0]))
-    found = specification(bench.space, apart)
+    found = specification(bench.space, bench.space.objective, apart)
     objective = bench.space.objective
-    plain = bench.space.seen_plainly(fit, fit.predictor)
-    assert found.bound == pytest.approx(chi2.isf(POLICY.specification_level, 3))
+    plain = ls.fit(objective, fit.hypothesis, fit.x, WHITE, 12)
+    assert found.bound == pytest.approx(chi2.isf(POLICY.noise_level, 3))
     whole = float(objective.costs(fit.hypothesis, apart.x[None, :], WHITE)[0])
     assert found.statistic == pytest.approx(objective.count * np.log(whole / plain.cost))
-    assert found.contradicts and not specification(bench.space, fit).contradicts
+    assert found.contradicts and not specification(bench.space, bench.space.objective, fit).contradicts
     searched = replace(A, steps=lambda s: (0.0,))
-    assert specification(bench.space, bench.fit(searched)).bound == pytest.approx(chi2.isf(POLICY.specification_level, 2))
+    assert specification(bench.space, bench.space.objective, bench.fit(searched)).bound == pytest.approx(
+        chi2.isf(POLICY.noise_level, 2)
+    )
 
 
 def test_models_are_compared_in_the_same_view() -> None:

@@ -10,8 +10,8 @@ import pytest
 import gaident as ga
 from drive_cases import Truth, random_case
 from drive_rig import library, rig
-from gaident.diagnosis.experiments.next_experiment import CLEAR
 from gaident.diagnosis.library.terms import EQUIVALENT
+from gaident.policy.table import POLICY
 
 try:
     library()
@@ -43,7 +43,7 @@ def test_the_proposed_experiment_names_what_a_step_could_not(effect: str) -> Non
     assert proposal is not None and dia.verdict == "explained"
     (finding,) = dia.causes
     assert finding.effect in proposal.separates and set(proposal.separates) <= {finding.effect, *finding.alternatives}
-    assert proposal.margin > CLEAR / 2 and proposal.reason.endswith(".") and proposal.dt == rec.dt
+    assert proposal.margin > POLICY.told_apart / 2 and proposal.reason.endswith(".") and proposal.dt == rec.dt
     assert np.abs(proposal.command).max() <= np.abs(rec.command).max() * (1 + 1e-12)
     new = rig(truth.plant, proposal.command, truth.effects, truth.noise, seed=99)
     after = ga.diagnose(new, controller)

@@ -5,54 +5,36 @@ from __future__ import annotations
 import ast
 import importlib.util
 import re
+from collections.abc import Iterator
 from dataclasses import FrozenInstanceError, fields
-from pathlib import Path
 
 import pytest
 
-from gaident.diagnosis.policy import POLICY, Policy, rows
+from drive_cases import EFFECTS
+from gaident.policy.table import EFFORT, POLICY, Policy, rows
 from test_codebase import PACKAGE, ROOT
 
-EFFORT = "effort_ratio"  # the first of the last group, which spends more or less work and decides nothing about what was found
-
-# A decision constant is a number that a module gives a name in capitals: NAME = 0.3, also in a tuple, signed, or computed from
-# numbers alone. In the rooms below each such number decides through the policy, but for these: accuracies of a computation, which
-# change a result by less than it is known, and physical or mathematical facts.
-ROOMS = ("diagnosis/selection", "diagnosis", "estimation")
-ACCURACIES = {
-    "diagnosis/gains": {
-        "SHARE": "split of a record into one for fits and one held out: a protocol of measurement, the same for every model",
-        "LEAST": "samples of a record that is split: the same protocol",
-        "BLOCKS": "draws of a bootstrap: how finely an interval is known",
-    },
-    "diagnosis/mechanics": {"WHOLE": "how many of the names every axis has: an index"},
-    "diagnosis/selection/moves": {"MISSED": "a start of a fit"},
-    "diagnosis/selection/score_test": {
-        "TURN": "2 pi",
-        "SIXTH": "pi/3: the angle from which once per turn is no constant and spring, a matter of geometry",
-        "FURTHEST": "reach of a linearised step: which start a fit begins from",
-    },
-    "estimation/dataset": {"FINEST": "substep of a simulation: its discretisation error"},
-    "estimation/criterion": {"DEAD": "where a correlogram is cut off: its own error is larger from there on"},
-    "estimation/least_squares": {"SETTLED": "where iterations end: a fall by less changes no decision"},
-    "estimation/projection": {"WORST": "the cost of a model that diverges: any number that none reaches"},
-    "estimation/prediction": {"MOST_SUBSTEPS": "powers of two of a sample: work of a simulation"},
-    "estimation/uncertainty": {"BLOCKS": "blocks of a jackknife: how finely a deviation is known"},
-    "estimation/objective": {"LOST": "the error of a model that diverges: any number that none reaches"},
-    "estimation/noise_model": {
-        "HIGHEST": "order up to which an autoregression is tried; BIC takes the order",
-        "ON_TOP": "the same behind a noise at the shaft",
-        "TAUS": "grid of time constants; the cost takes one",
-        "SIZES": "grid of sizes; the cost takes one",
-        "MIDDLE": "place in the grid of both where the search for the least cost begins",
-    },
+# Rooms in which a number that a module names in capitals, NAME = 0.3, is a row of the policy, or says on its line why it decides
+# nothing: `# no decision: a start of a fit`.
+NAMED = ("diagnosis", "estimation", "identification")
+MARK = "# no decision: "
+# In the diagnosis a number without a name stands in no comparison and bounds nothing, counts no iterations and cuts no list, but
+# for these, and what only guards a division or stands for no limit.
+FREE = (-1, 0, 1, 2)
+BOUNDS = {"max", "min", "maximum", "minimum", "clip"}
+FITS = {"fit", "fitted", "refitted", "continued", "reestimated", "evolved", "start"}
+TABLES = {
+    "diagnosis/library/terms": "bounds, steps and starts of the parameters of each effect",
+    "diagnosis/library/coordinates": "the same",
+    "diagnosis/experiments/menu": "shapes of the commands that are proposed",
+    "diagnosis/experiments/commands": "the same",
+    "diagnosis/experiments/first_experiment": "the same",
 }
 
 
 def deciding() -> list[str]:
-    """Names of the policy's numbers that decide: all before the group of effort."""
-    names = [f.name for f in fields(Policy)]
-    return names[: names.index(EFFORT)]
+    """Names of the policy's numbers that decide: all but those of effort."""
+    return [r.name for r in rows() if r.group != EFFORT]
 
 
 def numeric(node: ast.expr) -> bool:
@@ -73,52 +55,90 @@ def numeric(node: ast.expr) -> bool:
     return False
 
 
-def numbers_named(file: Path) -> list[str]:
-    """Names in capitals that a module gives to numbers."""
-    found = []
-    for node in ast.parse(file.read_text()).body:
-        if isinstance(node, ast.Assign):
-            targets, value = node.targets, node.value
-        elif isinstance(node, ast.AnnAssign) and node.value is not None:
-            targets, value = [node.target], node.value
-        else:
-            continue
-        names = [n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)]
-        found += [n for n in names if re.fullmatch(r"_?[A-Z][A-Z0-9_]*", n) and numeric(value)]
+def numbers_named(text: str) -> list[str]:
+    """Names in capitals that a module or a class gives to numbers, where nothing on their lines says that they decide nothing."""
+    found, lines = [], text.splitlines()
+    for node in ast.walk(ast.parse(text)):
+        for inner in node.body if isinstance(node, (ast.Module, ast.ClassDef)) else []:
+            if isinstance(inner, ast.Assign):
+                targets, value = inner.targets, inner.value
+            elif isinstance(inner, ast.AnnAssign) and inner.value is not None:
+                targets, value = [inner.target], inner.value
+            else:
+                continue
+            names = [n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)]
+            reasons = [line.partition(MARK)[2] for line in lines[inner.lineno - 1 : inner.end_lineno]]
+            if numeric(value) and not any(r.strip() for r in reasons):
+                found += [n for n in names if re.fullmatch(r"_?[A-Z][A-Z0-9_]*", n)]
     return found
 
 
-def modules_that_decide() -> list[Path]:
-    """The files of the rooms, without the policy itself."""
-    files = [f for room in ROOMS for f in (PACKAGE / room).glob("*.py")]
-    return sorted(f for f in files if f.stem != "policy")
+def numbers_inside(text: str) -> list[str]:
+    """Numbers without a name in comparisons, bounds, iterations, defaults and ends of lists: "line: number"."""
+    found = []
+    for node in ast.walk(ast.parse(text)):
+        parts: list[ast.expr] = []
+        if isinstance(node, ast.Compare):
+            parts = [node]
+        elif isinstance(node, ast.Slice) and isinstance(node.upper, ast.Constant):
+            parts = [node.upper]
+        elif isinstance(node, ast.Call):
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            parts = node.args if name in BOUNDS else [a for a in node.args if isinstance(a, ast.Constant) and name in FITS]
+        elif isinstance(node, (ast.FunctionDef, ast.Lambda)):
+            parts = [*node.args.defaults, *(d for d in node.args.kw_defaults if d is not None)]
+        found += [f"{n.lineno}: {n.value}" for part in parts for n in literals(part)]
+    return sorted(set(found))
+
+
+def literals(node: ast.expr) -> Iterator[ast.Constant]:
+    """Numbers in an expression that may decide; indices are none, nor what is next to nothing or to infinity."""
+    number = isinstance(node, ast.Constant) and isinstance(node.value, (int, float)) and not isinstance(node.value, bool)
+    if number and abs(node.value) not in FREE and 1e-8 < abs(node.value) < 1e100:
+        yield node
+    for inner in ast.iter_child_nodes(node):
+        if isinstance(inner, ast.expr) and not (isinstance(node, ast.Subscript) and inner is node.slice):
+            yield from literals(inner)
+
+
+def modules(*rooms: str) -> dict[str, str]:
+    """Name -> text of the modules in some rooms."""
+    files = sorted(f for room in rooms for f in (PACKAGE / room).rglob("*.py"))
+    return {f.relative_to(PACKAGE).with_suffix("").as_posix(): f.read_text() for f in files}
 
 
 def test_every_row_has_a_unit_and_a_source() -> None:
     assert {r.name for r in rows()} == {f.name for f in fields(Policy)}
     for row in rows():
         assert row.value == getattr(POLICY, row.name) and row.value > 0, row.name
-        assert row.unit.strip() and len(row.source) > 10, row.name
+        assert row.unit.strip() and row.group and len(row.source) > 10, row.name
 
 
 def test_every_number_that_decides_has_the_command_that_measures_it() -> None:
     without = [r.name for r in rows() if r.name in deciding() and not r.command]
     assert not without
-    assert len(deciding()) > 15
+    assert len(deciding()) > 15 and len(rows()) - len(deciding()) > 5
     beside = [r.name for r in rows() if r.name not in deciding() and r.command]
-    assert not beside, "a number with a command decides: it stands before the group of effort"
+    assert not beside, "a number with a command decides: it is no effort"
 
 
 def test_the_commands_can_be_called() -> None:
-    """The script is there, and knows the groups that a command names."""
+    """The script is there, and knows the options, groups and effects that a command names."""
     for command in {r.command for r in rows() if r.command}:
         program, script, *arguments = command.split()
         assert program == "python" and (ROOT / script).is_file(), command
-        groups = re.search(r"^GROUPS = \((.*)\)$", (ROOT / script).read_text(), re.MULTILINE)
-        options = [a for a in arguments if a.startswith("--")]
-        assert not options or groups is not None
-        named = [a for a in arguments if not a.startswith("--") and not a.isdigit()]
-        assert all(f'"{name}"' in groups[1] for name in named if groups), command
+        text, option = (ROOT / script).read_text(), ""
+        groups = re.search(r"^GROUPS = \((.*)\)$", text, re.MULTILINE)
+        for argument in arguments:
+            if argument.startswith("--"):
+                option = argument
+                assert f'"{option}"' in text, command
+            elif option == "--effects":
+                assert argument in EFFECTS, command
+            elif option == "--only":
+                assert groups is not None and f'"{argument}"' in groups[1], command
+            else:
+                assert argument.isdigit(), command
 
 
 def test_the_page_of_the_policy_is_what_the_policy_says() -> None:
@@ -127,7 +147,8 @@ def test_the_page_of_the_policy_is_what_the_policy_says() -> None:
     tool = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(tool)
     assert tool.PAGE.read_text(encoding="utf-8") == tool.page(), "write it again: python docs/tools/policy.py"
-    assert all(f"| `{row.name}` | {row.value:g} |" in tool.page() for row in rows())
+    text = tool.page()
+    assert all(f"| `{row.name}` | {row.value:g} |" in text for row in rows())
 
 
 def test_the_policy_cannot_be_changed() -> None:
@@ -139,26 +160,49 @@ def test_the_policy_cannot_be_changed() -> None:
 
 
 def test_every_number_of_the_policy_is_used() -> None:
-    text = "".join(f.read_text() for f in (PACKAGE / "diagnosis").rglob("*.py") if f.stem != "policy")
-    used = set(re.findall(r"\b(?:policy|POLICY)\.(\w+)", text))
-    assert {r.name for r in rows()} - used == set()
-    assert used - {r.name for r in rows()} - {"POLICY", "Policy"} <= {"import"}
+    text = "".join(f.read_text() for f in PACKAGE.rglob("*.py") if f.parent.name != "policy")
+    used = set(re.findall(r"\b(?:policy|POLICY)\.(\w+)", text)) - {"table"}
+    assert used == {r.name for r in rows()}
 
 
-def test_no_module_that_decides_has_a_number_of_its_own() -> None:
-    found = {}
-    for file in modules_that_decide():
-        name = file.relative_to(PACKAGE).with_suffix("").as_posix()
-        named = numbers_named(file)
-        assert set(ACCURACIES.get(name, {})) <= set(named), f"{name}: take what is gone out of ACCURACIES"
-        found |= {f"{name}.{n}": file for n in named if n not in ACCURACIES.get(name, {})}
-    assert not found, f"a number that decides belongs into diagnosis/policy.py: {', '.join(found)}"
-    assert all(len(reason) > 3 for names in ACCURACIES.values() for reason in names.values())
+def test_a_number_with_a_name_is_in_the_policy_or_says_why_not() -> None:
+    found = [f"{module}.{name}" for module, text in modules(*NAMED).items() for name in numbers_named(text)]
+    assert not found, f"a number that decides is a row of policy/table.py, others say '{MARK}why': {', '.join(found)}"
 
 
-def test_what_counts_as_a_number_of_its_own(tmp_path: Path) -> None:
-    (tmp_path / "module.py").write_text(
+def test_no_number_without_a_name_decides() -> None:
+    texts = modules("diagnosis")
+    assert set(TABLES) <= set(texts)
+    found = [f"{module}:{number}" for module, text in texts.items() if module not in TABLES for number in numbers_inside(text)]
+    assert not found, f"a number that decides is a row of policy/table.py, others have a name and '{MARK}why': {', '.join(found)}"
+
+
+def test_what_counts_as_a_number_of_its_own() -> None:
+    text = (
         "import numpy as np\nLIMIT = 0.3\nA, B = -1, 2.0 * np.pi\n_GRID = 2.0 ** np.arange(3)\nLEVEL: float = 1e-3\n"
         "LEVELS = (1.0, 2.0)\nNAME = 'x'\nFLAG = True\nlimit = 0.3\nTABLE = {'a': 1.0}\ndef f():\n    LOCAL = 1.0\n"
+        "class C:\n    INNER = 3\nSTART = 0.3  # no decision: a start\nBARE = 0.3  # no decision: \n"
     )
-    assert numbers_named(tmp_path / "module.py") == ["LIMIT", "A", "B", "_GRID", "LEVEL", "LEVELS"]
+    assert numbers_named(text) == ["LIMIT", "A", "B", "_GRID", "LEVEL", "LEVELS", "BARE", "INNER"]
+
+
+@pytest.mark.parametrize(
+    ("line", "numbers"),
+    [
+        ("x < 0.3", ["0.3"]),
+        ("x < 3.0 * floor", ["3.0"]),
+        ("max(6.0 * noise, 1e-300)", ["6.0"]),
+        ("np.clip(x, -0.5, 0.7)", ["0.5", "0.7"]),
+        ("costs[:3]", ["3"]),
+        ("ls.fit(objective, x, 8)", ["8"]),
+        ("lambda x, most=7: x", ["7"]),
+        ("def f(x, *, most=7): ...", ["7"]),
+        ("0.0 < x <= 1 and abs(y) < 2.0 * z and len(u) > 1", []),
+        ("x[:, 3] > x[:, 4]", []),
+        ("max(x, 1e-300)", []),
+        ("0.25 * x + 3.0", []),
+        ("ls.fit(objective, POLICY.usual)", []),
+    ],
+)
+def test_what_counts_as_a_number_that_decides(line: str, numbers: list[str]) -> None:
+    assert numbers_inside(line) == [f"1: {n}" for n in numbers]

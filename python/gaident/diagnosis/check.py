@@ -20,14 +20,14 @@ from gaident.axis import Text, joined, say, unit_text
 from gaident.data.record import Record
 from gaident.diagnosis.gains import Gains
 from gaident.diagnosis.library.terms import LIBRARY
-from gaident.diagnosis.policy import POLICY
 from gaident.errors import GaidentError
 from gaident.estimation.regression.force_error import ForceError, band_of, effects_before_the_shaft, force_error
 from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
 from gaident.estimation.term import Term
 from gaident.models.model import Model
-from gaident.results.diagnosis import Comparison, Fitness
+from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
+from gaident.results.fitness import Comparison, Fitness
 from gaident.results.inverse_dynamics import InverseDynamics
 
 __all__ = ["Check", "checked"]

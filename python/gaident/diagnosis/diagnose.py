@@ -22,7 +22,6 @@ from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
 from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, LOAD, TWO_LEVELS, conditional_classes
 from gaident.diagnosis.mechanics import base_shift, mechanics_of
 from gaident.diagnosis.note import Note
-from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_order, noise_std_of, records_of
 from gaident.diagnosis.records.folded import ADVICE, FOLDED, folded
 from gaident.diagnosis.records.hygiene import cleaned, outliers, quantisation
@@ -38,6 +37,7 @@ from gaident.estimation.uncertainty import estimates_of
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
 from gaident.models.simulate import simulate
+from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
@@ -45,6 +45,8 @@ from gaident.results.identification import Identification
 from gaident.version import version
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
+
+DIVERGED = 1e6  # no decision: of the velocity; a simulation that leaves so much has diverged
 
 
 def diagnose(
@@ -166,12 +168,8 @@ class _Work:
         shown = self.at_controller.controller or self.controller
         data = replace(data, controller=shown, loop_follows=self.at_controller.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
-        weight = np.ones(sum(self.data.lengths))
-        at = 0
-        for h, n in zip(hit, self.data.lengths, strict=True):
-            weight[at + h] = 0.0
-            at += n
-        self.objective = Objective(self.data, weight)
+        kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
+        self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
         self.spoiled = int(sum(len(h) for h in hit))
         self.excited = excitation(self.clean, shown)
 
@@ -182,7 +180,7 @@ class _Work:
         """Samples that stand out of the velocity, or out of the linear model's error: a slope of the velocity may hide them."""
         with np.errstate(over="ignore", invalid="ignore"):
             error = rec.velocity - simulate(self.idn.model, rec, self.controller)
-        if np.all(np.abs(error) < 1e6 * np.abs(rec.velocity).max()):
+        if np.all(np.abs(error) < DIVERGED * np.abs(rec.velocity).max()):
             return outliers(rec.velocity, error)
         return outliers(rec.velocity)
 

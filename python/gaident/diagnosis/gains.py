@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.policy import POLICY
+from gaident.diagnosis.library.terms import RESONANCE
 from gaident.diagnosis.records.hygiene import quantisation
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit
@@ -24,15 +24,18 @@ from gaident.models import simulate
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
 from gaident.models.starts import noise_std, starts_moving
-from gaident.results.diagnosis import Fitness
+from gaident.policy.table import POLICY
+from gaident.results.fitness import Fitness
 
 __all__ = ["Gains", "free_run_errors", "held_from", "measured_gains"]
 
 Vector = NDArray[np.float64]
 
-SHARE = 0.7  # of a record that parameters are fitted to
-LEAST = 600  # samples of a record from which a part is held out
-BLOCKS = 200  # bootstrap draws
+LEVELS = 0.025, 0.975  # no decision: of the interval that is reported
+MEMORY = 3  # no decision: times the memory of an error that a block of its bootstrap is long
+BLOCKS = 8  # no decision: parts of a record, of which a bootstrap draws at least so many
+LEAST = 4  # no decision: parts of a record, of which one at least is fitted
+DEAD = 0.2  # no decision: of an autocorrelation, below which an error has forgotten
 IN_SAMPLE = "in-sample"
 
 
@@ -73,10 +76,10 @@ def measured_gains(
     part: tuple[int, ...] | None
     if held:
         judged, words, part = [(r, 0) for r in held], "validation records", None
-    elif all(len(r) >= LEAST for r in records):
+    elif all(len(r) >= POLICY.least_held for r in records):
         judged = [(r, held_from(r)) for r in records]
         part = tuple(first for _, first in judged)
-        by_time = all(first == int(SHARE * len(r)) for r, first in judged)
+        by_time = all(first == int(POLICY.fitted_share * len(r)) for r, first in judged)
         words = f"the last 30 % of {'the record' if by_time else 'its path'}, parameters fitted to the first 70 %"
     else:
         judged, words, part = [(r, 0) for r in records], IN_SAMPLE, None
@@ -102,7 +105,8 @@ def measured_gains(
     spread = np.concatenate([r.velocity[first:] for r, first in judged])
     step = quantisation(tuple(r for r, _ in judged))
     floor = float(np.mean([noise_std(r.velocity, step) for r, _ in judged])) if noise is None else noise
-    floor = max(floor, step / float(np.sqrt(12.0)))
+    rounding = step / float(np.sqrt(12.0))
+    floor = max(floor, rounding)
     size = float(np.sqrt(np.mean((spread - spread.mean()) ** 2)))
 
     def fitness(parts: list[Vector]) -> Fitness:
@@ -146,16 +150,16 @@ def _turned(rec: Record, controller: PI | None, final: Fit) -> Record:
 
 
 def _without(found: Fit, effect: str, objective: Objective) -> Fit:
-    return fit(objective, found.hypothesis.without(effect), found.parameters.removed(found.x, effect), found.noise, 10)
+    return fit(objective, found.hypothesis.without(effect), found.parameters.removed(found.x, effect), found.noise, POLICY.usual)
 
 
 def held_from(rec: Record) -> int:
     """The first sample that is held out: of the last 30 % of the time or, where these hardly move, of the path."""
-    at = int(SHARE * len(rec))
+    at = int(POLICY.fitted_share * len(rec))
     before, after = (float(np.sqrt(np.mean(w**2))) for w in (rec.velocity[:at], rec.velocity[at:]))
     if after < POLICY.held_motion * before:
         path = np.cumsum(np.abs(rec.velocity))
-        at = int(np.clip(np.searchsorted(path, SHARE * path[-1]), len(rec) // 4, at))
+        at = int(np.clip(np.searchsorted(path, POLICY.fitted_share * path[-1]), len(rec) // LEAST, at))
     return at
 
 
@@ -184,9 +188,9 @@ def _stages(final: Fit, objective: Objective, part: tuple[int, ...] | None) -> l
     hypothesis, x = final.hypothesis, final.x
     for e in reversed(final.effects):
         whole = part is None and hypothesis is final.hypothesis
-        fits.append(final if whole else fit(objective, hypothesis, x, final.noise, 10))
+        fits.append(final if whole else fit(objective, hypothesis, x, final.noise, POLICY.usual))
         x, hypothesis = hypothesis.parameters.removed(x, e), hypothesis.without(e)
-    fits.append(fit(objective, hypothesis, x, final.noise, 10))
+    fits.append(fit(objective, hypothesis, x, final.noise, POLICY.usual))
     return fits[::-1]
 
 
@@ -211,7 +215,7 @@ def start_state(model: Model, rec: Record, controller: PI | None) -> Vector | No
     if not model.effects:
         return np.asarray(initial_state(model, rec, controller))
     head = rec[: min(len(rec), POLICY.head)]
-    state = np.zeros(model.order)
+    state = np.zeros(model.order + 2 * any(effect.name == RESONANCE.name for effect in model.effects))
     state[0] = rec.velocity[0]
     step = 1e-3 * float(np.abs(head.velocity).max())
     for _ in range(2):
@@ -228,21 +232,22 @@ def _interval(before: list[Vector], after: list[Vector]) -> tuple[float, float]:
     """95 % interval of 1 - rmse_after/rmse_before by a paired block bootstrap (blocks longer than the errors stay correlated)."""
     b, a = np.concatenate(before), np.concatenate(after)
     n = len(b)
-    block = max(min(n // 8, 3 * _memory(a)), 1)
+    block = max(min(n // BLOCKS, MEMORY * _memory(a)), 1)
     count = n // block
     if count < 2:
         return (float("-inf"), 1.0)
     sums = np.add.reduceat(np.column_stack([b**2, a**2])[: count * block], np.arange(0, count * block, block), axis=0)
     rng = np.random.default_rng(0)
-    drawn = sums[rng.integers(0, count, (BLOCKS, count))].sum(axis=1)
+    drawn = sums[rng.integers(0, count, (POLICY.draws, count))].sum(axis=1)
     falls = 1.0 - np.sqrt(drawn[:, 1] / np.maximum(drawn[:, 0], 1e-300))
-    return float(np.quantile(falls, 0.025)), float(np.quantile(falls, 0.975))
+    low, high = np.quantile(falls, LEVELS)
+    return float(low), float(high)
 
 
 def _memory(e: Vector) -> int:
-    """Samples until the autocorrelation of e first falls below 0.2."""
+    """Samples until the autocorrelation of e first falls below DEAD."""
     size = 1 << (2 * len(e) - 1).bit_length()
     spectrum = np.abs(np.fft.rfft(e - e.mean(), size)) ** 2
     r = np.fft.irfft(spectrum, size)[: len(e)]
-    below = np.flatnonzero(r < 0.2 * r[0])
+    below = np.flatnonzero(r < DEAD * r[0])
     return int(below[0]) if len(below) else len(e)

@@ -36,7 +36,7 @@ MECHANICS = {
     "ground_resonance": "Hz",
 }
 """Names and units; inertia and viscous friction are of the whole axis, the last two of a spring between it and the ground."""
-WHOLE = 2  # of these, what every axis has
+WHOLE = 2  # no decision: of these, what every axis has
 
 
 def mechanics_of(objective: Objective, fit: Fit) -> dict[str, Estimate]:
@@ -97,7 +97,8 @@ def _numbers(values: Vector) -> Vector:
         return none
     D = a * e0 * JM / f0
     none[:WHOLE] = abs(e0 * JM / f0), D
-    swings = e1 * e1 < 4.0 * e0 and f1 * f1 < 4.0 * f0
+    poles, zeros = e1 * e1 - 4.0 * e0, f1 * f1 - 4.0 * f0
+    swings = poles < 0.0 and zeros < 0.0
     if not (swings and e0 + a * e1 > f0):
         return none
     mechanics = mechanics_with_shaft_damping(np.array([abs(K), a + e1, e0 + a * e1, a * e0, f1, f0]))

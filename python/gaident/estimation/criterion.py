@@ -38,7 +38,7 @@ __all__ = ["Specification", "bic", "chi_square_bound", "effective_samples", "spe
 
 Vector = NDArray[np.float64]
 
-DEAD = 0.05  # of the autocorrelation: from there on it is zero
+DEAD = 0.05  # no decision: of the autocorrelation; from there on its own error is larger
 
 
 def bic(variance: float, information: float, numbers: int) -> float:

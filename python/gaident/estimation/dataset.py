@@ -27,7 +27,7 @@ __all__ = ["DataSet", "with_angle"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-FINEST = 0.125e-3  # s, of a substep: the accuracy that friction on a stiff shaft needs
+FINEST = 0.125e-3  # no decision: s, of a substep: the accuracy that friction on a stiff shaft needs
 
 
 @dataclass(frozen=True, eq=False)

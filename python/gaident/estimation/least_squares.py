@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 from gaident.estimation.noise_model import WHITE, NoiseFilter
 from gaident.estimation.objective import Fit, Hypothesis, Objective
 from gaident.estimation.projection import WORST
+from gaident.policy.table import POLICY
 
 __all__ = ["evolved", "fit", "reestimated", "scored"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-SETTLED = 0.02  # of the noise variance: a fall of the cost by less changes no decision
+SETTLED = 0.02  # no decision: of the noise variance: a fall of the cost by less changes no decision
 
 
 def fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, iterations: int) -> Fit:
@@ -93,7 +94,7 @@ def _scored(objective: Objective, found: Fit) -> Fit:
     return objective.fitted(found.hypothesis, found.x, noise, float(v @ v), found.converged)
 
 
-def reestimated(objective: Objective, found: Fit, iterations: int = 6) -> Fit:
+def reestimated(objective: Objective, found: Fit, iterations: int = POLICY.short) -> Fit:
     """The fit under the filter of what it leaves itself (two rounds of generalised least squares)."""
     if found.cost >= WORST:
         return found
@@ -112,7 +113,7 @@ def _reestimated(objective: Objective, found: Fit, iterations: int) -> Fit:
     return best
 
 
-def evolved(objective: Objective, found: Fit, iterations: int) -> Fit:
+def evolved(objective: Objective, found: Fit, generations: int) -> Fit:
     """Differential evolution around a fit (Storn and Price 1997): a stop or an impact more or less makes the cost multimodal."""
     from scipy.optimize import differential_evolution
 
@@ -132,9 +133,9 @@ def evolved(objective: Objective, found: Fit, iterations: int) -> Fit:
         return np.log(objective.costs(hypothesis, X, WHITE))
 
     best = differential_evolution(
-        costs, list(zip(low, high, strict=True)), popsize=6, maxiter=iterations, x0=start, rng=0, vectorized=True,
+        costs, list(zip(low, high, strict=True)), popsize=6, maxiter=generations, x0=start, rng=0, vectorized=True,
         updating="deferred", polish=False, tol=1e-4, mutation=(0.4, 0.9), recombination=0.9,
     )  # fmt: skip
     x = found.x.copy()
     x[moved] = best.x
-    return fit(objective, hypothesis, x, WHITE, 15)
+    return fit(objective, hypothesis, x, WHITE, POLICY.usual)

@@ -34,11 +34,12 @@ __all__ = ["HIGHEST", "WHITE", "NoiseFilter", "ShaftNoise", "autoregression", "s
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-HIGHEST = 20  # order of an autoregression alone
-ON_TOP = 6  # and of one behind a shaft's noise: what the sensor does
-TAUS = 2.5 * 2.0 ** np.arange(10)  # samples
-SIZES = 2.0 ** np.arange(-12.0, 6.0)  # std of w times the velocity that 1 N m for one sample leaves, over the std of n
-MIDDLE = 4, 7  # place in the grid of both where a search begins
+HIGHEST = 20  # no decision: BIC takes the order; order of an autoregression alone
+ON_TOP = 6  # no decision: and of one behind a shaft's noise: what the sensor does
+TAUS = 2.5 * 2.0 ** np.arange(10)  # no decision: a grid; samples
+SIZES = 2.0 ** np.arange(-12.0, 6.0)  # no decision: a grid
+"""Std of w times the velocity that 1 N m for one sample leaves, over the std of n."""
+MIDDLE = 4, 7  # no decision: place in the grid of both where a search begins
 
 
 @dataclass(frozen=True, eq=False)

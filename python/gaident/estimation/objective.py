@@ -41,7 +41,7 @@ Matrix = NDArray[np.float64]
 Index = NDArray[np.intp]
 T = TypeVar("T")
 
-LOST = 1e60  # rad/s: the error of a model that diverges, every sample; its squares stay numbers
+LOST = 1e60  # no decision: rad/s: the error of a model that diverges, every sample; its squares stay numbers
 
 
 @dataclass(frozen=True)

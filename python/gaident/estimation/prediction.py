@@ -37,7 +37,7 @@ __all__ = ["ClosedLoop", "OpenLoop", "Predictor", "coupling_response", "twist"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-MOST_SUBSTEPS = 5  # powers of two
+MOST_SUBSTEPS = 5  # no decision: powers of two
 
 
 class Predictor(Protocol):

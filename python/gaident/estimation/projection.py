@@ -10,7 +10,7 @@ __all__ = ["orthonormal_rows", "project_out", "sums_of_squares"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-WORST = 1e100
+WORST = 1e100  # no decision: the cost of a model that diverges, which none reaches
 """The cost of a model that diverges."""
 
 

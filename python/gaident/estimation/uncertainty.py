@@ -22,11 +22,12 @@ from gaident.estimation.criterion import effective_samples
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.objective import Fit, Innovations, Objective
 from gaident.models.effects import table
+from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
 __all__ = ["covariance_of", "estimates_of"]
 
-BLOCKS = 8
+BLOCKS = 8  # no decision: of a jackknife, how finely a deviation is known
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -55,7 +56,7 @@ def _jackknife(objective: Objective, fit: Fit) -> Vector:
     for first, end in pairwise(edges):
         weight = objective.weight.copy()
         weight[first:end] = 0.0
-        fits.append(fitted(objective.weighted(weight), fit.hypothesis, fit.x, fit.noise, 6).x)
+        fits.append(fitted(objective.weighted(weight), fit.hypothesis, fit.x, fit.noise, POLICY.short).x)
     return np.asarray(np.sqrt((BLOCKS - 1) * np.var(fits, axis=0)))
 
 

@@ -17,13 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.identification.noise import Autoregression, chi2_tail, ljung_box_of
-from gaident.results.adequacy import LEVEL, Adequacy
+from gaident.policy.table import POLICY
+from gaident.results.adequacy import Adequacy
 
 __all__ = ["Sums", "assess", "independence_p", "regressor_lags", "white_lags"]
 
 Vector = NDArray[np.float64]
 
-LAGS = (0, 1, 2, 4, 8, 16, 32)
+LAGS = (0, 1, 2, 4, 8, 16, 32)  # no decision: of the input, which a test looks at
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,8 @@ def assess(s: Sums) -> Adequacy:
     predictable = 1.0 - s.noise.std**2 / power if power > 0.0 else 0.0
     p = independence_p(s.white, s.unknowns, total - s.noise.order * len(s.lengths))
     excess = math.sqrt(power) / s.quiet if s.quiet > 0.0 else (0.0 if power == 0.0 else math.inf)
-    falsified = p < LEVEL
-    undecided = not falsified and white_p < LEVEL and excess > 2.0
+    falsified = p < POLICY.test_level
+    undecided = not falsified and white_p < POLICY.test_level and excess > POLICY.undecided_ratio
     return Adequacy(white_p, s.noise.order, s.noise.std, max(predictable, 0.0), excess, p, falsified, undecided)
 
 

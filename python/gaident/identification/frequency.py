@@ -34,13 +34,13 @@ __all__ = ["measured_response", "response_of", "sampled_response", "simulated_re
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-WINDOWS = 8  # at least, half-overlapping
-LONGEST = 4096  # samples of a window
-PER_OCTAVE = 12  # frequencies kept
-CHANCE = 0.05  # of a coherence above `threshold` where there is none
+WINDOWS = 8  # no decision: at least, half-overlapping
+LONGEST = 4096  # no decision: samples of a window
+PER_OCTAVE = 12  # no decision: frequencies kept
+CHANCE = 0.05  # no decision: of a coherence above `threshold` where there is none
 
-SAME = np.array([1.0, 4.0 / 9.0, 1.0 / 36.0])
-NEXT = np.array([1.0 / 36.0, (4.0 / (9.0 * np.pi)) ** 2, 1.0 / 144.0, (4.0 / (45.0 * np.pi)) ** 2])
+SAME = np.array([1.0, 4.0 / 9.0, 1.0 / 36.0])  # no decision: of a Hann window
+NEXT = np.array([1.0 / 36.0, (4.0 / (9.0 * np.pi)) ** 2, 1.0 / 144.0, (4.0 / (45.0 * np.pi)) ** 2])  # no decision: Hann
 """|rho|^2 of white noise behind Hann windows, 0, 1, 2, ... frequencies apart: in one window, and in the next one."""
 
 

@@ -22,13 +22,14 @@ from gaident.identification.arguments import check_arithmetic, check_numbers, ch
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.identification.notes import record_notes, warnings_of
 from gaident.identification.parts import search_parts
-from gaident.identification.selection import MARGIN, Candidate
+from gaident.identification.selection import Candidate
 from gaident.identification.space import derive_space
 from gaident.messages import Message
 from gaident.models.mechanics import mechanics_from_model
 from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
 from gaident.models.starts import noise_std, starts_moving
+from gaident.policy.table import POLICY
 from gaident.results.adequacy import Adequacy
 from gaident.results.identification import Identification
 from gaident.results.settings import Settings
@@ -40,10 +41,10 @@ __all__ = ["identify"]
 Vector = NDArray[np.float64]
 ProgressCallback = Callable[[float, str], None]
 
-FINAL_ITERATIONS = 60
-FINAL_TOLERANCE = 1e-9
-WHOLE_ITERATIONS = 30  # of a fit found on a part of a long record
-REACH = math.log(2.0)  # units of BIC per sample of the part: with twice the error of the best there, none wins on all samples
+FINAL_ITERATIONS = 60  # no decision: effort
+FINAL_TOLERANCE = 1e-9  # no decision: of a solver
+WHOLE_ITERATIONS = 30  # no decision: effort; of a fit found on a part of a long record
+REACH = math.log(2.0)  # no decision: effort; units of BIC per sample: twice the error of the best, and none wins on all samples
 
 
 def identify(
@@ -319,10 +320,8 @@ class _Work:
         lowest = min((c.bic for c in scored), default=0.0)
         # Where every structure is contradicted a criterion that supposes one of them true ranks nothing.
         close = [] if judged.falsified else scored
-        rivals = sorted(
-            (Rival(c.p, c.q, c.bic - bic, c.model) for c in close if c.bic <= bic + MARGIN and (c.p, c.q) != (model.p, model.q)),
-            key=lambda r: r.delta_bic,
-        )
+        close = [c for c in close if c.bic <= bic + POLICY.rival_margin and (c.p, c.q) != (model.p, model.q)]
+        rivals = sorted((Rival(c.p, c.q, c.bic - bic, c.model) for c in close), key=lambda r: r.delta_bic)
         states = {d: tuple(x.tolist()) for d, x in zip(self.digests, self.states(best.candidate), strict=True) if len(x)}
         return Identification(
             model=model,
@@ -342,7 +341,7 @@ class _Work:
                 mechanics,
                 rivals,
                 model,
-                lowest < bic - MARGIN,
+                lowest < bic - POLICY.rival_margin,
                 record_notes(self.records, self.controller, s.initial_state),
             ),
             space=self.space,

@@ -36,8 +36,8 @@ from gaident.models.model import Model
 __all__ = ["LeastSquares", "least_squares"]
 
 Vector = NDArray[np.float64]
-ROUNDS = 50
-CONVERGED = 1e-9
+ROUNDS = 50  # no decision: effort
+CONVERGED = 1e-9  # no decision: of a solver
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from gaident.axis import Text, say
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.identification.selection import MARGIN
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Model
 from gaident.models.starts import doubtful_start
+from gaident.policy.table import POLICY
 from gaident.results.adequacy import Adequacy
 from gaident.results.estimate import Estimate
 from gaident.results.structures import Rival
@@ -44,7 +44,9 @@ def warnings_of(
         notes.append(f"Not identifiable from this data (standard deviation as large as the value): {', '.join(unknown)}.")
     if rivals:
         names = ", ".join(f"({r.p},{r.q})" for r in rivals)
-        notes.append(f"Structures within {MARGIN:.0f} BIC units of ({model.p},{model.q}): {names}; the smallest is reported.")
+        notes.append(
+            f"Structures within {POLICY.rival_margin:.0f} BIC units of ({model.p},{model.q}): {names}; the smallest is reported."
+        )
     if mechanics is not None:
         notes.extend(_shaft_notes(mechanics))
         notes.extend(mechanics.notes)
@@ -55,7 +57,7 @@ def _shaft_notes(mechanics: OneMass | TwoMass) -> list[str]:
     """A sentence where the six numbers of a two-mass model contradict a shaft without damping by more than three deviations."""
     std = mechanics.std.get("inconsistency", 0.0)
     found = mechanics.inconsistency or 0.0
-    if not isinstance(mechanics, TwoMass) or not std > 0.0 or found < 3.0 * std:
+    if not isinstance(mechanics, TwoMass) or not std > 0.0 or found < POLICY.contradiction * std:
         return []
     damped = mechanics.with_shaft_damping
     remedy = "an effect that the model lacks bends them; trust neither"

@@ -16,11 +16,11 @@ from gaident.data.record import Record
 
 __all__ = ["search_parts"]
 
-LEAST = 8192  # samples that a search looks at, at least
-MOST = 65536
-SHARE = 64  # of longer records one sample in so many
-WINDOW = 4096  # shortest window, samples
-BLOCKS = 8  # a window may begin at every eighth of its length
+LEAST = 8192  # no decision: effort; samples that a search looks at, at least
+MOST = 65536  # no decision: effort, samples
+SHARE = 64  # no decision: effort; of longer records one sample in so many
+WINDOW = 4096  # no decision: effort; shortest window, samples
+BLOCKS = 8  # no decision: effort; a window may begin at every eighth of its length
 
 
 def search_parts(records: Sequence[Record], controller: PI | None, moving: Sequence[bool]) -> list[tuple[Record, bool]]:

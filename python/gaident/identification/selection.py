@@ -21,12 +21,11 @@ from numpy.typing import NDArray
 from gaident import _core
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.models.model import Model
+from gaident.policy.table import POLICY
 
-__all__ = ["MARGIN", "Candidate", "is_chain", "noise_of", "scored", "smallest_close", "smallest_mechanism", "tolerance"]
+__all__ = ["Candidate", "is_chain", "noise_of", "scored", "smallest_close", "smallest_mechanism", "tolerance"]
 
-MARGIN = 10.0
-CANCELLATION = 0.02
-WHITE_ITERATIONS = 8
+WHITE_ITERATIONS = 8  # no decision: effort, of a fit that is whitened again
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ def cancellations(poles: Sequence[complex], zeros: Sequence[complex]) -> int:
     free = list(poles)
     count = 0
     for zero in zeros:
-        near = [pole for pole in free if abs(pole - zero) < CANCELLATION * max(abs(zero), 1e-12)]
+        near = [pole for pole in free if abs(pole - zero) < POLICY.cancellation * max(abs(zero), 1e-12)]
         if near:
             free.remove(min(near, key=lambda pole: abs(pole - zero)))
             count += 1
@@ -114,7 +113,7 @@ def scored(
     found = []
     for c, cost in zip(candidates, costs, strict=True):
         bic = count * math.log(max(cost, 1e-300) / count) + (c.size + len(c.starts)) * logarithm
-        found.append(replace(c, bic=bic + MARGIN * cancellations(c.fit.poles.tolist(), c.fit.zeros.tolist())))
+        found.append(replace(c, bic=bic + POLICY.rival_margin * cancellations(c.fit.poles.tolist(), c.fit.zeros.tolist())))
     return found
 
 
@@ -126,7 +125,7 @@ def tolerance(samples: int) -> float:
 def smallest_close(scores: Sequence[Candidate]) -> int:
     """Index of the winner: the smallest structure within 10 units of the best."""
     best = min(c.bic for c in scores)
-    close = [i for i, c in enumerate(scores) if c.bic <= best + MARGIN]
+    close = [i for i, c in enumerate(scores) if c.bic <= best + POLICY.rival_margin]
     return min(close, key=lambda i: (scores[i].size, scores[i].bic))
 
 

@@ -1,8 +1,9 @@
 from .adequacy import Adequacy
-from .diagnosis import Comparison, Diagnosis, Fitness
+from .diagnosis import Diagnosis
 from .estimate import Estimate
 from .experiment import Limits, Proposal
 from .finding import Finding
+from .fitness import Comparison, Fitness
 from .frequency import FrequencyResponse, Responses
 from .identification import Identification
 from .inverse_dynamics import InverseDynamics

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-__all__ = ["LEVEL", "Adequacy"]
+from gaident.policy.table import POLICY
 
-
-LEVEL = 1e-4  # p-value below which the linear model counts as falsified
+__all__ = ["Adequacy"]
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ class Adequacy:
                 "or missing dynamics; this record cannot tell which, and parameters and standard deviations hold only "
                 "if it is noise."
             )
-        if self.white_p < LEVEL:
+        if self.white_p < POLICY.test_level:
             return (
                 "The residual is not white but does not depend on input or motion: coloured noise. The linear model stands; "
                 "the standard deviations take the colour into account."

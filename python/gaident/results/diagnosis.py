@@ -17,6 +17,7 @@ from gaident.providers import provided
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
+from gaident.results.fitness import Comparison, Fitness
 from gaident.results.identification import Identification
 from gaident.results.inverse_dynamics import InverseDynamics
 from gaident.results.json_text import json_text
@@ -24,64 +25,10 @@ from gaident.results.json_text import json_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Comparison", "Diagnosis", "Fitness"]
+__all__ = ["Diagnosis"]
 
 SCHEMA = "gaident/diagnosis"
 SCHEMA_VERSION = 1
-
-
-@dataclass(frozen=True)
-class Fitness:
-    """A model against held-out data, in the free run and by its force error.
-
-    Attributes
-    ----------
-    rmse : float
-        Root mean square of the free run's velocity error [rad/s].
-    fit_percent : float
-        100 (1 - norm(error)/norm(velocity - mean velocity)) [%].
-    noise_floor : float
-        Root mean square that the noise of the measured velocity alone leaves [rad/s].
-    force_error : float or None
-        Root mean square of the logged torque minus the torque that the model needs for the measured motion [N m]; None where no
-        torque is logged, or nothing moves.
-    torque_rms : float or None
-        Root mean square of the torque itself, over the same samples [N m].
-    force_floor : float or None
-        What noise leaves of the force error at most [N m].
-
-    See Also
-    --------
-    diagnose : Makes it.
-    force_error : The same figure of any model on any records.
-    """
-
-    rmse: float
-    fit_percent: float
-    noise_floor: float
-    force_error: float | None = None
-    torque_rms: float | None = None
-    force_floor: float | None = None
-
-    @property
-    def force_percent(self) -> float | None:
-        """The force error as a percentage of the torque's rms."""
-        if self.force_error is None or not self.torque_rms:
-            return None
-        return 100.0 * self.force_error / self.torque_rms
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """One quantity by two methods.
-
-    name: "inertia", "dry friction", "gravity" or "ground stiffness"; differs: they contradict each other, and it matters.
-    """
-
-    name: str
-    diagnosis: Estimate
-    regression: Estimate
-    differs: bool
 
 
 @dataclass(frozen=True, repr=False)

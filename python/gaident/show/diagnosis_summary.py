@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 
-from gaident.axis import Text, identifier_words, said, say, unit, velocity_unit
+from gaident.axis import Text, identifier_words, said, say, unit, velocity_unit, word
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
@@ -181,7 +181,7 @@ def _force(dia: Diagnosis, axis: str) -> list[str]:
     where = "IN-SAMPLE" if dia.held_out == "in-sample" else f"on {dia.held_out}"
     torque = "torque" if axis == "rotary" else "force"
     head = ("", f"rms [{unit('N m', axis)}]", f"of the {torque} [%]")
-    return [f"Force error, {where}", *table([head, *rows]), *_wrapped(force_words(dia, axis), "  ")]
+    return [f"{word('Torque', axis)} error, {where}", *table([head, *rows]), *_wrapped(force_words(dia, axis), "  ")]
 
 
 def _second_method(dia: Diagnosis, axis: str) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gaident.axis import said, say, unit
+from gaident.axis import identifier_words, said, say, unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.show.wording import number, with_std
 
@@ -36,7 +36,7 @@ def comparison_rows(dia: Diagnosis, axis: str) -> list[tuple[str, str, str, str,
     for c in dia.comparisons:
         remark = "they disagree" if c.differs else ""
         values = with_std(c.diagnosis.value, c.diagnosis.std), with_std(c.regression.value, c.regression.std)
-        rows.append((said(c.name, axis), *values, unit(c.regression.unit, axis), remark))
+        rows.append((identifier_words(c.name.replace(" ", "_"), axis), *values, unit(c.regression.unit, axis), remark))
     return rows
 
 
@@ -49,5 +49,5 @@ def method_words(dia: Diagnosis, axis: str) -> str:
         "Least squares of the {torque} on {}, without simulation: all channels through a Butterworth filter of order {} at "
         "{:.3g} Hz, forward and backward; {} rows."
     )
-    terms = ", ".join(name.replace("_", " ") for name in found.terms)
+    terms = ", ".join(identifier_words(name, axis) for name in found.terms)
     return said(say(text, terms, found.order, found.cutoff_hz, found.samples), axis)

@@ -23,6 +23,7 @@ from gaident.diagnosis.library.terms import IN_CONTROLLER
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.term import Scales, Term
 from gaident.models.effects import table
+from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
@@ -31,9 +32,9 @@ __all__ = ["AsLogged", "AtController", "as_logged", "as_read", "controller_findi
 Vector = NDArray[np.float64]
 
 DECIDED = tuple(t.name for t in IN_CONTROLLER)
-SAME_GAINS, SAME_LIMITS = 1e-2, 2e-3  # relative differences within which records show the same gains or limits
 LIMITS = ("torque_limit", CLAMP, "anti_windup")  # causes that a replay finds
-CLOSE = 1e-3  # of the replay's squared error: what an effect may leave that explains it
+ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
+GRID = 25  # no decision: values from which a search for a limit starts
 
 
 @dataclass
@@ -76,7 +77,7 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
     if not found or len(found) < len(replays):
         return as_given
     gains = np.array([[c.kp, c.ki] for c in found])
-    if np.any(np.ptp(gains, axis=0) > SAME_GAINS * gains.max(axis=0)):
+    if np.any(np.ptp(gains, axis=0) > POLICY.same_gains * gains.max(axis=0)):
         return as_given
     kp, ki = (float(g) for g in gains.mean(axis=0))
     if all(r.cause == "integration_rule" for r in off):
@@ -129,7 +130,7 @@ def controller_findings(
     texts = (say("{}: {}", name, r.sentence) if len(said) > 1 else r.sentence for name, r in said if not r.follows)
     notes = list(dict.fromkeys(texts))
     plain = data.replayed_error({})
-    floor = len(plain) * max(max(r.resolution for r in replays), 1e-9 * scales.torque) ** 2
+    floor = len(plain) * max(max(r.resolution for r in replays), ROUNDING * scales.torque) ** 2
     shown = _limits_shown(off, controller)
     if shown is not None:
         return _limit_findings(data, shown, off, plain, floor, notes)
@@ -138,7 +139,7 @@ def controller_findings(
     effect = term.name
     n, before = len(plain), float(plain @ plain)
     left = data.replayed_error({term: np.array([value])})
-    if cost < CLOSE * before or cost < 4.0 * floor or white_noise(left, data.torque):
+    if cost < POLICY.replay_left * before or cost < POLICY.replay_steps**2 * floor or white_noise(left, data.torque):
         parameter = next(r for r in table() if r.name == effect).parameters[0]
         name, unit = parameter.name, parameter.unit
         text = say(
@@ -166,7 +167,7 @@ def _limits_shown(off: Sequence[Replay], controller: PI) -> PI | None:
         return None
     limits = np.array([c.limits for c in found])
     low, high = limits.min(axis=0), limits.max(axis=0)
-    if np.any(low < (1.0 - SAME_LIMITS) * high):
+    if np.any(low < (1.0 - POLICY.same_value) * high):
         return None
     torque, clamp = (None if not np.isfinite(x) else float(x) for x in high)
     return replace(controller, torque_limit=torque, integrator_limit=clamp)
@@ -234,7 +235,7 @@ def _fitted(data: DataSet, scales: Scales, term: Term) -> tuple[float, float]:
         e = data.replayed_error({term: np.array([np.exp(z)])})
         return float(e @ e)
 
-    grid = np.linspace(low, high, 25)
+    grid = np.linspace(low, high, GRID)
     costs = [cost(z) for z in grid]
     k = int(np.argmin(costs))
     bracket = (grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)])

@@ -29,19 +29,19 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.diagnosis.controller.replay import replay
-from gaident.diagnosis.policy import POLICY
 from gaident.estimation.regression.torque_lag import TorqueLag, torque_lag
 from gaident.identification.notes import reading_notes
+from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 
 __all__ = ["Aligned", "aligned"]
 
 Vector = NDArray[np.float64]
 
-FARTHEST = 2  # samples in either direction
-LONGEST = 1 << 16  # samples that the law is fitted to
-SHARES = (0.0, 0.5, -0.5)  # of ki dt, by which the newest error counts more than half: trapezoidal and rectangular integrals
-MOST_LEFT = 0.1  # of the torque's standard deviation: where the law leaves more, it is not this controller
+FARTHEST = 2  # no decision: how far is looked, samples in either direction
+LONGEST = 1 << 16  # no decision: work; samples that the law is fitted to
+SHARES = (0.0, 0.5, -0.5)  # no decision: the rules that exist
+"""Of ki dt, by which the newest error counts more than half: trapezoidal and rectangular integrals."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def _of_law(rec: Record, controller: PI | None) -> tuple[Mapping[str, int], Text
     if after.follows is False and after.cause in ("", "shift"):
         return {}, Text("")
     lag = torque_lag(rec)
-    if rec.torque_is == MEASURED and b > 0 and not (lag is not None and lag.lag > b - 0.25):
+    if rec.torque_is == MEASURED and b > 0 and not (lag is not None and lag.lag > b - POLICY.lag_seen / 2):
         return {}, _measured_note(b, lag)
     return moves, _moved_note(moves, b, lag)
 
@@ -120,9 +120,9 @@ def _shift_of_law(rec: Record, controller: PI) -> tuple[int, int]:
     assert rec.command is not None and rec.torque is not None
     r, w, u = (x[:LONGEST] for x in (rec.command, rec.velocity, rec.torque))
     inner = slice(FARTHEST, len(u) - FARTHEST)
-    within = np.abs(u[inner]) < 0.999 * float(np.abs(u).max())
+    within = np.abs(u[inner]) < POLICY.at_limit * float(np.abs(u).max())
     n, top = int(within.sum()), float(np.std(u))
-    if n < 20 or not top > 0.0:
+    if n < POLICY.least_rows or not top > 0.0:
         return 0, 0
     steps = range(-FARTHEST, FARTHEST + 1)
     least = (1e-6 * float(np.abs(u).max())) ** 2
@@ -137,7 +137,7 @@ def _shift_of_law(rec: Record, controller: PI) -> tuple[int, int]:
                 off = u[inner][within] - table @ np.linalg.lstsq(table, u[inner][within], rcond=1e-12)[0]
                 left[a, b] = min(left.get((a, b), np.inf), float(off @ off) / n)
     best = min(left.values())
-    if best > (MOST_LEFT * top) ** 2:
+    if best > (POLICY.replay_noise * top) ** 2:
         return 0, 0
     worse = {shift: n * float(np.log((value + least) / (best + least))) for shift, value in left.items()}
     alike = [shift for shift, units in worse.items() if units < POLICY.log_shift]
@@ -181,7 +181,7 @@ def _moved_note(moves: Mapping[str, int], b: int, lag: TorqueLag | None) -> Text
     )
     if b < 0:
         return say("{} As logged, the controller would have acted before it measured.", text)
-    if b > 0 and (lag is None or lag.lag < b - 0.5):
+    if b > 0 and (lag is None or lag.lag < b - POLICY.lag_seen):
         same = "{} A drive that computes for {} makes the same log; that delay would show below as a transport delay."
         return say(same, text, _samples(b))
     return text
@@ -190,18 +190,18 @@ def _moved_note(moves: Mapping[str, int], b: int, lag: TorqueLag | None) -> Text
 def _measured_note(b: int, lag: TorqueLag | None) -> Text:
     text = (
         "The measured {torque} is {} behind the controller's, exactly: the log may have written it late, or the drive needs that "
-        "long. {}; nothing was moved. Where you know that it is the log, read it with shift torque={}."
+        "long. {}; nothing was moved. Where you know that it is the log, read it with {}."
     )
     where = "The motion does not tell which"
     if lag is not None:
         where = f"The motion puts it {_samples(lag.lag)} {'behind' if lag.lag > 0 else 'before'} its place"
-    return say(text, _samples(b), where, -b)
+    return say(text, _samples(b), where, f"shift torque={-b}")
 
 
 def _of_motion(rec: Record) -> Text:
     """What the motion says of a torque in open loop, where no law proves anything: a note, "" where there is nothing to say."""
     lag = torque_lag(rec)
-    if lag is None or abs(lag.lag) - 3.0 * lag.std < 0.5 or abs(lag.lag) < 0.75:
+    if lag is None or abs(lag.lag) - POLICY.contradiction * lag.std < POLICY.lag_seen:
         return Text("")
     remedy = f"where you know that it is the log, read it with shift torque={-round(lag.lag)}. Nothing was moved."
     if lag.lag > 0.0:

@@ -19,10 +19,14 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.replay_causes import explain, rounded_command, white_noise
 from gaident.diagnosis.records.lattice import lattice_step, rounding_step
 from gaident.errors import RecordError
+from gaident.policy.table import POLICY
 
 __all__ = ["Replay", "replay"]
 
 Vector = NDArray[np.float64]
+
+ROUNDING = 1e-6  # no decision: of the largest torque, what a controller in single precision is exact to
+DEVIATIONS = 3.0  # no decision: standard deviations of a sum of roundings that none exceeds
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +127,7 @@ def _compared(rec: Record, command: Vector, controller: PI, logged: Vector, repl
 
 
 def _tolerance(rec: Record, command: Vector, controller: PI, logged: Vector) -> float:
-    """Three steps of the torque's rounding, and what rounded decimals of velocity and command do to P part and integral [N m].
+    """Steps of the torque's rounding, and what rounded decimals of velocity and command do to P part and integral [N m].
 
     A coarse lattice of the velocity is the encoder's, and the controller read the same numbers; a fine one is the text log's,
     and then the command's decimals are no finer. Each of N velocities is rounded by itself, a command once for all the samples
@@ -132,9 +136,9 @@ def _tolerance(rec: Record, command: Vector, controller: PI, logged: Vector) -> 
         sum of the squares = ki^2 dt^2 (N q_w^2 + sum L_i^2 q_r^2)/12        L_i: samples for which a command is held
     """
     q = rounding_step(rec.velocity)
-    q_w = q if q < 1e-3 * float(np.ptp(rec.velocity)) else 0.0
+    q_w = q if q < POLICY.negligible * float(np.ptp(rec.velocity)) else 0.0
     q_r = min(q_w, rounding_step(command))
     held = np.diff(np.flatnonzero(np.concatenate([[True], np.diff(command) != 0.0, [True]])))
     drift = controller.ki * rec.dt * np.sqrt((len(rec) * q_w**2 + float(held @ held) * q_r**2) / 12.0)
-    own = 3.0 * rounding_step(logged) + 1e-6 * float(np.abs(logged).max())
-    return float(own + controller.kp * (q_w + q_r) + 3.0 * drift)
+    own = POLICY.replay_steps * rounding_step(logged) + ROUNDING * float(np.abs(logged).max())
+    return float(own + controller.kp * (q_w + q_r) + DEVIATIONS * drift)

@@ -14,19 +14,19 @@ from gaident.control.filtering import filtered, rate_limited
 from gaident.control.pi import PI
 from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
 from gaident.diagnosis.library.names import CLAMP, RATE_LIMIT
+from gaident.estimation.criterion import chi_square_bound
+from gaident.identification.adequacy import white_lags
 from gaident.identification.noise import ljung_box
+from gaident.policy.table import POLICY
 
 __all__ = ["Explanation", "explain", "rounded_command", "white_noise"]
 
 Vector = NDArray[np.float64]
 
-SHIFTS = (0, 1, -1, 2, -2)  # samples by which what the controller saw may be older (+) than the log's
+SHIFTS = (0, 1, -1, 2, -2)  # no decision: samples by which what the controller saw may be older (+) than the log's
 # By how much of ki dt the newest error counts more than half, and the one before less: the rule of integration in words.
 RULES = {0.0: "", 0.5: "a rectangular integral", -0.5: "a rectangular integral that lacks the newest error"}
-PLATEAU = 5  # samples at a limit from which it is one that an integrator is held at
-SAME = 2e-3  # relative difference below which a fitted gain is the configured one
-RPM = 30.0 / np.pi  # rpm in 1 rad/s
-ROUNDED = 5e-5  # part of the largest command, that a command may be off in a log of few decimals
+RPM = 30.0 / np.pi  # no decision: rpm in 1 rad/s
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ def explain(command: Vector, velocity: Vector, dt: float, controller: PI, logged
             if float(np.abs(off).max()) <= tolerance or rounded_command(off, command, dt, found.controller or controller):
                 return found
             rms = float(np.sqrt(np.mean(off**2)))
-            if rms < 0.99 * least:  # a later, more complicated reason must be better
+            if rms < POLICY.better_reason * least:  # a later, more complicated reason must be better
                 best, least = found, rms
     return best if best is not None and white_noise(best.off(logged), logged) else None
 
@@ -92,10 +92,11 @@ def rounded_command(off: Vector, command: Vector, dt: float, controller: PI) -> 
 
         off(n) - off(n-1) = (kp + h) d(n) - (kp - h) d(n-1)
     """
-    if controller.kp <= 0.5 * controller.ki * dt or controller.limited:
+    h = 0.5 * controller.ki * dt
+    if controller.kp <= h or controller.limited:
         return False
     d = _error_of(off, controller, dt)
-    return float(np.abs(d).max()) <= ROUNDED * float(np.abs(command).max())
+    return float(np.abs(d).max()) <= POLICY.rounded_command * float(np.abs(command).max())
 
 
 def _error_of(torque: Vector, controller: PI, dt: float) -> Vector:
@@ -115,8 +116,10 @@ def _error_of(torque: Vector, controller: PI, dt: float) -> Vector:
 def white_noise(off: Vector, logged: Vector) -> float:
     """Standard deviation [N m] of `off` where it is white noise small against the torque; 0.0 where it is not."""
     spread = float(np.std(off))
-    small = spread < 0.1 * float(np.std(logged)) and abs(float(np.mean(off))) < 4.0 * spread / np.sqrt(len(off))
-    return spread if small and ljung_box([off], min(20, len(off) // 5)) > 1e-4 else 0.0
+    if not spread < POLICY.replay_noise * float(np.std(logged)):
+        return 0.0
+    centred = len(off) * float(np.mean(off)) ** 2 < chi_square_bound(1, POLICY.test_level) * spread**2
+    return spread if centred and ljung_box([off], white_lags([len(off)])) > POLICY.test_level else 0.0
 
 
 def _start(case: _Case) -> Iterator[Explanation]:
@@ -137,20 +140,20 @@ def _limits(case: _Case) -> Iterator[Explanation]:
             alike = _trapezoidal(limited, share, case.dt)
             torque = case.torque(alike)
             acting = _acting(torque, limit)
-            if share and acting < PLATEAU:  # the log's largest torque may have another reason
+            if share and acting < POLICY.plateau:  # the log's largest torque may have another reason
                 continue
             sentence = say("It does with {}a {torque} limit of {:.4g} {N m}, which acts at {} samples.", words, limit, acting)
             yield Explanation(torque, "torque_limit", limit, sentence, controller=alike)
     proportional = controller.kp * (case.command - case.velocity)
     for torque_limit in (controller.torque_limit, highest):
-        free = np.ones(len(proportional), bool) if torque_limit is None else np.abs(case.logged) < 0.999 * torque_limit
+        free = np.ones(len(proportional), bool) if torque_limit is None else np.abs(case.logged) < POLICY.at_limit * torque_limit
         clamp = float(np.abs((case.logged - proportional)[free]).max(initial=0.0))
         if not clamp > 0.0:
             continue
         limited = replace(controller, torque_limit=torque_limit, integrator_limit=clamp)
         torque = case.torque(limited)
         more = "" if torque_limit == controller.torque_limit else say(" and a {torque} limit of {:.4g} {N m}", torque_limit)
-        acting = int(np.sum(np.abs(torque - proportional) >= 0.999 * clamp))
+        acting = int(np.sum(np.abs(torque - proportional) >= POLICY.at_limit * clamp))
         sentence = say("It does with the integral clamped to {:.4g} {N m}{}; the clamp acts at {} samples.", clamp, more, acting)
         yield Explanation(torque, CLAMP, clamp, sentence, controller=limited)
 
@@ -159,9 +162,9 @@ def _limited(case: _Case) -> list[PI]:
     """The controller with limits that are not configured: the log's highest torque, the middle of its noisy plateau."""
     size = np.abs(case.logged)
     highest = float(size.max())
-    if case.controller.torque_limit is not None and highest >= 0.999 * case.controller.torque_limit:
+    if case.controller.torque_limit is not None and highest >= POLICY.at_limit * case.controller.torque_limit:
         return []
-    middle = float(np.median(size[size > 0.95 * highest]))
+    middle = float(np.median(size[size > POLICY.noisy_plateau * highest]))
     return [replace(case.controller, torque_limit=limit) for limit in dict.fromkeys((highest, middle))]
 
 
@@ -178,7 +181,7 @@ def _trapezoidal(controller: PI, share: float, dt: float) -> PI:
 
 
 def _acting(torque: Vector, limit: float) -> int:
-    return int(np.sum(np.abs(torque) >= 0.999 * limit))
+    return int(np.sum(np.abs(torque) >= POLICY.at_limit * limit))
 
 
 def _held(case: _Case) -> Iterator[Explanation]:
@@ -191,7 +194,7 @@ def _held(case: _Case) -> Iterator[Explanation]:
             for rule, words in HOLDS.items():
                 torque = held_torque(case.command, case.velocity, case.dt, limited, rule, share=share)
                 acting = _acting(torque, limit)
-                if acting < PLATEAU:
+                if acting < POLICY.plateau:
                     continue
                 held = "It does with {}{} (anti-windup): the limit of {:.4g} {N m} acts at {} samples."
                 sentence = say(held, integral, words, limit, acting)
@@ -206,15 +209,16 @@ def _rate(case: _Case) -> Iterator[Explanation]:
 
     moves with the slope of the limit where it is not the logged one.
     """
-    if case.controller.kp <= 0.5 * case.controller.ki * case.dt or case.controller.limited:
+    h = 0.5 * case.controller.ki * case.dt
+    if case.controller.kp <= h or case.controller.limited:
         return
     seen = _error_of(case.logged, case.controller, case.dt) + case.velocity
-    behind = np.abs(seen - case.command)[1:] > 1e-3 * float(np.abs(case.command).max())
+    behind = np.abs(seen - case.command)[1:] > POLICY.negligible * float(np.abs(case.command).max())
     slopes = np.abs(np.diff(seen))[behind] / case.dt
     if len(slopes) == 0:
         return
     middle = float(np.median(slopes))
-    near = slopes[np.abs(slopes - middle) <= 0.2 * middle]
+    near = slopes[np.abs(slopes - middle) <= POLICY.same_slope * middle]
     if len(near) == 0 or not middle > 0.0:
         return
     rate = float(np.mean(near))
@@ -240,7 +244,7 @@ def _fitted(case: _Case) -> Iterator[Explanation]:
         for share, _ in _rules(case.controller):
             columns = [e, case.dt * _sum(e, share), np.ones(len(e))] if case.controller.ki else [e, np.ones(len(e))]
             table = np.column_stack(columns)
-            used = np.abs(case.logged) < 0.999 * top
+            used = np.abs(case.logged) < POLICY.at_limit * top
             used[: abs(shift)] = used[len(used) - abs(shift) :] = False
             sizes = np.linalg.norm(table[used], axis=0)
             if not np.all(sizes > 0.0):
@@ -264,16 +268,16 @@ def _named(controller: PI, gains: _Gains, dt: float, start: float, shift: int, s
         differs.append(RULES[share])
         cause = cause or "integration_rule"
     factors = [found / given for found, given in ((kp, controller.kp), (ki, controller.ki)) if given]
-    fitted_kp = abs(kp) > SAME * ki and not controller.kp
-    if any(abs(f - 1.0) > SAME for f in factors) or fitted_kp:
-        if max(factors) - min(factors) <= SAME * abs(factors[0]) and not fitted_kp:
+    fitted_kp = abs(kp) > POLICY.same_value * ki and not controller.kp
+    if any(abs(f - 1.0) > POLICY.same_value for f in factors) or fitted_kp:
+        if max(factors) - min(factors) <= POLICY.same_value * abs(factors[0]) and not fitted_kp:
             turned = " (a reversed sign)" if factors[0] < 0.0 else ""
             differs.append(say("its {torque} multiplied by {:.5g}{}: {}", factors[0], turned, _check_unit(factors[0])))
             cause, value = "scale", factors[0]
         else:
             differs.append(say("kp = {:.4g} {N m s/rad} and ki = {:.4g} {N m/rad}", kp, ki))
             cause, value = "gains", np.nan
-    if abs(start) > 1e-3 * float(np.abs(torque).max()):
+    if abs(start) > POLICY.negligible * float(np.abs(torque).max()):
         differs.append(say("an integral that starts at {:.4g} {N m}", start))
         if not cause:
             cause, value = "initial_integral", start
@@ -286,7 +290,7 @@ def _named(controller: PI, gains: _Gains, dt: float, start: float, shift: int, s
 
 def _check_unit(factor: float) -> Text:
     units = say("check the units of the {torque}, of the speeds and of the gains")
-    if abs(factor * RPM - 1.0) <= SAME:
+    if abs(factor * RPM - 1.0) <= POLICY.same_value:
         return Text("speeds in rpm seem to be taken for rad/s; check their unit", units.linear)
     return units
 

@@ -21,10 +21,14 @@ from gaident.errors import RecordError
 from gaident.models.drive_torque import torque_of
 from gaident.models.model import Model
 from gaident.models.starts import noise_std
+from gaident.policy.table import POLICY
 
 __all__ = ["Excitation", "excitation", "position_of"]
 
 Vector = NDArray[np.float64]
+
+SMOOTHED, WINDOWS = 5, 400  # no decision: width of a moving average, samples and parts of a record
+TINY = 1e-300  # no decision: no division by 0
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,7 @@ def excitation(records: Record | Sequence[Record], controller: PI | None = None,
         raise RecordError("records is empty: give at least one Record")
     top = max(float(np.abs(rec.velocity).max()) for rec in listed)
     motions = [_motion(rec, controller, top) for rec in listed]
-    speeds = _distinct([v for m in motions for v in m.held], 0.05 * top)
+    speeds = _distinct([v for m in motions for v in m.held], POLICY.apart * top)
     torque = max(float(np.abs(m.torque).max()) for m in motions)
     limit = None if controller is None else controller.torque_limit
     moving = sum(int(np.sum(m.moving)) for m in motions)
@@ -104,14 +108,14 @@ def excitation(records: Record | Sequence[Record], controller: PI | None = None,
         highest_speed=top,
         speeds=speeds,
         reversals=sum(_changes(m.velocity, m.velocity_floor) for m in motions),
-        slow=sum(m.dt * int(np.sum(m.moving & (np.abs(m.velocity) < 0.1 * top))) for m in motions),
+        slow=sum(m.dt * int(np.sum(m.moving & (np.abs(m.velocity) < POLICY.slow * top))) for m in motions),
         standstill=sum(m.dt * int(np.sum(~m.moving)) for m in motions),
         highest_torque=torque,
         torque_share=math.nan if limit is None else torque / limit,
         torque_reversals=sum(_changes(m.torque, m.torque_floor) for m in motions),
         opposed=opposed / moving if moving else 0.0,
         revolutions=max(float(np.ptp(m.position)) for m in motions) / TURN,
-        steps=_distinct([s for m in motions for s in m.jumps], 0.05 * max(top, 1e-300)),
+        steps=_distinct([s for m in motions for s in m.jumps], POLICY.apart * max(top, TINY)),
         repeated=any(m.repeated for m in motions),
         not_testable=not_testable(motions, controller, model),
         one_sided=one_sided(motions, controller),
@@ -129,15 +133,15 @@ def position_of(rec: Record) -> Vector:
 def _motion(rec: Record, controller: PI | None, top: float) -> Motion:
     w = rec.velocity
     u = torque_of(rec, controller)
-    floor = max(6.0 * noise_std(w), 1e-3 * top, 1e-300)
-    smooth = _smoothed(w, max(5, len(w) // 400))
+    floor = max(POLICY.above_noise * noise_std(w), POLICY.negligible * top, TINY)
+    smooth = _smoothed(w, max(SMOOTHED, len(w) // WINDOWS))
     moving = np.abs(smooth) > floor
     position = position_of(rec)
     command = rec.command
     jumps = [] if command is None else _jumps(command, top)
     held, early, late = _held(smooth, rec.dt, floor, top)
-    torque_floor = max(6.0 * noise_std(u), 0.02 * float(np.abs(u).max()), 1e-300)
-    repeated = any(abs(a - b) < 0.05 * top for a in early for b in late if a)
+    torque_floor = max(POLICY.above_noise * noise_std(u), POLICY.still * float(np.abs(u).max()), TINY)
+    repeated = any(abs(a - b) < POLICY.apart * top for a in early for b in late if a)
     return Motion(rec.dt, w, smooth, u, position, command, floor, torque_floor, moving, tuple(held), tuple(jumps), repeated)
 
 
@@ -150,10 +154,11 @@ def _smoothed(x: Vector, width: int) -> Vector:
 
 
 def _held(smooth: Vector, dt: float, floor: float, top: float) -> tuple[list[float], list[float], list[float]]:
-    """Speeds held (velocity within 2 % of the highest for 20 samples or more): all, those of the first and of the last third."""
-    band = max(0.04 * top, 2.0 * floor)
+    """Speeds held (velocity within 2 % of the highest, for long enough): all, those of the first and of the last third."""
+    band = 2.0 * max(POLICY.still * top, floor)
     held, early, late = [], [], []
     n, start = len(smooth), 0
+    third = n / 3
     low = high = float(smooth[0])
     values = smooth.tolist()
     for i in range(1, n + 1):
@@ -165,12 +170,13 @@ def _held(smooth: Vector, dt: float, floor: float, top: float) -> tuple[list[flo
                 continue
         middle = (start + i) // 2
         # On a ramp the halves of the stretch differ by half the band.
-        if i - start >= 20 and abs(np.median(smooth[start:middle]) - np.median(smooth[middle:i])) < 0.35 * band:
+        first, second = smooth[start:middle], smooth[middle:i]
+        if i - start >= POLICY.held_samples and abs(np.median(first) - np.median(second)) < POLICY.no_ramp * band:
             level = float(np.median(smooth[start:i]))
             level = 0.0 if abs(level) <= floor else level
             held.append(level)
-            early += [level] if start < n / 3 else []
-            late += [level] if i > 2 * n / 3 else []
+            early += [level] if start < third else []
+            late += [level] if i > 2 * third else []
         if i < n:
             start, low, high = i, values[i], values[i]
     return held, early, late
@@ -179,7 +185,7 @@ def _held(smooth: Vector, dt: float, floor: float, top: float) -> tuple[list[flo
 def _jumps(command: Vector, top: float) -> list[float]:
     """Sizes of the command's jumps [rad/s]: within one sample, above 2 % of the highest speed; the first from rest."""
     steps = np.abs(np.diff(command, prepend=0.0))
-    return [float(s) for s in steps if s > 0.02 * top]
+    return [float(s) for s in steps if s > POLICY.still * top]
 
 
 def _distinct(values: Sequence[float], apart: float) -> tuple[float, ...]:

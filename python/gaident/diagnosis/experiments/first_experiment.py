@@ -35,10 +35,10 @@ __all__ = ["Limits", "MenuItem", "Proposal", "candidate_commands", "first_experi
 
 Vector = NDArray[np.float64]
 
-FREE = 0.9  # of speed and travel that commands use
-ROOM = 0.25  # of the speed limit, for the overshoot of ramps where kp is known
-AT_ONCE = 2  # samples within which the command's changes are one jump: reversals have a sample of rest between
-LEAST_SAMPLES = 400
+FREE = 0.9  # no decision: of speed and travel that commands use
+ROOM = 0.25  # no decision: of the speed limit, for the overshoot of ramps where kp is known
+AT_ONCE = 2  # no decision: samples of a jump; reversals have a sample of rest between
+LEAST_SAMPLES = 400  # no decision: that the shape of the command needs
 
 
 @dataclass(frozen=True, eq=False)

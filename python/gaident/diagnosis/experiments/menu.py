@@ -17,7 +17,7 @@ __all__ = ["MENU", "Bench", "Builder", "prbs_moving", "reversals", "slow_stairs"
 
 Vector = NDArray[np.float64]
 
-ASKED = 0.8  # of the torque: what kp times a jump asks for; the rest is for the integral
+ASKED = 0.8  # no decision: of the torque: what kp times a jump asks for; the rest is for the integral
 
 
 @dataclass(frozen=True)

@@ -34,18 +34,13 @@ from gaident.estimation.objective import Fit, Hypothesis, Objective
 from gaident.estimation.prediction import ClosedLoop, OpenLoop
 from gaident.estimation.projection import WORST, project_out
 from gaident.models.simulate import run
+from gaident.policy.table import POLICY
 from gaident.results.experiment import Limits, Proposal
 from gaident.results.finding import Finding
 
 __all__ = ["propose"]
 
 Vector = NDArray[np.float64]
-
-CLEAR = 25.0  # chi2 from which two explanations are told apart
-SAMPLES = 4000  # of a proposed record at least, where the diagnosed one is shorter
-PAIRS = 3  # of explanations, the closest ones
-REFITTED = 4  # commands whose rivals are really fitted; the others are judged by the linearised fit
-ITERATIONS = 6
 
 
 def _listed(effects: Sequence[str]) -> str:
@@ -83,7 +78,7 @@ class _Bench:
         objective = Objective(data, np.ones(len(record)))
         hypothesis, x = at_rest(rival, data)
         if refitted:
-            cost = fitted(objective, hypothesis, x, self.noise, ITERATIONS).cost
+            cost = fitted(objective, hypothesis, x, self.noise, POLICY.short).cost
         else:
             v, J = objective.linearised(hypothesis, x, self.noise)
             rest = project_out(J, v[None, :])[0]
@@ -112,7 +107,7 @@ def propose(
         for rival in rivals[f.effect][1]
         if not any({f.effect, rival.effect} <= alike for alike in EQUIVALENT)
     ]
-    pairs = sorted(pairs, key=lambda p: p[1].behind)[:PAIRS]
+    pairs = sorted(pairs, key=lambda p: p[1].behind)[: POLICY.starts]
     if not pairs:
         return None, notes
     names = tuple(dict.fromkeys(name for effect, rival in pairs for name in (effect, rival.effect)))
@@ -129,7 +124,7 @@ def propose(
     table = [
         (pair, trial, [_tried(bench, item, trial, False) for item in items]) for pair in pairs for trial in _trials([pair], final)
     ]
-    hopeless = {id(pair) for pair, _, T in table if max(T, default=0.0) < 0.5 * CLEAR}
+    hopeless = {id(pair) for pair, _, T in table if max(T, default=0.0) < POLICY.hope * POLICY.told_apart}
     table = [row for row in table if id(row[0]) not in hopeless]
     pairs = [pair for pair in pairs if id(pair) not in hopeless]
     if pairs:
@@ -137,7 +132,7 @@ def propose(
     trials = [trial for _, trial, _ in table]
     rough = np.min([T for *_, T in table], axis=0) if table and items else np.zeros(0)
     best, most = None, -1.0
-    for i in np.argsort(rough)[::-1][:REFITTED]:
+    for i in np.argsort(rough)[::-1][: POLICY.commands]:
         T = np.inf
         for trial in trials:
             T = min(T, _tried(bench, items[i], trial, True))
@@ -145,7 +140,7 @@ def propose(
                 break
         if most < T:
             best, most = items[i], T
-    if best is None or most < CLEAR:
+    if best is None or most < POLICY.told_apart:
         text = "No experiment of the menu within the limits of these records tells {} apart."
         return None, [*notes, say(text, _listed(names))]
     n = len(best.command)
@@ -165,7 +160,7 @@ def menu(data: DataSet, fit: Fit) -> list[MenuItem]:
     dt = data.dt
     try:
         limits = Limits.of(data.records, data.controller)
-        limits = replace(limits, duration=max(limits.duration, SAMPLES * dt))
+        limits = replace(limits, duration=max(limits.duration, POLICY.proposed_samples * dt))
         assert data.controller is not None
         return candidate_commands(dt, limits, inertia_of(fit), data.controller.kp or None)
     except GaidentError:
@@ -174,9 +169,7 @@ def menu(data: DataSet, fit: Fit) -> list[MenuItem]:
 
 def inertia_of(fit: Fit) -> float:
     """Total inertia [kg m^2]: 1/J = K for one mass, K f0/e0 for two."""
-    values = fit.parameters.base_values(fit.x[None, :])[0]
-    gain = abs(values[0] * values[5] / values[3]) if len(values) > 3 and values[3] and values[5] else abs(values[0])
-    return 1.0 / max(float(gain), 1e-300)
+    return float(fit.parameters.inertias(fit.x[None, :])[0])
 
 
 def _trials(pairs: Sequence[tuple[str, Rival]], final: Fit) -> list[tuple[Fit, Fit]]:

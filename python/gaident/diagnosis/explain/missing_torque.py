@@ -32,9 +32,11 @@ __all__ = ["MissingTorque", "missing_torque"]
 
 Vector = NDArray[np.float64]
 
-TUNED_ON = 30_000  # samples of a longer record on which noise and walk are chosen
-LEAST_NOISE = 1e-5  # of the velocity's range: a log smoothed beyond that would make any torque of its last digits
-DECADES = (-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0)  # of walk per sample over the noise, seen at the velocity after one sample
+FORGETS = 1e-3, 0.9998  # no decision: slowest pole of the filter, between which its memory is reckoned
+TUNED_ON = 30_000  # no decision: samples of a longer record on which noise and walk are chosen
+LEAST_NOISE = 1e-5  # no decision: of the velocity's range; a log smoothed beyond that would make any torque of its last digits
+DECADES = (-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0)  # no decision: a grid
+"""Of walk per sample over the noise, seen at the velocity after one sample."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +145,7 @@ class _Filter:
         self.K = self.A @ self.P @ self.H.conj() / self.F
         self.L = self.A - np.outer(self.K, self.H)
         # Samples after which the filter has forgotten its start to 1e-9.
-        slowest = min(max(float(np.abs(np.linalg.eigvals(self.L)).max()), 1e-3), 0.9998)
+        slowest = float(np.clip(np.abs(np.linalg.eigvals(self.L)).max(), *FORGETS))
         self.memory = 2 + int(np.log(1e-9) / np.log(slowest))
 
     def predict(self, u: Vector, w: Vector) -> tuple[Vector, NDArray[np.complex128]]:

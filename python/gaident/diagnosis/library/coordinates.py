@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gaident.estimation.term import Natural, Rows, Scales, Term
 
-FREE = 1e6
+FREE = 1e6  # no decision: a bound that nothing reaches;
 """Times the largest torque of the log: a pendulum that swings with little friction has far more torque than drives it."""
 
 Vector = NDArray[np.float64]

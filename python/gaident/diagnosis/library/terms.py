@@ -54,7 +54,7 @@ __all__ = [
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-HIGHEST_ORDER = 64
+HIGHEST_ORDER = 64  # no decision: which effects there are
 """Of cogging and encoder ripple that a drive is expected to have [1/turn]."""
 
 FRICTION = "dry friction"

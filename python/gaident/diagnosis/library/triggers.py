@@ -13,13 +13,11 @@ from gaident.axis import TURN, Text, joined, order, say, turns
 from gaident.control.pi import PI
 from gaident.diagnosis.library.terms import HIGHEST_ORDER, friction_family
 from gaident.models.model import Model
+from gaident.policy.table import POLICY
 
 __all__ = ["Motion", "not_testable", "one_sided"]
 
 Vector = NDArray[np.float64]
-
-LEAST_TURN = math.pi / 3.0  # rad of travel below which a once-per-turn torque is a constant and a spring
-REACHED = 0.999  # of a limit of the controller: from there on it was reached
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +56,13 @@ def one_sided(motions: Sequence[Motion], controller: PI | None) -> dict[str, Tex
     """Effect -> which sizes of it could not have shown in these records; what stands there is tested, but not beyond."""
     limit, clamp = (math.inf, math.inf) if controller is None else controller.limits
     highest = max(float(np.abs(m.torque).max()) for m in motions)
-    own = highest > REACHED * limit
+    own = highest > POLICY.at_limit * limit
     why = Text("the controller's own limit lets no more through") if own else say("no more {torque} was asked for")
     notes = {"torque_saturation": say("a limit above {:.3g} {N m} would not have shown: {}", highest, why)}
     if controller is not None:
         integral = max((_integral(m, controller) for m in motions), default=0.0)
         if integral > 0.0:
-            own = integral > REACHED * clamp
+            own = integral > POLICY.at_limit * clamp
             why = Text("the controller's own clamp lets it go no higher" if own else "the integral went no higher")
             notes["integrator_clamp"] = say("a clamp above {:.3g} {N m} would not have shown: {}", integral, why)
         slope = max((float(np.abs(np.diff(m.command)).max()) / m.dt for m in motions if m.command is not None), default=0.0)
@@ -72,8 +70,9 @@ def one_sided(motions: Sequence[Motion], controller: PI | None) -> dict[str, Tex
             rate = say("a limit above {:.3g} {rad/s^2} would not have shown: no command rises faster", slope)
             notes["command_rate_limit"] = rate
     travel = max(float(np.ptp(m.position)) for m in motions)
-    least = math.ceil(TURN / travel) if travel > 0.0 else HIGHEST_ORDER
-    fastest = math.floor(0.8 * math.pi / max(_slowest(m) * m.dt for m in motions)) if any(_slowest(m) for m in motions) else None
+    least = math.ceil(POLICY.seen_turn * TURN / travel) if travel > 0.0 else HIGHEST_ORDER
+    per_sample = max(_slowest(m) * m.dt for m in motions)
+    fastest = math.floor(POLICY.seen_band * math.pi / per_sample) if per_sample > 0.0 else None
     for effect in ("cogging", "velocity_ripple"):
         parts = [say("orders below {} need more than the {} travelled", order(least), turns(travel))] if least > 2 else []
         if fastest is not None and fastest < HIGHEST_ORDER:
@@ -87,7 +86,7 @@ def _integral(m: Motion, controller: PI) -> float:
     """Highest |u - kp (r - w)| [N m] while the controller's limit does not cut its torque u; 0 without a command."""
     if m.command is None:
         return 0.0
-    free = np.abs(m.torque) <= REACHED * controller.limits[0]
+    free = np.abs(m.torque) <= POLICY.at_limit * controller.limits[0]
     held = np.abs(m.torque - controller.kp * (m.command - m.velocity))[free]
     return float(held.max(initial=0.0))
 
@@ -114,16 +113,16 @@ def _speed(motions: Sequence[Motion]) -> dict[str, Text]:
     if not (forward and backward):
         why["asymmetric_friction"] = say("the axis {turns} {} only", "forwards" if forward else "backwards")
     slowest = min(float(np.abs(m.velocity).min()) for m in motions)
-    if slowest > 0.1 * top:
+    if slowest > POLICY.slow * top:
         why["stribeck_friction"] = say("the axis never {turns} slower than {:.3g} {rad/s}", slowest)
     if slowest > max(m.velocity_floor for m in motions):
         restless = say("the axis neither stands nor reverses (slowest {:.3g} {rad/s})", slowest)
         why["presliding_friction"] = why["lugre_friction"] = restless
-    speeds = sorted({round(abs(v) / (0.1 * top)) for m in motions for v in m.held if v})
-    near = sum(int(np.sum(np.abs(np.abs(m.smooth[m.moving]) - top) < 0.15 * top)) for m in motions)
-    if len(speeds) < 2 and near > 0.5 * sum(int(np.sum(m.moving)) for m in motions):
+    speeds = sorted({round(abs(v) / (POLICY.slow * top)) for m in motions for v in m.held if v})
+    near = sum(int(np.sum(np.abs(np.abs(m.smooth[m.moving]) - top) < POLICY.slow * top)) for m in motions)
+    if len(speeds) < 2 and 2 * near > sum(int(np.sum(m.moving)) for m in motions):
         why["quadratic_drag"] = say("one speed only ({:.3g} {rad/s}): its drag is viscous friction there", top)
-    if all(_monotone(m, 0.05 * top) for m in motions):
+    if all(_monotone(m, POLICY.apart * top) for m in motions):
         why["friction_drift"] = Text("no speed is held early and late, nor are speeds mixed in time: a drift would be drag")
     return why
 
@@ -132,7 +131,7 @@ def _travel(motions: Sequence[Motion]) -> dict[str, Text]:
     travel = max(float(np.ptp(m.position)) for m in motions)
     moved = Text(f"{math.degrees(travel):.2g} degrees of travel", f"{travel:.2g} m of travel")
     why = {}
-    if travel < LEAST_TURN:
+    if travel < POLICY.gravity_turn * TURN:
         why["unbalance"] = say("{}: over so little it is a constant load", moved)
     if travel < TURN / HIGHEST_ORDER:
         for effect in ("cogging", "velocity_ripple"):
@@ -147,7 +146,7 @@ def _torque(motions: Sequence[Motion]) -> dict[str, Text]:
         why["backlash"] = say("the {torque} never changes its sign: the coupling stays on one flank")
         least = min(float(np.abs(m.torque).min()) for m in motions)
         highest = max(float(np.abs(m.torque).max()) for m in motions)
-        if least > 0.1 * highest:
+        if least > POLICY.slow * highest:
             near = "the {torque} never comes near zero (least {:.2g} {N m}): a dead band is a constant load"
             why["torque_dead_band"] = say(near, least)
     if all(float(np.ptp(m.torque)) == 0.0 for m in motions):

@@ -16,8 +16,8 @@ __all__ = ["Library"]
 
 Matrix = NDArray[np.float64]
 
-STEP = 0.05  # of the range between the bounds: what makes a difference
-MOST_STARTS = 64
+STEP = 0.05  # no decision: of the range between the bounds: what makes a difference
+MOST_STARTS = 64  # no decision: starts of a fit, as many as the built-in effects have at most
 
 
 class Library(Mapping[str, Term]):

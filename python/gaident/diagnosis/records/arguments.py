@@ -10,14 +10,12 @@ from gaident.arguments import NO_CONTROLLER
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
+from gaident.policy.table import POLICY
 from gaident.results.identification import Identification
 
-__all__ = ["LEAST_SAMPLES", "ProgressCallback", "checked", "in_order", "noise_std_of", "records_of"]
+__all__ = ["ProgressCallback", "checked", "in_order", "noise_std_of", "records_of"]
 
 ProgressCallback = Callable[[float, str], None]
-
-LEAST_SAMPLES = 100
-"""Of a record: below, the noise filter and the base parameters alone use up what it knows."""
 
 
 def records_of(rec: Record | Sequence[Record], name: str) -> tuple[Record, ...]:
@@ -50,10 +48,10 @@ def checked(
     if len({r.dt for r in (*records, *held)}) > 1:
         raise RecordError("records have different sample times: a diagnosis needs one; diagnose them apart")
     for i, r in enumerate(records):
-        if len(r) < LEAST_SAMPLES:
+        if len(r) < POLICY.least_samples:
             raise RecordError(
-                f"record {r.name or i + 1} has {len(r)} samples: a diagnosis needs {LEAST_SAMPLES} or more, thousands are good; "
-                "record a longer motion"
+                f"record {r.name or i + 1} has {len(r)} samples: a diagnosis needs {POLICY.least_samples} or more, thousands are "
+                "good; record a longer motion"
             )
     known = {r.digest for r in records}
     for i, r in enumerate(held):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gaident.axis import Text, say
 from gaident.data.record import Record
 from gaident.models.starts import noise_std
+from gaident.policy.table import POLICY
 
 __all__ = ["ADVICE", "FOLDED", "folded"]
 
@@ -26,26 +27,25 @@ ADVICE = say(
     "{torque} stays as it is, so that the direction of motion is not known; log a signed velocity, or the position."
 )
 
-STEEP = 0.15  # of the slopes that are common: what is no rest
-SMOOTHER = 0.8  # of the curvature around a turning point: less is left when what follows is turned over; far from zero far more
-LEAST = 3  # turning points; one or two may be chance
+WINDOW = 5  # no decision: samples around a turning point
+USUAL = 0.95  # no decision: quantile of the slopes that stands for a usual motion
 
 
 def folded(rec: Record) -> bool:
     """Whether the velocity is an absolute value."""
     w, u = rec.velocity, rec.torque
     top = float(w.max())
-    if u is None or len(w) < 5 or not top > 0.0 or float(w.min()) < -0.02 * top:
+    if u is None or len(w) < WINDOW or not top > 0.0 or float(w.min()) < -POLICY.still * top:
         return False
-    around = np.lib.stride_tricks.sliding_window_view(w, 5)
+    around = np.lib.stride_tricks.sliding_window_view(w, WINDOW)
     before, after = 0.5 * (around[:, 2] - around[:, 0]), 0.5 * (around[:, 4] - around[:, 2])
-    steep = max(STEEP * float(np.quantile(np.abs(np.diff(w)), 0.95)), 6.0 * noise_std(w))
+    steep = max(POLICY.folded_steep * float(np.quantile(np.abs(np.diff(w)), USUAL)), POLICY.above_noise * noise_std(w))
     turning = (before < -steep) & (after > steep) & (around[:, 2] <= np.minimum(around[:, 1], around[:, 3]))
-    held = np.ptp(np.lib.stride_tricks.sliding_window_view(u[:-1], 4), axis=1) < 0.02 * float(np.ptp(u))
+    held = np.ptp(np.lib.stride_tricks.sliding_window_view(u[:-1], WINDOW - 1), axis=1) < POLICY.still * float(np.ptp(u))
     # The sign changes just before or just after the lowest sample.
-    turned = [_curvature(around * np.where(np.arange(5) < first, 1.0, -1.0)) for first in (2, 3)]
-    through = np.minimum(*turned) < SMOOTHER * _curvature(around)
-    return int(np.sum(turning & held & through)) >= LEAST
+    turned = [_curvature(around * np.where(np.arange(WINDOW) < first, 1.0, -1.0)) for first in (2, 3)]
+    through = np.minimum(*turned) < POLICY.folded_smoother * _curvature(around)
+    return int(np.sum(turning & held & through)) >= POLICY.folded_points
 
 
 def _curvature(rows: Matrix) -> Vector:

@@ -7,16 +7,17 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.diagnosis.records.lattice import lattice_step
+from gaident.policy.table import POLICY
 
 __all__ = ["cleaned", "outliers", "quantisation"]
 
 Vector = NDArray[np.float64]
 
-ROBUST = 1.4826  # median absolute deviation of normal noise -> standard deviation
-FAR = 9.0  # standard deviations
-MISSED = 0.4  # of what an outlier stands out by: the least that the lines from either side, and a model, miss it by
-NEAR = 8  # samples on either side that an outlier stands out of
-PASSES = 4
+ROBUST = 1.4826  # no decision: median absolute deviation of normal noise -> standard deviation
+SECOND = 1.5  # no decision: sqrt(14/6), noise of the line through two samples before over that through the two next ones
+NEAR = 8  # no decision: samples on either side that an outlier stands out of, the reach of a filter's ringing
+SHORTEST = 7  # no decision: samples that all these differences need
+PASSES = 4  # no decision: neighbours hide each other, no more than four in a row
 
 
 def outliers(velocity: Vector, error: Vector | None = None) -> NDArray[np.intp]:
@@ -40,21 +41,21 @@ def outliers(velocity: Vector, error: Vector | None = None) -> NDArray[np.intp]:
 
 def _leaving(w: Vector, error: Vector | None) -> NDArray[np.intp]:
     """One pass of `outliers`."""
-    if len(w) < 7:
+    if len(w) < SHORTEST:
         return np.zeros(0, dtype=np.intp)
     middle = _middle(w)
     spread = ROBUST * float(np.median(np.abs(middle - np.median(middle))))
     steps = np.abs(np.diff(w))
     quantum = float(steps[steps > 0.0].min()) if np.any(steps > 0.0) else 0.0
-    size, least = np.abs(middle), FAR * max(spread, quantum)
+    size, least = np.abs(middle), POLICY.outlier_far * max(spread, quantum)
     left = (size > least) & _missed(w, middle, least) & _missed(w[::-1], middle[::-1], least)[::-1]
     if error is not None:
-        left &= np.sign(middle) * _middle(error) > MISSED * size
+        left &= np.sign(middle) * _middle(error) > POLICY.outlier_missed * size
     found = np.flatnonzero(left)
     around = np.lib.stride_tricks.sliding_window_view(np.pad(size, NEAR), 2 * NEAR + 1)[found]
     beside = np.abs(np.arange(-NEAR, NEAR + 1)) <= 2  # where the outlier itself shows
     largest = size[found] >= around[:, beside].max(axis=1)
-    alone = np.sum(around[:, ~beside] > 0.5 * size[found, None], axis=1) < 2  # where much is as rough it rings
+    alone = np.sum(around[:, ~beside] > POLICY.outlier_alone * size[found, None], axis=1) < 2  # where much is as rough it rings
     kept: NDArray[np.intp] = found[largest & alone] + 2
     return kept
 
@@ -74,7 +75,7 @@ def _missed(w: Vector, middle: Vector, least: float) -> NDArray[np.bool_]:
     now, one, two, three = before[3:-2], before[2:-3], before[1:-4], before[:-5]
     sign = np.sign(middle)
     first, second = sign * (now - 2.0 * one + two), sign * (now - 3.0 * two + 2.0 * three)
-    missed: NDArray[np.bool_] = np.maximum(first, second / 1.5) > np.maximum(MISSED * np.abs(middle), least)
+    missed: NDArray[np.bool_] = np.maximum(first, second / SECOND) > np.maximum(POLICY.outlier_missed * np.abs(middle), least)
     return missed
 
 
@@ -98,4 +99,4 @@ def quantisation(records: tuple[Record, ...]) -> float:
     """Step of the lattice that all velocities lie on [rad/s], 0 where there is none or only a text log's."""
     w = np.concatenate([r.velocity for r in records])
     step = lattice_step(w)
-    return step if step > 1e-4 * float(np.ptp(w)) else 0.0
+    return step if step > POLICY.sensor_step * float(np.ptp(w)) else 0.0

@@ -59,7 +59,7 @@ def simplified(space: Moves, final: Fit, left: Dependence) -> Fit:
 def share(space: Moves, without: Fit, final: Fit, left: Dependence) -> float:
     """The part that `final` explains of what it and a free function of the best driver explain together."""
     objective = space.objective
-    less = fitted(objective, without.hypothesis, without.x, WHITE, 8)
+    less = fitted(objective, without.hypothesis, without.x, WHITE, space.policy.usual)
     before, after = (objective.plain(*objective.sensitivities(f.hypothesis, f.x)) for f in (less, final))
     free = min(left.least.values())
     return float((before - after) / np.maximum(before - free, 1e-300))

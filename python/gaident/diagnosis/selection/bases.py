@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gaident.diagnosis.library.terms import of_inverse_dynamics
-from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.selection.mechanisms import is_mechanism, one_mass, reduced, resonant, rigid, swings
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.score_test import ScoreTest
@@ -26,6 +25,7 @@ from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
 from gaident.models.simulate import simulate
+from gaident.policy.table import POLICY
 from gaident.results.inverse_dynamics import InverseDynamics
 
 __all__ = ["PlainView", "Task", "linear_bases", "noise_floor", "plain_bases", "plain_view"]
@@ -55,7 +55,7 @@ class Task:
         """Of linear models: the closed loop only where no torque is available."""
         return ClosedLoop(self.data) if self.data.loop_only else OpenLoop(self.data)
 
-    def start(self, model: Model, iterations: int = 20) -> Fit:
+    def start(self, model: Model, iterations: int = POLICY.long) -> Fit:
         """A mechanism fitted to the records' plain errors."""
         parameters = Parameterisation.of(model, self.scales, self.data.moving)
         return ls.fit(self.objective, Hypothesis(parameters, self.predictor()), parameters.start(model), WHITE, iterations)
@@ -66,7 +66,7 @@ class Task:
     def two_masses(self, one: Fit) -> tuple[list[Fit], list[Fit]]:
         """Short fits of two masses: from the identified model, and from the resonances that help one mass most."""
         starts = (reduced(self.model), resonant(self.objective, one))
-        fits = [[self.start(m, 6) for m in models] for models in starts]
+        fits = [[self.start(m, POLICY.short) for m in models] for models in starts]
         known, other = ([f for f in part if f.cost < WORST and is_mechanism(f.parameters, f.x)] for part in fits)
         return known, other
 
@@ -86,7 +86,7 @@ def linear_bases(task: Task) -> tuple[Task, list[Fit]]:
     if not fits:
         return task, [one]
     chosen = sorted(fits, key=lambda f: f.cost)[:1] + sorted(known, key=lambda f: f.cost)[:1]
-    two = min((space.refitted(f.hypothesis, f.x, 20) for f in chosen), key=lambda f: f.bic)
+    two = min((space.refitted(f.hypothesis, f.x, POLICY.long) for f in chosen), key=lambda f: f.bic)
     best = min((one, two), key=lambda f: f.bic)
     family = task.objective.family
     shaft = ShaftNoise(best.parameters.linear(best.x), task.scales.dt, task.data.controller)
@@ -99,9 +99,9 @@ def linear_bases(task: Task) -> tuple[Task, list[Fit]]:
     test.add(one.hypothesis, one.x, [t for t in space.candidates(one) if not t.nested and not t.resonates])
     tried: set[str] = set()
     for noise in (WHITE, two.noise):
-        for s in test.ranked(noise)[:3]:
+        for s in test.ranked(noise)[: POLICY.starts]:
             if s.term.name not in tried:
-                short = ls.scored(task.objective, ls.fit(task.objective, s.hypothesis, s.starts[0], noise, 5))
+                short = ls.scored(task.objective, ls.fit(task.objective, s.hypothesis, s.starts[0], noise, POLICY.short))
                 if short.bic - two.bic < POLICY.near_mass * task.objective.count:
                     return task, [one, two]
             tried.add(s.term.name)
@@ -120,7 +120,7 @@ def plain_bases(task: Task, bases: Sequence[Fit]) -> list[Fit]:
     for model in rigid(task.model) + reduced(task.model):
         parameters = Parameterisation.of(model, task.scales, task.data.moving)
         starts.append((parameters, parameters.start(model)))
-    fits = [ls.fit(task.objective, Hypothesis(p, view), x, WHITE, 12) for p, x in starts]
+    fits = [ls.fit(task.objective, Hypothesis(p, view), x, WHITE, POLICY.usual) for p, x in starts]
     fits.sort(key=lambda f: (not swings(f), f.cost))
     return [next(f for f in fits if f.parameters.masses == m) for m in sorted({f.parameters.masses for f in fits})]
 
@@ -187,7 +187,7 @@ class PlainView:
                 x = np.concatenate([x, np.clip(term.coordinates(own), low, high)])
                 parameters = parameters.extended(term)
         x = np.concatenate([x, np.zeros(sum(parameters.starts))])
-        fit = ls.fit(task.objective, Hypothesis(parameters, predictor), x, WHITE, 20)
+        fit = ls.fit(task.objective, Hypothesis(parameters, predictor), x, WHITE, POLICY.long)
         return fit if fit.cost < WORST else None
 
 

@@ -15,6 +15,8 @@ from typing import Generic, TypeVar
 
 __all__ = ["Beam", "reduced"]
 
+STEPS = 32  # no decision: each step of a reduction drops an effect or is better; the bound guards against a cycle of equals
+
 State = TypeVar("State")
 Move = Callable[[State], Iterable[State]]
 
@@ -95,9 +97,7 @@ def reduced(
     state: State, moves: Sequence[Move[State]], prefers: Callable[[State, State], bool], score: Callable[[State], float]
 ) -> State:
     """The model after every reduction that is preferred, until there is none."""
-    left = 32  # each step drops an effect or is better; the bound only guards against a cycle of equals
-    while left:
-        left -= 1
+    for _ in range(STEPS):
         for move in moves:
             tries = [other for other in move(state) if prefers(other, state)]
             if tries:

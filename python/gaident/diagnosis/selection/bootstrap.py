@@ -41,7 +41,7 @@ def largest_gains(space: Moves, base: Fit, final: Fit, draws: int, seed: int, no
         # The filter's own start dies out in the samples in front.
         noise = [left.coloured(rng.choice(pool, 2 * n))[-n:] for n in objective.lengths]
         drawn = Objective(objective.data, objective.weight, objective.family, clean + np.concatenate(noise))
-        start = reestimated(drawn, fit(drawn, base.hypothesis, base.x, WHITE, 12))
+        start = reestimated(drawn, fit(drawn, base.hypothesis, base.x, WHITE, space.policy.usual))
         found = replace(space, objective=drawn, note=lambda _: None, grown={}).add(start)
         gains[k] = start.bic - min(f.bic for f in found) if found else -np.inf
     return gains

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.diagnosis.policy import POLICY
 from gaident.estimation.dataset import FINEST, DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Objective
@@ -26,6 +25,7 @@ from gaident.estimation.parameterisation import Parameterisation, parameter_name
 from gaident.estimation.prediction import OpenLoop
 from gaident.estimation.projection import WORST
 from gaident.estimation.term import Scales
+from gaident.policy.table import POLICY
 
 __all__ = ["blocks_of", "decimated", "decimated_record", "moved"]
 
@@ -56,7 +56,7 @@ def blocks_of(data: DataSet, error: Vector) -> int:
         return 1
     if not np.all(np.isfinite(error)):
         return 1
-    most = min(sum(data.lengths) // POLICY.enough_samples, min(data.lengths) // 200)
+    most = min(sum(data.lengths) // POLICY.enough_samples, min(data.lengths) // POLICY.short_record)
     for k in range(most, 1, -1):
         parts = np.split(error, np.cumsum(data.lengths)[:-1])
         rows = np.vstack([e[: len(e) // k * k].reshape(-1, k) for e in parts])

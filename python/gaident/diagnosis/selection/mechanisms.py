@@ -17,6 +17,7 @@ from gaident.estimation.projection import project_out
 from gaident.estimation.term import Term
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
+from gaident.policy.table import POLICY
 
 __all__ = [
     "as_held",
@@ -69,10 +70,9 @@ def held(data: DataSet) -> Model | None:
         columns = np.vstack([np.cumsum(r.torque), -np.cumsum(r.velocity), -np.cumsum(r.position - r.position[0])]) * r.dt
         line = np.vstack([np.ones(len(r)), np.linspace(-1.0, 1.0, len(r))])
         beyond = np.linalg.qr(line.T)[0]
-        rows = np.vstack([columns, r.velocity])
-        rows = rows - (rows @ beyond) @ beyond.T
-        gram += rows[:3] @ rows[:3].T
-        right += rows[:3] @ rows[3]
+        columns, w = (rows - (rows @ beyond) @ beyond.T for rows in (columns, r.velocity))
+        gram += columns @ columns.T
+        right += columns @ w
     sizes = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     K, a, c = np.linalg.lstsq(gram / np.outer(sizes, sizes), right / sizes, rcond=1e-12)[0] / sizes
     if not (K > 0.0 and c > 0.0):
@@ -132,7 +132,7 @@ def resonant(objective: Objective, one: Fit) -> list[Model]:
     finite = np.all(np.abs(E) < LOST, axis=1)
     rest = project_out(J, np.where(finite[:, None], E, 0.0))
     costs = np.where(finite, np.einsum("ij,ij->i", rest, rest), np.inf)
-    return [_two_masses(longer.parameters, X[i]) for i in np.argsort(costs)[:3]]
+    return [_two_masses(longer.parameters, X[i]) for i in np.argsort(costs)[: POLICY.starts]]
 
 
 def _resonance_of(parameters: Parameterisation) -> Term:
@@ -205,14 +205,15 @@ def is_mechanism(parameters: Parameterisation, x: Vector) -> bool:
 
 
 def swings(fit: Fit) -> bool:
-    """Whether two masses are damped as those on a shaft: e1 < 2 zeta sqrt(e0), f1 < 2 zeta sqrt(f0), zeta = 0.5."""
+    """Whether two masses are damped as those on a shaft: e1 < 2 zeta sqrt(e0), f1 < 2 zeta sqrt(f0)."""
     if fit.parameters.masses == 1:
         return True
     _, _, e1, e0, f1, f0 = fit.parameters.base_values(fit.x[None, :])[0]
-    return bool(e0 > 0.0 and f0 > 0.0 and abs(e1) < np.sqrt(e0) and abs(f1) < np.sqrt(f0))
+    twice = 2.0 * POLICY.swing_damping
+    return bool(e0 > 0.0 and f0 > 0.0 and abs(e1) < twice * np.sqrt(e0) and abs(f1) < twice * np.sqrt(f0))
 
 
 def resonance(fit: Fit) -> float:
     """Of a fit of two masses [rad/s]; 0 for one."""
     values = fit.parameters.base_values(fit.x[None, :])[0]
-    return float(np.sqrt(abs(values[3]))) if len(values) > 3 else 0.0
+    return float(np.sqrt(abs(values[3]))) if fit.parameters.masses == 2 else 0.0

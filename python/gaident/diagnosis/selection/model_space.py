@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
-from gaident.diagnosis.policy import POLICY, Policy
 from gaident.diagnosis.selection.mechanisms import as_two_masses
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
@@ -25,6 +24,7 @@ from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
 from gaident.estimation.term import Term
+from gaident.policy.table import POLICY, Policy
 
 __all__ = ["ModelSpace", "words"]
 
@@ -155,13 +155,13 @@ class ModelSpace:
         """
         if not set(plain.effects) - set(whitened.effects):
             return False
-        without = ls.fit(self.objective, whitened.hypothesis.driven_by(plain.predictor), whitened.x, WHITE, 12)
+        without = ls.fit(self.objective, whitened.hypothesis.driven_by(plain.predictor), whitened.x, WHITE, self.policy.usual)
         return plain.cost < self.policy.overrules * without.cost and self.score(plain) < self.score(without) - self.margin
 
     def plain_cost(self, fit: Fit) -> float:
         """Sum of squared plain errors, refitted to these, of the loop where there is one."""
         view = self.closed(fit.predictor) if self.data.loopable and self.data.loop_follows else fit.predictor
-        return ls.fit(self.objective, fit.hypothesis.driven_by(view), fit.x, WHITE, 8).cost
+        return ls.fit(self.objective, fit.hypothesis.driven_by(view), fit.x, WHITE, self.policy.usual).cost
 
     def in_both_views(self, simpler: Fit, fuller: Fit) -> bool:
         """Whether a generalisation is worth its cost in closed loop too, and not only because it is simulated with more substeps.
@@ -208,13 +208,13 @@ class ModelSpace:
         """A model fitted under another predictor."""
         if fit.predictor == predictor:
             return fit
-        return self.refitted(fit.hypothesis.driven_by(predictor), fit.x, 8)
+        return self.refitted(fit.hypothesis.driven_by(predictor), fit.x)
 
-    def refitted(self, hypothesis: Hypothesis, x: Vector, iterations: int = 12) -> Fit:
+    def refitted(self, hypothesis: Hypothesis, x: Vector, iterations: int = POLICY.usual) -> Fit:
         """Plain least squares from x, then under a noise model of its own."""
         return ls.reestimated(self.objective, ls.fit(self.objective, hypothesis, x, WHITE, iterations))
 
-    def continued(self, hypothesis: Hypothesis, fit: Fit, x: Vector, iterations: int = 8) -> Fit:
+    def continued(self, hypothesis: Hypothesis, fit: Fit, x: Vector, iterations: int = POLICY.usual) -> Fit:
         """From x under the noise model of a fit that it was made of, then under its own."""
         return ls.reestimated(self.objective, ls.fit(self.objective, hypothesis, x, fit.noise, iterations))
 
@@ -224,7 +224,7 @@ class ModelSpace:
 
     def completed(self, fit: Fit) -> Fit:
         """A short fit taken to the end under its own noise model."""
-        fit = fit if fit.converged else ls.fit(self.objective, fit.hypothesis, fit.x, fit.noise, 8)
+        fit = fit if fit.converged else ls.fit(self.objective, fit.hypothesis, fit.x, fit.noise, self.policy.usual)
         return ls.reestimated(self.objective, fit)
 
     def seen_best(self, fit: Fit) -> Fit:

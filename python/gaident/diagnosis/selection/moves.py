@@ -44,7 +44,8 @@ from gaident.estimation.term import Term
 
 __all__ = ["Moves"]
 
-MISSED = 0.05  # of the largest torque: a level of friction to start from where the fitted one is lower
+MISSED = 0.05  # no decision: of the largest torque, a level of friction to start from where the fitted one is lower
+LEAST = 1e-4  # no decision: the same, of a level that was fitted as 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,14 +96,14 @@ class Moves(ModelSpace):
                 # The simplest of a family first: its generalisations are tried at its level.
                 start = next((s for s in test.ranked(WHITE) if s.term is first), None)
                 if start is not None:
-                    fits.append(self.refitted(start.hypothesis, start.starts[0], 8))
+                    fits.append(self.refitted(start.hypothesis, start.starts[0]))
                     self._generalisations(test, now, fits[-1], first)
         if not test.trials:
             return []
         rankings = [test.ranked(WHITE), test.ranked(None)] if self.whitens else [test.ranked(WHITE)]
         if self.whitens and self.quiet(now):
             # Where nothing but noise is left the linearised gains are near enough: only what promises something is fitted.
-            rankings = [[s for s in ranking if s.hope > 0.5 * self.penalty] for ranking in rankings]
+            rankings = [[s for s in ranking if s.hope > self.policy.hope * self.penalty] for ranking in rankings]
             if not any(rankings):
                 return self._best(now, fits)
         done = {f.parameters.terms[-1] for f in fits}
@@ -110,7 +111,7 @@ class Moves(ModelSpace):
         for ranking in rankings:
             for s in [s for s in ranking if s.term not in done][: self.policy.screened]:
                 for x in s.starts[:2]:
-                    fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, 3))
+                    fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, self.policy.glance))
                     if s.term not in short or fit.bic < short[s.term].bic:
                         short[s.term] = fit
         reach = self.policy.hopeless * self.objective.information
@@ -145,7 +146,7 @@ class Moves(ModelSpace):
         wanted = [t for t in self.allowed if t.family == simple.family and simple.name in t.nested]
         level = abs(float(source.x[source.parameters.slot(simple.name)][0]))
         torque = parameters.scales.torque
-        for friction in {max(level, 1e-4 * torque), max(level, MISSED * torque)}:
+        for friction in {max(level, LEAST * torque), max(level, MISSED * torque)}:
             scales = replace(parameters.scales, friction=friction)
             bare = Hypothesis(replace(parameters, scales=scales), source.predictor)
             if source is now:
@@ -159,7 +160,7 @@ class Moves(ModelSpace):
         Its stiffness is that of a linear test, a torque -k theta beside the model and a constant, or of the momentum's balance.
         """
         data = self.data
-        if fit.parameters.kind != "one mass" or data.travel > self.policy.most_of_a_spring:
+        if fit.parameters.kind != "one mass" or data.travel > 2.0 * np.pi * self.policy.spring_turns:
             return []
         J, error = self.objective.sensitivities(fit.hypothesis, fit.x)
         response = fit.predictor.torque_response(fit.parameters, fit.x, np.vstack([-data.angle, np.ones(len(data.angle))]))
@@ -174,10 +175,10 @@ class Moves(ModelSpace):
                 fall = -self.objective.information * float(np.log(max(1.0 - slope**2 / (size * power), 1e-300)))
                 if fall > best:
                     best, stiffness = fall, slope / size
-        starts = [as_held(fit, stiffness, data)] if stiffness > 0.0 and best > 0.5 * self.penalty else []
+        starts = [as_held(fit, stiffness, data)] if stiffness > 0.0 and best > self.policy.hope * self.penalty else []
         if not fit.effects and not self.quiet(fit) and (balanced := held(data)) is not None:
             starts.append(moved_to(balanced, fit))
-        fits = [self.refitted(h, x, 20) for h, x in starts]
+        fits = [self.refitted(h, x, self.policy.long) for h, x in starts]
         return [f for f in fits if f.cost < WORST and is_mechanism(f.parameters, f.x)]
 
     def resettled(self, fit: Fit) -> list[Fit]:
@@ -190,7 +191,7 @@ class Moves(ModelSpace):
             return []
         shorter, y = as_two_masses(fit)
         shorter = shorter.driven_by(OpenLoop(self.data, fit.predictor.own_angle)) if self.whitens else shorter
-        tries = [self.refitted(shorter, y, 20)]
+        tries = [self.refitted(shorter, y, self.policy.long)]
         for t in self.candidates(tries[0]):
             if t.size > 1 or t.place == "shaft":
                 continue
@@ -201,7 +202,7 @@ class Moves(ModelSpace):
             if t.multimodal and self.data.loopable:
                 longer = longer.driven_by(self.closed(longer.predictor))
             X = np.array([shorter.parameters.inserted(y, np.array(row)) for row in rows])
-            tries.append(self.refitted(longer, X[int(np.argmin(self.objective.costs(longer, X, WHITE)))], 20))
+            tries.append(self.refitted(longer, X[int(np.argmin(self.objective.costs(longer, X, WHITE)))], self.policy.long))
         return tries
 
     # Moves that reduce.
@@ -231,17 +232,17 @@ class Moves(ModelSpace):
         level = fit.x[fit.parameters.slot(term.name)][list(term.shared.get(simple.name, (0,)))]
         hypothesis = fit.hypothesis.without(term.name).extended(simple)
         x = hypothesis.parameters.without(simple.name).inserted(fit.parameters.removed(fit.x, term.name), level)
-        return self.continued(hypothesis, fit, x, 12)
+        return self.continued(hypothesis, fit, x)
 
     def demote(self, fit: Fit) -> list[Fit]:
         """Two masses with effects as one mass with these effects; one that a spring holds without the spring."""
         if fit.parameters.held:
             hypothesis, x = released(fit)
-            return [self.continued(hypothesis, fit, x, 20)]
+            return [self.continued(hypothesis, fit, x, self.policy.long)]
         if fit.parameters.masses == 1 or not fit.effects or any(t.in_coupling or t.resonates for t in fit.parameters.terms):
             return []
         hypothesis, x = as_one_mass(fit)
-        return [self.continued(hypothesis, fit, x, 20)]
+        return [self.continued(hypothesis, fit, x, self.policy.long)]
 
     def close(self, fit: Fit) -> list[Fit]:
         """A model with dry friction in closed loop, whose controller keeps the simulation near the record between its stops.
@@ -298,8 +299,8 @@ class Moves(ModelSpace):
         limits = np.array(term.limits(fit.parameters.scales)).T
         X = np.repeat(fit.x[None, :], len(rows), axis=0)
         X[:, fit.parameters.slot(term.name)] = np.clip(np.array(rows), *limits)
-        order = np.argsort(self.objective.costs(fit.hypothesis, X, fit.noise))[:3]
-        tries = [ls.scored(self.objective, ls.fit(self.objective, fit.hypothesis, X[i], WHITE, 8)) for i in order]
+        order = np.argsort(self.objective.costs(fit.hypothesis, X, fit.noise))[: self.policy.starts]
+        tries = [ls.scored(self.objective, ls.fit(self.objective, fit.hypothesis, X[i], WHITE, self.policy.usual)) for i in order]
         best = min(tries, key=lambda f: f.bic)
         return self.refitted(best.hypothesis, best.x)
 
@@ -320,5 +321,5 @@ class Moves(ModelSpace):
                 continue
             X = np.array([base.parameters.inserted(base.x, np.array(z)) for z in rows])
             x = X[int(np.argmin(self.objective.costs(hypothesis, X, WHITE)))]
-            found.append(self.evolved(ls.scored(self.objective, ls.fit(self.objective, hypothesis, x, WHITE, 5))))
+            found.append(self.evolved(ls.scored(self.objective, ls.fit(self.objective, hypothesis, x, WHITE, self.policy.short))))
         return found

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaident.diagnosis.selection.moves import Moves
+from gaident.estimation.criterion import chi_square_bound
 from gaident.estimation.objective import Fit
 
 __all__ = ["Rival", "rivals_of"]
@@ -42,8 +43,8 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
                 continue
             # A generalisation is never worse by more than its parameters: only a hint of what it adds counts.
             more = other.size - term.size
-            hint = space.policy.hint + 3.0 * (more - 1)
-            if behind - more * np.log(space.objective.information) > -hint:
+            gained = more * np.log(space.objective.information) - behind  # likelihood ratio, 2 ln
+            if gained < chi_square_bound(more, space.policy.detail_level):
                 continue
             if behind < -space.penalty and not space.in_both_views(final, f):
                 continue

@@ -26,14 +26,16 @@ from gaident.estimation.objective import LOST, Fit, Hypothesis, Objective
 from gaident.estimation.prediction import ClosedLoop
 from gaident.estimation.projection import orthonormal_rows, project_out
 from gaident.estimation.term import Term
+from gaident.policy.table import POLICY
 
 __all__ = ["Screened", "ScoreTest"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-TURN, SIXTH = 2.0 * np.pi, np.pi / 3.0  # rad
-FURTHEST = 2.0  # times the way to a start: the next one stands there
+TURN = 2.0 * np.pi  # no decision: rad
+ROOM = 8  # no decision: samples for each direction that is taken out before a noise filter is fitted
+FURTHEST = 2.0  # no decision: times the way to a start, where the next one stands
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ class ScoreTest:
         if valleys and self.data.loopable and not hypothesis.predictor.closed:
             # A replayed torque that ignores a limit of the controller has biased the mechanism; the closed loop has not.
             inside = hypothesis.driven_by(ClosedLoop(self.data, hypothesis.predictor.own_angle))
-            held = x if self.data.torque_logged else ls.fit(self.objective, inside, x, WHITE, 8).x
+            held = x if self.data.torque_logged else ls.fit(self.objective, inside, x, WHITE, POLICY.usual).x
             self.add(inside, held, valleys)
             terms = [t for t in terms if not t.in_coupling]
         self._add(hypothesis, x, terms)
@@ -158,11 +160,11 @@ class ScoreTest:
         # Seen is what passes a few times, slowly enough for the sampling at the speeds that matter: there and back counts twice,
         # but most of a turn has to be there. A single order once per turn is gravity, which a sixth of a turn shows.
         turned, path = float(np.ptp(angle)), float(np.abs(np.diff(angle)).sum())
-        speed = float(np.median(np.abs(self.objective.measured)) + 1e-12)
-        seen = (orders * turned > 0.75 * TURN) & (orders * path > 3.0 * TURN)
+        per_sample = float(np.median(np.abs(self.objective.measured)) + 1e-12) * self.data.dt
+        seen = (orders * turned > POLICY.seen_turn * TURN) & (orders * path > POLICY.seen_path * TURN)
         if last == 1:
-            seen |= turned > SIXTH
-        orders = orders[seen & (orders * speed * self.data.dt < 2.5)]
+            seen |= turned > POLICY.gravity_turn * TURN
+        orders = orders[seen & (orders * per_sample < POLICY.seen_band * np.pi)]
         if len(orders) == 0:
             return orders, np.zeros((0, len(error)))
         waves = _harmonics(angle, orders)
@@ -185,7 +187,7 @@ class ScoreTest:
                 if finite.any():
                     nearest = np.argmin(_along(project_out(base.J, t.errors[finite]) - rest, rest))
                     directions.append((t.errors[finite][nearest] - base.error)[None, :])
-        D = np.vstack(directions)[: max(len(base.error) // 8, 1)]
+        D = np.vstack(directions)[: max(len(base.error) // ROOM, 1)]
         return self.objective.noise_of(project_out(D, base.error[None, :])[0], base.hypothesis.predictor.closed)
 
     def ranked(self, noise: NoiseFilter | None) -> list[Screened]:
@@ -237,7 +239,7 @@ class ScoreTest:
         else:
             costs = np.where(finite, _along(V - rest, rest, t.term.proportional), np.inf)
             order = np.argsort(costs)
-            starts = tuple(t.start(row) for row in _start_rows(t, V, rest, order[:3]))
+            starts = tuple(t.start(row) for row in _start_rows(t, V, rest, order[: POLICY.starts]))
             costs = costs[order]
         cost, size = max(float(costs[0]), 1e-300), t.hypothesis.parameters.size - t.base.hypothesis.parameters.size
         if not np.isfinite(cost):  # every start diverges

@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.library.terms import EVEN_FRICTION
-from gaident.diagnosis.policy import POLICY
 from gaident.diagnosis.selection.bases import PlainView, Task, linear_bases, noise_floor, plain_bases, plain_view
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
@@ -36,6 +35,7 @@ from gaident.estimation.noise_model import WHITE, ShaftNoise
 from gaident.estimation.objective import Fit, Innovations, Objective, OutputErrors
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
+from gaident.policy.table import POLICY
 
 __all__ = ["Selection", "by_whitened_errors", "compared", "selected", "specification"]
 
@@ -154,7 +154,7 @@ def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]
         end = _searched(space, base)
         # On a coarse grid a resonance beyond what it shows stands for another fast effect: the fit to all samples decides.
         # Two overdamped masses describe some other effect, which one mass leaves in the error.
-        seen = task.scales.blocks == 1 or resonance(end) < POLICY.seen_resonance * np.pi / task.scales.dt
+        seen = task.scales.blocks == 1 or resonance(end) < POLICY.seen_band * np.pi / task.scales.dt
         if not ends or (swings(end) and seen):
             ends.append((base, end))
         if space.quiet(end) and space.runs_free(end):
@@ -215,12 +215,12 @@ def specification(space: Moves, plainly: Objective, fit: Fit) -> Specification:
     plainly: the objective of output errors. What no estimate moves by slope, the order of a harmonic, is the same in both and no
     degree of freedom. H is 0 where the whitened estimate's plain errors are no larger than noise.
     """
-    plain = ls.fit(plainly, fit.hypothesis, fit.x, WHITE, 12)
+    plain = ls.fit(plainly, fit.hypothesis, fit.x, WHITE, space.policy.usual)
     errors = [plainly.plain_errors(f) for f in (fit, plain)]
     information = min(effective_samples(errors[1]), plainly.count)
     whole, least = (float(e @ e) for e in errors)
     freedom = int(np.count_nonzero(fit.parameters.steps()))
-    bound = chi_square_bound(freedom, space.policy.specification_level)
+    bound = chi_square_bound(freedom, space.policy.noise_level)
     if whole < plainly.count * (space.policy.noise_ratio * plainly.data.noise) ** 2:
         return Specification(0.0, bound)
     return Specification(specification_statistic(whole, least, information), bound)
@@ -230,7 +230,8 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     """What the coarse grid came to, fitted to all samples, reduced, and grown by what the grid could not show."""
     data, family = task.data, outline.space.objective.family
     if outline.final.parameters.masses == 1:  # no stiff shaft, no fine substeps
-        data = replace(data, finest=max(data.finest, 0.5 * data.dt))
+        coarse = 0.5 * data.dt
+        data = replace(data, finest=max(data.finest, coarse))
     if isinstance(family, Innovations) and family.shaft is not None:
         shaft = ShaftNoise(outline.base.parameters.linear(outline.base.x), data.dt, data.controller)
         family = Innovations(shaft, family.floor)
@@ -251,7 +252,7 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
 
 def _moved(space: Moves, scales: Scales, fit: Fit) -> Fit:
     start = moved(space.data, scales, fit)
-    return space.refitted(start.hypothesis, start.x, 12)
+    return space.refitted(start.hypothesis, start.x)
 
 
 def _bare(space: Moves, final: Fit) -> Fit:
@@ -265,7 +266,7 @@ def _bare(space: Moves, final: Fit) -> Fit:
 def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> Selection:
     """With the rivals of every effect; a better one takes the place, and all are compared again."""
     space, final = found.space, found.final
-    for swaps_left in (2, 1, 0):
+    for swaps_left in range(POLICY.swaps, -1, -1):
         rivals, better = _rivals(space, final, swaps_left > 0, classes, note)
         if better is None:
             break

@@ -38,16 +38,16 @@ __all__ = ["ForceError", "band_of", "effects_before_the_shaft", "force_error", "
 Vector = NDArray[np.float64]
 TorqueOf = Callable[[Record], Vector]
 
-ORDER = 4
-LOOP = 0.4
+ORDER = 4  # no decision: of the low-pass
+LOOP = 0.4  # no decision: accuracy of the inversion
 """Gain of the stiff loop, of the one that takes an integrator to its command in a single step."""
-INTEGRAL = 0.02
+INTEGRAL = 0.02  # no decision: the same
 """Of the proportional gain, in each step: what friction and gravity leave of the error is gone within the filter's time."""
-STEPS = 200
+STEPS = 200  # no decision: the same
 """Steps of the stiff loop in 1/cutoff: its bandwidth is 0.4 * 200/(2 pi) = 13 times the cutoff."""
-EDGE = 2.0
+EDGE = 2.0  # no decision: what is left out is in neither figure
 """Times 1/cutoff at both ends of a record that are left out: filters and the stiff loop start there."""
-BELOW = 0.5
+BELOW = 0.5  # no decision: a band, the same for every model
 """Of the lowest antiresonance: the highest cutoff where a load swings on a shaft."""
 
 

@@ -15,22 +15,15 @@ from gaident.estimation.regression.motion import cutoff_of, noise_share
 from gaident.estimation.regression.regression import bic, covariance, effective_samples, solve
 from gaident.estimation.regression.rows import Rows, decimation_of, rows_of
 from gaident.estimation.regression.torque_terms import CHOICES, TERMS, estimates_of
+from gaident.policy.table import POLICY
 from gaident.results.inverse_dynamics import InverseDynamics
 
 __all__ = ["inverse_dynamics"]
 
 Vector = NDArray[np.float64]
 
-ORDER = 4
-HELD_OUT = 0.3
-RIVAL = 10.0
-MATERIAL = 0.05
-LEAST_ROWS = 20
-LEAST_SHARE = 0.02
-"""Of the rows, in each direction of motion, before dry friction is told from a constant torque."""
-SIXTH_OF_A_TURN = np.pi / 3.0
-MOST_OF_A_SPRING = 20.0 * np.pi
-"""rad: over more than ten turns no spring is fixed to the ground; such a column is time, warmth or drift."""
+ORDER = 4  # no decision: of a Butterworth filter
+TURN = 2.0 * np.pi  # no decision: rad
 
 
 def inverse_dynamics(
@@ -125,10 +118,11 @@ def inverse_dynamics(
     everything = tuple(TERMS)
     rows = [rows_of(r, everything, cutoff, int(order), factor, standstill) for r in records]
     count = sum(len(r.torque) for r in rows)
-    if count < LEAST_ROWS:
+    if count < POLICY.least_rows:
         raise RecordError(
             f"only {count} rows are left in motion of {sum(map(len, records))} samples (cutoff {cutoff:g} Hz, every "
-            f"{factor}th sample), but at least {LEAST_ROWS} are needed; give a record that moves more, or a higher cutoff_hz"
+            f"{factor}th sample), but at least {POLICY.least_rows} are needed; give a record that moves more, or a higher "
+            "cutoff_hz"
         )
     refused = _refused(records, rows, axis)
     if asked is not None:
@@ -214,18 +208,18 @@ def _refused(records: Sequence[Record], rows: Sequence[Rows], axis: str) -> dict
     travel = max(r.travel for r in rows)
     refused: dict[str, Text] = {}
     slower = min(np.count_nonzero(velocity > 0.0), np.count_nonzero(velocity < 0.0))
-    if slower < max(10, LEAST_SHARE * len(velocity)):
+    if slower < max(POLICY.least_rows // 2, POLICY.both_ways * len(velocity)):
         why = say(
             "the velocity hardly changes its sign: dry friction and a constant {torque} cannot be told apart, offset is both"
         )
         refused |= dict.fromkeys(("viscous_by_direction", "coulomb", "coulomb_by_direction"), why)
     if axis == "linear":
         refused["gravity"] = Text("on a linear axis gravity is the same everywhere, and part of the offset")
-    elif travel < SIXTH_OF_A_TURN:
+    elif travel < POLICY.gravity_turn * TURN:
         refused["gravity"] = Text(
-            f"the travel is {travel:.2g} rad, and gravity shows from a sixth of a turn on, {SIXTH_OF_A_TURN:.3g} rad"
+            f"the travel is {travel:.2g} rad, and gravity shows from a sixth of a turn on, {POLICY.gravity_turn * TURN:.3g} rad"
         )
-    if axis == "rotary" and travel > MOST_OF_A_SPRING:
+    if axis == "rotary" and travel > POLICY.spring_turns * TURN:
         refused["spring"] = say("the travel is {}, and a spring to ground ends after ten", turns(travel, 3))
     return refused
 
@@ -250,7 +244,7 @@ def _material(best: tuple[str, ...], squares: dict[tuple[str, ...], float]) -> t
     """
     for simpler in (_without_angle, _common):
         other = simpler(best)
-        if other in squares and squares[best] > (1.0 - MATERIAL) * squares[other]:
+        if other in squares and squares[best] > (1.0 - POLICY.material_column) * squares[other]:
             best = other
     return best
 
@@ -268,7 +262,7 @@ def _common(terms: tuple[str, ...]) -> tuple[str, ...]:
 
 def _rivals(scores: dict[tuple[str, ...], float], chosen: tuple[str, ...]) -> tuple[tuple[tuple[str, ...], float], ...]:
     worse = {c: score - scores[chosen] for c, score in scores.items() if c != chosen}
-    return tuple(sorted(((c, d) for c, d in worse.items() if d < RIVAL), key=lambda item: item[1]))
+    return tuple(sorted(((c, d) for c, d in worse.items() if d < POLICY.rival_margin), key=lambda item: item[1]))
 
 
 def _effective(rows: Sequence[Rows], possible: Sequence[tuple[str, ...]]) -> float:
@@ -291,7 +285,7 @@ def _held_out(rows: Sequence[Rows], result: InverseDynamics, validation: Record 
         if {r.digest for r in others} & set(result.digests):
             raise RecordError("a validation record is one that is fitted; give another record, or None")
         return result.error(others), "validation records"
-    first, last = zip(*(r.split(1.0 - HELD_OUT) for r in rows), strict=True)
+    first, last = zip(*(r.split(POLICY.fitted_share) for r in rows), strict=True)
     theta, rank = _fitted(first, result.terms)
     if rank < len(theta):
         return float("nan"), "no part: the first 70 % of the samples in motion do not determine the terms"

@@ -22,21 +22,21 @@ __all__ = ["Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "tor
 
 Vector = NDArray[np.float64]
 
-NOISE_SHARE = 1e-3
+NOISE_SHARE = 1e-3  # no decision: how exact an inertia is
 """Most of the acceleration's power that may be noise: so much is the inertia too small by it."""
 
-BAND = 0.1
+BAND = 0.1  # no decision: how exact a derivative is
 """The cutoff is at most this share of the sample rate: the derivative is then exact to within 2 % in the pass band
 up to a third of the cutoff, and 100 Hz at 1 kHz is the practice of the literature."""
 
-LOWEST = 0.005
+LOWEST = 0.005  # no decision: where a filter may begin
 """The cutoff is at least this share of the sample rate, whatever the noise."""
 
-HIGH = (0.35, 0.475)
+HIGH = (0.35, 0.475)  # no decision: where noise is read
 """Where the noise level is read, as shares of the sample rate: the signal is assumed to be elsewhere."""
 
-DEVIATIONS = 3.0
-OF_RMS = 0.005
+DEVIATIONS = 3.0  # no decision: which samples are fitted
+OF_RMS = 0.005  # no decision: which samples are fitted
 """Standstill: velocity below 3 deviations of its noise, or below 0.5 % of its own rms, and 1/cutoff before and after."""
 
 

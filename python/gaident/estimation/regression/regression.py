@@ -25,8 +25,8 @@ __all__ = ["bic", "covariance", "effective_samples", "solve"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-LAGS_PER_ROOT = 1.3
-RANK = 1e-10
+LAGS_PER_ROOT = 1.3  # no decision: of an estimate of variance, see above
+RANK = 1e-10  # no decision: of a solver
 """Singular values below this share of the largest, of columns of equal length, are zero."""
 
 

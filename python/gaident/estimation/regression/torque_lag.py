@@ -21,22 +21,17 @@ from gaident.data.record import Record
 from gaident.estimation.regression.motion import cutoff_of
 from gaident.estimation.regression.regression import effective_samples, solve
 from gaident.estimation.regression.rows import decimation_of, rows_of
+from gaident.policy.table import POLICY
 
 __all__ = ["TorqueLag", "torque_lag"]
 
 Vector = NDArray[np.float64]
 
-ORDER = 4
-FARTHEST = 3
+ORDER = 4  # no decision: of the low-pass
+FARTHEST = 3  # no decision: how far is looked
 """Samples in either direction; what is farther away is no slip of a log's lines."""
-LONGEST = 1 << 17
+LONGEST = 1 << 17  # no decision: work
 """Samples that are looked at."""
-LEAST_ROWS = 20
-MOST_LEFT = 0.05
-"""Of the torque's power: where the best lag leaves more, the regression does not describe the axis and tells nothing."""
-
-LEAST_CURVATURE = 1e-3
-"""Of the torque's power, that one sample more has to cost: at a single frequency (2e-5 and less) inertia and friction take it."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +61,7 @@ def torque_lag(rec: Record) -> TorqueLag | None:
         moved = np.concatenate([held[k:], np.full(k, held[-1])] if k >= 0 else [np.full(-k, held[0]), held[:k]])
         rows = rows_of(rec.with_channels(torque=moved), terms, cutoff, ORDER, factor, None)
         power = float(rows.torque @ rows.torque)
-        if len(rows.torque) < LEAST_ROWS or not power > 0.0:
+        if len(rows.torque) < POLICY.least_rows or not power > 0.0:
             return None
         theta, rank = solve(rows.of(terms), rows.torque)
         if rank < len(theta):
@@ -74,11 +69,11 @@ def torque_lag(rec: Record) -> TorqueLag | None:
         residuals.append(rows.torque - rows.of(terms) @ theta)
         left.append(float(residuals[-1] @ residuals[-1]) / power)
     best = int(np.argmin(left))
-    if best in (0, len(left) - 1) or left[best] > MOST_LEFT:
+    if best in (0, len(left) - 1) or left[best] > POLICY.lag_left:
         return None
     before, least, after = left[best - 1 : best + 2]
     curvature = 0.5 * (before + after) - least
-    if not curvature > LEAST_CURVATURE:
+    if not curvature > POLICY.lag_curvature:
         return None
     within = 0.25 * (before - after) / curvature
     lowest = max(least - curvature * within**2, 0.0)

@@ -16,16 +16,14 @@ from gaident.errors import RecordError
 from gaident.estimation.regression.motion import cutoff_of, low_passed
 from gaident.estimation.regression.regression import covariance, solve
 from gaident.estimation.regression.rows import decimation_of
+from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
 __all__ = ["WindingFit", "estimate_winding"]
 
 Vector = NDArray[np.float64]
 
-ORDER = 4
-LEAST_ROWS = 20
-SURE = 5.0
-"""Deviations that resistance and back-EMF constant have to be away from 0."""
+ORDER = 4  # no decision: of the low-pass
 NAMES = {"resistance": "Ohm", "back_emf_constant": "V s/rad", "inductance": "H", "offset": "V"}
 
 
@@ -116,7 +114,7 @@ def estimate_winding(
     U, i, w = (low_passed(x, rec.dt, cutoff, ORDER) for x in (held, i, w))
     columns = (i, w, np.gradient(i, rec.dt), np.ones(len(i)))
     X, y = (np.column_stack([decimated(np.ascontiguousarray(c), factor) for c in part])[2:-2] for part in (columns, (U,)))
-    if len(X) < LEAST_ROWS:
+    if len(X) < POLICY.least_rows:
         raise RecordError(f"only {len(X)} rows are left of {len(w)} samples behind {cutoff:g} Hz; give a longer record")
     theta, _ = solve(X, y[:, 0])
     left = y[:, 0] - X @ theta
@@ -127,7 +125,7 @@ def estimate_winding(
     }
     for name in ("resistance", "back_emf_constant"):
         e = found[name]
-        if not e.value > SURE * e.std:
+        if not e.value > POLICY.winding_sure * e.std:
             raise RecordError(
                 f"the {name.replace('_', ' ')} comes out as {e.value:.3g} +- {e.std:.2g} {e.unit}: voltage, current and velocity "
                 "do not determine it; check their units and signs, and give a motion with load and speed apart, such as "
@@ -137,6 +135,6 @@ def estimate_winding(
     winding = Winding(
         found["resistance"].value,
         found["back_emf_constant"].value,
-        inductance.value if inductance.value > SURE * inductance.std else 0.0,
+        inductance.value if inductance.value > POLICY.winding_sure * inductance.std else 0.0,
     )
     return WindingFit(winding, found, float(np.sqrt(left @ left / (y[:, 0] @ y[:, 0]))), cutoff)

@@ -247,7 +247,7 @@ def _force(dia: Diagnosis, axis: str) -> list[str]:
     rows: list[Row] = [(what, value, typeset(share)) for what, value, share in force_rows(dia, axis)]
     if rows:
         torque = "torque" if axis == "rotary" else "force"
-        parts += [tag("h3", "Force error"), tag("p", typeset(force_words(dia, axis)))]
+        parts += [tag("h3", f"{word('Torque', axis)} error"), tag("p", typeset(force_words(dia, axis)))]
         parts.append(table(("", f"rms [{unit('N m', axis)}]", f"of the {torque} [%]"), [rows]))
     both: list[Row] = [tuple(map(typeset, row)) for row in comparison_rows(dia, axis)]
     if both:

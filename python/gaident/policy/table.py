@@ -1,0 +1,244 @@
+"""The policy: every number by which gaident decides about a model, with unit, source, and the command that measures it.
+
+A decision is never made by a number that stands elsewhere: `tests/python/test_policy.py` looks for such numbers. What other
+modules keep are numbers that decide nothing (the step of a difference, the tolerance of a solver, the start of a fit): a name in
+capitals, marked by a comment `# no decision: why`.
+
+Numbers that follow from records without effects are calibrated: `python bench/blind.py --calibrate` writes them into
+`calibrated.json`, which is read here. The others are set by hand, for the reason that their row gives.
+
+Effort is the last group: budgets of iterations, starts and models. More of it may find more, and changes no decision about what
+was found.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, NamedTuple
+
+__all__ = ["CALIBRATED", "EFFORT", "POLICY", "Policy", "Row", "rows"]
+
+CALIBRATED: dict[str, Any] = json.loads(Path(__file__).with_name("calibrated.json").read_text(encoding="utf-8"))
+"""What the blind bench wrote: its command, count of records, seed, level; by number the value and the largest one measured."""
+
+CLEAN = "python bench/blind.py --only clean --cases 20"
+SIZES = "python bench/blind.py --only effects sizes"
+PAIRS = "python bench/blind.py --only pairs outside"
+LOOP = "python bench/blind.py --only effects --effects torque_saturation integrator_clamp command_rate_limit outliers"
+REAL = "python bench/real.py"
+SUCCESS = "python bench/success.py"
+
+GAIN = "Is the gain enough?"
+NOISE = "Is this noise?"
+CAUSE = "Is a finding a cause?"
+SECOND = "Does a second method agree?"
+CONTROLLER = "Does the logged torque follow from the controller?"
+RECORD = "What does a record show?"
+LINEAR = "Which linear model?"
+EFFORT = "Effort"
+
+
+def _row(group: str, value: float, unit: str, source: str, command: str = "") -> Any:
+    return field(default=value, metadata={"group": group, "unit": unit, "source": source, "command": command})
+
+
+def calibrated(group: str, name: str, unit: str, source: str) -> Any:
+    """A row with the value that the blind bench wrote."""
+    measured = CALIBRATED["numbers"][name]
+    source = f"{source}; calibrated at `noise_level`, the largest of {measured['records']} is {measured['largest']:.3g}"
+    return _row(group, measured["value"], unit, source, CALIBRATED["command"])
+
+
+def gain(value: float, unit: str, source: str, command: str) -> Any:
+    return _row(GAIN, value, unit, source, command)
+
+
+def noise(value: float, unit: str, source: str, command: str) -> Any:
+    return _row(NOISE, value, unit, source, command)
+
+
+def cause(value: float, unit: str, source: str, command: str) -> Any:
+    return _row(CAUSE, value, unit, source, command)
+
+
+def check(value: float, unit: str, source: str, command: str) -> Any:
+    return _row(SECOND, value, unit, source, command)
+
+
+def loop(value: float, unit: str, source: str) -> Any:
+    return _row(CONTROLLER, value, unit, source, LOOP)
+
+
+def record(value: float, unit: str, source: str, command: str) -> Any:
+    return _row(RECORD, value, unit, source, command)
+
+
+def linear(value: float, unit: str, source: str, command: str) -> Any:
+    return _row(LINEAR, value, unit, source, command)
+
+
+def effort(value: float, unit: str, source: str) -> Any:
+    return _row(EFFORT, value, unit, source)
+
+
+@dataclass(frozen=True)
+class Policy:
+    """See the module; `rows()` lists all with unit, source and command."""
+
+    # Is the gain enough? One criterion: BIC and a penalty for each effect, which stands for the number of candidates tried.
+    effect_penalty: float = calibrated(GAIN, "effect_penalty", "BIC units", "of each effect, for the number of candidates tried")
+    short_record: int = gain(200, "samples", "a record this short doubles the penalty: its noise filter is uncertain", CLEAN)
+    material_share: float = gain(
+        0.1, "1", "of the error beyond the noise, whitened or plain, that an effect explains at least", PAIRS
+    )
+    material_beside_impacts: float = gain(
+        0.5, "1", "the same beside a gap or a hard coupling: no model foresees an impact", PAIRS
+    )
+    overrules: float = gain(0.5, "1", "of the plain error that a cause which whitening hid may leave at most", REAL)
+    rival_margin: float = gain(10.0, "BIC units", "closer explanations are not told apart (Kass and Raftery 1995)", SIZES)
+    rival_short: int = gain(400, "samples", "a record this short doubles the margin", SIZES)
+    detail_level: float = gain(
+        0.005, "1", "of the likelihood-ratio test that a generalisation adds nothing to what it contains (Wilks 1938)", SIZES
+    )
+    swap: float = gain(2.0, "BIC units", "by which a rival has to be better to take a place", SIZES)
+    harm: float = gain(0.02, "1", "of the held-out error that an effect may add before it is refused", REAL)
+    fitted_share: float = gain(0.7, "1", "of a record that parameters are fitted to where the rest is held out", REAL)
+    least_held: int = gain(600, "samples", "of a record from which a part is held out", REAL)
+    held_motion: float = gain(0.33, "1", "rms speed of a held-out part over that before: below, it is cut by path", REAL)
+    told_apart: float = gain(25.0, "chi2", "of a proposed experiment, from which it tells two explanations apart", SIZES)
+
+    # Is this noise? One variance ratio, one specification test, one test for dependence.
+    noise_ratio: float = calibrated(NOISE, "noise_ratio", "1", "rms of whitened errors over the noise of the velocity")
+    free_run_ratio: float = calibrated(
+        NOISE, "free_run_ratio", "1", "rms of the free run over the noise: more is a misfit that whitening took"
+    )
+    noise_level: float = noise(
+        1e-6,
+        "1",
+        "share of records without effects that a test may mistake: of the chi-square test, and calibrated",
+        CLEAN,
+    )
+    dependence_gain: float = calibrated(NOISE, "dependence_gain", "BIC units", "of a free function of one signal")
+    immaterial: float = noise(
+        0.02, "1", "of the linear mechanism's rms error: counts as noise, however little noise there is", CLEAN
+    )
+    grid_loss: float = noise(0.02, "1", "share of the linear model's squared error that a coarser grid of time may lose", REAL)
+
+    # Is a finding a cause, or does it only describe what the library does not hold?
+    of_its_size: float = cause(0.25, "1", "of a finding's gain that a free function may still find beside it", PAIRS)
+    stands: float = cause(
+        0.9, "1", "share of what a free function explains: drag by friction 0.87, friction of a robot joint 0.946", PAIRS
+    )
+    class_stands: float = cause(0.5, "1", "the same for a class that the record cannot split", PAIRS)
+
+    # Does a second method agree? The inverse-dynamics regression beside the result.
+    check_deviations: float = check(3.0, "1", "deviations of both: 0.3 % of a normal distribution are beyond", CLEAN)
+    check_share: float = check(0.1, "1", "of the larger value: a smaller difference does not matter", CLEAN)
+    check_torque: float = check(0.05, "1", "of the torque's rms: the same, of friction and gravity", CLEAN)
+    rigid_band: float = check(0.25, "1", "of the antiresonance: below, a load is rigid within 1/16 (1/(1 - 1/16))", SIZES)
+    loses: float = check(2.0, "1", "force error of the diagnosed model over that of the regression: above, it is a note", REAL)
+
+    # Does the logged torque follow from command and velocity through the controller?
+    replay_steps: float = loop(3.0, "steps", "of the torque's rounding, within which a replayed torque follows")
+    replay_left: float = loop(1e-3, "1", "of the replay's squared error, that an effect which explains it leaves at most")
+    replay_noise: float = loop(0.1, "1", "of the torque's deviation: more is no noise of a measured torque")
+    same_gains: float = loop(1e-2, "1", "relative difference within which records show the same gains")
+    same_value: float = loop(2e-3, "1", "the same for limits, and for a gain that is the configured one")
+    at_limit: float = loop(0.999, "1", "of a limit, from which a torque or an integral is at it")
+    plateau: int = loop(5, "samples", "at a limit, from which an integrator is held at it")
+    noisy_plateau: float = loop(0.95, "1", "of the highest torque, from which its median is the limit of a noisy log")
+    same_slope: float = loop(0.2, "1", "relative difference from the median slope, within which a command is at its rate limit")
+    better_reason: float = loop(0.99, "1", "of the rms that a simpler reason leaves: a later one has to leave less")
+    rounded_command: float = loop(5e-5, "1", "of the largest command, that a command may be off in a log of few decimals")
+    log_shift: float = loop(50.0, "BIC units", "by which the law holds better before a channel is moved by samples: odds of e^25")
+    lag_seen: float = loop(0.5, "samples", "between motion and torque, from which a lag is seen")
+    negligible: float = loop(1e-3, "1", "of a signal's largest value or range: less is 0, or the rounding of a log")
+
+    # What does a record show? What is spoiled in it, and what it could not have shown.
+    least_samples: int = record(100, "samples", "of a record: below, noise filter and linear model use up what it knows", CLEAN)
+    outlier_far: float = record(9.0, "1", "standard deviations of what is usual, by which an outlier stands out at least", LOOP)
+    outlier_missed: float = record(0.4, "1", "of that, by which the lines from either side, and a model, miss it", LOOP)
+    outlier_alone: float = record(0.5, "1", "of that: where two samples near by stand out as much, the axis rings", LOOP)
+    sensor_step: float = record(1e-4, "1", "of the velocity's range: a finer lattice is that of a text log", SIZES)
+    on_lattice: float = record(0.1, "steps", "from the places of a lattice, within which all values lie on it", SIZES)
+    folded_steep: float = record(0.15, "1", "of the 95 % quantile of slopes: less is a rest, no turning point", REAL)
+    folded_smoother: float = record(0.8, "1", "of the curvature there, below which turning the sign over smooths it", REAL)
+    folded_points: int = record(3, "1", "turning points of a speed without its sign; one or two may be chance", REAL)
+    above_noise: float = record(6.0, "1", "standard deviations of a signal's noise, beyond which it is not 0", SIZES)
+    still: float = record(0.02, "1", "of a signal's largest value or range: within, it holds a value, or is 0", SIZES)
+    apart: float = record(0.05, "1", "of the highest speed, by which two speeds or jumps differ", SIZES)
+    slow: float = record(0.1, "1", "of the highest speed or torque: below, it is a slow or a small one", SIZES)
+    held_samples: int = record(20, "samples", "for which a speed is held at least", SIZES)
+    no_ramp: float = record(0.35, "1", "of the band of a held speed, by which its halves differ at most; on a ramp 0.5", SIZES)
+    seen_turn: float = record(0.75, "1", "of a period of the angle, that a record has to turn to show its order", SIZES)
+    seen_path: float = record(3.0, "periods", "of the angle that a record has to travel, there and back, to show an order", SIZES)
+    seen_band: float = record(0.8, "1", "of half the sampling frequency: what is faster does not show", SIZES)
+    gravity_turn: float = record(1 / 6, "turns", "of travel: below, a torque once per turn is a constant and a spring", REAL)
+    swing_damping: float = record(0.5, "1", "damping ratio below which two masses swing as on a shaft", CLEAN)
+
+    # Which linear model holds? What identify() and inverse_dynamics() decide for themselves; a diagnosis starts from it.
+    test_level: float = linear(1e-4, "1", "of the tests that a linear model holds, and that a replay leaves white noise", SUCCESS)
+    undecided_ratio: float = linear(2.0, "1", "rms of a residual over the noise: above, colour may hide a misfit", SUCCESS)
+    cancellation: float = linear(0.02, "1", "of a zero's magnitude: a pole so close cancels it", SUCCESS)
+    contradiction: float = linear(3.0, "1", "standard deviations by which numbers of a mechanism contradict each other", SUCCESS)
+    material_column: float = linear(
+        0.05, "1", "of the squared torque, that a spring or friction by direction takes at least", REAL
+    )
+    lag_left: float = linear(0.05, "1", "of the squared torque, that the regression behind a lag leaves at most", REAL)
+    lag_curvature: float = linear(1e-3, "1", "of the squared torque per squared sample: below, the motion shows no lag", REAL)
+    winding_sure: float = linear(5.0, "1", "standard deviations from 0, from which a resistance or inductance is shown", SUCCESS)
+    least_rows: int = linear(20, "1", "rows of a regression at least, half of them in each direction for dry friction", REAL)
+    both_ways: float = linear(0.02, "1", "of the rows, that either direction has at least to tell dry friction from a load", REAL)
+    spring_turns: float = linear(10.0, "turns", "of travel: beyond, no spring is fixed to the ground", REAL)
+
+    # Effort: budgets.
+    effort_ratio: float = effort(1.1, "1", "rms of whitened errors over the noise: below, no more effort is spent")
+    misfit_ratio: float = effort(
+        2.0, "1", "rms of the whitened errors of the linear model over the noise: above, plain errors first"
+    )
+    loop_ratio: float = effort(2.0, "1", "rms of the free run over the noise: above, output errors are searched as well")
+    most_effects: int = effort(4, "1", "effects in one model")
+    beam_width: int = effort(3, "1", "models that are carried on side by side")
+    beam_reach: float = effort(4.0, "penalties", "how far behind the best a model is carried on")
+    hope: float = effort(0.5, "1", "of what is asked for, that a linearised gain has to promise to be worth a fit")
+    screened: int = effort(6, "1", "candidates that each ranking of the score test sends into a short fit")
+    finished: int = effort(5, "1", "of these, how many are fitted to the end")
+    hopeless: float = effort(0.5, "BIC units per sample", "by which a short fit may be behind the model that it extends")
+    near_mass: float = effort(0.05, "BIC units per sample", "by which one mass with an effect may be behind two, to be looked at")
+    starts: int = effort(3, "1", "best ones of a list (starts, candidates, frequencies, rivals) that are followed up")
+    swaps: int = effort(2, "1", "times that a better rival may take an effect's place")
+    glance: int = effort(3, "iterations", "of a fit that only ranks candidates")
+    short: int = effort(6, "iterations", "of a fit whose neighbourhood is known, or that is one of many")
+    usual: int = effort(12, "iterations", "of a fit of a model that is a step away")
+    long: int = effort(20, "iterations", "of a fit from a start that may be far away")
+    evolution: int = effort(50, "generations", "of a global search beside stops and impacts")
+    enough_samples: int = effort(3500, "samples", "of a search on a coarser grid")
+    proposed_samples: int = effort(4000, "samples", "of a proposed record at least, where the diagnosed one is shorter")
+    commands: int = effort(4, "1", "of the menu of experiments, on which rivals are fitted, not only linearised")
+    head: int = effort(200, "samples", "from whose velocity the start of a model in motion is fitted")
+    draws: int = effort(200, "1", "of the bootstrap of an interval")
+
+
+class Row(NamedTuple):
+    """One number of the policy."""
+
+    name: str
+    value: float
+    unit: str
+    source: str
+    command: str
+    group: str
+
+
+def rows() -> tuple[Row, ...]:
+    """The whole table."""
+    return tuple(
+        Row(f.name, f.default, *(f.metadata[key] for key in ("unit", "source", "command", "group")))  # type: ignore[arg-type]
+        for f in fields(Policy)
+    )
+
+
+POLICY = Policy()
+"""The one policy of all diagnoses."""
