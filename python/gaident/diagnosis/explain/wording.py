@@ -36,9 +36,12 @@ def basis_of(found: Selection) -> list[Text]:
         if found.space.whitens:
             meant = "the standard deviations of the parameters are too small"
         else:
-            meant = "the parameters are those that miss the velocity least, not those that leave white noise"
+            meant = "the parameters are those of least output error, not those that leave white noise"
         text = "What the model leaves is no stationary noise (specification test {:.0f}, bound {:.0f}): {}."
         return [say(text, test.statistic, test.bound, meant)]
     if found.space.whitens:
         return []
-    return [Text("A noise model would take a cause for noise here: the parameters are those that miss the velocity least.")]
+    before = found.whitened
+    if before is not None and not before.space.is_noise(before.final):
+        return [Text("What the model leaves is more than noise: the parameters are those of least output error.")]
+    return [Text("A noise model would take a cause for noise here: the parameters are those of least output error.")]

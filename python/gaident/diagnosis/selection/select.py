@@ -4,8 +4,9 @@
     2. Where more than noise is left, or the free run of the loop is missed: the same search under output errors. What it finds
        is fitted under innovations as well, and counts there if it is better.
        Only this search where the torque itself was measured: noise on the input, which no noise model of the output describes.
-    3. The specification test: where whitened and plain estimates of the selected model contradict each other, its errors are no
-       stationary noise, and the model that output errors select is the result, with the information of its independent samples.
+    3. Whitened errors decide where they leave noise (variance ratio) and where whitened and plain estimates of the selected
+       model do not contradict each other (specification test). Else its errors are no stationary noise, and the model that
+       output errors select is the result, with the information of its independent samples.
     4. The same is the result where it holds a cause that the whitened errors hide: two models, compared by their plain errors.
     5. The rivals of every effect.
 
@@ -114,7 +115,7 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
             return _Found(*plainly, test)
     base, final = _explored(task, space, bases)
     test = specification(space, plain.objective, final)
-    if plainly is None and (test.contradicts or not space.runs_free(final)):
+    if plainly is None and (test.contradicts or not (space.is_noise(final) and space.runs_free(final))):
         plainly = _plainly(plain, bases, note)
     if plainly is not None:
         again = _improved(space, _as_innovations(space, plainly[2]), final)
@@ -122,7 +123,7 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
             base, final = _bare(space, again), again
         test = specification(space, plain.objective, final)
     whitened = _Found(space, base, final, test)
-    if plainly is not None and (test.contradicts or plainly[0].hidden(final, plainly[2])):
+    if plainly is not None and (test.contradicts or not space.is_noise(final) or plainly[0].hidden(final, plainly[2])):
         return _Found(*plainly, test, whitened)
     return whitened
 
