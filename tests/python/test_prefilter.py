@@ -52,3 +52,12 @@ def test_a_slow_error_counts_by_its_slope() -> None:
     )
     assert slow < 0.1 * middle
     assert fast < 1e-3 * middle
+
+
+def test_the_balance_is_where_slope_and_error_have_the_same_power() -> None:
+    """A sine of w rad/s: its slope is w times itself. Several records are one answer."""
+    t = DT * np.arange(6000)
+    for angular in (3.0, 40.0):
+        e = np.sin(angular * t)
+        assert weight().balance(e, (len(e),)) == pytest.approx(angular, rel=0.03)
+        assert weight().balance(np.concatenate([e, e]), (len(e), len(e))) == pytest.approx(angular, rel=0.03)

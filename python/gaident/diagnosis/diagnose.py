@@ -243,7 +243,7 @@ class _Work:
         offset = offset_of(space, self.final)
         estimates = estimates_of(self.objective, self.final)
         causes = [e for e in causes if self._determined(e, estimates[e])]
-        if self.final.effects and not causes:
+        if not causes:
             instead = by_whitened_errors(self.found, self._equivalent_here, self._say)
             if instead is not None:
                 self.notes = said

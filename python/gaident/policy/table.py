@@ -117,7 +117,7 @@ class Policy:
     noise_level: float = noise(
         1e-6,
         "1",
-        "share of records without effects that a test may mistake: of the chi-square test, and calibrated",
+        "share of records without effects that a test may mistake: chi-square; calibrated rows rest on it too",
         CLEAN,
     )
     dependence_gain: float = calibrated(NOISE, "dependence_gain", "BIC units", "of a free function of one signal")
@@ -142,6 +142,7 @@ class Policy:
 
     # Does the logged torque follow from command and velocity through the controller?
     replay_steps: float = loop(3.0, "steps", "of the torque's rounding, within which a replayed torque follows")
+    replay_rms: float = loop(2.0, "steps", "the same, rms")
     replay_left: float = loop(1e-3, "1", "of the replay's squared error, that an effect which explains it leaves at most")
     replay_noise: float = loop(0.1, "1", "of the torque's deviation: more is no noise of a measured torque")
     same_gains: float = loop(1e-2, "1", "relative difference within which records show the same gains")
@@ -154,6 +155,7 @@ class Policy:
     rounded_command: float = loop(5e-5, "1", "of the largest command, that a command may be off in a log of few decimals")
     log_shift: float = loop(50.0, "BIC units", "by which the law holds better before a channel is moved by samples: odds of e^25")
     lag_seen: float = loop(0.5, "samples", "between motion and torque, from which a lag is seen")
+    lag_said: float = loop(0.75, "samples", "from which a lag of an open loop's log is said; a sampled torque stands at 0.5")
     negligible: float = loop(1e-3, "1", "of a signal's largest value or range: less is 0, or the rounding of a log")
 
     # What does a record show? What is spoiled in it, and what it could not have shown.

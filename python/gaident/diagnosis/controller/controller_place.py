@@ -139,7 +139,7 @@ def controller_findings(
     effect = term.name
     n, before = len(plain), float(plain @ plain)
     left = data.replayed_error({term: np.array([value])})
-    if cost < POLICY.replay_left * before or cost < POLICY.replay_steps**2 * floor or white_noise(left, data.torque):
+    if cost < POLICY.replay_left * before or cost < POLICY.replay_rms**2 * floor or white_noise(left, data.torque):
         parameter = next(r for r in table() if r.name == effect).parameters[0]
         name, unit = parameter.name, parameter.unit
         text = say(

@@ -201,7 +201,7 @@ def _measured_note(b: int, lag: TorqueLag | None) -> Text:
 def _of_motion(rec: Record) -> Text:
     """What the motion says of a torque in open loop, where no law proves anything: a note, "" where there is nothing to say."""
     lag = torque_lag(rec)
-    if lag is None or abs(lag.lag) - POLICY.contradiction * lag.std < POLICY.lag_seen:
+    if lag is None or abs(lag.lag) - POLICY.contradiction * lag.std < POLICY.lag_seen or abs(lag.lag) < POLICY.lag_said:
         return Text("")
     remedy = f"where you know that it is the log, read it with shift torque={-round(lag.lag)}. Nothing was moved."
     if lag.lag > 0.0:

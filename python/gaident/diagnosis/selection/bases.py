@@ -204,7 +204,9 @@ def plain_view(task: Task) -> PlainView:
     axis, objective = plain.axis, plain.objective
     inertia = axis.parameters["inertia"]
     weight = Prefilter(axis.dt, 0.0, axis.cutoff_hz, axis.order)
-    weight = replace(weight, corner=max(weight.balance(objective.plain_errors(fit), objective.lengths), _corner(axis)))
+    weight = replace(
+        weight, corner=max(weight.balance(objective.bridged(objective.error(fit)[None, :])[0], objective.lengths), _corner(axis))
+    )
     heaviest = inertia.value + 2.0 * inertia.std if task.data.torque_measured else None
     return PlainView(task.under(OutputErrors(1.0, weight, heaviest)), axis)
 

@@ -33,7 +33,7 @@ def largest_gains(space: Moves, base: Fit, final: Fit, draws: int, seed: int, no
     objective = space.objective
     clean = base.predictor.velocities(base.parameters, base.x[None, :])[0]
     left = _noise_of(objective, final)
-    v = objective.whitened(objective.error(final)[None, :], left)[0]
+    v = left.of(objective.bridged(objective.error(final)[None, :]), objective.lengths)[0]
     pool = v[objective.counted > 0.0]
     gains = np.empty(draws)
     for k in range(draws):

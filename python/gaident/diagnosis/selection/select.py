@@ -122,10 +122,20 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
         if again is not final:
             base, final = _bare(space, again), again
         test = specification(space, plain.objective, final)
+        plainly = _with(plainly, final)
     whitened = _Found(space, base, final, test)
     if plainly is not None and (test.contradicts or not space.is_noise(final) or plainly[0].hidden(final, plainly[2])):
         return _Found(*plainly, test, whitened)
     return whitened
+
+
+def _with(plainly: tuple[Moves, Fit, Fit], whitened: Fit) -> tuple[Moves, Fit, Fit]:
+    """The result of output errors, or the model of whitened errors in its place where it scores better there."""
+    space, base, final = plainly
+    better = _improved(space, ls.fit(space.objective, whitened.hypothesis, whitened.x, WHITE, POLICY.usual), final)
+    if better is final:
+        return plainly
+    return space, base if base.parameters.kind == better.parameters.kind else _bare(space, better), better
 
 
 def _plainly(plain: PlainView, bases: Sequence[Fit], note: Callable[[str], None]) -> tuple[Moves, Fit, Fit]:
