@@ -352,13 +352,13 @@ class _Work:
             self._settle(self.found.space.without(self.final, effect))
 
     def _alternatives(self, effect: str, rivals: Sequence[Rival], even: bool) -> tuple[str, ...]:
-        """Statistical rivals and equivalent effects; even: friction of two levels has one viscous part, and is a load as well."""
+        """Statistical rivals and equivalent effects, no untestable ones; even: friction of two levels is a load as well."""
         names = [r.effect for r in rivals]
         names += sorted(self._equivalent_here(effect))
         for names_of_class in EQUIVALENT:
             if effect in names_of_class and (even or effect != TWO_LEVELS.name):
                 names += [t for t in sorted(names_of_class) if t != effect]
-        return tuple(dict.fromkeys(names))
+        return tuple(name for name in dict.fromkeys(names) if name not in self.not_testable)
 
     def _equivalent_here(self, effect: str) -> set[str]:
         """What these records cannot tell from an effect, whatever their noise, for lack of reversals or of sizes of steps."""
