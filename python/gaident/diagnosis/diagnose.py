@@ -275,11 +275,9 @@ class _Work:
             verdict = "partly explained" if real else "unexplained"
             dropped = [e.replace("_", " ") for e in self.final.effects if e not in causes]
             if dropped:
-                text = (
-                    "The closest description is {}, but it leaves an error that depends on {}: no effect of the library fits, so "
-                    "none is named."
-                )
-                self.notes.append(say(text, " and ".join(dropped), called(driver)))
+                of_driver = say(" that depends on {}", called(driver)) if self.left.gains[driver] > self.left.needed else ""
+                text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
+                self.notes.append(say(text, " and ".join(dropped), of_driver))
         check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None)
         self.notes += check.notes
         if self.final.parameters.held and LOAD.name in self.final.effects:
@@ -308,6 +306,7 @@ class _Work:
             held_out=gains.held_out,
             base_shift=base_shift(self.base, self.final),
             left=self.left.gains,
+            left_needed=self.left.needed,
             line=self.left.line if driver == "time" else None,
             one_sided={e: sizes for e, sizes in self.excited.one_sided.items() if e not in answered},
             mechanics=mechanics,
