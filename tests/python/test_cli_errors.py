@@ -7,6 +7,7 @@ import pickle
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cli_cases import LOOP, NAMES, command, refusal
@@ -49,11 +50,6 @@ def test_messages_speak_of_options(here: Path, capsys: pytest.CaptureFixture[str
             "give delimiter=',' and decimal='.' as in my--run_1.csv, dt=1 says",
             "give --delimiter ',' and --decimal '.' as in my--run_1.csv, dt=1 says",
         ),
-        (
-            f"reverse one, or give {arg('space', 'SearchSpace(gain=...)')}",
-            "reverse one, or give space=SearchSpace(gain=...)",
-            "reverse one, or give --gain LOW HIGH",
-        ),
         (f"leave {arg('pade', '3')} out", "leave pade=3 out", "leave pade=3 out"),
     ):
         error = ReadError(text)
@@ -61,6 +57,20 @@ def test_messages_speak_of_options(here: Path, capsys: pytest.CaptureFixture[str
         again = pickle.loads(pickle.dumps(error))
         assert type(again) is ReadError and in_options(again) == options
         assert in_options(SettingsError(f"run.csv: {error.marked}")) == f"run.csv: {options}"
+
+
+@pytest.mark.parametrize("name", ["identify", "diagnose"])
+@pytest.mark.parametrize("sign", [0.0, -1.0])
+def test_a_record_that_shows_no_gain_has_no_remedy_among_the_options(
+    here: Path, capsys: pytest.CaptureFixture[str], name: str, sign: float
+) -> None:
+    """A range of the gain does not help: it is an option of identify alone, and the rest of the space comes from the record."""
+    torque = np.sign(np.sin(np.arange(400) / 30))
+    velocity = sign * np.cumsum(torque)
+    np.savetxt("bad.csv", np.column_stack([1e-3 * np.arange(400), abs(sign) * torque, velocity]), delimiter=",", header="t,u,w")
+    err = refusal([name, "bad.csv", "--columns", "torque=u,velocity=w"], capsys)
+    assert ("reverse the sign" if sign else "use a record in which the drive moves") in err
+    assert "--gain" not in err and "--inertia" not in err
 
 
 def test_a_forgotten_unit_is_named_and_not_taken_for_a_sign(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -81,7 +91,9 @@ WRONG = [
     (["frobnicate"], "invalid choice: 'frobnicate'"),
     (["identify"], "LOG"),
     (["identify", "stp.csv"], "stp.csv: there is no such file (did you mean 'step.csv'?)"),
-    (["identify", "step.csv", *NAMES, "--frobnicate"], "unrecognized arguments: --frobnicate"),
+    (["identify", "step.csv", *NAMES, "--frobnicate"], "unrecognized arguments: --frobnicate; see gaident identify --help"),
+    (["diagnose", "step.csv", "--sed", "3"], "arguments: --sed 3 (did you mean --seed?); see gaident diagnose --help"),
+    (["identify", "step.csv", "--trails=3"], "arguments: --trails=3 (did you mean --trials?); see gaident identify --help"),
     (["identify", "step.csv", "--kp", "1", "other.csv"], "name all files in one place"),
     (["identify", "step.csv", *NAMES, "--kp", "much"], "--kp: 'much' is no number"),
     (["identify", "step.csv", *NAMES, "--kp", "0.02"], "the controller lacks ki"),

@@ -19,6 +19,7 @@ from gaident.cli import examination as doctor
 from gaident.cli import main
 from gaident.data.guess import guess_channels, unit_from_position, unit_from_velocity
 from gaident.data.listing import columns
+from gaident.drive.draft import draft
 from gaident.drive.drive_file import read_drive_file
 from gaident.messages import Message, shortest
 from gaident.show.progress_bar import Progress
@@ -99,6 +100,50 @@ def test_twins_are_not_guessed_and_a_force_may_be_a_voltage(tmp_path: Path) -> N
     }
     guess = guess_channels(columns(tmp_path / "force.csv"))
     assert {channel: c.name for channel, c in guess.channels.items()} == {"velocity": "speed [rpm]", "torque": "Force [V]"}
+
+
+@pytest.mark.parametrize(
+    ("command", "velocity"),
+    [
+        ("Solldrehzahl [U/min]", "Istdrehzahl [U/min]"),
+        ("Drehzahlsollwert [U/min]", "Drehzahlistwert [U/min]"),
+        ("Sollgeschwindigkeit [mm/s]", "Istgeschwindigkeit [mm/s]"),
+        ("Geschwindigkeitssollwert", "Geschwindigkeitsistwert"),
+        ("speedref", "speedact"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("torque", "kind"),
+    [
+        ("Sollmoment [Nm]", "commanded"),
+        ("Istmoment [Nm]", "measured"),
+        ("Momentensollwert", "commanded"),
+        ("Stromistwert", "measured"),
+    ],
+)
+@pytest.mark.parametrize("swapped", [False, True])
+def test_compound_names_say_what_is_commanded(
+    tmp_path: Path, command: str, velocity: str, torque: str, kind: str, swapped: bool
+) -> None:
+    t = np.arange(50)
+    names = [velocity, command] if swapped else [command, velocity]
+    rows = "\n".join(f"{x};{np.sin(0.1 * x):.6f};{np.sin(0.1 * x - 0.2):.6f};{np.cos(0.1 * x):.6f}" for x in t)
+    (tmp_path / "log.csv").write_text(f"Zeit [ms];{';'.join(names)};{torque}\n{rows}\n")
+    found = draft(columns(tmp_path / "log.csv"), {})
+    assert found.channels == {"command": command, "velocity": velocity, "torque": torque}
+    assert found.torque_is == kind
+
+
+def test_init_asks_which_of_two_velocities_was_measured(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    t = np.arange(50)
+    rows = "\n".join(f"{x},{np.sin(0.1 * x):.6f},{np.sin(0.1 * x - 0.2):.6f},{np.cos(0.1 * x):.6f}" for x in t)
+    Path("two.csv").write_text(f"t [ms],alpha [rpm],beta [rpm],torque [Nm]\n{rows}\n")
+    assert main(["init", "two.csv", "--out", "two.toml", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert 'velocity: the measured velocity, not its command: "alpha [rpm]" or "beta [rpm]"?' in told["fill_in"]
+    assert "velocity" not in told["channels"] and "command" not in told["channels"]
+    assert main(["identify", "two.csv", "--drive", "two.toml", "--loop", "open"]) == 2
+    assert "no column is named for the velocity" in capsys.readouterr().err
 
 
 def test_init_writes_a_drive_file_that_identify_takes(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -415,3 +415,16 @@ def test_the_disturbed_loop_is_the_simulated_one() -> None:
             x = plant.A @ x + plant.B * (integral - CONTROLLER.kp * w[n] + f[n])
             w_old = w[n]
         np.testing.assert_allclose(disturbed(plant, CONTROLLER, DT).response(f), w, atol=1e-12)
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_what_a_record_cannot_test_is_no_alternative(direction: float) -> None:
+    """A load that drives, in one direction of motion: dry friction of two levels is a load as well, but needs both directions."""
+    torque = direction * (1.0 + 0.4 * np.sign(np.sin(np.arange(800) / 37.0)))
+    drive = ga.OneMass(J=0.01, D=0.05).model().with_effect("load_torque", torque=-0.3 * direction)
+    run = ga.run(drive, ga.Record(1e-3, torque=torque, velocity=np.zeros(800)))
+    noise = 0.02 * np.random.default_rng(1).standard_normal(800)
+    dia = ga.diagnose(ga.Record(1e-3, torque=torque, velocity=run.velocity + noise))
+    (load,) = dia.causes
+    assert load.effect == "load_torque" and "coulomb_friction" in load.alternatives
+    assert "asymmetric_friction" in dia.not_testable and not dia.not_testable.keys() & set(load.alternatives)

@@ -103,6 +103,8 @@ def fake() -> Any:
         ),
         force_reason="the torque drives the simulation, and a free run adds up what is small in every sample",
         driver="time",
+        left={"velocity": -20.0, "time": 60.0},
+        left_needed=47.0,
         next_experiment=ga.Proposal(np.zeros(2000), DT, ("cogging", "velocity_ripple"), 412.3, "Slow speeds: several turns."),
         gain_interval=(0.55, 0.64),
         held_out="validation records",
@@ -143,6 +145,14 @@ def summary(result: Any, axis: str = "rotary") -> str:
     from gaident.show.diagnosis_summary import diagnosis_summary
 
     return diagnosis_summary(result, axis)
+
+
+@pytest.mark.parametrize(("left", "needed"), [({"position": -5.0, "time": -3.0}, 47.0), ({"position": 40.0, "time": 30.0}, 47.0)])
+def test_a_driver_that_does_not_count_is_only_the_closest(left: dict[str, float], needed: float) -> None:
+    dia = SimpleNamespace(**{**vars(fake()), "driver": "position", "left": left, "left_needed": needed, "line": None})
+    text = " ".join(summary(dia).split())
+    assert "No single signal explains what is left; what comes closest depends on the position." in text
+    assert "What is left depends" not in text
 
 
 def test_the_summary_reads_as_agreed() -> None:

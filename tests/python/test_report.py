@@ -211,6 +211,16 @@ def test_the_last_part_of_a_record_is_marked_where_it_is_held_out(dia: ga.Diagno
     assert held_out_chart(run, 0.05, "run", "rotary").panels[0].traces[0].x[0] == pytest.approx(1.12)
 
 
+@pytest.mark.parametrize(("gain", "mark"), [(60.0, "most"), (-5.0, "closest")])
+def test_text_and_table_agree_on_what_the_rest_depends_on(dia: ga.Diagnosis, fast: None, gain: float, mark: str) -> None:
+    left = replace(dia, driver="position", left={"position": gain, "time": -3.0}, left_needed=47.0)
+    page = " ".join(re.sub("<[^>]*>", " ", report_page(left)).split())
+    assert re.search(rf"on the position \S*{abs(gain):.0f} {mark}", page)
+    assert ("What is left depends on the position." in page) == (mark == "most")
+    assert ("No single signal explains what is left; what comes closest depends on the position." in page) == (mark == "closest")
+    assert ("Above 47 one counts." in page) == (mark == "closest")
+
+
 def test_it_says_which_record_is_shown_and_that_it_never_reverses(dia: ga.Diagnosis, fast: None) -> None:
     view = view_of(dia, None, None, "rotary")
     one_way = replace(view.fitted[0], measured=80.0 + view.fitted[0].measured)

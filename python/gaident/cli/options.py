@@ -268,9 +268,21 @@ class _Parser(argparse.ArgumentParser):
         more = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
         super().__init__(**{**more, **kwargs})
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Arguments that nothing takes are an error of the command's own parser, which knows its options and its help."""
+        namespace, rest = super().parse_known_args(args, namespace)
+        if rest:
+            self.error(f"unrecognized arguments: {' '.join(rest)}{self._meant(rest[0])}")
+        return namespace, rest
+
+    def _meant(self, argument: str) -> str:
+        """What may have been meant by an argument that nothing takes."""
+        if not argument.startswith("-"):
+            return " (name all files in one place, without options between them)"
+        near = difflib.get_close_matches(argument.partition("=")[0], self._option_string_actions, n=1)
+        return f" (did you mean {near[0]}?)" if near else ""
+
     def error(self, message: str) -> NoReturn:
-        if message.startswith("unrecognized arguments: ") and not message.split()[2].startswith("-"):
-            message += " (name all files in one place, without options between them)"
         if (wrong := re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)) is not None:
             near = difflib.get_close_matches(wrong[1], re.findall(r"[\w-]+", wrong[2]), n=1)
             message = f"{message[: wrong.end(1)]}' (did you mean {near[0]!r}?)" if near else message

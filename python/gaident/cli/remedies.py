@@ -23,8 +23,6 @@ SAME_NAME = {
     ),
 }
 WHOLE = {
-    ("space", "SearchSpace(gain=...)"): "--gain LOW HIGH",
-    ("space", "SearchSpace(...)"): "--inertia LOW HIGH or --gain LOW HIGH",
     ("controller", "None"): "--loop open",
     ("controller", "PI(...)"): "--kp and --ki",
     ("controller", "PI(kp=..., ki=...)"): "--kp and --ki",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 
 __all__ = ["COMMAND_WORDS", "FOREIGN_WORDS", "MEASURED_WORDS", "QUANTITY_WORDS", "words_of"]
 
@@ -34,13 +35,48 @@ QUANTITY_WORDS: dict[str, dict[str, int]] = {
 FOREIGN_WORDS = frozenset(
     (
         *("error", "err", "deviation", "droop", "following", "limit", "max", "min", "load", "ratio", "temp", "temperature"),
+        *("abweichung", "regelabweichung", "schleppfehler", "fehler", "grenze", "last", "temperatur", "beschleunigung"),
         *("status", "state", "seq", "id", "acc", "acceleration", "jerk", "counter", "digital", "selected", "power"),
     )
 )
 """It is no channel of a record."""
 
 
+_JOINTS = ("", "s", "en")  # Geschwindigkeit-s-sollwert, Moment-en-sollwert
+_LETTERS = 3  # no decision: shorter words would be found in any name
+
+
 def words_of(name: str) -> list[str]:
-    """The words of a column's name, small; it is cut at capitals, digits and signs, and a unit in brackets is left out."""
+    """The words of a column's name, small; it is cut at capitals, digits and signs, and a unit in brackets is left out.
+
+    A compound of known words is cut as well, as German writes them.
+
+    >>> [words_of(name) for name in ("Motor speed [rpm]", "Solldrehzahl", "Geschwindigkeitsistwert", "Torsion")]
+    [['motor', 'speed'], ['soll', 'drehzahl'], ['geschwindigkeit', 'istwert'], ['torsion']]
+    """
     spaced = re.sub(r"([a-z])([A-Z])", r"\1 \2", re.sub(r"[\[(<{].*", "", name))
-    return [word.casefold() for word in re.findall(r"[^\W\d_]+", spaced)]
+    found = [word.casefold() for word in re.findall(r"[^\W\d_]+", spaced)]
+    return [part for word in found for part in _parts(word) or (word,)]
+
+
+@cache
+def _known() -> frozenset[str]:
+    """Words that a compound may be made of."""
+    quantities = (word for words in QUANTITY_WORDS.values() for word in words)
+    return frozenset(w for w in (*quantities, *COMMAND_WORDS, *MEASURED_WORDS, *FOREIGN_WORDS) if len(w) >= _LETTERS)
+
+
+@cache
+def _parts(word: str) -> tuple[str, ...]:
+    """The known words that a word is made of, without a rest, the longest first; () where there are none."""
+    if word in _known():
+        return (word,)
+    for end in range(len(word) - _LETTERS, _LETTERS - 1, -1):
+        first = word[:end]
+        if first not in _known():
+            continue
+        for joint in _JOINTS:
+            rest = word[end + len(joint) :] if word.startswith(joint, end) else ""
+            if rest and (parts := _parts(rest)):
+                return (first, *parts)
+    return ()

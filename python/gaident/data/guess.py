@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,15 +21,19 @@ _LEAST = 2
 
 @dataclass(frozen=True)
 class Guess:
-    """Channel -> column, with why; what the file says of its unit stands in the column."""
+    """Channel -> column, with why; what the file says of its unit stands in the column.
+
+    undecided: channel -> columns for which as much speaks.
+    """
 
     channels: Mapping[str, ColumnInfo]
     reasons: Mapping[str, str]
     time: ColumnInfo | None
+    undecided: Mapping[str, tuple[ColumnInfo, ...]] = field(default_factory=dict)
 
 
 def guess_channels(listing: Listing) -> Guess:
-    """The most likely column of each channel; one that nothing speaks for is left out."""
+    """The most likely column of each channel; one that nothing speaks for, or as much for several columns, is left out."""
     usable = [c for c in listing.columns if c.samples > 1 and c.lowest is not None and c.lowest != c.highest and not c.is_time]
     longest = max((c.samples for c in usable), default=0)
     usable = [c for c in usable if c.samples == longest or c.sample_time is not None]
@@ -42,13 +45,17 @@ def guess_channels(listing: Listing) -> Guess:
                 scored[channel].append((score, column, reason))
     channels: dict[str, ColumnInfo] = {}
     reasons: dict[str, str] = {}
+    undecided: dict[str, tuple[ColumnInfo, ...]] = {}
     for channel in ("velocity", "command", "torque", "position"):
         free = [row for row in scored[channel] if row[1].name not in {c.name for c in channels.values()}]
-        best = max(free, key=lambda row: row[0], default=None)
-        if best is not None and not any(score == best[0] and _numbered(column, best[1]) for score, column, _ in free):
-            _, channels[channel], reasons[channel] = best
+        best = max((score for score, _, _ in free), default=0)
+        first = [row for row in free if row[0] == best]
+        if len(first) == 1:
+            _, channels[channel], reasons[channel] = first[0]
+        elif first:
+            undecided[channel] = tuple(column for _, column, _ in first)
     order = {channel: channels[channel] for channel in CHANNELS if channel in channels}
-    return Guess(order, reasons, _time(listing, longest))
+    return Guess(order, reasons, _time(listing, longest), undecided)
 
 
 def _time(listing: Listing, longest: int) -> ColumnInfo | None:
@@ -58,12 +65,6 @@ def _time(listing: Listing, longest: int) -> ColumnInfo | None:
         return named[0]
     even = [c for c in listing.columns if c.rises_evenly and c.samples == longest and c.lowest is not None]
     return even[0] if len(even) == 1 else None
-
-
-def _numbered(one: ColumnInfo, other: ColumnInfo) -> bool:
-    """Whether two columns are told apart by a number only, as u1 and u2 of two motors: which is meant only a person knows."""
-    bare = [re.sub(r"\d+", "#", column.name) for column in (one, other)]
-    return one.name != other.name and bare[0] == bare[1] and "#" in bare[0]
 
 
 def _score(column: ColumnInfo, channel: str) -> tuple[int, str]:

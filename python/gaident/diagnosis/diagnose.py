@@ -275,11 +275,9 @@ class _Work:
             verdict = "partly explained" if real else "unexplained"
             dropped = [e.replace("_", " ") for e in self.final.effects if e not in causes]
             if dropped:
-                text = (
-                    "The closest description is {}, but it leaves an error that depends on {}: no effect of the library fits, so "
-                    "none is named."
-                )
-                self.notes.append(say(text, " and ".join(dropped), called(driver)))
+                of_driver = say(" that depends on {}", called(driver)) if self.left.gains[driver] > self.left.needed else ""
+                text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
+                self.notes.append(say(text, " and ".join(dropped), of_driver))
         check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None)
         self.notes += check.notes
         if self.final.parameters.held and LOAD.name in self.final.effects:
@@ -308,6 +306,7 @@ class _Work:
             held_out=gains.held_out,
             base_shift=base_shift(self.base, self.final),
             left=self.left.gains,
+            left_needed=self.left.needed,
             line=self.left.line if driver == "time" else None,
             one_sided={e: sizes for e, sizes in self.excited.one_sided.items() if e not in answered},
             mechanics=mechanics,
@@ -352,13 +351,13 @@ class _Work:
             self._settle(self.found.space.without(self.final, effect))
 
     def _alternatives(self, effect: str, rivals: Sequence[Rival], even: bool) -> tuple[str, ...]:
-        """Statistical rivals and equivalent effects; even: friction of two levels has one viscous part, and is a load as well."""
+        """Statistical rivals and equivalent effects, no untestable ones; even: friction of two levels is a load as well."""
         names = [r.effect for r in rivals]
         names += sorted(self._equivalent_here(effect))
         for names_of_class in EQUIVALENT:
             if effect in names_of_class and (even or effect != TWO_LEVELS.name):
                 names += [t for t in sorted(names_of_class) if t != effect]
-        return tuple(dict.fromkeys(names))
+        return tuple(name for name in dict.fromkeys(names) if name not in self.not_testable)
 
     def _equivalent_here(self, effect: str) -> set[str]:
         """What these records cannot tell from an effect, whatever their noise, for lack of reversals or of sizes of steps."""

@@ -199,7 +199,10 @@ class _Draft:
             and c.lowest != c.highest
         ]
         others = f"; the log also holds {', '.join(map(_quoted, rest[:8]))}" if rest else ""
-        if "velocity" not in self.guess.channels and "position" not in self.guess.channels:
+        either = " or ".join(_quoted(c.name) for c in self.guess.undecided.get("velocity", ()))
+        if "velocity" not in self.guess.channels and either:
+            lines.append(self._todo('# velocity = "..."', "velocity", f"the measured velocity, not its command: {either}?"))
+        elif "velocity" not in self.guess.channels and "position" not in self.guess.channels:
             lines.append(self._todo('# velocity = "..."', "velocity", f"the measured velocity (or position = ...){others}"))
         if "command" not in self.guess.channels:
             needed = "torque" not in self.guess.channels

@@ -61,8 +61,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
     for what, still in (("torque", not energy > 0.0), ("velocity", all(np.ptp(r.velocity) == 0.0 for r in records))):
         if still:
             raise SpaceError(
-                f"the {what} of the record is constant: nothing can be identified from it; use a record in which the "
-                f"drive moves, or give {arg('space', 'SearchSpace(...)')}"
+                f"the {what} of the record is constant: nothing can be identified from it; use a record in which the drive moves"
             )
     rigid = float(np.linalg.solve(gram, right)[0]) if np.linalg.cond(gram) < 1e14 else 0.0
     found = [k for k in (rigid, steps / energy) if np.isfinite(k) and k > 0.0]
@@ -75,8 +74,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
         found = _held_gain(records, controller)
     if not found:
         raise SpaceError(
-            "the velocity falls when the torque rises: reverse the sign of one of them (for example by a unit of -1), "
-            f"or give {arg('space', 'SearchSpace(gain=...)')}"
+            "the velocity falls when the torque rises: reverse the sign of one of them (for example by a unit of -1)"
         )
     dt = min(rec.dt for rec in records)
     longest = max(rec.duration for rec in records)

@@ -49,6 +49,7 @@ class Diagnosis:
         The linear and the extended model on held-out data.
     driver : str or None
         What the error still depends on: "velocity", "position", "torque", "command", "time", "past" or None.
+        Where its gain in `left` is not above `left_needed`, no signal explains what is left, and this one comes closest.
     next_experiment : Proposal or None
         The experiment that would tell apart what these data cannot.
     gain_interval : tuple of float
@@ -59,6 +60,8 @@ class Diagnosis:
         Parameter of the linear part -> (before, after).
     left : mapping of str to float
         Gain of each driver of what is left [BIC units].
+    left_needed : float
+        The gain from which on a driver counts [BIC units].
     notes : tuple of str
         What to keep in mind, in plain sentences.
     identification : Identification
@@ -147,6 +150,7 @@ class Diagnosis:
     regression_force_error: float | None = None
     comparisons: tuple[Comparison, ...] = ()
     force_reason: str = ""
+    left_needed: float = 0.0
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
@@ -294,6 +298,7 @@ class Diagnosis:
             "regression_force_error": self.regression_force_error,
             "comparisons": [asdict(c) for c in self.comparisons],
             "force_reason": self.force_reason,
+            "left_needed": self.left_needed,
             "linear_axis": linear_sentences(self._sentences()),
         }
 
@@ -359,6 +364,7 @@ class Diagnosis:
                     for c in data.get("comparisons", ())
                 ),
                 force_reason=data.get("force_reason", ""),
+                left_needed=data.get("left_needed", 0.0),
             )
         except (KeyError, TypeError, AttributeError, IndexError) as error:
             raise GaidentError(f"the saved diagnosis is damaged: {error!r}; save it again") from error

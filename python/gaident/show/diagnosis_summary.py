@@ -17,6 +17,7 @@ __all__ = [
     "TESTED_UP_TO",
     "chance_words",
     "diagnosis_summary",
+    "driver_counts",
     "either",
     "fall_words",
     "left_words",
@@ -94,7 +95,15 @@ def left_words(dia: Diagnosis, axis: str) -> str:
     if dia.line is not None:
         frequency, amplitude = dia.line
         like = say(": like a {torque} of {} Hz and {} {N m} at the motor", number(frequency, 3), number(amplitude, 2))
-    return said(say("What is left depends {}{}.", DRIVERS[dia.driver], like), axis)
+    if driver_counts(dia):
+        return said(say("What is left depends {}{}.", DRIVERS[dia.driver], like), axis)
+    text = "No single signal explains what is left; what comes closest depends {}{}."
+    return said(say(text, DRIVERS[dia.driver], like), axis)
+
+
+def driver_counts(dia: Diagnosis) -> bool:
+    """Whether a free function of the driver gains enough to be said to drive what is left."""
+    return dia.driver is not None and dia.left.get(dia.driver, 0.0) > dia.left_needed
 
 
 def verdict_words(dia: Diagnosis) -> str:

@@ -14,6 +14,7 @@ from gaident.show.diagnosis_summary import (
     DRIVERS,
     TESTED_UP_TO,
     chance_words,
+    driver_counts,
     either,
     fall_words,
     left_words,
@@ -231,12 +232,17 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
         parts.append(needs_record(view, "The curves of what was held out need the record."))
     if dia.left:
         found = sorted(dia.left.items(), key=lambda item: -item[1])
+        counts = driver_counts(dia)
+        mark = "most" if counts else "closest"
         lines: list[Row] = [
-            (said(DRIVERS.get(k, k), axis), typeset(f"{g:.0f}"), "most" if k == dia.driver else "") for k, g in found
+            (said(DRIVERS.get(k, k), axis), typeset(f"{g:.0f}"), mark if k == dia.driver else "") for k, g in found
         ]
         parts.append(tag("h3", "What the rest depends on"))
         verdict = "Nothing of it is significant." if dia.driver is None else typeset(left_words(dia, axis))
         parts.append(tag("p", verdict, " BIC units gained by a free function of each; below 0 it is not worth its parameters."))
+        if dia.driver is not None and not counts:
+            text = f"Above {dia.left_needed:.0f} one counts. Where plain errors decide, the closest is what leaves least of them."
+            parts.append(tag("p", text))
         parts.append(table(("", "BIC units", ""), [lines]))
     return Section("gain", "Before and after", *parts)
 
