@@ -224,7 +224,8 @@ def specification(space: Moves, plainly: Objective, fit: Fit) -> Specification:
     """The specification test: the plain errors of the whitened and of the plain estimate of one model.
 
     plainly: the objective of output errors. What no estimate moves by slope, the order of a harmonic, is the same in both and no
-    degree of freedom. H is 0 where the whitened estimate's plain errors are no larger than noise.
+    degree of freedom. H is 0 where the whitened estimate's errors are no larger than noise, as torques
+    and in the free run.
     """
     plain = ls.fit(plainly, fit.hypothesis, fit.x, WHITE, space.policy.usual)
     errors = [plainly.plain_errors(f) for f in (fit, plain)]
@@ -232,7 +233,7 @@ def specification(space: Moves, plainly: Objective, fit: Fit) -> Specification:
     whole, least = (float(e @ e) for e in errors)
     freedom = int(np.count_nonzero(fit.parameters.steps()))
     bound = chi_square_bound(freedom, space.policy.noise_level)
-    if whole < plainly.count * (space.policy.noise_ratio * plainly.data.noise) ** 2:
+    if whole < plainly.count * (space.policy.noise_ratio * plainly.data.noise) ** 2 and space.runs_free(fit):
         return Specification(0.0, bound)
     return Specification(specification_statistic(whole, least, information), bound)
 
@@ -279,11 +280,21 @@ def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> S
     space, final = found.space, found.final
     for swaps_left in range(POLICY.swaps, -1, -1):
         rivals, better = _rivals(space, final, swaps_left > 0, classes, note)
+        if better is not None and _runs_far_worse(space, better, final):
+            rivals, better = _rivals(space, final, False, classes, note)
         if better is None:
             break
         final = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
     base = found.base if found.base.parameters.kind == final.parameters.kind else _bare(space, final)
     return Selection(space, base, final, rivals, found.specification, found.whitened)
+
+
+def _runs_far_worse(space: Moves, better: Fit, final: Fit) -> bool:
+    """Whether a model of smaller whitened errors misses the free run by far more: whitening has hidden a cause that it lacks."""
+    if not space.whitens:
+        return False
+    other, own = (space.plain_cost(f) for f in (better, final))
+    return own < space.policy.overrules * other and not space.runs_free(better)
 
 
 def by_whitened_errors(selection: Selection, classes: Classes, note: Callable[[str], None]) -> Selection | None:
