@@ -155,6 +155,15 @@ def test_a_driver_that_does_not_count_is_only_the_closest(left: dict[str, float]
     assert "What is left depends" not in text
 
 
+def test_a_number_that_was_zero_within_its_deviation_moved_by_no_share() -> None:
+    damping = ga.Estimate(0.0836, 0.0011, "1")
+    for old, moved in ((-0.00043, ""), (0.0, ""), (0.05, "+67.2 %")):
+        dia = SimpleNamespace(**{**vars(fake()), "mechanics": {"resonance_damping": damping}})
+        dia.base_shift = {"resonance_damping": (old, 0.0836)}
+        table = summary(dia).split("How far the effects had bent the linear model")[1].split("\n\n")[0]
+        assert f"{old:.5g}" in table and ("%" in table) == bool(moved) and moved in table
+
+
 def test_the_summary_reads_as_agreed() -> None:
     """Word for word; after a change that is meant, write the new text into golden/diagnosis.txt."""
     assert summary(fake()) + "\n" == GOLDEN.read_text()

@@ -413,3 +413,15 @@ def test_a_gear_between_motor_and_sensor() -> None:
         read(SAMPLES / "scope.csv", columns=columns, load_side="torque")
     with pytest.raises(ReadError, match="load_side names 'position'"):
         read(SAMPLES / "scope.csv", columns=columns, gear_ratio=10.0, load_side=["position"])
+
+
+@pytest.mark.parametrize("columns", [None, {"velocity": "w", "torque": "u"}])
+@pytest.mark.parametrize(("header", "names"), [("t,u,w,x", 4), ("t,u", 2)])
+def test_a_header_that_does_not_fit_the_rows_is_named(
+    tmp_path: Path, columns: dict[str, str | int | None] | None, header: str, names: int
+) -> None:
+    (tmp_path / "log.csv").write_text(header + "\n" + "".join(f"{k},{k * k},{k % 3}\n" for k in range(30)))
+    with pytest.raises(
+        ReadError, match=f"the header has {names} names, the rows have 3 cells, so the file holds '#0', '#1', '#2'"
+    ):
+        read(tmp_path / "log.csv", columns, dt=1e-3)

@@ -186,7 +186,7 @@ def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
 def _say_missing(table: Table, wanted: Wanted, channel: str, what: str) -> str:
     guess = ", or let gaident init write down what the log shows" if wanted.columns is None and table.form != "DataFrame" else ""
     return (
-        f"{table.path}: no column is named for {what}; the file holds {table.listing()}; "
+        f"{table.path}: no column is named for {what}; {table.said()}; "
         f"say which it is with {arg('columns', '...', channel)}{guess}"
     )
 

@@ -22,6 +22,7 @@ __all__ = [
     "fall_words",
     "left_words",
     "mechanical_name",
+    "moved_words",
     "next_words",
     "parameter_row",
     "verdict_words",
@@ -254,10 +255,16 @@ def _base(dia: Diagnosis, axis: str) -> list[str]:
     for name, e in dia.mechanics.items():
         if name in dia.base_shift:
             old, new = dia.base_shift[name]
-            change = f"{100.0 * (new / old - 1.0):+.1f} %" if old else ""
+            change = moved_words(old, new, e.std)
             u = "" if e.unit == "1" else unit(e.unit, axis)
             rows.append((mechanical_name(name, axis), number(old, 5), number(new, 5), change, u))
     return ["How far the effects had bent the linear model", *table(rows)] if len(rows) > 1 and dia.model.effects else []
+
+
+def moved_words(old: float, new: float, std: float | None) -> str:
+    """By how much a parameter moved; empty where it was 0 within its deviation, for no share of that means anything."""
+    nothing = not math.isfinite(old) or abs(old) <= 2.0 * (std or 0.0)
+    return "" if nothing else f"{round(100.0 * (new / old - 1.0), 1) + 0.0:+.1f} %"
 
 
 def _record(dia: Diagnosis, axis: str) -> list[str]:

@@ -82,7 +82,9 @@ class _Layout:
         columns = [Column(h.key, values[:, k], h.names, h.unit, bad.get(k), h.clock, h.period) for k, h in enumerate(headings)]
         if self.dialect.ragged:
             columns = _without_tail(columns)
-        return Table(path, tuple(columns), lines=numbers, form="text")
+        cells = self.dialect.width - self.trailing
+        unused = f"the header has {self.header.unused} names, the rows have {cells} cells" if self.header.unused else ""
+        return Table(path, tuple(columns), lines=numbers, form="text", remark=unused)
 
 
 def open_text(path: str, file: Path, options: TextOptions) -> Table:

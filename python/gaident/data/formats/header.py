@@ -34,10 +34,14 @@ class Heading:
 
 @dataclass(frozen=True)
 class Header:
-    """headings: one per column; start: position, among the lines given, of the first row of numbers."""
+    """headings: one per column; start: position, among the lines given, of the first row of numbers.
+
+    unused: names in the line above the numbers, where they are more or fewer than the columns and so name none; 0: none.
+    """
 
     headings: tuple[Heading, ...]
     start: int
+    unused: int = 0
 
 
 def find_header(lines: Sequence[Line], comments: Sequence[Line], dialect: Dialect) -> Header:
@@ -57,7 +61,8 @@ def find_header(lines: Sequence[Line], comments: Sequence[Line], dialect: Dialec
         in_comments = [cells for _, text in comments if (cells := _cells(COMMENT.sub("", text, count=1), dialect))]
         units = in_comments.pop() if len(in_comments) >= 2 and _is_unit_row(in_comments[-1], in_comments[-2]) else below
         named = in_comments[-1] if in_comments and not _has_number(in_comments[-1], dialect) else None
-        return Header(_headings(named or [""] * dialect.width, None, units), start)
+        unused = 0 if named else _unused(lines[:start], dialect)
+        return Header(_headings(named or [""] * dialect.width, None, units), start, unused)
     index, names = rows[names_at]
     above = rows[names_at - 1][1] if names_at and rows[names_at - 1][0] == index - 1 else None
     if above is not None and _has_number(above, dialect):
@@ -69,6 +74,12 @@ def find_header(lines: Sequence[Line], comments: Sequence[Line], dialect: Dialec
             start = later
             break
     return Header(_headings(names, above, below), start)
+
+
+def _unused(above: Sequence[Line], dialect: Dialect) -> int:
+    """How many names the last line above the numbers holds; 0 where it is no line of names."""
+    cells = split(above[-1][1], dialect.delimiter) if above else []
+    return len(cells) if len(cells) > 1 and all(cells) and not _has_number(cells, dialect) else 0
 
 
 def _first_data(lines: Sequence[Line], dialect: Dialect) -> int:

@@ -96,6 +96,7 @@ class Table:
     batches   of a file that is read row by row: the rows of the columns asked for, block by block; the columns of
               the table itself then hold no values
     form      what the format is called
+    remark    why the columns have no names, where the file holds some; for messages about a missing column
     """
 
     path: str
@@ -106,6 +107,7 @@ class Table:
     first: int = 0
     batches: Callable[[Sequence[Column]], Iterator[Table]] | None = None
     form: str = ""
+    remark: str = ""
 
     def place(self, row: int) -> str:
         """Where a row stands, for messages."""
@@ -224,13 +226,16 @@ class Table:
             f"one of {numbers}"
         )
 
+    def said(self) -> str:
+        """What the file holds, in words."""
+        return f"{f'{self.remark}, so ' if self.remark else ''}the file holds {self.listing()}"
+
     def _missing(self, wanted: str, channel: str) -> str:
         names = {name.casefold(): name for column in self.columns for name in (*column.names, column.key)}
         near = difflib.get_close_matches(wanted.casefold(), names, n=1)
         guess = f" (did you mean {names[near[0]]!r}?)" if near else ""
         return (
-            f"{self.path}: there is no column {wanted!r} for {channel}{guess}; the file holds "
-            f"{self.listing()}; "
+            f"{self.path}: there is no column {wanted!r} for {channel}{guess}; {self.said()}; "
             f"name one of these in {arg('columns', '...', channel)}, or give a number such as '#0' (zero based)"
         )
 

@@ -19,6 +19,7 @@ from gaident.show.diagnosis_summary import (
     fall_words,
     left_words,
     mechanical_name,
+    moved_words,
     next_words,
     parameter_row,
     words,
@@ -171,7 +172,7 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     for name, e in dia.mechanics.items():
         u = "" if e.unit == "1" else unit(e.unit, axis)
         old, new = dia.base_shift.get(name, (math.nan, math.nan))
-        moved = typeset(f"{round(100.0 * (new / old - 1.0), 1) + 0.0:+.1f} %") if old and math.isfinite(old) else None
+        moved = typeset(moved_words(old, new, e.std))
         remark = "" if e.identifiable else "not determined"
         rows.append((mechanical_name(name, axis).strip(), estimate(e.value, e.std), typeset(u), number(old), moved, remark))
     if rows:
