@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfiltfilt
 
+from gaident.estimation.objective import OutputErrors
 from gaident.estimation.prefilter import Prefilter
 
 DT, CORNER, INERTIA = 1e-3, 4.0, 2e-3
@@ -61,3 +62,14 @@ def test_the_balance_is_where_slope_and_error_have_the_same_power() -> None:
         e = np.sin(angular * t)
         assert weight().balance(e, (len(e),)) == pytest.approx(angular, rel=0.03)
         assert weight().balance(np.concatenate([e, e]), (len(e), len(e))) == pytest.approx(angular, rel=0.03)
+
+
+def test_of_a_measured_torque_a_heavier_axis_counts_more_and_a_lighter_one_the_same() -> None:
+    """max(J/J_r, 1) times the error: what follows a noisy torque less gains nothing, nor does a shaft that friction holds."""
+    E = np.repeat(RNG.normal(size=(1, 500)), 3, axis=0)
+    family = OutputErrors(10.0, weight(), INERTIA)
+    weighed = family.prefiltered(E, (500,), INERTIA * np.array([0.5, 1.0, 3.0]))
+    expected = weight().of(E[:1], (500,))[0]
+    assert np.allclose(weighed, expected * np.array([[1.0], [1.0], [3.0]]))
+    assert np.array_equal(OutputErrors(10.0, weight()).prefiltered(E, (500,), INERTIA * np.ones(3)), weight().of(E, (500,)))
+    assert OutputErrors(10.0).prefiltered(E, (500,)) is E
