@@ -128,7 +128,7 @@ def test_a_diagnosis_carries_it_and_its_file_too(tmp_path: Any) -> None:
     assert dia.regression is not None and dia.regression.digests
     assert dia.before.force_error > 5.0 * dia.after.force_error and not any("disagree" in note for note in dia.notes)
     text = dia.summary()
-    assert "Force error, on the last 30 %" in text and "figure to go by here" in " ".join(text.split())
+    assert "Torque error, on the last 30 %" in text and "figure to go by here" in " ".join(text.split())
     assert "Check by inverse-dynamics regression" in text
     dia.save(tmp_path / "dia.json")
     back = ga.load(tmp_path / "dia.json")

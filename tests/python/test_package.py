@@ -88,7 +88,8 @@ def test_sdist_holds_the_sources(sdist: Path) -> None:
 def test_wheel_holds_the_package_and_nothing_else(wheel: Path) -> None:
     python = ROOT / "python"
     sources = [f for f in (python / "gaident").rglob("*") if f.suffix in (".py", ".pyi", ".css", ".js", ".c", ".h")]
-    expected = {f.relative_to(python).as_posix() for f in sources} | {"gaident/py.typed", "gaident/results/results.schema.json"}
+    expected = {f.relative_to(python).as_posix() for f in sources}
+    expected |= {f"gaident/{n}" for n in ("py.typed", "results/results.schema.json", "policy/calibrated.json")}
     info = f"gaident-{pyproject_version()}.dist-info"
     expected |= {f"{info}/{n}" for n in ("METADATA", "WHEEL", "RECORD", "entry_points.txt", "licenses/LICENSE")}
 

@@ -14,9 +14,8 @@ from gaident.control.filtering import filtered, rate_limited
 from gaident.control.pi import PI
 from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
 from gaident.diagnosis.library.names import CLAMP, RATE_LIMIT
-from gaident.estimation.criterion import chi_square_bound
 from gaident.identification.adequacy import white_lags
-from gaident.identification.noise import ljung_box
+from gaident.identification.noise import chi2_tail, ljung_box
 from gaident.policy.table import POLICY
 
 __all__ = ["Explanation", "explain", "rounded_command", "white_noise"]
@@ -118,7 +117,7 @@ def white_noise(off: Vector, logged: Vector) -> float:
     spread = float(np.std(off))
     if not spread < POLICY.replay_noise * float(np.std(logged)):
         return 0.0
-    centred = len(off) * float(np.mean(off)) ** 2 < chi_square_bound(1, POLICY.test_level) * spread**2
+    centred = chi2_tail(len(off) * (float(np.mean(off)) / max(spread, 1e-300)) ** 2, 1) > POLICY.test_level
     return spread if centred and ljung_box([off], white_lags([len(off)])) > POLICY.test_level else 0.0
 
 
