@@ -3,12 +3,13 @@
 // be asked with a branch; on numbers there are selections only. The loop names no effect: it runs over the list (effects/list.hpp) at each
 // hook (effects/effect.hpp). The chain, with a user's own effects (own_effects.hpp) at those marked with a star:
 //
-//     command -> PI -> *actuator -> actuator_dynamics -> *torque -> coupling, *friction -> *sensor -> sensor_dynamics -> reading
+//     command -> controller -> *actuator -> actuator_dynamics -> *torque -> coupling, *friction -> *sensor -> sensor_dynamics -> reading
 //
 // One sample is `substeps` steps of h. In the sampled and the open loop the torque is held over the sample; in the continuous one the
 // controller acts every substep on the linearly interpolated command, and its torque is extrapolated to the substep's mean (third order).
 #pragma once
 
+#include "../control/servo.hpp"
 #include "mechanism.hpp"
 #include "own_effects.hpp"
 
@@ -20,16 +21,18 @@ namespace gaident {
 struct EffectRun {
     EffectSet effects;
     Loop loop;
-    double sample_time = 0.0;
+    double sample_time = 0.0;  // of the controller
+    int log_every = 1;         // outputs are written for the first of so many samples
     int substeps = 1;
     int order = 0;                     // of the plant in observer form
     bool two_masses = false;           // the coupling is not linear
     bool moving = false;               // the record does not start at rest
     std::span<const double> input;     // command, or torque in open loop
-    std::span<const double> position;  // measured, or empty
+    std::span<const double> velocity_feedforward, torque_feedforward;  // of a servo, or empty
+    std::span<const double> position;                                  // measured, or empty
     double start_angle = 0.0;
 
-    // Written where not null, lanes side by side: input.size() * width numbers.
+    // Written where not null, lanes side by side: input.size() / log_every * width numbers.
     double* velocity = nullptr;
     double* torque = nullptr;
     double* angle = nullptr;
@@ -59,20 +62,26 @@ struct PastTorques {
     }
 };
 
-template <class R, class Plant>
+// Control: ControllerState, or Servo.
+template <class R, class Plant, class Control>
 class EffectLoop {
+    static constexpr bool is_servo = std::same_as<Control, Servo<R>>;
+
 public:
     EffectLoop(const EffectRun& run, const EffectConstants<R>& constants)
         : run_(run),
           set_(run.effects),
           c_(constants),
           plant_(constants, run.order),
-          pi_(run.loop.controller, Clock{run.sample_time}) {
+          pi_(controller_of(run)) {
         const bool continuous = run.loop.kind == LoopKind::continuous;
         h_ = run.sample_time / run.substeps;
-        if (continuous) pi_ = ControllerState<R>(run.loop.controller, Clock{h_});
+        if constexpr (!is_servo)
+            if (continuous) pi_ = ControllerState<R>(run.loop.controller, Clock{h_});
         turning_ = run.own != nullptr;
-        const Beginning<R> start{plant_.velocity(), c_.before, R(run.moving && !run.input.empty() ? run.input[0] : 0.0)};
+        const bool placed = run.loop.kind == LoopKind::servo && run.loop.servo.position_gain > 0.0;
+        const R command = run.moving && !run.input.empty() ? (placed ? plant_.velocity() : R(run.input[0])) : R(0.0);
+        const Beginning<R> start{plant_.velocity(), c_.before, command};
         Effects::each([&]<class E>() {
             if (!set_.has<E>()) return;
             const auto& c = c_.effects.template of<E>();
@@ -85,7 +94,8 @@ public:
             if constexpr (hook::law<E>) E::law(c, law_);
             if constexpr (hook::begin<E>) E::begin(c, states_.template of<E>(), start);
         });
-        pi_.s = c_.stored;
+        if constexpr (!is_servo) pi_.s = c_.stored;
+        else if (run.moving) pi_.rest(start.command, start.velocity, c_.stored);
         if (run.own != nullptr) {
             own_torque_ = run.own->at(OwnPlace::torque);
             own_friction_ = run.own->at(OwnPlace::friction);
@@ -112,6 +122,11 @@ public:
 private:
     static constexpr std::size_t width = static_cast<std::size_t>(Pack<R>::width);
 
+    static Control controller_of(const EffectRun& run) {
+        if constexpr (is_servo) return Control(run.loop.controller, run.loop.servo, run.sample_time);
+        else return Control(run.loop.controller, Clock{run.sample_time});
+    }
+
     // All zero.
     static typename Effects::States<R> no_states() {
         typename Effects::States<R> s;
@@ -127,8 +142,9 @@ private:
             theta_ = run_.position.empty() ? angle_ : R(here);
             time_ = static_cast<double>(n) * run_.sample_time;
             const R y = sensor();
-            const R u = open ? R(run_.input[n]) : control(R(run_.input[n]), y);
-            write(n, y, u);
+            const R u = open ? R(run_.input[n]) : control(n, y);
+            if constexpr (!is_servo) write(n, y, u);
+            else if (n % static_cast<std::size_t>(run_.log_every) == 0) write(n / static_cast<std::size_t>(run_.log_every), y, u);
             act(u);
             for (int j = 0; j < run_.substeps; ++j) {
                 middle(here, next, (j + 0.5) * share);
@@ -234,13 +250,24 @@ private:
         });
     }
 
-    [[gnu::always_inline]] R control(R r, R y) {
-        r = Effects::chain(r, [&]<class E>(R x) __attribute__((always_inline)) {
+    [[gnu::always_inline]] R control(std::size_t n, R y) {
+        if constexpr (is_servo) {
+            const auto fed = [&](std::span<const double> signal) { return R(signal.empty() ? 0.0 : signal[n]); };
+            const R r = pi_.command(n, R(run_.input[n]), fed(run_.velocity_feedforward), angle_);
+            return pi_.torque(shaped(r), y, fed(run_.torque_feedforward));
+        } else {
+            return control(R(run_.input[n]), y);
+        }
+    }
+    [[gnu::always_inline]] R control(R r, R y) { return pi_.step(shaped(r) - y); }
+
+    // The velocity command as the effects let it pass.
+    [[gnu::always_inline]] R shaped(R r) {
+        return Effects::chain(r, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::command<E>)
                 if (set_.has<E>()) return E::command(c_.effects.template of<E>(), states_.template of<E>(), x);
             return x;
         });
-        return pi_.step(r - y);
     }
 
     [[gnu::noinline]] R asked(OwnPlace place, R w, R u, double t) const {
@@ -336,7 +363,7 @@ private:
     const EffectSet set_;
     const EffectConstants<R>& c_;
     Plant plant_;
-    ControllerState<R> pi_;
+    Control pi_;
     double h_;
     bool dry_ = false, actuator_in_time_ = false, looking_back_ = false, filtering_ = false, turning_ = false;
     bool own_shaft_ = false, own_torque_ = false, own_friction_ = false, own_actuator_ = false, own_sensor_ = false;
@@ -354,13 +381,17 @@ private:
 // Runs the lanes whose constants are given, with the plant's order known to the compiler where it is a usual one.
 template <class R>
 void run_effects(const EffectRun& run, const EffectConstants<R>& c) {
-    if (run.two_masses) return EffectLoop<R, TwoMassPlant<R>>(run, c)();
+    const auto under = [&]<class Plant>() {
+        if (run.loop.kind == LoopKind::servo) EffectLoop<R, Plant, Servo<R>>(run, c)();
+        else EffectLoop<R, Plant, ControllerState<R>>(run, c)();
+    };
+    if (run.two_masses) return under.template operator()<TwoMassPlant<R>>();
     switch (run.order) {
-        case 1: return EffectLoop<R, ObserverPlant<R, 1>>(run, c)();
-        case 2: return EffectLoop<R, ObserverPlant<R, 2>>(run, c)();
-        case 3: return EffectLoop<R, ObserverPlant<R, 3>>(run, c)();
-        case 5: return EffectLoop<R, ObserverPlant<R, 5>>(run, c)();
-        default: return EffectLoop<R, ObserverPlant<R, -1>>(run, c)();
+        case 1: return under.template operator()<ObserverPlant<R, 1>>();
+        case 2: return under.template operator()<ObserverPlant<R, 2>>();
+        case 3: return under.template operator()<ObserverPlant<R, 3>>();
+        case 5: return under.template operator()<ObserverPlant<R, 5>>();
+        default: return under.template operator()<ObserverPlant<R, -1>>();
     }
 }
 

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
-from gaident.control.pi import PI
+from gaident.control.cascade import Cascade, Controller, cascade_of
+from gaident.control.pi import RULES, PI
+from gaident.control.ticks import ticks_of
 
 __all__ = [
     "clock",
@@ -23,6 +25,7 @@ __all__ = [
     "held_torque",
     "loop",
     "loop_name",
+    "needs_steps",
     "record",
     "recurrence",
     "simulate",
@@ -32,9 +35,14 @@ Vector = NDArray[np.float64]
 Roots = NDArray[np.complex128]
 
 
-def loop_name(controller: PI | None) -> str:
+def loop_name(controller: Controller | None) -> str:
     """ "sampled", "continuous" or "open"."""
     return "open" if controller is None else controller.loop
+
+
+def needs_steps(controller: Controller | None) -> bool:
+    """Whether controller and plant are simulated step by step: one difference equation holds a bare PI only."""
+    return controller is not None and cascade_of(controller) is not None
 
 
 def clock(dt: float) -> _core.Clock:
@@ -68,11 +76,52 @@ def discrete(gain: float, poles: Roots, zeros: Roots, dt: float, controller: PI 
 
 
 def effect_record(
-    dt: float, source: Vector, position: Vector, velocity: Vector, start_angle: float, controller: PI | None
+    dt: float, source: Vector, position: Vector | None, velocity: Vector, start_angle: float, controller: Controller | None
 ) -> _core.EffectRecord:
-    """A record and its loop, for models with effects."""
+    """A record and its loop, for models with effects and for every controller.
+
+    source: command [rad/s], in the open loop torque [N m], with a position controller position command [rad].
+    """
+    cascade = None if controller is None else cascade_of(controller)
+    if cascade is not None:
+        return _servo_record(dt, source, position, velocity, start_angle, cascade)
+    assert not isinstance(controller, Cascade)
     return _core.EffectRecord(
-        clock=clock(dt), input=source, position=position, velocity=velocity, start_angle=start_angle, loop=loop(controller)
+        clock=clock(dt),
+        input=source,
+        position=np.zeros(0) if position is None else position,
+        velocity=velocity,
+        start_angle=start_angle,
+        loop=loop(controller),
+    )
+
+
+def _servo_record(
+    dt: float, source: Vector, position: Vector | None, velocity: Vector, start_angle: float, cascade: Cascade
+) -> _core.EffectRecord:
+    ticks = ticks_of(cascade, dt, source, position)
+    period = dt / ticks.log_every
+    pi = cascade.velocity
+    settings = _core.ServoSettings(
+        newest=RULES[pi.rule],
+        command_weight=pi.command_weight,
+        anti_windup=pi.anti_windup,
+        tracking_time=pi.tracking_time or 0.0,
+        command_filters=[f.digital(period) for f in cascade.command_filters],
+        velocity_filters=[f.digital(period) for f in cascade.velocity_filters],
+        torque_filters=[f.digital(period) for f in cascade.torque_filters],
+        position_gain=0.0 if cascade.position is None else cascade.position.gain,
+        position_every=cascade.position_every(dt),
+    )
+    return _core.EffectRecord(
+        clock=_core.Clock(period=period, log_every=ticks.log_every),
+        input=ticks.source,
+        position=ticks.position,
+        velocity=velocity,
+        start_angle=start_angle,
+        loop=_core.Loop(kind="servo", controller=core_controller(pi), servo=settings),
+        velocity_feedforward=ticks.velocity_feedforward,
+        torque_feedforward=ticks.torque_feedforward,
     )
 
 
