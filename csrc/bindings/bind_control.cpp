@@ -2,6 +2,8 @@
 // another by its place.
 #include "bindings.hpp"
 
+#include "gaident/control/servo.hpp"
+
 using namespace gaident;
 
 namespace {
@@ -36,6 +38,21 @@ Start start_named(const std::string& name) {
     if (name == "steady") return Start::steady;
     if (name == "free") return Start::free;
     throw std::invalid_argument("start must be 'rest', 'steady' or 'free', not '" + name + "'");
+}
+
+// The torque that a servo makes of measured signals, one after the other at its own clock; from rest.
+RealArray servo_torque(const Clock& clock, const Loop& loop, const RealArray& source, const RealArray& velocity,
+                       const RealArray& position, const RealArray& velocity_feedforward, const RealArray& torque_feedforward) {
+    const py::ssize_t n = source.size();
+    for (const RealArray* signal : {&velocity, &position, &velocity_feedforward, &torque_feedforward})
+        if (signal->size() != n) throw std::invalid_argument("every signal needs as many samples as the source");
+    Servo<double> servo(loop.controller, loop.servo, clock.period);
+    RealArray torque(n);
+    for (py::ssize_t i = 0; i < n; ++i) {
+        const double r = servo.command(static_cast<std::size_t>(i), source.at(i), velocity_feedforward.at(i), position.at(i));
+        torque.mutable_data()[i] = servo.torque(r, velocity.at(i), torque_feedforward.at(i));
+    }
+    return torque;
 }
 
 }  // namespace
@@ -84,6 +101,8 @@ void bind_control(py::module_& m) {
                  return Loop{loop_named(kind), controller, servo};
              }),
              py::kw_only(), py::arg("kind"), py::arg("controller") = Controller{}, py::arg("servo") = ServoSettings{});
+    m.def("servo_torque", &servo_torque, py::kw_only(), py::arg("clock"), py::arg("loop"), py::arg("source"), py::arg("velocity"),
+          py::arg("position"), py::arg("velocity_feedforward"), py::arg("torque_feedforward"));
     py::class_<PyRecord>(m, "Record")
         .def(py::init<const Clock&, RealArray, RealArray, const std::string&, double>(), py::kw_only(), py::arg("clock"),
              py::arg("input"), py::arg("output"), py::arg("start"), py::arg("velocity0"));

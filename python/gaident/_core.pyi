@@ -125,6 +125,18 @@ class ServoSettings:
         position_every: int,
     ) -> None: ...
 
+def servo_torque(
+    *,
+    clock: Clock,
+    loop: Loop,
+    source: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    position: NDArray[np.float64],
+    velocity_feedforward: NDArray[np.float64],
+    torque_feedforward: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Torque [N m] that a servo makes of measured signals at its own clock, from rest."""
+
 class Loop:
     """How the loop is closed, "continuous", "sampled", "servo" or "open", and over which controller; "open" has none."""
 

@@ -131,7 +131,9 @@ class Cascade:
             raise ControllerError(f"delay is {self.delay:g}: give seconds, >= 0")
         if self.position is None and (self.velocity_feedforward != 0.0 or self.position_period is not None):
             given = "velocity_feedforward" if self.velocity_feedforward != 0.0 else "position_period"
-            raise ControllerError(f"{given} belongs to a position controller, and there is none: give position=P(gain) or leave it out")
+            raise ControllerError(
+                f"{given} belongs to a position controller, and there is none: give position=P(gain) or leave it out"
+            )
         if self.period is not None and self.position_period is not None:
             _multiple(self.position_period, self.period, "position_period", "period")
         for name in FILTERS:

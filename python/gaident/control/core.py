@@ -28,6 +28,7 @@ __all__ = [
     "needs_steps",
     "record",
     "recurrence",
+    "servo_torque",
     "simulate",
 ]
 
@@ -101,6 +102,35 @@ def _servo_record(
 ) -> _core.EffectRecord:
     ticks = ticks_of(cascade, dt, source, position)
     period = dt / ticks.log_every
+    return _core.EffectRecord(
+        clock=_core.Clock(period=period, log_every=ticks.log_every),
+        input=ticks.source,
+        position=ticks.position,
+        velocity=velocity,
+        start_angle=start_angle,
+        loop=_servo(cascade, period, cascade.position_every(dt)),
+        velocity_feedforward=ticks.velocity_feedforward,
+        torque_feedforward=ticks.torque_feedforward,
+    )
+
+
+def servo_torque(dt: float, source: Vector, velocity: Vector, position: Vector | None, cascade: Cascade) -> Vector:
+    """Torque [N m] (n,) that a cascade makes of measured signals (n,), from rest; the log has a line for each of its samples."""
+    ticks = ticks_of(cascade, dt, source, position)
+    none = np.zeros(len(source))
+    fed, added = ticks.velocity_feedforward, ticks.torque_feedforward
+    return _core.servo_torque(
+        clock=clock(dt),
+        loop=_servo(cascade, dt, cascade.position_every(dt)),
+        source=ticks.source,
+        velocity=velocity,
+        position=none if position is None else position,
+        velocity_feedforward=fed if len(fed) else none,
+        torque_feedforward=added if len(added) else none,
+    )
+
+
+def _servo(cascade: Cascade, period: float, position_every: int) -> _core.Loop:
     pi = cascade.velocity
     settings = _core.ServoSettings(
         newest=RULES[pi.rule],
@@ -111,18 +141,9 @@ def _servo_record(
         velocity_filters=[f.digital(period) for f in cascade.velocity_filters],
         torque_filters=[f.digital(period) for f in cascade.torque_filters],
         position_gain=0.0 if cascade.position is None else cascade.position.gain,
-        position_every=cascade.position_every(dt),
+        position_every=position_every,
     )
-    return _core.EffectRecord(
-        clock=_core.Clock(period=period, log_every=ticks.log_every),
-        input=ticks.source,
-        position=ticks.position,
-        velocity=velocity,
-        start_angle=start_angle,
-        loop=_core.Loop(kind="servo", controller=core_controller(pi), servo=settings),
-        velocity_feedforward=ticks.velocity_feedforward,
-        torque_feedforward=ticks.torque_feedforward,
-    )
+    return _core.Loop(kind="servo", controller=core_controller(pi), servo=settings)
 
 
 def record(dt: float, source: Vector, velocity: Vector, start: str, velocity0: float) -> _core.Record:

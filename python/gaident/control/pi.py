@@ -117,7 +117,9 @@ class PI:
             raise ControllerError(f"command_weight is {weight:g}: give a number >= 0; 1 is a PI, 0 an IP controller")
         object.__setattr__(self, "command_weight", weight)
         if self.anti_windup != "none" and self.torque_limit is None:
-            raise ControllerError(f'anti_windup is "{self.anti_windup}" without a torque_limit, at which it would act: give torque_limit=')
+            raise ControllerError(
+                f'anti_windup is "{self.anti_windup}" without a torque_limit, at which it would act: give torque_limit='
+            )
         if (self.anti_windup == "tracking") != (self.tracking_time is not None):
             raise ControllerError(
                 f'anti_windup is "{self.anti_windup}" and tracking_time is {self.tracking_time}: "tracking" needs a tracking_time '

@@ -40,7 +40,9 @@ def ticks_of(controller: Cascade, dt: float, command: Vector, position: Vector |
         velocity = _slope(source, step, period)
     fed = np.zeros(0)
     if controller.acceleration_feedforward != 0.0 or controller.friction_feedforward != 0.0:
-        fed = controller.acceleration_feedforward * _slope(velocity, step, period) + controller.friction_feedforward * np.sign(velocity)
+        fed = controller.acceleration_feedforward * _slope(velocity, step, period) + controller.friction_feedforward * np.sign(
+            velocity
+        )
     return Ticks(
         every,
         source,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, called, say
+from gaident.control.cascade import Cascade, Controller
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
@@ -33,9 +34,11 @@ from gaident.diagnosis.selection.rivals import Rival
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.objective import Fit, Objective
+from gaident.errors import SettingsError
 from gaident.estimation.uncertainty import estimates_of
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
+from gaident.models.drive_torque import torque_driven
 from gaident.models.simulate import simulate
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
@@ -51,7 +54,7 @@ DIVERGED = 1e6  # no decision: of the velocity; a simulation that leaves so much
 
 def diagnose(
     rec: Record | Sequence[Record],
-    controller: PI | None = None,
+    controller: Controller | None = None,
     identification: Identification | None = None,
     validation: Record | Sequence[Record] | None = None,
     noise: float | Record | None = None,
@@ -71,8 +74,9 @@ def diagnose(
     ----------
     rec : Record or sequence of Record
         The data.
-    controller : PI, optional
+    controller : PI or Cascade, optional
         The velocity loop; None: open loop, the record's torque drives the model.
+        Under what is no bare PI at the log's rate the torque drives the model too: as logged, or as this controller makes it.
     identification : Identification, optional
         What `identify` found; None: it is run first.
     validation : Record or sequence of Record, optional
@@ -113,8 +117,11 @@ def diagnose(
     """
     began = time.perf_counter()
     note = Note(progress)
-    records = records_of(rec, "rec")
-    held = () if validation is None else records_of(validation, "validation")
+    if controller is not None and not isinstance(controller, PI | Cascade):
+        raise SettingsError(f"controller is {controller!r}: give a gaident.PI or a Cascade, or None for a record in open loop")
+    given, given_held = records_of(rec, "rec"), () if validation is None else records_of(validation, "validation")
+    records, loop, under = torque_driven(given, controller)
+    held, controller = torque_driven(given_held, controller).records if given_held else (), loop
     checked(records, held, controller, identification, bootstrap, seed, progress)
     records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
@@ -131,6 +138,7 @@ def diagnose(
         work = _Work(moved.records, moved.held, logged, idn, noise_std, note)
         work.search()
         result = moved.noted(replace(work.report(seed), noise=noise_std, bootstrap=bootstrap))
+        result = replace(result, notes=(*under, *result.notes)) if under else result
         if bootstrap:
             from gaident.diagnosis.selection.bootstrap import with_p_value
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gaident import _core
 from gaident.control import core
+from gaident.control.cascade import Controller
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import SettingsError, SpaceError
@@ -25,6 +26,7 @@ from gaident.identification.parts import search_parts
 from gaident.identification.selection import Candidate
 from gaident.identification.space import derive_space
 from gaident.messages import Message
+from gaident.models.drive_torque import torque_driven
 from gaident.models.mechanics import mechanics_from_model
 from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
@@ -49,7 +51,7 @@ REACH = math.log(2.0)  # no decision: effort; units of BIC per sample: twice the
 
 def identify(
     rec: Record | Sequence[Record],
-    controller: PI | None = None,
+    controller: Controller | None = None,
     space: SearchSpace | None = None,
     settings: Settings | None = None,
     trials: int = 1,
@@ -66,8 +68,9 @@ def identify(
     ----------
     rec : Record or sequence of Record
         The data; one model for all, each record with its own initial state.
-    controller : PI, optional
+    controller : PI or Cascade, optional
         The velocity loop, driven by the record's command; None: open loop, the record's torque drives the model.
+        Under what is no bare PI at the log's rate the torque drives the model too: as logged, or as this controller makes it.
     space : SearchSpace, optional
         Search ranges; None: derived from the data, see `Identification.space`.
     settings : Settings, optional
@@ -115,7 +118,7 @@ def identify(
     (1, 0, 0.01, 0.05, False)
     """
     began = time.perf_counter()
-    given = checked_records(rec, controller)
+    given, controller, under = torque_driven(checked_records(rec, controller), controller)
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
@@ -139,6 +142,8 @@ def identify(
     if derived and not settings.species:
         warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
         object.__setattr__(result, "warnings", (*result.warnings, warning))
+    if under:
+        object.__setattr__(result, "warnings", (*under, *result.warnings))
     overflows = sum(t.overflows for t in found)
     if overflows:
         evaluations = sum(t.evaluations for t in found)

@@ -229,7 +229,9 @@ def _simulated(
     if not plant.effects and not isinstance(controller, Cascade) and not core.needs_steps(controller):
         return *_core_simulate(plant, rec.dt, source, controller, start, arithmetic), None
     if arithmetic != "double":
-        raise ModelError(f'arithmetic is {arithmetic!r}: a model with effects, or a controller that is no bare PI, has "double" only')
+        raise ModelError(
+            f'arithmetic is {arithmetic!r}: a model with effects, or a controller that is no bare PI, has "double" only'
+        )
     starts = start.reshape(1, -1) if state is not None else np.zeros((0, 0))
     found = simulated_with_effects(core_record(rec, source, controller), [plant], starts, steps, 1, True)
     velocity, torque, angle = (signal[0] for signal in found)

@@ -36,8 +36,6 @@ def checked(
     progress: ProgressCallback | None,
 ) -> None:
     """Raises RecordError or SettingsError for what cannot be diagnosed."""
-    if controller is not None and not isinstance(controller, PI):
-        raise SettingsError(f"controller is {controller!r}: give a gaident.PI, or None for a record in open loop")
     if idn is not None and not isinstance(idn, Identification):
         raise SettingsError(f"identification is {type(idn).__name__}: give what identify() returned, or None")
     for r in (*records, *held):
