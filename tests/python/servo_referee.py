@@ -1,7 +1,7 @@
-"""A servo axis simulated by other means than the library's: the plant by SciPy's exact hold on a fine grid, the controller line by line.
+"""A servo axis simulated by other means than the library's: the plant by SciPy's exact hold, the controller line by line.
 
-It follows the definition of the controller and shares no code with gaident: filters come from scipy.signal, the plant is a state space
-in physical coordinates, stepped ten times in a controller sample.
+It follows the definition of the controller and shares no code with gaident: filters come from scipy.signal, the plant is a state
+space in physical coordinates, stepped ten times in a controller sample.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ def notch(hz: float, zn: float, zd: float, T: float) -> Filter:
 def simulate(axis: Axis, source: np.ndarray, T: float, every: int = 1, **c: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(velocity, torque, position) at every `every`-th controller sample; source: command at the controller's samples.
 
-    c: kp, ki, rule, weight, windup, tracking, torque_limit, integrator_limit, position_gain, position_every, kff, aff, fff, filters as
-    lists of Filter (torque_filters, velocity_filters, command_filters).
+    c: kp, ki, rule, weight, windup, tracking, torque_limit, integrator_limit, position_gain, position_every, kff, aff, fff,
+    filters as lists of Filter (torque_filters, velocity_filters, command_filters).
     """
     A, B = axis.state_space()
     F, G, *_ = signal.cont2discrete((A, B, np.eye(len(A)), np.zeros((len(A), 1))), T / FINE, "zoh")

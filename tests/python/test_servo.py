@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import servo_referee as referee
 
 import gaident as ga
+import servo_referee as referee
 
 T = 125e-6
 KP, KI = 0.05, 2.0
@@ -128,3 +128,105 @@ def test_position_loops(name: str, axis: tuple[referee.Axis, Any], every: int) -
     assert np.abs(run.velocity - w)[:-9].max() < 1e-5 * np.abs(w).max()
     assert np.abs(run.torque - u)[:-9].max() < 1e-5 * np.abs(u).max()
     assert np.abs(run.position - q)[:-9].max() < 1e-5
+
+
+def servo_record(every: int, seed: int = 3) -> tuple[ga.Record, ga.Cascade]:
+    """A drive of one mass under a backward PI with a torque filter and anti-windup, 0.02 rad/s of noise."""
+    samples = 2000 * every
+    r = np.repeat(np.random.default_rng(seed).uniform(-60.0, 60.0, 20), samples // 20)
+    w, u, _ = referee.simulate(
+        ONE[0], r, T, every, kp=KP, ki=KI, rule="backward", torque_limit=2.0, windup="hold", torque_filters=[low(4e-4)]
+    )
+    w = w + 0.02 * np.random.default_rng(seed + 1).standard_normal(len(w))
+    drive = ga.Cascade(
+        ga.PI(KP, KI, rule="backward", torque_limit=2.0, anti_windup="hold"), period=T, torque_filters=(ga.LowPass(4e-4),)
+    )
+    return ga.Record(every * T, command=r[::every], velocity=w, torque=u), drive
+
+
+@pytest.mark.parametrize("every", [1, 8])
+def test_a_clean_drive_under_a_whole_known_controller_is_adequate(every: int) -> None:
+    rec, drive = servo_record(every)
+    dia = ga.diagnose(rec, drive)
+    assert dia.verdict == "adequate", dia.summary()
+    assert not dia.findings
+    assert dia.mechanics is not None
+    assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=2e-3)
+
+
+def test_the_torque_drives_the_identification() -> None:
+    rec, drive = servo_record(1)
+    idn = ga.identify(rec, drive, seed=1)
+    assert (idn.p, idn.q) == (1, 0)
+    assert idn.mechanics is not None
+    assert pytest.approx(1e-3, rel=2e-3) == idn.mechanics.J
+    assert any("its torque drives the model" in w for w in idn.warnings)
+
+
+def test_a_torque_that_another_controller_made_is_said() -> None:
+    rec, drive = servo_record(1)
+    idn = ga.identify(rec, ga.Cascade(drive.velocity, period=T), seed=1)
+    assert any("does not follow from command and velocity" in w for w in idn.warnings)
+
+
+def test_what_is_lost_between_the_lines_is_an_error() -> None:
+    rec, drive = servo_record(8)
+    with pytest.raises(ga.errors.RecordError, match="a line for every 8th sample of the controller only"):
+        ga.identify(rec.with_channels(torque=None), drive)
+
+
+WRONG: dict[str, tuple[Any, str]] = {
+    "rule": (lambda: ga.PI(1.0, 1.0, rule="euler"), "rule is 'euler'"),
+    "weight": (lambda: ga.PI(1.0, 1.0, command_weight=-1.0), "command_weight is -1"),
+    "windup": (lambda: ga.PI(1.0, 1.0, anti_windup="hold"), "without a torque_limit"),
+    "tracking": (lambda: ga.PI(1.0, 1.0, torque_limit=1.0, anti_windup="tracking"), "needs a tracking_time"),
+    "time": (lambda: ga.PI(1.0, 1.0, torque_limit=1.0, tracking_time=1.0), "the others have none"),
+    "continuous": (lambda: ga.PI(1.0, 1.0, loop="continuous", rule="forward"), 'give loop="sampled"'),
+    "velocity": (lambda: ga.Cascade(ga.PI(1.0, 1.0, loop="continuous")), "the digital controller"),
+    "gain": (lambda: ga.P(0.0), "gain is 0"),
+    "position": (lambda: ga.Cascade(ga.PI(1.0, 1.0), position=40.0), "give P"),  # type: ignore[arg-type]
+    "feedforward": (lambda: ga.Cascade(ga.PI(1.0, 1.0), velocity_feedforward=1.0), "there is none: give position=P"),
+    "period": (lambda: ga.Cascade(ga.PI(1.0, 1.0), period=0.0), "period is 0"),
+    "multiple": (lambda: ga.Cascade(ga.PI(1.0, 1.0), period=3e-4).log_every(1e-3), "such as 0.0009 s"),
+    "filter": (lambda: ga.Cascade(ga.PI(1.0, 1.0), torque_filters=(1.0,)), "a sequence of LowPass"),  # type: ignore[arg-type]
+    "low pass": (lambda: ga.LowPass(0.0), "time_constant is 0"),
+    "notch": (lambda: ga.Notch(100.0, 0.1, 0.0), "denominator_damping is 0"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_controllers_are_refused(name: str) -> None:
+    make, words = WRONG[name]
+    with pytest.raises(ga.errors.ControllerError, match=words):
+        make()
+
+
+def test_a_notch_above_half_the_sampling_frequency_is_refused() -> None:
+    rec, _ = servo_record(8)
+    with pytest.raises(ga.errors.ControllerError, match="lies below 500 Hz"):
+        ga.simulate(ONE[1], rec, ga.Cascade(ga.PI(KP, KI), torque_filters=(ga.Notch(600.0, 0.1, 0.7),)))
+
+
+def test_a_cascade_is_saved_whole() -> None:
+    drive = ga.Cascade(
+        ga.PI(KP, KI, rule="backward", torque_limit=2.0, anti_windup="tracking", tracking_time=1e-3),
+        period=T,
+        position=ga.P(40.0),
+        position_period=8 * T,
+        velocity_feedforward=1.0,
+        torque_filters=(ga.LowPass(4e-4), ga.Notch(**NOTCH)),
+    )
+    assert ga.Cascade.from_dict(drive.to_dict()) == drive
+    assert ga.PI.from_dict(ga.PI(KP, KI, rule="forward").to_dict()) == ga.PI(KP, KI, rule="forward")
+
+
+def test_a_position_command_is_a_channel() -> None:
+    n = np.arange(100.0)
+    rec = ga.Record(1e-3, velocity=n, torque=n, position_command=2.0 * n)
+    assert "position_command" in dict(rec.channels())
+    part = rec[20:60]
+    assert part.position_command is not None
+    assert part.position_command[0] == 40.0
+    assert ga.Record.from_dict(rec.to_dict()) == rec
+    with pytest.raises(ga.errors.RecordError, match="no position_command, which drives"):
+        ga.simulate(ONE[1], rec.with_channels(position_command=None), ga.Cascade(ga.PI(KP, KI), position=ga.P(1.0)))

@@ -1,4 +1,4 @@
-"""The controller of a servo axis: a velocity controller with filters, under a position controller, with feedforward, at its own clock."""
+"""The controller of a servo axis: velocity controller, filters, position controller and feedforward, at its own clock."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Cascade:
                                                                        r is the record's velocity command
         r -> command_filters -> r',   measured velocity -> velocity_filters -> w,   e = r' - w
         u(n) = kp (b r' - w) + I(n) + acceleration_feedforward a*(n) + friction_feedforward sign(v*(n))
-        u, limited as `velocity` says -> torque_filters -> the torque that is logged, held for T, `delay` later at the motor
+        u, limited as `velocity` says -> torque_filters -> the torque that is logged and held for T
 
     q* is the position command; v* is its slope over the coming position period, or the velocity command; a* the slope of v*.
 
@@ -81,8 +81,6 @@ class Cascade:
         [N m].
     torque_filters, velocity_filters, command_filters : sequence of LowPass and Notch
         At most eight each; they act in their order.
-    delay : float
-        [s], >= 0, from the controller's sample to its torque.
 
     Raises
     ------
@@ -110,7 +108,6 @@ class Cascade:
     torque_filters: Sequence[Filter] = ()
     velocity_filters: Sequence[Filter] = ()
     command_filters: Sequence[Filter] = ()
-    delay: float = 0.0
 
     def __post_init__(self) -> None:
         if not isinstance(self.velocity, PI) or self.velocity.loop != "sampled":
@@ -125,10 +122,8 @@ class Cascade:
             if time <= 0.0:
                 raise ControllerError(f"{name} is {time:g}: give seconds, > 0")
             object.__setattr__(self, name, time)
-        for name in (*FEEDFORWARDS, "delay"):
+        for name in FEEDFORWARDS:
             object.__setattr__(self, name, real_number(getattr(self, name), name, ControllerError))
-        if self.delay < 0.0:
-            raise ControllerError(f"delay is {self.delay:g}: give seconds, >= 0")
         if self.position is None and (self.velocity_feedforward != 0.0 or self.position_period is not None):
             given = "velocity_feedforward" if self.velocity_feedforward != 0.0 else "position_period"
             raise ControllerError(
@@ -155,7 +150,7 @@ class Cascade:
         return self.velocity.limits
 
     def log_every(self, dt: float) -> int:
-        """Controller samples for each line of a log with the sample time dt [s]; raises ControllerError where it is no whole number."""
+        """Controller samples for each line of a log with the sample time dt [s]; ControllerError where it is no whole number."""
         return 1 if self.period is None else _multiple(dt, self.period, "the record's dt", "period")
 
     def position_every(self, dt: float) -> int:
@@ -167,19 +162,20 @@ class Cascade:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON or TOML."""
         filters = {name: [f.to_dict() for f in getattr(self, name)] for name in FILTERS}
-        numbers = {name: getattr(self, name) for name in ("period", "position_period", *FEEDFORWARDS, "delay")}
+        numbers = {name: getattr(self, name) for name in ("period", "position_period", *FEEDFORWARDS)}
         position = None if self.position is None else self.position.gain
         return {"velocity": self.velocity.to_dict(), "position_gain": position, **numbers, **filters}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Cascade:
         """Return the controller of what `to_dict` gave; raises ControllerError."""
-        allowed = ("velocity", "position_gain", "period", "position_period", *FEEDFORWARDS, *FILTERS, "delay")
+        allowed = ("velocity", "position_gain", "period", "position_period", *FEEDFORWARDS, *FILTERS)
         values: dict[str, Any] = known_keys(data, "the cascade", allowed, ("velocity",), ControllerError)
         gain = values.pop("position_gain", None)
         values["velocity"] = PI.from_dict(values["velocity"])
-        filters = {name: tuple(filter_of(one) for one in values.pop(name, ())) for name in FILTERS}
-        return cls(position=None if gain is None else P(gain), **values, **filters)
+        for name in FILTERS:
+            values[name] = tuple(filter_of(one) for one in values.get(name, ()))
+        return cls(position=None if gain is None else P(gain), **values)
 
 
 Controller: TypeAlias = PI | Cascade

@@ -6,14 +6,14 @@ controller: None for the open loop, where the torque drives the model.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
 from gaident.control.cascade import Cascade, Controller, cascade_of
-from gaident.control.pi import RULES, PI
+from gaident.control.pi import PI, RULES
 from gaident.control.ticks import ticks_of
 
 __all__ = [
@@ -25,7 +25,7 @@ __all__ = [
     "held_torque",
     "loop",
     "loop_name",
-    "needs_steps",
+    "one_equation",
     "record",
     "recurrence",
     "servo_torque",
@@ -41,9 +41,9 @@ def loop_name(controller: Controller | None) -> str:
     return "open" if controller is None else controller.loop
 
 
-def needs_steps(controller: Controller | None) -> bool:
-    """Whether controller and plant are simulated step by step: one difference equation holds a bare PI only."""
-    return controller is not None and cascade_of(controller) is not None
+def one_equation(controller: Controller | None) -> TypeGuard[PI | None]:
+    """Whether one difference equation holds controller and plant, limits left out: of a bare PI, and in the open loop."""
+    return controller is None or cascade_of(controller) is None
 
 
 def clock(dt: float) -> _core.Clock:

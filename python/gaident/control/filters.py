@@ -118,10 +118,12 @@ class Notch:
 
 def filter_of(data: Mapping[str, Any]) -> LowPass | Notch:
     """The filter of what `to_dict` gave; raises ControllerError."""
-    numbers = {key: value for key, value in data.items() if key != "kind"}
+    numbers: dict[str, Any] = {key: value for key, value in data.items() if key != "kind"}
     if data.get("kind") == "low pass":
-        return LowPass(**known_keys(numbers, "the low pass", ("time_constant",), ("time_constant",), ControllerError))
+        known_keys(numbers, "the low pass", ("time_constant",), ("time_constant",), ControllerError)
+        return LowPass(**numbers)
     if data.get("kind") == "notch":
         names = ("frequency", "numerator_damping", "denominator_damping")
-        return Notch(**known_keys(numbers, "the notch", names, names, ControllerError))
+        known_keys(numbers, "the notch", names, names, ControllerError)
+        return Notch(**numbers)
     raise ControllerError(f'kind is {data.get("kind")!r}: a filter is a "low pass" or a "notch"')

@@ -122,8 +122,8 @@ class PI:
             )
         if (self.anti_windup == "tracking") != (self.tracking_time is not None):
             raise ControllerError(
-                f'anti_windup is "{self.anti_windup}" and tracking_time is {self.tracking_time}: "tracking" needs a tracking_time '
-                "[s], the others have none"
+                f'anti_windup is "{self.anti_windup}" and tracking_time is {self.tracking_time}: "tracking" needs a '
+                "tracking_time [s], the others have none"
             )
         if self.tracking_time is not None:
             time = real_number(self.tracking_time, "tracking_time", ControllerError, "give a number > 0")
@@ -132,13 +132,13 @@ class PI:
             object.__setattr__(self, "tracking_time", time)
         if self.loop == "continuous" and not self.bare:
             raise ControllerError(
-                'loop is "continuous", but rule, command_weight and anti_windup belong to a digital controller: leave them out, or '
-                'give loop="sampled"'
+                'loop is "continuous", but rule, command_weight and anti_windup belong to a digital controller: leave them out, '
+                'or give loop="sampled"'
             )
 
     @property
     def bare(self) -> bool:
-        """True for the trapezoidal rule, a command weight of 1 and no anti-windup: the paper's controller, with or without limits."""
+        """True for the trapezoidal rule, a command weight of 1 and no anti-windup: the paper's controller, limits or not."""
         return self.rule == "trapezoidal" and self.command_weight == 1.0 and self.anti_windup == "none"
 
     @property

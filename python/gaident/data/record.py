@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident.checks import one_of
-from gaident.data.record_checks import equally_long, moved_channels, sample_time, texts, torque_kind
+from gaident.data.record_checks import check_bounds, equally_long, moved_channels, sample_time, texts, torque_kind
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel
 from gaident.data.signals.decimation import decimated, factor_of
 from gaident.data.torque_kind import COMMANDED, MEASURED
@@ -256,13 +256,7 @@ class Record:
         RecordError
             Where a bound is no number, t0 >= t1, or fewer than 20 samples are left.
         """
-        for key, value in (("t0", t0), ("t1", t1)):
-            if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-                raise RecordError(f"between({t0!r}, {t1!r}): {key} is no number; give seconds")
-            if math.isnan(value):
-                raise RecordError(f"between({t0!r}, {t1!r}): {key} is NaN; give seconds")
-        if not t0 < t1:
-            raise RecordError(f"between({t0!r}, {t1!r}): t0 must be before t1; exchange them")
+        check_bounds(t0, t1)
         start, stop = (self._sample_at(float(value)) for value in (t0, t1))
         return self._cut(start, stop, f"between({t0!r}, {t1!r})")
 

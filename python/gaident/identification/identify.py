@@ -118,32 +118,32 @@ def identify(
     (1, 0, 0.01, 0.05, False)
     """
     began = time.perf_counter()
-    given, controller, under = torque_driven(checked_records(rec, controller), controller)
+    driven = torque_driven(checked_records(rec, controller), controller)
+    loop = driven.controller
+    given = [r.with_channels(command=None) for r in driven.records] if driven.cascade is not None else list(driven.records)
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
     check_numbers(trials, seed, workers)
-    check_arithmetic(settings, controller)
+    check_arithmetic(settings, loop)
     threads = _processors() if workers is None else int(workers)
     digests = distinct(given)
     # Sums must not depend on the order given.
     order = sorted(range(len(given)), key=lambda i: (digests[i], given[i].name))
     records, digests = [given[i] for i in order], [digests[i] for i in order]
     derived = space is None
-    space = checked_space(derive_space(records, controller) if space is None else space, controller)
+    space = checked_space(derive_space(records, loop) if space is None else space, loop)
 
-    moving = [
-        settings.initial_state == "free" or (settings.initial_state == "auto" and starts_moving(r, controller)) for r in records
-    ]
-    work = _Work(records, digests, controller, space, settings, moving, threads)
+    moving = [settings.initial_state == "free" or (settings.initial_state == "auto" and starts_moving(r, loop)) for r in records]
+    work = _Work(records, digests, loop, space, settings, moving, threads)
     found = work.search(int(trials), int(seed), progress)
     best, scored = work.select(found)
     result = work.report(best, scored, found, int(seed))
     if derived and not settings.species:
         warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
         object.__setattr__(result, "warnings", (*result.warnings, warning))
-    if under:
-        object.__setattr__(result, "warnings", (*under, *result.warnings))
+    if driven.notes:
+        object.__setattr__(result, "warnings", (*driven.notes, *result.warnings))
     overflows = sum(t.overflows for t in found)
     if overflows:
         evaluations = sum(t.evaluations for t in found)

@@ -26,11 +26,15 @@ FOLLOWS = 1e-3  # no decision: of the torque's rms, what a log in few digits dif
 
 
 class Driven(NamedTuple):
-    """Records and the controller that an estimation closes the loop over; None: their torque drives the model. Notes on that."""
+    """Records and the controller that an estimation closes the loop over; None: their torque drives the model. Notes on that.
+
+    cascade: the whole controller where the log has no line for each of its samples.
+    """
 
     records: tuple[Record, ...]
     controller: PI | None
     notes: tuple[Text, ...]
+    cascade: Cascade | None = None
 
 
 def torque_driven(records: Sequence[Record], controller: Controller | None) -> Driven:
@@ -39,14 +43,15 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
     if cascade is None:
         assert not isinstance(controller, Cascade)
         return Driven(tuple(records), controller, ())
-    notes = [say("The controller is not a bare PI at the log's rate: its {torque} drives the model, and no loop is simulated.")]
     every = max(cascade.log_every(r.dt) for r in records)
-    if every > 1:
+    if every == 1:
+        notes = [say("The controller is not a bare PI: its {torque} drives the model, and no loop is simulated.")]
+    else:
         text = (
-            "The log has a line for every {}th sample of the controller: between the lines the {torque} is taken to go straight, and "
-            "what the controller answered to noise there is lost."
+            "The log has a line for every {}th sample of the controller. The linear model is identified from a {torque} that "
+            "goes straight from line to line; what the controller answered to noise between them is lost."
         )
-        notes.append(say(text, every))
+        notes = [say(text, every)]
     for rec in records:
         if every > 1 or rec.torque is None or not _replayable(rec, cascade):
             continue
@@ -54,11 +59,11 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
         size = float(np.sqrt(np.mean(rec.torque**2)))
         if off > FOLLOWS * size:
             text = (
-                "{}The logged {torque} does not follow from command and velocity through this controller: by {:.2g} {N m} rms, of "
-                "{:.2g} {N m} rms. Is this the controller, and are these the signals it saw?"
+                "{}The logged {torque} does not follow from command and velocity through this controller: by {:.2g} {N m} rms, "
+                "of {:.2g} {N m} rms. Is this the controller, and are these the signals it saw?"
             )
             notes.append(say(text, f"{rec.name}: " if len(records) > 1 and rec.name else "", off, size))
-    return Driven(tuple(driven_by_cascade(r, cascade) for r in records), None, tuple(notes))
+    return Driven(tuple(driven_by_cascade(r, cascade) for r in records), None, tuple(notes), cascade if every > 1 else None)
 
 
 def _replayable(rec: Record, cascade: Cascade) -> bool:
@@ -68,7 +73,7 @@ def _replayable(rec: Record, cascade: Cascade) -> bool:
 
 
 def driven_by_cascade(rec: Record, cascade: Cascade) -> Record:
-    """The record with the torque that drove the motor, as it is held over each line of the log [N m].
+    """The record with the torque that drove the motor, held over each line of the log [N m], and no more than drives it.
 
     Where the log has a line for each of the controller's samples, that is the logged torque, or the one that the controller
     makes of the measured signals. Of a torque logged every r-th sample, which goes on between the lines, it is the mean over the
@@ -79,21 +84,19 @@ def driven_by_cascade(rec: Record, cascade: Cascade) -> Record:
     Raises RecordError where a torque is neither logged nor can be made.
     """
     every = cascade.log_every(rec.dt)
-    if rec.torque is None:
-        return rec.with_channels(torque=made_by_cascade(rec, cascade))
+    torque = made_by_cascade(rec, cascade) if rec.torque is None else rec.torque
     if every == 1:
-        return rec
-    steps = np.diff(rec.torque)
-    return rec.with_channels(torque=rec.torque + np.append(steps, 0.0) * ((every - 1) / (2 * every)))
+        return rec.with_channels(torque=torque, command=None, position_command=None)
+    return rec.with_channels(torque=torque + np.append(np.diff(torque), 0.0) * ((every - 1) / (2 * every)))
 
 
 def made_by_cascade(rec: Record, cascade: Cascade) -> Vector:
-    """The torque [N m] (n,) that the controller makes of command and measured signals; raises RecordError where it cannot be made."""
+    """The torque [N m] (n,) that the controller makes of command and measured signals; RecordError where it cannot be made."""
     every = cascade.log_every(rec.dt)
     if every > 1:
         raise RecordError(
-            f"the record has no torque, and a line for every {every}th sample of the controller only: what it made between the lines "
-            f"of the velocity is lost; give {TORQUE}"
+            f"the record has no torque, and a line for every {every}th sample of the controller only: what it made between "
+            f"the lines of the velocity is lost; give {TORQUE}"
         )
     source = rec.command if cascade.position is None else rec.position_command
     if source is None or (cascade.position is not None and rec.position is None):

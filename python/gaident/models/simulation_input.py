@@ -39,8 +39,8 @@ def input_for(p: int, rec: Record, controller: Controller | None) -> tuple[Signa
     if isinstance(controller, Cascade) and controller.position is not None:
         if rec.position_command is None:
             raise RecordError(
-                "the record has no position_command, which drives the loop with a position controller: give position_command=, or "
-                "leave position= out of the cascade to drive its velocity controller with the command"
+                "the record has no position_command, which drives the loop with a position controller: give position_command=, "
+                "or leave position= out of the cascade to drive its velocity controller with the command"
             )
         return np.ascontiguousarray(rec.position_command, dtype=np.float64), "position_command"
     if controller is not None:
