@@ -236,7 +236,8 @@ def _simulated(
         return *_core_simulate(plant, rec.dt, source, controller, start, arithmetic), None
     if arithmetic != "double":
         raise ModelError(
-            f'arithmetic is {arithmetic!r}: a model with effects, or a controller that is no bare PI, has "double" only'
+            f'arithmetic is {arithmetic!r}: a model with effects, or under another controller than a bare PI, is '
+            'simulated in "double" only'
         )
     starts = start.reshape(1, -1) if state is not None else np.zeros((0, 0))
     found = simulated_with_effects(core_record(rec, source, controller), [plant], starts, steps, 1, True)
