@@ -17,8 +17,8 @@ from scipy.stats import chi2
 
 import gaident as ga
 from gaident.diagnosis.selection import model_space, moves, score_test
+from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.bootstrap import largest_gains
-from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.select import specification
 from gaident.estimation import least_squares as ls
 from gaident.estimation import prediction
@@ -165,7 +165,8 @@ class Bench:
         data = DataSet.of([rec], ga.PI(1.0, 1.0) if loop else None)
         self.data = replace(data, known_noise=noise, moving=(False,))
         family = OutputErrors(100.0) if plain else Innovations()
-        self.space = Moves(Objective(self.data, np.ones(N), family), tuple(allowed), lambda message: None)
+        self.task = Task(Objective(self.data, np.ones(N), family), SCALES, ONE, tuple(allowed), lambda message: None)
+        self.space = self.task.space()
 
     def hypothesis(self, *terms: Term, masses: int = 0, closed: bool = False) -> Hypothesis:
         parameters = Parameterisation.of(ONE if (masses or self.masses) == 1 else TWO, SCALES, [False])
@@ -280,17 +281,25 @@ def test_the_specification_test_is_of_one_model_and_counts_what_a_fit_moves() ->
     bench = Bench({"a": (0.3,)}, noise=0.05)
     fit = bench.fit(A)
     apart = replace(fit, x=fit.x + np.array([0.2, 0.0, 0.0]))
-    found = specification(bench.space, bench.space.objective, apart)
+    found = specification(bench.space, bench.task, apart)
     objective = bench.space.objective
     plain = ls.fit(objective, fit.hypothesis, fit.x, WHITE, 12)
     assert found.bound == pytest.approx(chi2.isf(POLICY.noise_level, 3))
     whole = float(objective.costs(fit.hypothesis, apart.x[None, :], WHITE)[0])
     assert found.statistic == pytest.approx(objective.count * np.log(whole / plain.cost))
-    assert found.contradicts and not specification(bench.space, bench.space.objective, fit).contradicts
+    assert found.contradicts and not specification(bench.space, bench.task, fit).contradicts
     searched = replace(A, steps=lambda s: (0.0,))
-    assert specification(bench.space, bench.space.objective, bench.fit(searched)).bound == pytest.approx(
-        chi2.isf(POLICY.noise_level, 2)
-    )
+    assert specification(bench.space, bench.task, bench.fit(searched)).bound == pytest.approx(chi2.isf(POLICY.noise_level, 2))
+
+
+def test_what_is_white_without_a_filter_needs_no_output_errors_and_contradicts_nothing() -> None:
+    """Whitened and plain estimate are one there; a coloured rest has to be looked at."""
+    colour = lfilter([1.0], [1.0, -0.9], 0.5 * NOISE * np.random.default_rng(1).standard_normal(N))
+    white, slow = Bench({"a": (0.3,)}), Bench({"a": (0.3,)}, extra=colour)
+    assert white.fit(A).noise.size == 0 and specification(white.space, white.task, white.fit(A)).statistic == 0.0
+    assert "plain" not in vars(white.task), "no regression, no fit"
+    specification(slow.space, slow.task, slow.fit(A))
+    assert "plain" in vars(slow.task) and slow.task.plain is slow.task.plain
 
 
 def test_models_are_compared_in_the_same_view() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from gaident.models.simulate import simulate
 from gaident.policy.table import POLICY
 from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["PlainView", "Task", "linear_bases", "noise_floor", "plain_bases", "plain_view"]
+__all__ = ["PlainView", "Task", "linear_bases", "noise_floor", "plain_bases"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +51,11 @@ class Task:
 
     def under(self, family: Innovations | OutputErrors) -> Task:
         return replace(self, objective=self.objective.under(family))
+
+    @cached_property
+    def plain(self) -> PlainView:
+        """The task under output errors: made when it is first asked for, and once for each grid of time."""
+        return _plain_view(self)
 
     def predictor(self) -> Predictor:
         """Of linear models: the closed loop only where no torque is available."""
@@ -191,7 +197,7 @@ class PlainView:
         return fit if fit.cost < WORST else None
 
 
-def plain_view(task: Task) -> PlainView:
+def _plain_view(task: Task) -> PlainView:
     """The task under output errors.
 
     Their corner is where the error of the regressed axis has as much power in its slope as in itself: free run and torque then

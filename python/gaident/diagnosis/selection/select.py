@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.library.terms import EVEN_FRICTION
-from gaident.diagnosis.selection.bases import PlainView, Task, linear_bases, noise_floor, plain_bases, plain_view
+from gaident.diagnosis.selection.bases import PlainView, Task, linear_bases, noise_floor, plain_bases
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
@@ -33,7 +33,7 @@ from gaident.diagnosis.selection.rivals import Rival, rivals_of
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import Specification, chi_square_bound, effective_samples, specification_statistic
 from gaident.estimation.noise_model import WHITE, ShaftNoise
-from gaident.estimation.objective import Fit, Innovations, Objective, OutputErrors
+from gaident.estimation.objective import Fit, Innovations, Objective
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
@@ -103,25 +103,24 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     """Steps 1 to 4; where the linear model leaves a large misfit, step 2 first: step 1 may then be needless."""
     task, bases = linear_bases(task)
     space = task.space()
-    plain = plain_view(task)
     if task.data.torque_measured:
         # Noise on the input makes a whitened inertia too large, whatever the noise model; at the slow end there is little of it.
-        return _Found(*_plainly(plain, bases, note), None)
+        return _Found(*_plainly(task.plain, bases, note), None)
     plainly: tuple[Moves, Fit, Fit] | None = None
     if min(space.ratio(b) for b in bases) > POLICY.misfit_ratio:
-        plainly = _plainly(plain, bases, note)
-        test = specification(space, plain.objective, _as_innovations(space, plainly[2]))
+        plainly = _plainly(task.plain, bases, note)
+        test = specification(space, task, _as_innovations(space, plainly[2]))
         if test.contradicts:
             return _Found(*plainly, test)
     base, final = _explored(task, space, bases)
-    test = specification(space, plain.objective, final)
+    test = specification(space, task, final)
     if plainly is None and (test.contradicts or not (space.is_noise(final) and space.runs_free(final))):
-        plainly = _plainly(plain, bases, note)
+        plainly = _plainly(task.plain, bases, note)
     if plainly is not None:
         again = _improved(space, _as_innovations(space, plainly[2]), final)
         if again is not final:
             base, final = _bare(space, again), again
-        test = specification(space, plain.objective, final)
+        test = specification(space, task, final)
         plainly = _with(plainly, final)
     whitened = _Found(space, base, final, test)
     if plainly is not None and (test.contradicts or not space.is_noise(final) or plainly[0].hidden(final, plainly[2])):
@@ -148,14 +147,18 @@ def _plainly(plain: PlainView, bases: Sequence[Fit], note: Callable[[str], None]
     starts = plain_bases(plain.task, bases)
     least = min(starts, key=lambda f: f.cost)
     axis = plain.regressed(least.predictor)
-    samples = [effective_samples(plain.objective.plain_errors(f)) for f in (least, axis) if f is not None]
-    task = plain.worth(max(samples))
+    task = _informed(plain, least, axis)
     space = task.space()
     base, final = _explored(task, space, [task.objective.rescored(f) for f in starts])
     if axis is not None:
         final = _improved(space, task.objective.rescored(axis), final)
         base = base if base.parameters.kind == final.parameters.kind else _bare(space, final)
     return space, base, final
+
+
+def _informed(plain: PlainView, *fits: Fit | None) -> Task:
+    """The task under output errors, with as many independent samples as the errors of one of these fits hold."""
+    return plain.worth(max(effective_samples(plain.objective.plain_errors(f)) for f in fits if f is not None))
 
 
 def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]:
@@ -220,45 +223,54 @@ def _as_innovations(space: Moves, fit: Fit) -> Fit:
     return space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit)))
 
 
-def specification(space: Moves, plainly: Objective, fit: Fit) -> Specification:
+def specification(space: Moves, task: Task, fit: Fit) -> Specification:
     """The specification test: the plain errors of the whitened and of the plain estimate of one model.
 
-    plainly: the objective of output errors. What no estimate moves by slope, the order of a harmonic, is the same in both and no
-    degree of freedom. H is 0 where the whitened estimate's errors are no larger than noise, as torques
-    and in the free run.
+    task: the one whose output errors are taken. What no estimate moves by slope, the order of a harmonic, is the same in both and
+    no degree of freedom. H is 0 where the whitened estimate's errors are no larger than noise, as torques and in the free run.
+    Where they are that, and white without a filter, the two estimates are one: no prefilter keeps white noise from being noise.
     """
-    plain = ls.fit(plainly, fit.hypothesis, fit.x, WHITE, space.policy.usual)
-    errors = [plainly.plain_errors(f) for f in (fit, plain)]
-    information = min(effective_samples(errors[1]), plainly.count)
-    whole, least = (float(e @ e) for e in errors)
     freedom = int(np.count_nonzero(fit.parameters.steps()))
     bound = chi_square_bound(freedom, space.policy.noise_level)
-    if whole < plainly.count * (space.policy.noise_ratio * plainly.data.noise) ** 2 and space.runs_free(fit):
+    free = space.runs_free(fit)
+    if free and fit.noise.size == 0 and space.is_noise(fit):
         return Specification(0.0, bound)
-    return Specification(specification_statistic(whole, least, information), bound)
+    plainly = task.plain.objective
+    whole = float(np.sum(plainly.plain_errors(fit) ** 2))
+    if free and whole < plainly.count * (space.policy.noise_ratio * plainly.data.noise) ** 2:
+        return Specification(0.0, bound)
+    least = plainly.plain_errors(ls.fit(plainly, fit.hypothesis, fit.x, WHITE, space.policy.usual))
+    information = min(effective_samples(least), plainly.count)
+    return Specification(specification_statistic(whole, float(least @ least), information), bound)
 
 
 def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) -> _Found:
-    """What the coarse grid came to, fitted to all samples, reduced, and grown by what the grid could not show."""
-    data, family = task.data, outline.space.objective.family
+    """What the coarse grid came to, fitted to all samples, reduced, and grown by what the grid could not show.
+
+    Output errors are weighed anew: what the low-pass of the coarse grid's prefilter removes is what that grid could not show.
+    """
+    data, family, found = task.data, task.objective.family, outline.space.objective.family
     if outline.final.parameters.masses == 1:  # no stiff shaft, no fine substeps
         coarse = 0.5 * data.dt
         data = replace(data, finest=max(data.finest, coarse))
-    if isinstance(family, Innovations) and family.shaft is not None:
+    if isinstance(found, Innovations) and found.shaft is not None:
         shaft = ShaftNoise(outline.base.parameters.linear(outline.base.x), data.dt, data.controller)
-        family = Innovations(shaft, family.floor)
-    if isinstance(family, OutputErrors) and family.prefilter is not None:
-        family = replace(family, prefilter=replace(family.prefilter, dt=data.dt))
-    objective = Objective(data, task.objective.weight, family, task.objective.measured, task.objective.counter)
-    task = replace(task, objective=objective)
-    space = task.space()
+        family = Innovations(shaft, found.floor)
+    task = replace(
+        task, objective=Objective(data, task.objective.weight, family, task.objective.measured, task.objective.counter)
+    )
+    selecting = task
+    if not outline.space.whitens:
+        linear = _moved(task.plain.task.space(), task.scales, outline.base)
+        selecting = _informed(task.plain, linear, task.plain.regressed(linear.predictor))
+    space = selecting.space()
     base, final = (_moved(space, task.scales, f) for f in (outline.base, outline.final))
     final = reduced_by(final, _reductions(space), space.prefers, space.score)
     note(f"looking beyond {words(final.effects) or 'the linear model'}, at all samples")
     final = _beam(space).run([final])
     if base.parameters.kind != final.parameters.kind:
         base = _bare(space, final)
-    test = specification(space, plain_view(task).objective, final) if space.whitens else outline.specification
+    test = specification(space, task, final) if space.whitens else outline.specification
     return _Found(space, base, final, test)
 
 
