@@ -96,7 +96,9 @@ class Policy:
     material_beside_impacts: float = gain(
         0.5, "1", "the same beside a gap or a hard coupling: no model foresees an impact", PAIRS
     )
-    overrules: float = gain(0.5, "1", "of the plain error that a cause which whitening hid may leave at most", REAL)
+    overrules: float = gain(
+        0.5, "1", "of the squared error before whitening: a cause that whitening hid leaves at most this", REAL
+    )
     rival_margin: float = gain(10.0, "BIC units", "closer explanations are not told apart (Kass and Raftery 1995)", SIZES)
     rival_short: int = gain(400, "samples", "a record this short doubles the margin", SIZES)
     detail_level: float = gain(

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
 from gaident.diagnosis.selection.mechanisms import as_two_masses
 from gaident.estimation import least_squares as ls
+from gaident.estimation.criterion import effective_samples
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
-from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective
+from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
 from gaident.estimation.term import Term
 from gaident.policy.table import POLICY, Policy
@@ -146,22 +147,43 @@ class ModelSpace:
         before, after = (self.plain_cost(f) for f in (simpler, fuller))
         return before - after > share * (before - noise)
 
-    def hidden(self, whitened: Fit, plain: Fit) -> bool:
-        """Whether a model of plain errors holds a cause that whitened errors took for noise; of the space of output errors.
+    def hidden(self, whitened: Fit, other: Fit) -> bool:
+        """Whether whitening hides a cause that another model holds: it has passed for noise.
 
-        The two are different models, of which no specification test says anything. Each is fitted to the plain errors, under the
-        same predictor; the score decides, by as much as tells two explanations apart, and the cause has to explain most of what
-        is left without it.
+        The two are different models, of which no specification test says anything. Both are fitted to the errors before whitening,
+        under the same predictor. There the model without the cause leaves more than noise; the other one leaves at most the share
+        `overrules` of that, and is better by as much as tells two explanations apart. What that is worth is counted in independent
+        samples: those of the space of output errors, else those in the errors of the model without the cause.
         """
-        if not set(plain.effects) - set(whitened.effects):
+        if not set(other.effects) - set(whitened.effects):
             return False
-        without = ls.fit(self.objective, whitened.hypothesis.driven_by(plain.predictor), whitened.x, WHITE, self.policy.usual)
-        return plain.cost < self.policy.overrules * without.cost and self.score(plain) < self.score(without) - self.margin
+        space = self.of_output_errors()
+        predictor = space.free_run(other)
+        without, beside = (space.plain(f, predictor) for f in (whitened, other))
+        if not beside.cost < self.policy.overrules * without.cost or self.ratio(without) < self.policy.loop_ratio:
+            return False
+        if self.whitens:
+            space = space.of_output_errors(effective_samples(space.objective.plain_errors(without)))
+            without, beside = (space.objective.rescored(f) for f in (without, beside))
+        return space.score(beside) < space.score(without) - space.margin
+
+    def of_output_errors(self, samples: float = np.inf) -> ModelSpace:
+        """The same models under errors that are not whitened, so many of them independent; this space where they are not."""
+        if not self.whitens:
+            return self
+        return replace(self, objective=self.objective.under(OutputErrors(samples)))
 
     def plain_cost(self, fit: Fit) -> float:
         """Sum of squared plain errors, refitted to these, of the loop where there is one."""
-        view = self.closed(fit.predictor) if self.data.loopable and self.data.loop_follows else fit.predictor
-        return ls.fit(self.objective, fit.hypothesis.driven_by(view), fit.x, WHITE, self.policy.usual).cost
+        return self.plain(fit, self.free_run(fit)).cost
+
+    def plain(self, fit: Fit, predictor: Predictor) -> Fit:
+        """A model fitted to the errors before whitening."""
+        return ls.fit(self.objective, fit.hypothesis.driven_by(predictor), fit.x, WHITE, self.policy.usual)
+
+    def free_run(self, fit: Fit) -> Predictor:
+        """What leaves a model to itself: the loop where it is the drive's, else the torque that drives the model."""
+        return self.closed(fit.predictor) if self.data.loopable and self.data.loop_follows else fit.predictor
 
     def in_both_views(self, simpler: Fit, fuller: Fit) -> bool:
         """Whether a generalisation is worth its cost in closed loop too, and not only because it is simulated with more substeps.

@@ -292,21 +292,13 @@ def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> S
     space, final = found.space, found.final
     for swaps_left in range(POLICY.swaps, -1, -1):
         rivals, better = _rivals(space, final, swaps_left > 0, classes, note)
-        if better is not None and _runs_far_worse(space, better, final):
+        if better is not None and space.hidden(better, final):
             rivals, better = _rivals(space, final, False, classes, note)
         if better is None:
             break
         final = reduced_by(space.canonical(better), _reductions(space), space.prefers, space.score)
     base = found.base if found.base.parameters.kind == final.parameters.kind else _bare(space, final)
     return Selection(space, base, final, rivals, found.specification, found.whitened)
-
-
-def _runs_far_worse(space: Moves, better: Fit, final: Fit) -> bool:
-    """Whether a model of smaller whitened errors misses the free run by far more: whitening has hidden a cause that it lacks."""
-    if not space.whitens:
-        return False
-    other, own = (space.plain_cost(f) for f in (better, final))
-    return own < space.policy.overrules * other and not space.runs_free(better)
 
 
 def by_whitened_errors(selection: Selection, classes: Classes, note: Callable[[str], None]) -> Selection | None:
