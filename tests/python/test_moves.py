@@ -272,7 +272,7 @@ def test_a_cause_that_whitening_hid_is_one_by_the_errors_before_whitening(plain:
     assert not little.space.hidden(little.fit(B), little.fit(A))
     # What is left without it has to be more than noise: here it is 1.7 times that.
     small = Bench({"a": (0.1,)}, plain=plain, noise=0.05)
-    costs = [small.space.of_output_errors().plain_cost(small.fit(t)) for t in (B, A)]
+    costs = [small.space.of_output_errors().unwhitened_cost(small.fit(t)) for t in (B, A)]
     assert costs[1] < POLICY.overrules * costs[0] and not small.space.hidden(small.fit(B), small.fit(A))
 
 
@@ -280,14 +280,14 @@ def test_a_hidden_cause_counts_by_independent_samples() -> None:
     """Of too few of them the same cost says nothing; where errors are whitened they are those of the errors without the cause."""
     bench = Bench({"a": (0.3,)}, plain=True, noise=0.05)
     few = replace(bench.space, objective=bench.space.objective.under(OutputErrors(3.0)))
-    less, more = (few.plain(f, f.predictor) for f in (bench.fit(B), bench.fit(A)))
+    less, more = (few.unwhitened(f, f.predictor) for f in (bench.fit(B), bench.fit(A)))
     assert more.cost < POLICY.overrules * less.cost and not few.hidden(less, more)
     slow = Bench({"a": (0.3,)}, noise=0.05)
-    without = slow.space.of_output_errors().plain(slow.fit(B), slow.fit(B).predictor)
-    samples = effective_samples(slow.space.objective.plain_errors(without))
+    without = slow.space.of_output_errors().unwhitened(slow.fit(B), slow.fit(B).predictor)
+    samples = effective_samples(slow.space.objective.unwhitened_errors(without))
     assert samples < 0.1 * N and slow.space.hidden(slow.fit(B), slow.fit(A))
     with_them = slow.space.of_output_errors(samples)
-    scores = [with_them.score(with_them.plain(slow.fit(t), without.predictor)) for t in (B, A)]
+    scores = [with_them.score(with_them.unwhitened(slow.fit(t), without.predictor)) for t in (B, A)]
     assert scores[0] - scores[1] > with_them.margin
 
 
@@ -312,9 +312,9 @@ def test_what_is_white_without_a_filter_needs_no_output_errors_and_contradicts_n
     colour = lfilter([1.0], [1.0, -0.9], 0.5 * NOISE * np.random.default_rng(1).standard_normal(N))
     white, slow = Bench({"a": (0.3,)}), Bench({"a": (0.3,)}, extra=colour)
     assert white.fit(A).noise.size == 0 and specification(white.space, white.task, white.fit(A)).statistic == 0.0
-    assert "plain" not in vars(white.task), "no regression, no fit"
+    assert "by_output_errors" not in vars(white.task), "no regression, no fit"
     specification(slow.space, slow.task, slow.fit(A))
-    assert "plain" in vars(slow.task) and slow.task.plain is slow.task.plain
+    assert "by_output_errors" in vars(slow.task) and slow.task.by_output_errors is slow.task.by_output_errors
 
 
 def test_models_are_compared_in_the_same_view() -> None:
@@ -323,9 +323,9 @@ def test_models_are_compared_in_the_same_view() -> None:
     less, more = bench.fit(), bench.fit(A, closed=True)
     assert bench.space.score(more) < bench.space.score(less)
     assert not bench.space.worth(more, less)
-    seen = bench.space.in_view_of(less, more)
+    seen = bench.space.under_predictor_of(less, more)
     assert seen.predictor.closed and seen.bic < less.bic
-    assert bench.space.in_view_of(less, bench.fit(A)) is less
+    assert bench.space.under_predictor_of(less, bench.fit(A)) is less
 
 
 def test_quiet_and_noise_are_ratios_to_the_noise_of_the_velocity() -> None:

@@ -90,7 +90,7 @@ def scored(objective: Objective, found: Fit) -> Fit:
 
 def _scored(objective: Objective, found: Fit) -> Fit:
     noise = objective.own_noise(found)
-    v = objective.weighed(found, noise)
+    v = objective.whitened_errors(found, noise)
     return objective.fitted(found.hypothesis, found.x, noise, float(v @ v), found.converged)
 
 

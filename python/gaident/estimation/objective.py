@@ -2,7 +2,7 @@
 
     e(n) = w(n) - w_model(n; x),   v = H^-1 e,   minimise V(x) = sum of v^2 over the samples in use
 
-What becomes of e is the choice of a noise family:
+e is the *raw* error. What becomes of it is the choice of a noise family:
 
 *Innovations*: every hypothesis has a noise filter H^-1 of its own, which is part of it and counts in its criterion, so that no
 effect is whitened away by a filter that was estimated without it, and none is favoured by one estimated with it.
@@ -12,7 +12,8 @@ White noise of a variance f (`floor`) is then added to the error of every hypoth
 is that of e plus this noise, and V/N becomes V/N + f |h|^2, h the impulse response of H^-1.
 
 *Output errors*: the same filter for every hypothesis, none (H = 1) or a prefilter (see `prefilter.py`), with the information of
-the independent samples (see `criterion.py`). That is what is left where the errors are a misfit and no stationary noise.
+the independent samples (see `criterion.py`). Behind a prefilter errors are *weighed*, alike for all hypotheses, and not
+*whitened*, by a filter of each. That is what is left where the errors are a misfit and no stationary noise.
 """
 
 from __future__ import annotations
@@ -114,11 +115,11 @@ class NoiseFamily(Protocol):
         ...
 
     def prefiltered(self, E: Matrix, lengths: Sequence[int], inertias: Vector | None = None) -> Matrix:
-        """Rows of plain errors behind a filter that no hypothesis estimates; inertias: of each row."""
+        """Rows of raw errors behind a filter that no hypothesis estimates; inertias: of each row."""
         ...
 
     def estimated(self, objective: Objective, error: Vector, closed: bool) -> NoiseFilter:
-        """The filter of one row of plain errors."""
+        """The filter of one row of raw errors."""
         ...
 
 
@@ -157,7 +158,7 @@ class Innovations:
 
 @dataclass(frozen=True, eq=False)
 class OutputErrors:
-    """Plain errors behind one prefilter, None: as they are; samples: how many of them are independent.
+    """Raw errors behind one prefilter, None: as they are; samples: how many of them are independent.
 
     inertia: where the torque is measured, that of the regression [kg m^2], which noise on the torque does not bias. Compared as
     velocities, errors of a noisy torque get smaller with a heavier axis that follows it less; as torques they do not. A lighter
@@ -224,7 +225,7 @@ class Objective:
         return self.data.lengths
 
     def errors(self, hypothesis: Hypothesis, X: Matrix) -> Matrix:
-        """Rows of plain errors."""
+        """Rows of raw errors: measured minus simulated velocity [rad/s]."""
         self.counter.simulations += len(X)
         with np.errstate(invalid="ignore", over="ignore"):
             E = self.measured - hypothesis.predictor.velocities(hypothesis.parameters, X)
@@ -232,14 +233,14 @@ class Objective:
         return E
 
     def error(self, fit: Fit) -> Vector:
-        """The plain error of a fit."""
+        """The raw error of a fit."""
         return self.once(("error", fit.hypothesis, fit.x.tobytes()), lambda: self.errors(fit.hypothesis, fit.x[None, :])[0])
 
-    def plain_errors(self, fit: Fit) -> Vector:
-        """Those of a fit under no noise model, 0 where samples do not count."""
-        return self.weighed(fit, WHITE)
+    def unwhitened_errors(self, fit: Fit) -> Vector:
+        """The errors of a fit under no noise filter, 0 where samples do not count: raw, or weighed by the family's prefilter."""
+        return self.whitened_errors(fit, WHITE)
 
-    def weighed(self, fit: Fit, noise: NoiseFilter) -> Vector:
+    def whitened_errors(self, fit: Fit, noise: NoiseFilter) -> Vector:
         """The errors of a fit under a noise filter; its cost is their sum of squares."""
         rows = self.whitened(self.error(fit)[None, :], noise, fit.parameters.inertias(fit.x[None, :]))
         return np.asarray(rows[0])
@@ -311,7 +312,7 @@ class Objective:
         return self.family.information(self.count)
 
     def noise_of(self, error: Vector, closed: bool) -> NoiseFilter:
-        """The noise filter of one row of plain errors, of a model in its loop or not."""
+        """The noise filter of one row of raw errors, of a model in its loop or not."""
         if float(np.abs(error).max()) >= LOST:
             return WHITE
         return self.family.estimated(self, error, closed)
@@ -353,8 +354,8 @@ class Objective:
         X[np.arange(1, len(moved) + 1), moved] += h[moved]
         return X, np.where(steps > 0.0, h, 0.0)
 
-    def plain(self, rows: Matrix, error: Vector) -> float:
-        """Sum of squared errors of the free run, before all filters, beside what the rows can explain."""
+    def raw_rest(self, rows: Matrix, error: Vector) -> float:
+        """Sum of squared raw errors beside what the rows can explain."""
         rest = project_out(self.bridged(rows) * self.counted, self.bridged(error[None, :]) * self.counted)[0]
         return float(rest @ rest)
 

@@ -91,7 +91,7 @@ class Policy:
     effect_penalty: float = calibrated(GAIN, "effect_penalty", "BIC units", "of each effect, for the number of candidates tried")
     short_record: int = gain(200, "samples", "a record this short doubles the penalty: its noise filter is uncertain", CLEAN)
     material_share: float = gain(
-        0.1, "1", "of the error beyond the noise, whitened or plain, that an effect explains at least", PAIRS
+        0.1, "1", "of the error beyond the noise, whitened or before whitening, that an effect explains at least", PAIRS
     )
     material_beside_impacts: float = gain(
         0.5, "1", "the same beside a gap or a hard coupling: no model foresees an impact", PAIRS
@@ -200,7 +200,7 @@ class Policy:
     # Effort: budgets.
     effort_ratio: float = effort(1.1, "1", "rms of whitened errors over the noise: below, no more effort is spent")
     misfit_ratio: float = effort(
-        2.0, "1", "rms of the whitened errors of the linear model over the noise: above, plain errors first"
+        2.0, "1", "rms of the whitened errors of the linear model over the noise: above, output errors first"
     )
     loop_ratio: float = effort(2.0, "1", "rms of the free run over the noise: above, output errors are searched as well")
     most_effects: int = effort(4, "1", "effects in one model")

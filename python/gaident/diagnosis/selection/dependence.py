@@ -33,7 +33,7 @@ Matrix = NDArray[np.float64]
 class Dependence:
     """Gains [BIC units] by driver, and the strongest where it counts, from `needed` on.
 
-    least: squared plain errors beside each driver's family.
+    least: squared raw errors beside each driver's family.
     """
 
     gains: dict[str, float]
@@ -92,7 +92,7 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
         gain = none - account.bic(pairs) - np.log(objective.information)
         if gain > gains["time"]:
             gains["time"], line = gain, torque_of_line(objective, fit, J, error, pairs)
-    least = {driver: objective.plain(np.vstack([J, rows]), error) for driver, rows in columns.items()}
+    least = {driver: objective.raw_rest(np.vstack([J, rows]), error) for driver, rows in columns.items()}
     whitened = isinstance(objective.family, Innovations)
     needed = POLICY.dependence_gain * (1.0 + (POLICY.short_record / objective.count if whitened else 0.0))
     return Dependence({driver: float(gain) for driver, gain in gains.items()}, least, needed, line, whitened)

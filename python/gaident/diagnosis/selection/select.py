@@ -4,10 +4,10 @@
     2. Where more than noise is left, or the free run of the loop is missed: the same search under output errors. What it finds
        is fitted under innovations as well, and counts there if it is better.
        Only this search where the torque itself was measured: noise on the input, which no noise model of the output describes.
-    3. Whitened errors decide where they leave noise (variance ratio) and where whitened and plain estimates of the selected
-       model do not contradict each other (specification test). Else its errors are no stationary noise, and the model that
-       output errors select is the result, with the information of its independent samples.
-    4. The same is the result where it holds a cause that the whitened errors hide: two models, compared by their plain errors.
+    3. Whitened errors decide where they leave noise (variance ratio) and where the estimates of whitened and of output errors of
+       the selected model do not contradict each other (specification test). Else its errors are no stationary noise, and the
+       model that output errors select is the result, with the information of its independent samples.
+    4. The same is the result where it holds a cause that the whitened errors hide: two models, compared before whitening.
     5. The rivals of every effect.
 
 Long records are searched on a coarser grid of time first.
@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.library.terms import EVEN_FRICTION
-from gaident.diagnosis.selection.bases import PlainView, Task, linear_bases, noise_floor, plain_bases
+from gaident.diagnosis.selection.bases import ByOutputErrors, Task, linear_bases, noise_floor, output_error_bases
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
@@ -90,13 +90,18 @@ def selected(
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What a search came to."""
+    """What a search came to: its space, the linear part of its model, the model; further as in `Selection`."""
 
     space: Moves
     base: Fit
     final: Fit
-    specification: Specification | None
+    specification: Specification | None = None
     whitened: _Found | None = None
+
+    def of(self, final: Fit) -> _Found:
+        """The same with another model, and its linear part."""
+        base = self.base if self.base.parameters.kind == final.parameters.kind else _bare(self.space, final)
+        return replace(self, base=base, final=final)
 
 
 def _decided(task: Task, note: Callable[[str], None]) -> _Found:
@@ -105,60 +110,59 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     space = task.space()
     if task.data.torque_measured:
         # Noise on the input makes a whitened inertia too large, whatever the noise model; at the slow end there is little of it.
-        return _Found(*_plainly(task.plain, bases, note), None)
-    plainly: tuple[Moves, Fit, Fit] | None = None
+        return _by_output_errors(task.by_output_errors, bases, note)
+    by_output: _Found | None = None
     if min(space.ratio(b) for b in bases) > POLICY.misfit_ratio:
-        plainly = _plainly(task.plain, bases, note)
-        test = specification(space, task, _as_innovations(space, plainly[2]))
+        by_output = _by_output_errors(task.by_output_errors, bases, note)
+        test = specification(space, task, _as_innovations(space, by_output.final))
         if test.contradicts:
-            return _Found(*plainly, test)
+            return replace(by_output, specification=test)
     base, final = _explored(task, space, bases)
     test = specification(space, task, final)
-    if plainly is None and (test.contradicts or not (space.is_noise(final) and space.runs_free(final))):
-        plainly = _plainly(task.plain, bases, note)
-    if plainly is not None:
-        again = _improved(space, _as_innovations(space, plainly[2]), final)
+    if by_output is None and (test.contradicts or not (space.is_noise(final) and space.small_unwhitened(final))):
+        by_output = _by_output_errors(task.by_output_errors, bases, note)
+    if by_output is not None:
+        again = _improved(space, _as_innovations(space, by_output.final), final)
         if again is not final:
             base, final = _bare(space, again), again
         test = specification(space, task, final)
-        plainly = _with(plainly, final)
+        by_output = _with(by_output, final)
     whitened = _Found(space, base, final, test)
-    if plainly is not None and (test.contradicts or not space.is_noise(final) or plainly[0].hidden(final, plainly[2])):
-        return _Found(*plainly, test, whitened)
+    if by_output is not None and (
+        test.contradicts or not space.is_noise(final) or by_output.space.hidden(final, by_output.final)
+    ):
+        return replace(by_output, specification=test, whitened=whitened)
     return whitened
 
 
-def _with(plainly: tuple[Moves, Fit, Fit], whitened: Fit) -> tuple[Moves, Fit, Fit]:
+def _with(by_output: _Found, whitened: Fit) -> _Found:
     """The result of output errors, or the model of whitened errors in its place where it scores better there."""
-    space, base, final = plainly
-    better = _improved(space, ls.fit(space.objective, whitened.hypothesis, whitened.x, WHITE, POLICY.usual), final)
-    if better is final:
-        return plainly
-    return space, base if base.parameters.kind == better.parameters.kind else _bare(space, better), better
+    space = by_output.space
+    better = _improved(space, ls.fit(space.objective, whitened.hypothesis, whitened.x, WHITE, POLICY.usual), by_output.final)
+    return by_output if better is by_output.final else by_output.of(better)
 
 
-def _plainly(plain: PlainView, bases: Sequence[Fit], note: Callable[[str], None]) -> tuple[Moves, Fit, Fit]:
-    """Step 2: (the space of output errors, linear fit, selected model).
+def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callable[[str], None]) -> _Found:
+    """Step 2: the search under output errors.
 
     The information is that of the errors which the best linear model or the regressed axis leaves: those of a better model are
     more.
     """
-    note("looking at the plain errors")
-    starts = plain_bases(plain.task, bases)
+    note("looking at the output errors")
+    starts = output_error_bases(output.task, bases)
     least = min(starts, key=lambda f: f.cost)
-    axis = plain.regressed(least.predictor)
-    task = _informed(plain, least, axis)
+    axis = output.regressed(least.predictor)
+    task = _informed(output, least, axis)
     space = task.space()
     base, final = _explored(task, space, [task.objective.rescored(f) for f in starts])
     if axis is not None:
         final = _improved(space, task.objective.rescored(axis), final)
-        base = base if base.parameters.kind == final.parameters.kind else _bare(space, final)
-    return space, base, final
+    return _Found(space, base, base).of(final)
 
 
-def _informed(plain: PlainView, *fits: Fit | None) -> Task:
+def _informed(output: ByOutputErrors, *fits: Fit | None) -> Task:
     """The task under output errors, with as many independent samples as the errors of one of these fits hold."""
-    return plain.worth(max(effective_samples(plain.objective.plain_errors(f)) for f in fits if f is not None))
+    return output.informed(max(effective_samples(output.objective.unwhitened_errors(f)) for f in fits if f is not None))
 
 
 def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]:
@@ -168,10 +172,10 @@ def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]
         end = _searched(space, base)
         # On a coarse grid a resonance beyond what it shows stands for another fast effect: the fit to all samples decides.
         # Two overdamped masses describe some other effect, which one mass leaves in the error.
-        seen = task.scales.blocks == 1 or resonance(end) < POLICY.seen_band * np.pi / task.scales.dt
-        if not ends or (swings(end) and seen):
+        shown = task.scales.blocks == 1 or resonance(end) < POLICY.seen_band * np.pi / task.scales.dt
+        if not ends or (swings(end) and shown):
             ends.append((base, end))
-        if space.quiet(end) and space.runs_free(end):
+        if space.quiet(end) and space.small_unwhitened(end):
             break
     return min(ends, key=lambda e: space.score(e[1]))
 
@@ -196,7 +200,7 @@ def _beam(space: Moves) -> Beam[Fit]:
         reduce=_reductions(space),
         prefers=space.prefers,
         search=space.search,
-        settled=space.is_noise,
+        leaves_noise=space.is_noise,
         size=lambda f: len(f.effects),
         most=policy.most_effects,
         width=policy.beam_width,
@@ -219,12 +223,12 @@ def _improved(space: Moves, other: Fit, best: Fit) -> Fit:
 
 
 def _as_innovations(space: Moves, fit: Fit) -> Fit:
-    """A model selected by output errors under a noise model of its own, in the views that may say more."""
+    """A model selected by output errors under a noise model of its own, under the predictors that may say more."""
     return space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit)))
 
 
 def specification(space: Moves, task: Task, fit: Fit) -> Specification:
-    """The specification test: the plain errors of the whitened and of the plain estimate of one model.
+    """The specification test: the output errors of the whitened and of the output-error estimate of one model.
 
     task: the one whose output errors are taken. What no estimate moves by slope, the order of a harmonic, is the same in both and
     no degree of freedom. H is 0 where the whitened estimate's errors are no larger than noise, as torques and in the free run.
@@ -232,15 +236,15 @@ def specification(space: Moves, task: Task, fit: Fit) -> Specification:
     """
     freedom = int(np.count_nonzero(fit.parameters.steps()))
     bound = chi_square_bound(freedom, space.policy.noise_level)
-    free = space.runs_free(fit)
+    free = space.small_unwhitened(fit)
     if free and fit.noise.size == 0 and space.is_noise(fit):
         return Specification(0.0, bound)
-    plainly = task.plain.objective
-    whole = float(np.sum(plainly.plain_errors(fit) ** 2))
-    if free and whole < plainly.count * (space.policy.noise_ratio * plainly.data.noise) ** 2:
+    output = task.by_output_errors.objective
+    whole = float(np.sum(output.unwhitened_errors(fit) ** 2))
+    if free and whole < output.count * (space.policy.noise_ratio * output.data.noise) ** 2:
         return Specification(0.0, bound)
-    least = plainly.plain_errors(ls.fit(plainly, fit.hypothesis, fit.x, WHITE, space.policy.usual))
-    information = min(effective_samples(least), plainly.count)
+    least = output.unwhitened_errors(ls.fit(output, fit.hypothesis, fit.x, WHITE, space.policy.usual))
+    information = min(effective_samples(least), output.count)
     return Specification(specification_statistic(whole, float(least @ least), information), bound)
 
 
@@ -261,17 +265,15 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     )
     selecting = task
     if not outline.space.whitens:
-        linear = _moved(task.plain.task.space(), task.scales, outline.base)
-        selecting = _informed(task.plain, linear, task.plain.regressed(linear.predictor))
+        linear = _moved(task.by_output_errors.task.space(), task.scales, outline.base)
+        selecting = _informed(task.by_output_errors, linear, task.by_output_errors.regressed(linear.predictor))
     space = selecting.space()
     base, final = (_moved(space, task.scales, f) for f in (outline.base, outline.final))
     final = reduced_by(final, _reductions(space), space.prefers, space.score)
     note(f"looking beyond {words(final.effects) or 'the linear model'}, at all samples")
     final = _beam(space).run([final])
-    if base.parameters.kind != final.parameters.kind:
-        base = _bare(space, final)
     test = specification(space, task, final) if space.whitens else outline.specification
-    return _Found(space, base, final, test)
+    return _Found(space, base, base, test).of(final)
 
 
 def _moved(space: Moves, scales: Scales, fit: Fit) -> Fit:
@@ -302,7 +304,7 @@ def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> S
 
 
 def by_whitened_errors(selection: Selection, classes: Classes, note: Callable[[str], None]) -> Selection | None:
-    """What whitened errors had selected in the place of a plain result that names nothing; None where there is none."""
+    """What whitened errors had selected, where output errors decided and their model names nothing; None where there is none."""
     return None if selection.whitened is None else _compared(selection.whitened, classes, note)
 
 
