@@ -201,7 +201,7 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
     """The task under output errors.
 
     Their corner is where the error of the regressed axis has as much power in its slope as in itself: free run and torque then
-    count alike. Of a measured torque an inertia up to two deviations above that of the regression is free.
+    count alike. Of a measured torque an inertia is free up to `heavier` deviations above that of the regression.
     """
     raw = ByOutputErrors(task.under(OutputErrors(1.0)), _axis(task.data))
     fit = raw.regressed(task.predictor())
@@ -213,7 +213,7 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
     weight = replace(
         weight, corner=max(weight.balance(objective.bridged(objective.error(fit)[None, :])[0], objective.lengths), _corner(axis))
     )
-    heaviest = inertia.value + 2.0 * inertia.std if task.data.torque_measured else None
+    heaviest = inertia.value + POLICY.heavier * inertia.std if task.data.torque_measured else None
     return ByOutputErrors(task.under(OutputErrors(1.0, weight, heaviest)), axis)
 
 
