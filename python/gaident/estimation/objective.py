@@ -42,6 +42,7 @@ Matrix = NDArray[np.float64]
 Index = NDArray[np.intp]
 T = TypeVar("T")
 
+HEAD = 12  # no decision: parts of the shortest record, of which a filter's start takes one at most
 LOST = 1e60  # no decision: rad/s: the error of a model that diverges, every sample; its squares stay numbers
 
 
@@ -299,7 +300,7 @@ class Objective:
     @property
     def head(self) -> int:
         """Samples at the start of each record that never count, so that filters of all orders are judged on the same ones."""
-        return min(HIGHEST, min(self.lengths) // 12)
+        return min(HIGHEST, min(self.lengths) // HEAD)
 
     @cached_property
     def count(self) -> float:
