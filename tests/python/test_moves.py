@@ -27,6 +27,7 @@ from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.parameterisation import Parameterisation
+from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.term import Scales, Term
 from gaident.policy.table import POLICY
 
@@ -152,6 +153,7 @@ class Bench:
         angle: bool = False,
         allowed: Sequence[Term] = TERMS,
         plain: bool = False,
+        prefilter: Prefilter | None = None,
         noise: float = NOISE,
         seed: int = 0,
     ) -> None:
@@ -165,7 +167,7 @@ class Bench:
         rec = ga.Record(DT, still if loop else None, w, still, np.arange(N) * DT if angle else None)
         data = DataSet.of([rec], ga.PI(1.0, 1.0) if loop else None)
         self.data = replace(data, known_noise=noise, moving=(False,))
-        family = OutputErrors(100.0) if plain else Innovations()
+        family = OutputErrors(100.0, prefilter) if plain else Innovations()
         self.task = Task(Objective(self.data, np.ones(N), family), SCALES, ONE, tuple(allowed), lambda message: None)
         self.space = self.task.space()
 
@@ -549,12 +551,16 @@ def test_valleys_are_searched_beside_a_linear_model() -> None:
 # The bootstrap.
 
 
-def test_records_that_are_drawn_where_plain_errors_count_are_as_slow_as_the_real_one() -> None:
-    """White noise would make the gains of chance too small, and a p-value of a slow misfit too good."""
+@pytest.mark.parametrize("prefilter", [None, Prefilter(DT, 20.0, 60.0, 4)], ids=["raw", "weighed"])
+def test_records_that_are_drawn_where_output_errors_count_are_as_slow_as_the_real_one(prefilter: Prefilter | None) -> None:
+    """White noise would make the gains of chance too small, and a p-value of a slow misfit too good.
+
+    Noise is drawn as raw errors, and weighed like those of the record.
+    """
 
     def bench(seed: int) -> Bench:
         slow = lfilter([1.0], [1.0, -0.97], 0.05 * np.random.default_rng(seed).standard_normal(N))
-        return Bench(extra=slow, plain=True, noise=1e-3, seed=seed, allowed=(A, PLACED))
+        return Bench(extra=slow, plain=True, prefilter=prefilter, noise=1e-3, seed=seed, allowed=(A, PLACED))
 
     def gain(one: Bench) -> float:
         start = one.fit()
