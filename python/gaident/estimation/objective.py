@@ -360,6 +360,11 @@ class Objective:
         rest = project_out(self.bridged(rows) * self.counted, self.bridged(error[None, :]) * self.counted)[0]
         return float(rest @ rest)
 
+    def unwhitened_rest(self, rows: Matrix, error: Vector) -> float:
+        """Sum of squared errors before whitening beside what the rows can explain; rows and error raw."""
+        rest = project_out(self.whitened(rows, WHITE), self.whitened(error[None, :], WHITE))[0]
+        return float(rest @ rest)
+
     def bic(self, cost: float, noise: NoiseFilter, numbers: int) -> float:
         """BIC of a cost V under a filter, for so many fitted numbers beside those of the filter."""
         return bic(self.variance(cost, noise), self.information, numbers + noise.size)
