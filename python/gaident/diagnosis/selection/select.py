@@ -126,7 +126,7 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
         if again is not final:
             base, final = _bare(space, again), again
         test = specification(space, task, final)
-        by_output = _with(by_output, final)
+        by_output = _offered(by_output, final)
     whitened = _Found(space, base, final, test)
     if by_output is not None and (
         test.contradicts or not space.is_noise(final) or by_output.space.hidden(final, by_output.final)
@@ -135,7 +135,7 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     return whitened
 
 
-def _with(by_output: _Found, whitened: Fit) -> _Found:
+def _offered(by_output: _Found, whitened: Fit) -> _Found:
     """The result of output errors, or the model of whitened errors in its place where it scores better there."""
     space = by_output.space
     better = _improved(space, ls.fit(space.objective, whitened.hypothesis, whitened.x, WHITE, POLICY.usual), by_output.final)
