@@ -32,7 +32,7 @@ from gaident.estimation.noise_model import HIGHEST, ON_TOP, WHITE, NoiseFilter, 
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import Predictor
 from gaident.estimation.prefilter import Prefilter
-from gaident.estimation.projection import WORST, project_out, sums_of_squares
+from gaident.estimation.projection import WORST, project_out, slopes, sums_of_squares
 from gaident.estimation.term import Term
 
 __all__ = ["Fit", "Hypothesis", "Innovations", "NoiseFamily", "Objective", "OutputErrors"]
@@ -336,13 +336,13 @@ class Objective:
         """(v, J) at x: J[j] = dv/dx_j, forward differences; rows of entries that are not moved are 0."""
         X, h = self._neighbours(hypothesis, x)
         V = self.whitened(self.errors(hypothesis, X), noise, hypothesis.parameters.inertias(X))
-        return V[0], _slopes(V, h)
+        return V[0], slopes(V, h)
 
     def sensitivities(self, hypothesis: Hypothesis, x: Vector) -> tuple[Matrix, Vector]:
         """(J, e) at x: J[j] = de/dx_j of the errors before all filters, 0 for samples that do not count; e as it is."""
         X, h = self._neighbours(hypothesis, x)
         E = self.errors(hypothesis, X)
-        return _slopes(self.bridged(E) * self.counted, h), E[0]
+        return slopes(self.bridged(E) * self.counted, h), E[0]
 
     def _neighbours(self, hypothesis: Hypothesis, x: Vector) -> tuple[Matrix, Vector]:
         """(rows: x, and x with each entry moved that is moved, steps: 0 for entries that are not)."""
@@ -390,12 +390,3 @@ class Objective:
     def weighted(self, weight: Vector) -> Objective:
         """The same with other samples left out."""
         return Objective(self.data, weight, self.family, self.measured, self.counter)
-
-
-def _slopes(V: Matrix, h: Vector) -> Matrix:
-    """Rows of differences over the steps h, 0 where there is none. V: the row at x, and one for each step."""
-    J = np.zeros((len(h), V.shape[1]))
-    moved = np.flatnonzero(h)
-    with np.errstate(invalid="ignore", over="ignore"):
-        J[moved] = (V[1:] - V[0]) / h[moved][:, None]
-    return J
