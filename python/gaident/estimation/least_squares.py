@@ -15,6 +15,7 @@ __all__ = ["evolved", "fit", "reestimated", "scored"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
+NEARBY = 0.15, 0.3, 0.7  # no decision: of a base parameter, of its unit at least, of a step of an effect: where it is searched
 SETTLED = 0.02  # no decision: of the noise variance: a fall of the cost by less changes no decision
 
 
@@ -90,7 +91,7 @@ def scored(objective: Objective, found: Fit) -> Fit:
 
 def _scored(objective: Objective, found: Fit) -> Fit:
     noise = objective.own_noise(found)
-    v = objective.weighed(found, noise)
+    v = objective.whitened_errors(found, noise)
     return objective.fitted(found.hypothesis, found.x, noise, float(v @ v), found.converged)
 
 
@@ -119,8 +120,9 @@ def evolved(objective: Objective, found: Fit, generations: int) -> Fit:
 
     hypothesis, parameters = found.hypothesis, found.parameters
     limits, steps = parameters.limits(), parameters.steps()
-    reach = np.where(np.arange(parameters.size) < parameters.base, 0.15 * np.maximum(np.abs(found.x), 0.3), 0.7 * steps)
-    reach[0] = 0.15
+    part, least, of_step = NEARBY
+    reach = np.where(np.arange(parameters.size) < parameters.base, part * np.maximum(np.abs(found.x), least), of_step * steps)
+    reach[0] = part  # ln K
     moved = np.flatnonzero(steps > 0.0)
     low, high = np.maximum(found.x - reach, limits[0])[moved], np.minimum(found.x + reach, limits[1])[moved]
     if np.any(low >= high) or not np.all(np.isfinite(found.x)):

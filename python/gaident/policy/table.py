@@ -91,12 +91,14 @@ class Policy:
     effect_penalty: float = calibrated(GAIN, "effect_penalty", "BIC units", "of each effect, for the number of candidates tried")
     short_record: int = gain(200, "samples", "a record this short doubles the penalty: its noise filter is uncertain", CLEAN)
     material_share: float = gain(
-        0.1, "1", "of the error beyond the noise, whitened or plain, that an effect explains at least", PAIRS
+        0.1, "1", "of the error beyond the noise, whitened or before whitening, that an effect explains at least", PAIRS
     )
     material_beside_impacts: float = gain(
         0.5, "1", "the same beside a gap or a hard coupling: no model foresees an impact", PAIRS
     )
-    overrules: float = gain(0.5, "1", "of the plain error that a cause which whitening hid may leave at most", REAL)
+    overrules: float = gain(
+        0.5, "1", "of the squared error before whitening: a cause that whitening hid leaves at most this", REAL
+    )
     rival_margin: float = gain(10.0, "BIC units", "closer explanations are not told apart (Kass and Raftery 1995)", SIZES)
     rival_short: int = gain(400, "samples", "a record this short doubles the margin", SIZES)
     detail_level: float = gain(
@@ -114,10 +116,17 @@ class Policy:
     free_run_ratio: float = calibrated(
         NOISE, "free_run_ratio", "1", "rms of the free run over the noise: more is a misfit that whitening took"
     )
+    unwhitened_ratio: float = noise(
+        2.0,
+        "1",
+        "rms before whitening over the noise: below, no noise model took a cause, and output errors are not searched",
+        CLEAN,
+    )
     noise_level: float = noise(
         1e-6,
         "1",
-        "share of records without effects that a test may mistake: chi-square; calibrated rows rest on it too",
+        "share of records without effects that one test may mistake, whether its bound is that of chi-square or the measured "
+        "tail of a calibrated number: to the user the mistake is the same",
         CLEAN,
     )
     dependence_gain: float = calibrated(NOISE, "dependence_gain", "BIC units", "of a free function of one signal")
@@ -137,6 +146,12 @@ class Policy:
     check_deviations: float = check(3.0, "1", "deviations of both: 0.3 % of a normal distribution are beyond", CLEAN)
     check_share: float = check(0.1, "1", "of the larger value: a smaller difference does not matter", CLEAN)
     check_torque: float = check(0.05, "1", "of the torque's rms: the same, of friction and gravity", CLEAN)
+    heavier: float = check(
+        2.0,
+        "1",
+        "deviations above the regressed inertia, from which a heavier axis of a measured torque counts: 98 % one-sided",
+        REAL,
+    )
     rigid_band: float = check(0.25, "1", "of the antiresonance: below, a load is rigid within 1/16 (1/(1 - 1/16))", SIZES)
     loses: float = check(2.0, "1", "force error of the diagnosed model over that of the regression: above, it is a note", REAL)
 
@@ -198,9 +213,8 @@ class Policy:
     # Effort: budgets.
     effort_ratio: float = effort(1.1, "1", "rms of whitened errors over the noise: below, no more effort is spent")
     misfit_ratio: float = effort(
-        2.0, "1", "rms of the whitened errors of the linear model over the noise: above, plain errors first"
+        2.0, "1", "rms of the whitened errors of the linear model over the noise: above, output errors first"
     )
-    loop_ratio: float = effort(2.0, "1", "rms of the free run over the noise: above, output errors are searched as well")
     most_effects: int = effort(4, "1", "effects in one model")
     beam_width: int = effort(3, "1", "models that are carried on side by side")
     beam_reach: float = effort(4.0, "penalties", "how far behind the best a model is carried on")

@@ -4,7 +4,7 @@ A finding is withdrawn where a free function of one signal in its place explains
 own domain, is of the finding's size.
 But whitened gains judge by what is fast, and in a record with almost no noise a small misfit of the true cause is as significant
 as the cause itself. So a finding stands where it leaves next to nothing of the free-run error that there is to explain.
-With V the sum of squared plain errors, all linear parts refitted: without the finding, with it, and with any function of the
+With V the sum of squared raw errors, all linear parts refitted: without the finding, with it, and with any function of the
 driver beside it,
 
     share = (V_without - V_with) / (V_without - V_free)
@@ -60,6 +60,6 @@ def share(space: Moves, without: Fit, final: Fit, left: Dependence) -> float:
     """The part that `final` explains of what it and a free function of the best driver explain together."""
     objective = space.objective
     less = fitted(objective, without.hypothesis, without.x, WHITE, space.policy.usual)
-    before, after = (objective.plain(*objective.sensitivities(f.hypothesis, f.x)) for f in (less, final))
+    before, after = (objective.raw_rest(*objective.sensitivities(f.hypothesis, f.x)) for f in (less, final))
     free = min(left.least.values())
     return float((before - after) / np.maximum(before - free, 1e-300))
