@@ -11,6 +11,12 @@ driver beside it,
 
 Measured: square-root drag 0.77 to 0.87 by whatever friction comes closest, friction that varies with the angle 0.44 to 0.71; the
 friction of a real ball-screw axis (EMPS) 0.997, beside a remainder that is significant all the same.
+
+That share asks whether the finding is all there is. An axis may hold the cause and something else as large that the library does
+not hold: a joint whose friction has a part that grows with gravity's torque has dry friction, though it explains 0.45 of what a
+function of the position does. So dry friction also stands where the records show it without any model of the rest: the torque
+jumps at the reversals, beside the steepest drag, or the axis rests while its torque changes
+(`estimation/regression/reversal.py`). It is then a cause, and what is left remains named by its driver.
 """
 
 from __future__ import annotations
@@ -23,8 +29,10 @@ from gaident.diagnosis.selection.moves import Moves
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit
+from gaident.estimation.regression.force_error import band_of
+from gaident.estimation.regression.reversal import jump_at_reversal, torque_held_at_rest
 
-__all__ = ["only_describes", "share", "simplified"]
+__all__ = ["only_describes", "share", "shown_by_the_records", "simplified"]
 
 
 def only_describes(
@@ -39,7 +47,26 @@ def only_describes(
     doubtful = max(instead.values()) > gain + space.policy.rival_margin
     if not doubtful and driver is not None and left.gains[driver] >= space.policy.of_its_size * gain:
         doubtful = driver in final.parameters.term(effect).domains
-    return doubtful and share(space, without, final, left) < (space.policy.class_stands if of_class else space.policy.stands)
+    if not doubtful or share(space, without, final, left) >= (space.policy.class_stands if of_class else space.policy.stands):
+        return False
+    return not shown_by_the_records(space, final, effect)
+
+
+def shown_by_the_records(space: Moves, final: Fit, effect: str) -> bool:
+    """Whether the records show dry friction of the finding's level by themselves: at the reversals, or at rest.
+
+    Of other effects they show nothing that no function of the driver could be.
+    """
+    parameters = final.parameters
+    if not parameters.term(effect).levels or not space.data.torque_logged:
+        return False
+    level = float(final.x[parameters.slot(effect)][0])
+    cutoff = band_of(parameters.model(final.x), space.data.records, below=space.policy.rigid_band)
+    shown = (
+        (jump_at_reversal(space.data.records, cutoff), space.policy.jump_deviations),
+        (torque_held_at_rest(space.data.records, cutoff), space.policy.above_noise),
+    )
+    return any(e is not None and e.value > max(sure * e.std, space.policy.of_its_level * level) for e, sure in shown)
 
 
 def simplified(space: Moves, final: Fit, left: Dependence) -> Fit:
