@@ -26,13 +26,16 @@ import numpy as np
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.dependence import Dependence, dependence
 from gaident.diagnosis.selection.moves import Moves
+from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit
 from gaident.estimation.regression.force_error import band_of
 from gaident.estimation.regression.reversal import jump_at_reversal, torque_held_at_rest
+from gaident.models.model import Model
+from gaident.policy.table import POLICY
 
-__all__ = ["only_describes", "share", "shown_by_the_records", "simplified"]
+__all__ = ["friction_shown", "only_describes", "share", "shown_by_the_records", "simplified"]
 
 
 def only_describes(
@@ -53,20 +56,27 @@ def only_describes(
 
 
 def shown_by_the_records(space: Moves, final: Fit, effect: str) -> bool:
-    """Whether the records show dry friction of the finding's level by themselves: at the reversals, or at rest.
+    """Whether the records show dry friction of the finding's level by themselves, at the reversals or at rest.
 
     Of other effects they show nothing that no function of the driver could be.
     """
     parameters = final.parameters
-    if not parameters.term(effect).levels or not space.data.torque_logged:
+    if not parameters.term(effect).levels:
         return False
-    level = float(final.x[parameters.slot(effect)][0])
-    cutoff = band_of(parameters.model(final.x), space.data.records, below=space.policy.rigid_band)
-    shown = (
-        (jump_at_reversal(space.data.records, cutoff), space.policy.jump_deviations),
-        (torque_held_at_rest(space.data.records, cutoff), space.policy.above_noise),
+    least = space.policy.of_its_level * float(final.x[parameters.slot(effect)][0])
+    return friction_shown(space.data, parameters.model(final.x), least)
+
+
+def friction_shown(data: DataSet, model: Model, least: float = 0.0) -> bool:
+    """Whether the records show dry friction of this level [N m] without any simulation, below what resonates in the model."""
+    if not data.torque_logged:
+        return False
+    cutoff = band_of(model, data.records, below=POLICY.rigid_band)
+    jump, rest = jump_at_reversal(data.records, cutoff), torque_held_at_rest(data.records, cutoff)
+    return any(
+        e is not None and e.value > max(sure * e.std, least)
+        for e, sure in ((jump, POLICY.jump_deviations), (rest, POLICY.above_noise))
     )
-    return any(e is not None and e.value > max(sure * e.std, space.policy.of_its_level * level) for e, sure in shown)
 
 
 def simplified(space: Moves, final: Fit, left: Dependence) -> Fit:

@@ -250,7 +250,7 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     if isinstance(family, OutputErrors) and family.prefilter is not None:
         family = replace(family, prefilter=replace(family.prefilter, dt=data.dt))
     objective = Objective(data, task.objective.weight, family, task.objective.measured, task.objective.counter)
-    task = replace(task, objective=objective)
+    task = replace(task, objective=objective, shown=outline.space.shown)
     space = task.space()
     base, final = (_moved(space, task.scales, f) for f in (outline.base, outline.final))
     final = reduced_by(final, _reductions(space), space.prefers, space.score)
