@@ -17,6 +17,8 @@ not hold: a joint whose friction has a part that grows with gravity's torque has
 function of the position does. So dry friction also stands where the records show it without any model of the rest: the torque
 jumps at the reversals, beside the steepest drag, or the axis rests while its torque changes
 (`estimation/regression/reversal.py`). It is then a cause, and what is left remains named by its driver.
+The same says where there is none: a drag sqrt(w) is explained to 0.95 by dry friction where the motion is fast, but its torque
+does not jump.
 """
 
 from __future__ import annotations
@@ -34,6 +36,7 @@ from gaident.estimation.regression.force_error import band_of
 from gaident.estimation.regression.reversal import jump_at_reversal, torque_held_at_rest
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
+from gaident.results.estimate import Estimate
 
 __all__ = ["friction_shown", "only_describes", "share", "shown_by_the_records", "simplified"]
 
@@ -45,38 +48,55 @@ def only_describes(
 
     of_class: the record cannot split it from other effects, whatever its noise, and it is reported with them.
     """
+    shown = shown_by_the_records(space, final, effect)
+    if shown is not None:
+        return not shown
     without = space.without(final, effect)
     instead = dependence(space.objective, without).gains
     doubtful = max(instead.values()) > gain + space.policy.rival_margin
     if not doubtful and driver is not None and left.gains[driver] >= space.policy.of_its_size * gain:
         doubtful = driver in final.parameters.term(effect).domains
-    if not doubtful or share(space, without, final, left) >= (space.policy.class_stands if of_class else space.policy.stands):
-        return False
-    return not shown_by_the_records(space, final, effect)
+    return doubtful and share(space, without, final, left) < (space.policy.class_stands if of_class else space.policy.stands)
 
 
-def shown_by_the_records(space: Moves, final: Fit, effect: str) -> bool:
-    """Whether the records show dry friction of the finding's level by themselves, at the reversals or at rest.
+def shown_by_the_records(space: Moves, final: Fit, effect: str) -> bool | None:
+    """Whether the records show dry friction of the finding's level by themselves; None where they say nothing.
 
-    Of other effects they show nothing that no function of the driver could be.
+    False where they show that there is none: the torque hardly jumps at the reversals. Of other effects they say nothing that no
+    function of the driver could be.
     """
     parameters = final.parameters
-    if not parameters.term(effect).levels:
-        return False
-    least = space.policy.of_its_level * float(final.x[parameters.slot(effect)][0])
-    return friction_shown(space.data, parameters.model(final.x), least)
+    if not parameters.term(effect).levels or not space.data.torque_logged:
+        return None
+    level = float(final.x[parameters.slot(effect)][0])
+    jump, rest = _friction_in(space.data, parameters.model(final.x))
+    if _sure(jump, rest, POLICY.of_its_level * level):
+        return True
+    refuted = jump is not None and jump.value + POLICY.jump_deviations * jump.std < POLICY.of_its_size * level
+    return False if refuted else None
 
 
-def friction_shown(data: DataSet, model: Model, least: float = 0.0) -> bool:
-    """Whether the records show dry friction of this level [N m] without any simulation, below what resonates in the model."""
-    if not data.torque_logged:
-        return False
+def friction_shown(data: DataSet, model: Model) -> bool:
+    """Whether the records show dry friction without any simulation, at the reversals or at rest."""
+    return data.torque_logged and _sure(*_friction_in(data, model), 0.0)
+
+
+def _friction_in(data: DataSet, model: Model) -> tuple[Estimate | None, Estimate | None]:
+    """(jump of the torque at the reversals, torque held at rest), below what resonates in the model.
+
+    A small torque held at rest is none: a controller at rest also answers to small torques that disturb the axis.
+    """
     cutoff = band_of(model, data.records, below=POLICY.rigid_band)
-    jump, rest = jump_at_reversal(data.records, cutoff), torque_held_at_rest(data.records, cutoff)
-    return any(
-        e is not None and e.value > max(sure * e.std, least)
-        for e, sure in ((jump, POLICY.jump_deviations), (rest, POLICY.above_noise))
-    )
+    rest = torque_held_at_rest(data.records, cutoff)
+    if rest is not None and rest.value < POLICY.slow * float(np.abs(data.torque).max()):
+        rest = None
+    return jump_at_reversal(data.records, cutoff), rest
+
+
+def _sure(jump: Estimate | None, rest: Estimate | None, least: float) -> bool:
+    """Whether either is beyond its noise, and at least so large [N m]."""
+    beyond = ((jump, POLICY.jump_deviations), (rest, POLICY.above_noise))
+    return any(e is not None and e.value > max(times * e.std, least) for e, times in beyond)
 
 
 def simplified(space: Moves, final: Fit, left: Dependence) -> Fit:
