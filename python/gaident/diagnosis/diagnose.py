@@ -15,7 +15,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
 from gaident.diagnosis.controller.log_shift import aligned
-from gaident.diagnosis.experiments.excitation import excitation
+from gaident.diagnosis.experiments.excitation import decided_by_the_angle, excitation
 from gaident.diagnosis.explain.wording import basis_of, evidence_of
 from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
@@ -33,7 +33,6 @@ from gaident.diagnosis.selection.rivals import Rival
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.objective import Fit, Objective
-from gaident.estimation.regression.sensor_lag import velocity_lag
 from gaident.estimation.uncertainty import estimates_of
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
@@ -194,7 +193,7 @@ class _Work:
         if self.data.torque_measured:
             behind = say("the {torque} was measured behind the actuator, which it does not show")
             not_testable |= {t.name: behind for t in LIBRARY.values() if t.place == "actuator"}
-        out = {*not_testable, *self.at_controller.decided, *self._decided_by_the_angle()}
+        out = {*not_testable, *self.at_controller.decided, *decided_by_the_angle(self.clean)}
         allowed = [t for t in LIBRARY.values() if t.name not in out and (self.controller is not None or not t.in_controller)]
         self.not_testable = not_testable
         found = selected(self.objective, self.scales, self.idn.model, allowed, self._equivalent_here, self._say)
@@ -203,17 +202,6 @@ class _Work:
         simpler = simplified(found.space, found.final, self.left)
         if simpler is not found.final:
             self.take(compared(found, simpler, self._equivalent_here, self._say))
-
-    def _decided_by_the_angle(self) -> set[str]:
-        """Effects that the logged angle says are not there: a late velocity, where it is not late behind the angle.
-
-        Beside a measured torque only. With a commanded one, what acts alike at the actuator would then stand alone, on the word of
-        an angle that the drive may have integrated from the same velocity.
-        """
-        lags = [velocity_lag(r) for r in self.clean] if self.data.torque_measured else [None]
-        if any(lag is None or abs(lag) > POLICY.lag_said for lag in lags):
-            return set()
-        return {t.name for t in LIBRARY.values() if t.late}
 
     def _say(self, message: str) -> None:
         self.note(None, message)

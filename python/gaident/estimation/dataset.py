@@ -96,9 +96,8 @@ class DataSet:
 
     @cached_property
     def loopable(self) -> bool:
-        """Whether command and controller can drive a model too; not where a measured torque shows that another loop drove it."""
-        there = self.controller is not None and self.command is not None and not any(self.moving)
-        return there and (self.loop_follows or not self.torque_measured)
+        """Whether command and controller can drive a model too."""
+        return self.controller is not None and self.command is not None and not any(self.moving)
 
     @cached_property
     def lengths(self) -> tuple[int, ...]:

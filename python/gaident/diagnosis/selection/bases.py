@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gaident.diagnosis.library.terms import of_inverse_dynamics
-from gaident.diagnosis.selection.mechanisms import is_mechanism, one_mass, reduced, resonant, rigid, swings
 from gaident.diagnosis.selection.attribution import friction_shown
+from gaident.diagnosis.selection.mechanisms import is_mechanism, one_mass, reduced, resonant, rigid, swings
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.score_test import ScoreTest
 from gaident.errors import RecordError, SettingsError
