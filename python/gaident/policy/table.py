@@ -133,7 +133,10 @@ class Policy:
     )
     class_stands: float = cause(0.5, "1", "the same for a class that the record cannot split", PAIRS)
     jump_deviations: float = cause(
-        4.0, "1", "deviations of the torque's jump at a reversal, from which it is dry friction; of outsiders at most 2.1", PAIRS
+        4.0,
+        "1",
+        "deviations of the torque's jump at a reversal, from which it is dry friction; of 237 without at most 3.4",
+        PAIRS,
     )
     of_its_level: float = cause(0.5, "1", "of a friction's level, that its jump or a rest under torque has at least", REAL)
 
