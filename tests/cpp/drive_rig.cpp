@@ -79,6 +79,7 @@ struct Drive {  // SI units, rad; neutral values
     double uneven_depth = 0;
     double uneven_order = 1;
     double uneven_phase = 0;
+    double loaded = 0;  // dry friction as a share of the torque that gravity and the load put on the axis
     double root = 0;        // drag root sqrt|w| sign(w),
     double hysteretic = 0;  // share of a Bouc-Wen spring in K,
     double yield = 1;       // and its yield twist, rad
@@ -95,7 +96,7 @@ public:
     explicit Rig(const Drive& drive)
         : d(drive),
           dry(d.friction_positive != 0 || d.friction_negative != 0 || d.viscous_positive != 0 || d.viscous_negative != 0 ||
-              d.stribeck != 0 || d.drifting != 0 || d.uneven != 0),
+              d.stribeck != 0 || d.drifting != 0 || d.uneven != 0 || d.loaded != 0),
           extra(d.wp > 0),
           g(extra ? (d.wp / d.wz) * (d.wp / d.wz) : 1) {}
 
@@ -136,6 +137,7 @@ private:
         if (d.stribeck != 0) f += d.stribeck * std::exp(-(speed / d.stribeck_velocity) * (speed / d.stribeck_velocity));
         if (d.drifting != 0) f += d.drifting * (1 + d.drift_rate * t);
         if (d.uneven != 0) f += d.uneven * (1 + d.uneven_depth * std::sin(d.uneven_order * x[angle] + d.uneven_phase));
+        if (d.loaded != 0) f += d.loaded * std::abs(d.load + d.unbalance * std::sin(x[angle] + d.unbalance_phase));
         return f;
     }
 

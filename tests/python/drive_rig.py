@@ -107,6 +107,7 @@ FIELDS: dict[str, dict[str, str]] = {
     "extra_resonance": {"frequency": "wp", "damping": "zp", "zero_frequency": "wz", "zero_damping": "zz"},
     "torque_hum": {"amplitude": "hum", "frequency": "hum_frequency", "phase": "hum_phase"},
     "uneven_friction": {"torque": "uneven", "depth": "uneven_depth", "order": "uneven_order", "phase": "uneven_phase"},
+    "load_dependent_friction": {"share": "loaded"},
     "root_drag": {"coefficient": "root"},
     "hysteretic_spring": {"share": "hysteretic", "yield_twist": "yield"},
 }

@@ -15,7 +15,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
 from gaident.diagnosis.controller.log_shift import aligned
-from gaident.diagnosis.experiments.excitation import excitation
+from gaident.diagnosis.experiments.excitation import decided_by_the_angle, excitation
 from gaident.diagnosis.explain.wording import basis_of, evidence_of
 from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
@@ -193,7 +193,7 @@ class _Work:
         if self.data.torque_measured:
             behind = say("the {torque} was measured behind the actuator, which it does not show")
             not_testable |= {t.name: behind for t in LIBRARY.values() if t.place == "actuator"}
-        out = {*not_testable, *self.at_controller.decided}
+        out = {*not_testable, *self.at_controller.decided, *decided_by_the_angle(self.clean)}
         allowed = [t for t in LIBRARY.values() if t.name not in out and (self.controller is not None or not t.in_controller)]
         self.not_testable = not_testable
         found = selected(self.objective, self.scales, self.idn.model, allowed, self._equivalent_here, self._say)

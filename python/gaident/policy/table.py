@@ -141,6 +141,13 @@ class Policy:
         0.9, "1", "share of what a free function explains: drag by friction 0.87, friction of a robot joint 0.946", PAIRS
     )
     class_stands: float = cause(0.5, "1", "the same for a class that the record cannot split", PAIRS)
+    jump_deviations: float = cause(
+        4.0,
+        "1",
+        "deviations of the torque's jump at a reversal, from which it is dry friction; of 237 without at most 3.4",
+        PAIRS,
+    )
+    of_its_level: float = cause(0.5, "1", "of a friction's level, that its jump or a rest under torque has at least", REAL)
 
     # Does a second method agree? The inverse-dynamics regression beside the result.
     check_deviations: float = check(3.0, "1", "deviations of both: 0.3 % of a normal distribution are beyond", CLEAN)

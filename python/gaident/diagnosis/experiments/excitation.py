@@ -16,14 +16,17 @@ from numpy.typing import NDArray
 from gaident.axis import TURN, Text, say, turns
 from gaident.control.pi import PI
 from gaident.data.record import Record
+from gaident.data.torque_kind import MEASURED
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.library.triggers import Motion, not_testable, one_sided
 from gaident.errors import RecordError
+from gaident.estimation.regression.sensor_lag import velocity_lag
 from gaident.models.drive_torque import torque_of
 from gaident.models.model import Model
 from gaident.models.starts import noise_std
 from gaident.policy.table import POLICY
 
-__all__ = ["Excitation", "excitation", "position_of"]
+__all__ = ["Excitation", "decided_by_the_angle", "excitation", "position_of"]
 
 Vector = NDArray[np.float64]
 
@@ -201,3 +204,15 @@ def _changes(x: Vector, floor: float) -> int:
     """Changes of sign between values beyond +-floor."""
     signs = np.sign(x[np.abs(x) > floor])
     return int(np.sum(signs[1:] != signs[:-1]))
+
+
+def decided_by_the_angle(records: Sequence[Record]) -> set[str]:
+    """Effects that a logged angle says are not there: a late velocity, where it is not late behind the angle.
+
+    Beside a measured torque only. With a commanded one, what acts alike at the actuator would then stand alone, on the word of an
+    angle that the drive may have integrated from the same velocity.
+    """
+    lags = [velocity_lag(r) if r.torque_is == MEASURED else None for r in records]
+    if any(lag is None or abs(lag) > POLICY.lag_said for lag in lags):
+        return set()
+    return {t.name for t in LIBRARY.values() if t.late}

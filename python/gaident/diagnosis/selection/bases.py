@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from gaident.diagnosis.library.terms import of_inverse_dynamics
+from gaident.diagnosis.selection.attribution import friction_shown
 from gaident.diagnosis.selection.mechanisms import is_mechanism, one_mass, reduced, resonant, rigid, swings
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.score_test import ScoreTest
@@ -41,13 +42,14 @@ class Task:
     model: Model
     allowed: tuple[Term, ...]
     note: Callable[[str], None]
+    shown: frozenset[str] = frozenset()
 
     @property
     def data(self) -> DataSet:
         return self.objective.data
 
     def space(self) -> Moves:
-        return Moves(self.objective, self.allowed, self.note)
+        return Moves(self.objective, self.allowed, self.note, shown=self.shown)
 
     def under(self, family: Innovations | OutputErrors) -> Task:
         return replace(self, objective=self.objective.under(family))
@@ -203,7 +205,8 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
     Their corner is where the error of the regressed axis has as much power in its slope as in itself: free run and torque then
     count alike. Of a measured torque an inertia is free up to `heavier` deviations above that of the regression.
     """
-    raw = ByOutputErrors(task.under(OutputErrors(1.0)), _axis(task.data))
+    shown = frozenset(t.family for t in task.allowed if t.levels) if friction_shown(task.data, task.model) else frozenset()
+    raw = ByOutputErrors(replace(task.under(OutputErrors(1.0)), shown=shown), _axis(task.data))
     fit = raw.regressed(task.predictor())
     if raw.axis is None or fit is None:
         return ByOutputErrors(raw.task, None)
@@ -214,7 +217,7 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
         weight, corner=max(weight.balance(objective.bridged(objective.error(fit)[None, :])[0], objective.lengths), _corner(axis))
     )
     heaviest = inertia.value + POLICY.heavier * inertia.std if task.data.torque_measured else None
-    return ByOutputErrors(task.under(OutputErrors(1.0, weight, heaviest)), axis)
+    return ByOutputErrors(raw.task.under(OutputErrors(1.0, weight, heaviest)), axis)
 
 
 def _axis(data: DataSet) -> InverseDynamics | None:

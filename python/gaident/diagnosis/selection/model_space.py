@@ -56,6 +56,7 @@ class ModelSpace:
     allowed: tuple[Term, ...]
     note: Callable[[str], None]
     policy: Policy = POLICY
+    shown: frozenset[str] = frozenset()  # families of effects that the records show by themselves
     grown: dict[Hashable, list[Fit]] = field(default_factory=dict)
 
     # What a model is worth.
@@ -84,7 +85,8 @@ class ModelSpace:
 
     def score(self, fit: Fit) -> float:
         """BIC and what the effects cost; the lower the better."""
-        effects = sum(_depth(t) for t in fit.parameters.terms)
+        # The penalty is for the number of candidates tried: what the records show by themselves was not found by trying.
+        effects = sum(_depth(t) - (t.family in self.shown) for t in fit.parameters.terms)
         # An order of the angle that was searched for counts as so many candidates more.
         orders = sum(2.0 * float(np.log(t.orders[1] - t.orders[0] + 1)) for t in fit.parameters.terms)
         more = fit.parameters.masses - 1 + fit.parameters.held  # a second mass, or a spring, counts as an effect

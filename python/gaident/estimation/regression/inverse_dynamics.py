@@ -131,6 +131,8 @@ def inverse_dynamics(
                 raise RecordError(f"terms has {name!r}, but {refused[name]}; leave it out, or give a record that shows it")
     possible = [asked] if asked is not None else [c for c in CHOICES if not set(c) & set(refused)]
     n_eff = _effective(rows, possible)
+    if asked is None:
+        possible = [c for c in possible if _exists(rows, c)] or possible
     squares = {choice: _squares(rows, choice) for choice in possible}
     scores = {c: bic(squares[c], count, n_eff, _count(c)) for c in possible}
     chosen = _material(min(possible, key=lambda c: (scores[c], len(c))), squares)
@@ -226,6 +228,12 @@ def _refused(records: Sequence[Record], rows: Sequence[Rows], axis: str) -> dict
 
 def _fitted(rows: Sequence[Rows], terms: tuple[str, ...]) -> tuple[Vector, int]:
     return solve(np.vstack([r.of(terms) for r in rows]), np.concatenate([r.torque for r in rows]))
+
+
+def _exists(rows: Sequence[Rows], terms: tuple[str, ...]) -> bool:
+    """Whether an axis can be so: its inertia, and the stiffness of a spring, are positive."""
+    values = dict(zip((p.name for t in terms for p in TERMS[t].parameters), _fitted(rows, terms)[0], strict=True))
+    return all(values.get(name, 1.0) > 0.0 for name in ("inertia", "spring"))
 
 
 def _squares(rows: Sequence[Rows], terms: tuple[str, ...]) -> float:
