@@ -298,7 +298,7 @@ class Objective:
     @property
     def head(self) -> int:
         """Samples at the start of each record that never count, so that filters of all orders are judged on the same ones."""
-        return min(HIGHEST, min(self.lengths) // 12)
+        return min(HIGHEST, min(self.lengths) // 12)  # no decision: the orders that a record can hold; a criterion chooses
 
     @cached_property
     def count(self) -> float:

@@ -207,7 +207,7 @@ def plain_view(task: Task) -> PlainView:
     weight = replace(
         weight, corner=max(weight.balance(objective.bridged(objective.error(fit)[None, :])[0], objective.lengths), _corner(axis))
     )
-    heaviest = inertia.value + 2.0 * inertia.std if task.data.torque_measured else None
+    heaviest = inertia.value + POLICY.inertia_bound * inertia.std if task.data.torque_measured else None
     return PlainView(task.under(OutputErrors(1.0, weight, heaviest)), axis)
 
 

@@ -242,7 +242,7 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     """What the coarse grid came to, fitted to all samples, reduced, and grown by what the grid could not show."""
     data, family = task.data, outline.space.objective.family
     if outline.final.parameters.masses == 1:  # no stiff shaft, no fine substeps
-        coarse = 0.5 * data.dt
+        coarse = 0.5 * data.dt  # no decision: the step of a simulation
         data = replace(data, finest=max(data.finest, coarse))
     if isinstance(family, Innovations) and family.shaft is not None:
         shaft = ShaftNoise(outline.base.parameters.linear(outline.base.x), data.dt, data.controller)
