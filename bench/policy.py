@@ -1,12 +1,15 @@
 """What a row of the policy decides: the same cases with the row at its value, at half of it and at twice.
 
     python bench/policy.py NAME [...] [--workers 2] [--cases 4] [--seed 5] [--out FILE] [--write]
-    python bench/policy.py                  # the table of what is in the data of the page
+    python bench/policy.py NAME [...] --report     # from what is in the file; nothing is run
+    python bench/policy.py                         # the table of what is in the data of the page
 
 NAME is a row of `gaident.policy.table` that decides, or the kind of cases by which rows are shown: "drives" measures every row
-that they show. `--cases` is the count of each combination; which cases a kind holds says bench/rows/cases.py. Every finished
-case is a line of the file: stop at will, start again and it goes on. `--write` puts what was measured into the data of
-docs/theory/policy.md (bench/rows/measured.json); `python docs/tools/policy.py` writes the page then.
+that they show, "all" every row. `--kind` runs other cases than those that a row names.
+`--cases` is the count of each combination; which cases a kind holds says bench/rows/cases.py.
+Every finished case is a line of the file: stop at will, start again and it goes on.
+`--write` puts what was measured into the data of docs/theory/policy.md (bench/rows/measured.json); `python docs/tools/policy.py`
+writes the page then.
 
 "Half" and "twice" follow from the row's unit (`moved` in bench/rows/watch.py). Each case runs once with the policy as it is and
 every row watched: that tells for each step of each row whether any decision of the case would be another. Where none would, the
@@ -44,6 +47,7 @@ from gaident.policy.table import SHOWN_BY, Policy, Row, rows
 from gaident.policy.trial import decide_by
 
 WATCH = Watch()
+RUNS = ("watched", "moved")
 DECIDING = {r.name: r for r in rows() if r.cases}
 
 
@@ -77,15 +81,16 @@ def key_of(case: Any, name: str | None, value: float) -> str:
     return f"{table}/{f'{name}={value:.6g}' if name else 'watched'}/{case.key}"
 
 
-def measured(row: Row, cases: list[Any], out: Path, workers: int, again: bool = True) -> dict[str, Any]:
-    """What a row decides in some cases; runs what is not in the file yet, with the row moved only where `again` says so."""
-    _run(out, None, 0.0, cases, workers)
+def measured(row: Row, cases: list[Any], out: Path, workers: int, runs: tuple[str, ...] = RUNS) -> dict[str, Any]:
+    """What a row decides in some cases, of those in the file; first runs those of `runs` that are not there yet."""
+    if "watched" in runs:
+        _run(out, None, 0.0, cases, workers)
     lines = read(out)
     base = {case.key: lines[key_of(case, None, 0.0)] for case in cases if key_of(case, None, 0.0) in lines}
     found = {}
     for step, value in zip((-1.0, 1.0), neighbours(row), strict=True):
         turned = [c for c in cases if c.key in base and step in base[c.key]["turned"].get(row.name, [])]
-        if again:
+        if "moved" in runs:
             _run(out, row.name, value, turned, workers)
         lines = read(out)
         moved = {c.key: lines.get(key_of(c, row.name, value)) for c in turned}
@@ -109,13 +114,16 @@ def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--cases", type=int, default=4)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--seed", type=int, default=5)
-    parser.add_argument("--ranges", action="store_true", help="only the watched run: in which range no decision changes")
+    parser.add_argument("--kind", choices=SHOWN_BY, help="other cases than those that the row names")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--ranges", action="store_true", help="only the watched run: in which range no decision changes")
+    which.add_argument("--report", action="store_true", help="run nothing: from what is there")
     parser.add_argument("--write", action="store_true", help="put the result into bench/rows/measured.json")
     options = parser.parse_args(arguments)
-    unknown = [n for n in options.names if n not in DECIDING and n not in SHOWN_BY]
+    unknown = [n for n in options.names if n not in DECIDING and n not in (*SHOWN_BY, "all")]
     if unknown:
         parser.error(f"{', '.join(unknown)}: no row that decides, and no kind of cases; rows: {', '.join(DECIDING)}")
-    options.rows = [r for r in DECIDING.values() if r.name in options.names or r.cases in options.names]
+    options.rows = [r for r in DECIDING.values() if {r.name, r.cases, "all"} & set(options.names)]
     return options
 
 
@@ -129,9 +137,11 @@ def main() -> None:
     options.out.parent.mkdir(parents=True, exist_ok=True)
     found = []
     for row in options.rows:
-        of_row = cases(row.cases, options.cases, options.seed)
-        told = {"date": date.today().isoformat(), "kind": row.cases, "each": options.cases, "seed": options.seed}
-        found.append({"name": row.name} | told | measured(row, of_row, options.out, options.workers, not options.ranges))
+        kind = options.kind or row.cases
+        of_row = cases(kind, options.cases, options.seed)
+        told = {"date": date.today().isoformat(), "kind": kind, "each": options.cases, "seed": options.seed}
+        runs = () if options.report else RUNS[:1] if options.ranges else RUNS
+        found.append({"name": row.name} | told | measured(row, of_row, options.out, options.workers, runs))
         print(report([found[-1]], head=row is options.rows[0]), flush=True)
     if options.write:
         MEASURED.write_text(json.dumps(merged(found), indent=1) + "\n", encoding="utf-8")

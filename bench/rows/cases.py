@@ -2,7 +2,7 @@
 
     drives      simulated drives of the blind bench, of each number five: one that hides nothing, one effect at its typical size,
                 one at 0.1 to 4 times of it, two effects, one that the library does not know
-    short       the same with nothing or one effect hidden, cut to 80, 150 or 300 samples
+    short       the same with nothing or one effect hidden, cut to 80, 200 or 400 samples
     loop        what only the controller shows: saturation, clamp, rate limit, outliers; and two clean records at once
     shifted     clean drives whose log wrote the torque 0, 1 or 2 samples late, with and without a controller
     real        measured drives, diagnosed (GAIDENT_DATA)
@@ -39,7 +39,7 @@ from blind_judge import judge
 from drive_rig import OUTSIDE
 
 LOOP = ("torque_saturation", "integrator_clamp", "command_rate_limit", "outliers")
-LENGTHS = (80, 150, 300)  # samples of a short record
+LENGTHS = (80, 200, 400)  # samples of a short record
 STRIDE = 7  # has no divisor in common with the count of effects: neighbours in their list are of one family
 OUTCOMES = ("right", "in set", "missed", "wrong", "false alarm", "refused", "crash")
 

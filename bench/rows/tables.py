@@ -60,10 +60,10 @@ def _last(row: Row, steps: Sequence[float], turned: set[float]) -> float:
 
 
 def merged(found: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """What the file holds, with the rows that were measured now in the place of what it held of them."""
+    """What the file holds, with what was measured now in the place of what it held of the same rows and kinds of cases."""
     there = json.loads(MEASURED.read_text(encoding="utf-8")) if MEASURED.exists() else []
-    rows = {each["name"]: dict(each) for each in [*there, *found]}
-    return [rows[name] for name in sorted(rows)]
+    rows = {(each["name"], each["kind"]): dict(each) for each in [*there, *found]}
+    return [rows[key] for key in sorted(rows) if rows[key]["used"]]
 
 
 def decides_nothing(measured: Mapping[str, Any]) -> bool:

@@ -120,16 +120,16 @@ def page() -> str:
 def _changes() -> str:
     """What was measured of each number, from the file that `bench/policy.py --write` makes."""
     deciding = {r.name: r for r in rows() if r.cases}
-    measured = json.loads(MEASURED.read_text(encoding="utf-8"))
-    valid = {m["name"]: m for m in measured if m["name"] in deciding and m["value"] == deciding[m["name"]].value and m["used"]}
-    lines = [_changed(valid[name]) for name in deciding if name in valid]
-    free = [name for name in deciding if name in valid and all(map(_nothing, valid[name]["at"]))]
+    found = json.loads(MEASURED.read_text(encoding="utf-8"))
+    valid = [m for name, row in deciding.items() for m in found if m["name"] == name and m["value"] == row.value and m["used"]]
+    names = {m["name"] for m in valid}
+    moving = {m["name"] for m in valid if not all(map(_nothing, m["at"]))}
     kinds = [f"`{kind}`" for kind in SHOWN_BY]
     return CHANGES.format(
         cases=f"{', '.join(kinds[:-1])} or {kinds[-1]}",
-        changes="".join(lines),
-        free=_names(free),
-        open=_names([name for name in deciding if name not in valid]),
+        changes="".join(map(_changed, valid)),
+        free=_names([name for name in deciding if name in names - moving]),
+        open=_names([name for name in deciding if name not in names]),
     )
 
 
