@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "python")
 import numpy as np
 import real_fits as fits
 import real_models as models
-from blind import read, work
+from json_lines import read, work
 from real_judge import judge, said
 from real_records import Case, Drive, Parts, cases, parts_of
 from real_tables import assert_published, report

@@ -67,6 +67,7 @@ def effective_samples(error: Vector) -> float:
     rho = np.fft.irfft(np.abs(np.fft.rfft(error, size)) ** 2, size)[:count] / power
     dead = np.flatnonzero(rho < DEAD)
     memory = int(dead[0]) if len(dead) else count
+    # no decision: the variance of a mean of correlated samples
     return float(max(count / (1.0 + 2.0 * float(rho[1:memory].sum())), 1.0))
 
 

@@ -28,7 +28,7 @@ def fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFil
 def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, iterations: int) -> Fit:
     limits, steps = hypothesis.parameters.limits(), hypothesis.parameters.steps()
     x = np.clip(x, *limits)
-    damping, converged = 1e-2, False
+    damping, converged = 1e-2, False  # no decision: a start
     v, J = objective.linearised(hypothesis, x, noise)
     cost = min(float(v @ v), WORST) if np.all(np.isfinite(v)) else WORST
     count = max(objective.count, 1.0)
@@ -51,14 +51,14 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
         costs = objective.costs(hypothesis, X, noise)
         best = int(np.argmin(costs))
         if not costs[best] < cost:
-            if damping > 1e5:
+            if damping > 1e5:  # no decision: nothing is gained by smaller steps
                 converged = True
                 break
             damping *= 1e5
             continue
         fall = cost - float(costs[best])
         x, cost = X[best], float(costs[best])
-        damping = float(np.clip(damping * 10.0 ** (best - 3.0), 1e-9, 1e9))
+        damping = float(np.clip(damping * 10.0 ** (best - 3.0), 1e-9, 1e9))  # no decision: the grid of a solver
         if fall < SETTLED * cost / count:
             converged = True
             break
@@ -127,6 +127,7 @@ def evolved(objective: Objective, found: Fit, generations: int) -> Fit:
     low, high = np.maximum(found.x - reach, limits[0])[moved], np.minimum(found.x + reach, limits[1])[moved]
     if np.any(low >= high) or not np.all(np.isfinite(found.x)):
         return found
+    # no decision: inside of the bounds
     start = low + (high - low) * np.clip((found.x[moved] - low) / (high - low), 1e-6, 1.0 - 1e-6)
 
     def costs(columns: Matrix) -> Vector:

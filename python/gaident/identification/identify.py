@@ -190,6 +190,7 @@ class _Work:
         """The core's view of (record, whether it starts in motion)."""
         c = self.controller
         rows = [
+            # no decision: a start
             core.record(r.dt, _input(r, c), r.velocity, "free" if moving else "rest", float(r.velocity[:3].mean()))
             for r, moving in parts
         ]
@@ -252,7 +253,7 @@ class _Work:
 
     def on_all_samples(self, candidates: list[Candidate]) -> list[Candidate]:
         """Fits of the parts, fitted to all samples; the start states of the whole records are other ones."""
-        starts = [(*c.as_start()[:3], np.zeros(0)) for c in candidates]
+        starts = [(*c.as_start()[:3], np.zeros(0)) for c in candidates]  # no decision: the first numbers of a start
         tolerance = selection.tolerance(self.samples)
         fits = self.experiment.refine(starts, self.ranges, [], WHOLE_ITERATIONS, self.workers, tolerance)
         return [Candidate(f) for f in fits if f.cost < 1e300]
@@ -369,7 +370,7 @@ class _Work:
         )
 
 
-def _spread(records: Sequence[Record], block: int = 1 << 18) -> float:
+def _spread(records: Sequence[Record], block: int = 1 << 18) -> float:  # no decision: samples of a block, for memory
     """Sum of squares of the velocity about its mean, a block at a time."""
     mean = sum(float(r.velocity.sum()) for r in records) / sum(len(r) for r in records)
     parts = (r.velocity[i : i + block] - mean for r in records for i in range(0, len(r), block))

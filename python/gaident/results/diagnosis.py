@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["Diagnosis"]
 
 SCHEMA = "gaident/diagnosis"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 1  # no decision: the version of a format
 
 
 @dataclass(frozen=True, repr=False)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["Identification"]
 
 SCHEMA = "gaident/identification"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 1  # no decision: the version of a format
 
 
 @dataclass(frozen=True, repr=False)

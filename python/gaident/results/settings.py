@@ -114,7 +114,7 @@ class Settings:
             value = getattr(self, name)
             if not isinstance(value, (int, float)) or not 0.0 <= value <= 1.0:
                 raise SettingsError(f"{name} is {value!r}: it is a probability, from 0 to 1")
-        if 0.0 < self.mutation < 1e-6:
+        if 0.0 < self.mutation < 1e-6:  # no decision: what an argument may be
             raise SettingsError(f"mutation is {self.mutation!r}: rates below 1e-6 never flip a bit; use 0 to have none")
         for name in ("error_weight", "order_weight"):
             value = getattr(self, name)

@@ -91,7 +91,7 @@ def rounded_command(off: Vector, command: Vector, dt: float, controller: PI) -> 
 
         off(n) - off(n-1) = (kp + h) d(n) - (kp - h) d(n-1)
     """
-    h = 0.5 * controller.ki * dt
+    h = 0.5 * controller.ki * dt  # no decision: the trapezoidal rule
     if controller.kp <= h or controller.limited:
         return False
     d = _error_of(off, controller, dt)
@@ -208,7 +208,7 @@ def _rate(case: _Case) -> Iterator[Explanation]:
 
     moves with the slope of the limit where it is not the logged one.
     """
-    h = 0.5 * case.controller.ki * case.dt
+    h = 0.5 * case.controller.ki * case.dt  # no decision: the trapezoidal rule
     if case.controller.kp <= h or case.controller.limited:
         return
     seen = _error_of(case.logged, case.controller, case.dt) + case.velocity

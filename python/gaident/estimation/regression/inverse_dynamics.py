@@ -102,9 +102,10 @@ def inverse_dynamics(
     """
     records = _checked(rec, "rec")
     checked_axis(axis)
+    # no decision: what an argument may be
     if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= 10:
         raise SettingsError(f"order={order!r}: give a whole number from 1 to 10, the filter's order in each direction")
-    nyquist = 0.5 / records[0].dt
+    nyquist = 0.5 / records[0].dt  # no decision: the Nyquist frequency
     cutoff = (
         min(cutoff_of(r, order) for r in records) if cutoff_hz is None else _number(cutoff_hz, "cutoff_hz", "the corner in Hz")
     )
@@ -278,7 +279,7 @@ def _effective(rows: Sequence[Rows], possible: Sequence[tuple[str, ...]]) -> flo
     fits = [(c, _fitted(rows, c)[0]) for c in possible]
     lefts = [[r.torque - r.of(c) @ theta for r in rows] for c, theta in fits]
     best = int(np.argmin([sum(float(x @ x) for x in left) for left in lefts]))
-    return max(effective_samples(lefts[best]), 2.0 * len(fits[best][1]))
+    return max(effective_samples(lefts[best]), 2.0 * len(fits[best][1]))  # no decision: no fewer than the fit has numbers twice
 
 
 def _relative(left: Sequence[Vector], rows: Sequence[Rows]) -> float:

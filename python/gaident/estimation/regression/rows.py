@@ -47,7 +47,8 @@ class Rows:
 def decimation_of(decimation: object, cutoff_hz: float, dt: float) -> int:
     """Samples that become one row: as asked, else 1/(cutoff_hz dt) of them, at least one. Raises SettingsError."""
     if decimation is None:
-        return max(1, int(1.0 / (cutoff_hz * dt) + 1e-6))
+        return max(1, int(1.0 / (cutoff_hz * dt) + 1e-6))  # no decision: rounding
+    # no decision: what an argument may be
     if isinstance(decimation, bool) or not isinstance(decimation, int | np.integer) or not 1 <= decimation <= 100_000:
         raise SettingsError(f"decimation={decimation!r}: give a whole number of samples from 1 to 100000, or None")
     return int(decimation)

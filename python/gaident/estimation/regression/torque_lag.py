@@ -72,10 +72,10 @@ def torque_lag(rec: Record) -> TorqueLag | None:
     if best in (0, len(left) - 1) or left[best] > POLICY.lag_left:
         return None
     before, least, after = left[best - 1 : best + 2]
-    curvature = 0.5 * (before + after) - least
+    curvature = 0.5 * (before + after) - least  # no decision: a parabola through three values
     if not curvature > POLICY.lag_curvature:
         return None
-    within = 0.25 * (before - after) / curvature
+    within = 0.25 * (before - after) / curvature  # no decision: a parabola through three values
     lowest = max(least - curvature * within**2, 0.0)
     std = float(np.sqrt(lowest / (effective_samples([residuals[best]]) * curvature)))
     return TorqueLag(steps[best] + within, std, lowest)
