@@ -36,7 +36,11 @@ def decimated(data: DataSet, blocks: int) -> DataSet:
     """The records on the coarser grid, open loop: driven by the torque that the controller issued."""
     records = [decimated_record(r, blocks) for r in data.driven]
     return replace(
-        DataSet.of(records, None), finest=max(FINEST, 2.0 * data.dt), known_noise=data.noise, torque_measured=data.torque_measured
+        DataSet.of(records, None),
+        finest=max(FINEST, 2.0 * data.dt),
+        known_noise=data.noise,
+        torque_measured=data.torque_measured,
+        axis=data.axis,
     )
 
 
