@@ -137,6 +137,27 @@ def test_the_lag_of_a_torque_from_its_motion(plant: Plant, noise: str) -> None:
     assert torque_lag(rig(plant, STEPS, torque_logged=False)) is None
 
 
+def sampled(command: NDArray[np.float64]) -> ga.Record:
+    """A drive of 10 kHz, of whose velocity and current every tenth sample is logged: nothing holds the current in between."""
+    fast = rig(Plant(3e-4, 2e-3, 0.03, 1.9, 1e-4), command, FRICTION)
+    assert fast.torque is not None
+    return ga.Record(1e-3, velocity=fast.velocity[::10], torque=fast.torque[::10], torque_is="measured")
+
+
+def test_a_torque_that_is_sampled_stands_half_a_sample_late_and_nothing_is_said_of_that() -> None:
+    """Half a sample where the current is smooth, none where it jumps with the log's samples, as a held one does."""
+    t = 1e-4 * np.arange(30000)
+    smooth = sum(200.0 / f * np.sin(2.0 * np.pi * f * t + f) for f in (1.3, 3.1, 7.7, 17.0, 29.0))
+    lengths = np.random.default_rng(6).integers(1500, 2500, 15)
+    for command, low, high in ((smooth, 0.4, 0.6), (np.repeat(STEPS[::200], 2000), 0.0, 0.1),
+                               (np.repeat(STEPS[::200], lengths), 0.1, 0.5)):  # fmt: skip
+        rec = sampled(np.asarray(command))
+        for k in (0, 1, -1):
+            lag = torque_lag(rec.shifted(torque=k))
+            assert lag is not None and low < lag.lag - k < high, (k, lag)
+        assert aligned([rec], [], None).notes == () != aligned([rec.shifted(torque=1)], [], None).notes
+
+
 def test_in_open_loop_it_is_said_and_nothing_is_moved() -> None:
     rec = rig(ELASTIC, STEPS, FRICTION)
     assert aligned([rec], [], None).notes == ()
