@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 import gaident as ga
 from gaident.axis import said
+from gaident.cli import main
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.errors import SettingsError
 from gaident.reporting.report import view_of
@@ -88,6 +90,23 @@ def test_experiments_keep_to_the_travel_of_a_linear_axis() -> None:
     assert np.ptp(path) <= 2.0 and "does not depend on the turns of a shaft" in said(first.reason, "linear")
     rotary = ga.first_experiment(1e-3, ga.Limits(speed=1.0, torque=300.0, travel=2.0, duration=20.0))
     assert set(rotary.separates) >= PERIODIC and np.array_equal(rotary.command, first.command)
+
+
+def test_the_command_line_takes_the_axis_of_the_drive_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    rec = record()[:400]
+    rows = np.column_stack([rec.time, rec.velocity, rec.torque, rec.position])
+    np.savetxt("axis.csv", rows, delimiter=",", header="time,velocity,torque,position", comments="", fmt="%.10g")
+    Path("drive.toml").write_text('axis = "linear"\n')
+    assert main(["diagnose", "axis.csv", "--drive", "drive.toml", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["axis"] == "linear" and set(data["not_testable"]) >= PERIODIC
+    limits = "[limits]\nspeed = 1.0\ntorque = 300.0\ntravel = 2.0\nduration = 20.0\n"
+    Path("drive.toml").write_text('axis = "linear"\ndt = 1e-3\n' + limits)
+    assert main(["experiment", "--drive", "drive.toml", "--json"]) == 0
+    assert not PERIODIC & set(json.loads(capsys.readouterr().out)["separates"])
 
 
 def test_another_axis_is_refused() -> None:
