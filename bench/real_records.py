@@ -187,6 +187,26 @@ DRIVES: dict[str, Drive] = {
 }
 
 
+FOLDERS: dict[Callable[..., Any], str] = {
+    emps: "emps",
+    hsm150: "hsm150",
+    joint: "robot_joints",
+    actuator: "joint_actuators",
+    epos: "epos_screws",
+    ced: "ced",
+    rack: "rack_pinion",
+}
+"""Where each loader reads."""
+
+
+def missing(case: Case) -> str:
+    """Which folder of data the case lacks here, in words; "" where it is there."""
+    if not os.environ.get("GAIDENT_DATA"):
+        return "GAIDENT_DATA does not name a folder of recorded data"
+    folder = Path(os.environ["GAIDENT_DATA"]) / FOLDERS[case.row.load]
+    return "" if folder.is_dir() else f"no recorded data: {folder} does not exist"
+
+
 def cases() -> list[Case]:
     """Every case, in the order of the table."""
     return [Case(name, variation) for name, drive in DRIVES.items() for variation in drive.variations]

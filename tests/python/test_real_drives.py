@@ -36,7 +36,7 @@ def emps_record(path: Path) -> ga.Record:
 @pytest.fixture(scope="module")
 def emps(data_dir: Path) -> ga.Diagnosis:
     training, other = (emps_record(folder(data_dir, "emps") / f) for f in FILES)
-    return ga.diagnose(training, validation=other)
+    return ga.diagnose(training, validation=other, axis="linear")
 
 
 def filtered(path: Path) -> tuple[Vector, Vector, Vector]:

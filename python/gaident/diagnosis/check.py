@@ -63,17 +63,23 @@ class Check:
 
 
 def checked(
-    records: Sequence[Record], gains: Gains, model: Model, mechanics: Mapping[str, Estimate], effects: Effects, driven: bool
+    records: Sequence[Record],
+    gains: Gains,
+    model: Model,
+    mechanics: Mapping[str, Estimate],
+    effects: Effects,
+    driven: bool,
+    axis: str = "rotary",
 ) -> Check:
     """The check of a diagnosis.
 
     records: as they were fitted; model: the extended one; mechanics: name -> Estimate; effects: effect -> its parameters;
-    driven: whether a torque drives the simulation, for lack of a controller.
+    driven: whether a torque drives the simulation, for lack of a controller; axis: rotary or linear.
     """
     nothing = Check(None, None, (), gains.before, gains.after, (), Text(""))
     if not all(r.torque is not None for r in records):
         return nothing
-    found = _regression(records, model)
+    found = _regression(records, model, axis)
     before, after, second = _forces(records, gains, found)
     if found is None:
         return replace(nothing, before=before, after=after, reason=_reason(effects, driven))
@@ -84,10 +90,10 @@ def checked(
     return Check(found, second, comparisons, before, after, notes, _reason(effects, driven))
 
 
-def _regression(records: Sequence[Record], model: Model) -> InverseDynamics | None:
+def _regression(records: Sequence[Record], model: Model, axis: str) -> InverseDynamics | None:
     """None where the records do not show one."""
     try:
-        return inverse_dynamics(list(records), cutoff_hz=band_of(model, records, below=POLICY.rigid_band))
+        return inverse_dynamics(list(records), cutoff_hz=band_of(model, records, below=POLICY.rigid_band), axis=axis)
     except GaidentError:
         return None
 
@@ -117,7 +123,7 @@ def _forces(records: Sequence[Record], gains: Gains, found: InverseDynamics | No
     if found is not None:
         try:
             part = [r[:first] for r, first in judged] if any(firsts) else list(records)
-            second = of(inverse_dynamics(part, terms=found.terms, cutoff_hz=found.cutoff_hz))
+            second = of(inverse_dynamics(part, terms=found.terms, cutoff_hz=found.cutoff_hz, axis=found.axis))
         except GaidentError:
             second = None
     return fitness(gains.before, gains.mechanism), fitness(gains.after, gains.extended), None if second is None else second.rms

@@ -16,9 +16,8 @@ from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
 from gaident.diagnosis.controller.log_shift import aligned
 from gaident.diagnosis.experiments.excitation import decided_by_the_angle, excitation
-from gaident.diagnosis.explain.wording import basis_of, evidence_of
+from gaident.diagnosis.explain.wording import basis_of, evidence_of, noise_findings
 from gaident.diagnosis.gains import Gains, measured_gains
-from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
 from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, LOAD, TWO_LEVELS, conditional_classes
 from gaident.diagnosis.mechanics import base_shift, mechanics_of
 from gaident.diagnosis.note import Note
@@ -58,6 +57,7 @@ def diagnose(
     bootstrap: int = 0,
     seed: int = 0,
     progress: ProgressCallback | None = None,
+    axis: str = "rotary",
 ) -> Diagnosis:
     """Show what the model of an axis gets wrong, name the physical cause where the data allow it, and measure the gain.
 
@@ -86,6 +86,8 @@ def diagnose(
         Seed of the random numbers; the same seed gives the same result.
     progress : callable, optional
         Called now and then with (fraction done, message), see `gaident.progress`.
+    axis : {"rotary", "linear"}
+        "linear" (m, m/s, N): positions are lengths, and no effect that returns with every turn is tried.
 
     Returns
     -------
@@ -115,7 +117,7 @@ def diagnose(
     note = Note(progress)
     records = records_of(rec, "rec")
     held = () if validation is None else records_of(validation, "validation")
-    checked(records, held, controller, identification, bootstrap, seed, progress)
+    checked(records, held, controller, identification, bootstrap, seed, progress, axis)
     records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
     moved = aligned(records, held, controller)
@@ -128,7 +130,7 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.02, "identifying the linear model")
         idn = identification if identification is not None else identify(list(moved.records), controller, seed=seed)
-        work = _Work(moved.records, moved.held, logged, idn, noise_std, note)
+        work = _Work(moved.records, moved.held, logged, idn, noise_std, note, axis)
         work.search()
         result = moved.noted(replace(work.report(seed), noise=noise_std, bootstrap=bootstrap))
         if bootstrap:
@@ -150,6 +152,7 @@ class _Work:
     idn: Identification
     noise: float | None
     note: Note
+    axis: str
 
     def __post_init__(self) -> None:
         self.controller = self.logged.controller
@@ -159,7 +162,7 @@ class _Work:
         self.clean = tuple(clean)
         self.step = quantisation(self.records)
         read = as_read(self.records, clean, self.controller)
-        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step)
+        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis)
         self.scales = scales_of(data)
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.logged.replays)
         self.notes += notes
@@ -171,7 +174,7 @@ class _Work:
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
         self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
         self.spoiled = int(sum(len(h) for h in hit))
-        self.excited = excitation(self.clean, shown)
+        self.excited = excitation(self.clean, shown, axis=self.axis)
 
     def _shown(self, effect: str) -> bool:
         return effect in self.at_controller.effects
@@ -249,7 +252,8 @@ class _Work:
                 self.notes = said
                 self.take(instead)
                 return self.report(seed)
-        findings = [*self._noise_findings(), *(replace(f, gain=gains.of(f.effect)) for f in self.controller_steps)]
+        findings = noise_findings(self.spoiled, sum(len(r) for r in self.records), self.step)
+        findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         for effect in causes:
             gain, rivals = self.rivals[effect]
             alternatives = self._alternatives(effect, rivals, offset is None)
@@ -278,7 +282,7 @@ class _Work:
                 of_driver = say(" that depends on {}", called(driver)) if self.left.gains[driver] > self.left.needed else ""
                 text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
                 self.notes.append(say(text, " and ".join(dropped), of_driver))
-        check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None)
+        check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None, self.axis)
         self.notes += check.notes
         if self.final.parameters.held and LOAD.name in self.final.effects:
             self.notes.append(
@@ -326,6 +330,7 @@ class _Work:
             torque_logged=self.data.torque_logged,
             loop_follows=self.at_controller.follows,
             version=version(),
+            axis=self.axis,
             records=self.records,
             validation_records=self.held,
         )
@@ -366,27 +371,6 @@ class _Work:
         turns = max(e.reversals, int(min(e.speeds, default=0.0) < 0.0 < max(e.speeds, default=0.0)))
         classes = conditional_classes(turns, len(e.steps), self.data.torque_logged)
         return set().union(*(c for c in classes if effect in c)) - {effect} - set(self.not_testable)
-
-    def _noise_findings(self) -> list[Finding]:
-        found = []
-        total = sum(len(r) for r in self.records)
-        if self.spoiled:
-            fraction = self.spoiled / total
-            samples = "{} of {} samples leave the signal and come back; they are left out of every fit."
-            found.append(
-                Finding(
-                    OUTLIERS,
-                    {"fraction": Estimate(fraction, float(np.sqrt(self.spoiled) / total), "1")},
-                    evidence=say(samples, self.spoiled, total),
-                    is_noise=True,
-                )
-            )
-        if self.step > 0.0:
-            text = say(
-                "All velocities lie on a lattice of {:.4g} {rad/s}: the resolution of the encoder or of the log.", self.step
-            )
-            found.append(Finding(QUANTISATION, {"step": Estimate(self.step, 0.0, "rad/s")}, evidence=text, is_noise=True))
-        return found
 
     def _determined(self, effect: str, parameters: Mapping[str, Estimate]) -> bool:
         """Whether the records say how large an effect is; else its name would rest on nothing, and a note says so."""

@@ -108,6 +108,8 @@ class Diagnosis:
         What both methods say of the same quantity; a contradiction is one of the notes, too.
     force_reason : str
         Why the force error is the figure to go by here, in words; empty where the free run is as good a figure.
+    axis : {"rotary", "linear"}
+        Kind of the axis, as it was given to `diagnose`.
     records, validation_records : tuple of Record
         The data; empty where the diagnosis was loaded from a file.
 
@@ -151,6 +153,7 @@ class Diagnosis:
     comparisons: tuple[Comparison, ...] = ()
     force_reason: str = ""
     left_needed: float = 0.0
+    axis: str = "rotary"
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
@@ -178,20 +181,20 @@ class Diagnosis:
         """
         return rec.shifted(**moves) if (moves := self.log_shifts.get(rec.digest)) else rec
 
-    def summary(self, axis: str = "rotary") -> str:
-        """Return the result as text; axis="linear" for units of m and N."""
-        text: str = provided("diagnosis_summary")(self, axis)
+    def summary(self, axis: str | None = None) -> str:
+        """Return the result as text, in the units of its axis; axis="linear" for m and N, "rotary" for rad and N m."""
+        text: str = provided("diagnosis_summary")(self, axis or self.axis)
         return text
 
-    def plot(self, records: Record | Sequence[Record] | None = None, axis: str = "rotary") -> Figure:
+    def plot(self, records: Record | Sequence[Record] | None = None, axis: str | None = None) -> Figure:
         """Draw what is wrong and what is left.
 
         Parameters
         ----------
         records : Record or sequence of Record, optional
             What to draw; None: the records used.
-        axis : {"rotary", "linear"}
-            "linear": units of m and N.
+        axis : {"rotary", "linear"}, optional
+            "linear": units of m and N; None: those of the axis.
 
         Returns
         -------
@@ -208,10 +211,10 @@ class Diagnosis:
         given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
         if not given:
             raise GaidentError("records: a loaded diagnosis holds no data; give plot(records)")
-        figure: Figure = provided("plot_diagnosis")(self, given, axis)
+        figure: Figure = provided("plot_diagnosis")(self, given, axis or self.axis)
         return figure
 
-    def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str = "rotary") -> Figure:
+    def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str | None = None) -> Figure:
         """Draw the extended model against the frequency response of the longest record, with coherence.
 
         Friction and other effects bend the record's response; the model, simulated and estimated the same way, has them too.
@@ -222,8 +225,8 @@ class Diagnosis:
             What the longest is taken of; None: the records used.
         hz : bool
             Frequencies in Hz instead of rad/s.
-        axis : {"rotary", "linear"}
-            "linear": units of m and N.
+        axis : {"rotary", "linear"}, optional
+            "linear": units of m and N; None: those of the axis.
 
         Returns
         -------
@@ -240,7 +243,8 @@ class Diagnosis:
         given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
         if not given:
             raise GaidentError("records: a loaded diagnosis holds no data; give plot_bode(records)")
-        figure: Figure = provided("plot_bode")(self.model, self.controller, tuple(map(self.as_used, given)), hz, axis)
+        used = tuple(map(self.as_used, given))
+        figure: Figure = provided("plot_bode")(self.model, self.controller, used, hz, axis or self.axis)
         return figure
 
     def _repr_html_(self) -> str:
@@ -299,12 +303,14 @@ class Diagnosis:
             "comparisons": [asdict(c) for c in self.comparisons],
             "force_reason": self.force_reason,
             "left_needed": self.left_needed,
+            "axis": self.axis,
             "linear_axis": linear_sentences(self._sentences()),
         }
 
     def _sentences(self) -> list[str]:
         """Everything that is said in words."""
-        return [*self.notes, *(f.evidence for f in self.findings), *self.not_testable.values(), *self.one_sided.values()]
+        told = [*self.notes, *(f.evidence for f in self.findings), *self.not_testable.values(), *self.one_sided.values()]
+        return [*told, self.force_reason]
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Diagnosis:
@@ -363,8 +369,9 @@ class Diagnosis:
                     Comparison(c["name"], Estimate(**c["diagnosis"]), Estimate(**c["regression"]), c["differs"])
                     for c in data.get("comparisons", ())
                 ),
-                force_reason=data.get("force_reason", ""),
+                force_reason=restored(data.get("force_reason", ""), linear),
                 left_needed=data.get("left_needed", 0.0),
+                axis=data.get("axis", "rotary"),
             )
         except (KeyError, TypeError, AttributeError, IndexError) as error:
             raise GaidentError(f"the saved diagnosis is damaged: {error!r}; save it again") from error

@@ -115,6 +115,7 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
             bootstrap=args.bootstrap,
             seed=args.seed,
             progress=progress,
+            axis=drive.axis,
         )
     dia = replace(dia, notes=(*reading_notes(drive, [*records, *(validation or ())]), *dia.notes))
     written = []

@@ -91,8 +91,10 @@ class Excitation:
         )
 
 
-def excitation(records: Record | Sequence[Record], controller: PI | None = None, model: Model | None = None) -> Excitation:
-    """Looks at one record or several; with `model`, its structure too decides what can be judged.
+def excitation(
+    records: Record | Sequence[Record], controller: PI | None = None, model: Model | None = None, axis: str = "rotary"
+) -> Excitation:
+    """Looks at one record or several; with `model`, its structure too decides what can be judged. axis: rotary or linear.
 
     Raises RecordError where there is no record, or a record has no torque and nothing to make it from.
     """
@@ -120,7 +122,7 @@ def excitation(records: Record | Sequence[Record], controller: PI | None = None,
         revolutions=max(float(np.ptp(m.position)) for m in motions) / TURN,
         steps=_distinct([s for m in motions for s in m.jumps], POLICY.apart * max(top, TINY)),
         repeated=any(m.repeated for m in motions),
-        not_testable=not_testable(motions, controller, model),
+        not_testable=not_testable(motions, controller, model, axis),
         one_sided=one_sided(motions, controller),
     )
 

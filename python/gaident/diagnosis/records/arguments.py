@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from gaident.arguments import NO_CONTROLLER
+from gaident.axis import checked_axis
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
@@ -34,8 +35,10 @@ def checked(
     bootstrap: int,
     seed: int,
     progress: ProgressCallback | None,
+    axis: str,
 ) -> None:
     """Raises RecordError or SettingsError for what cannot be diagnosed."""
+    checked_axis(axis)
     if controller is not None and not isinstance(controller, PI):
         raise SettingsError(f"controller is {controller!r}: give a gaident.PI, or None for a record in open loop")
     if idn is not None and not isinstance(idn, Identification):

@@ -224,7 +224,7 @@ def _axis(data: DataSet) -> InverseDynamics | None:
     if not data.torque_logged:
         return None
     try:
-        found = inverse_dynamics(list(data.records))
+        found = inverse_dynamics(list(data.records), axis=data.axis)
     except (RecordError, SettingsError):
         return None
     return found if found.parameters["inertia"].value > 0.0 else None
