@@ -33,7 +33,7 @@ void bind_control(py::module_& m) {
     py::class_<Clock>(m, "Clock").def(py::init([](double period) { return Clock{period}; }), py::kw_only(), py::arg("period"));
     py::class_<Controller>(m, "Controller")
         .def(py::init([](double kp, double ki, double torque_limit, double integrator_limit) {
-                 return Controller{kp, ki, torque_limit, integrator_limit};
+                 return Controller{.kp = kp, .ki = ki, .torque_limit = torque_limit, .integrator_limit = integrator_limit};
              }),
              py::kw_only(), py::arg("kp"), py::arg("ki"), py::arg("torque_limit") = endless,
              py::arg("integrator_limit") = endless);

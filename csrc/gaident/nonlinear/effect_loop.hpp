@@ -59,44 +59,78 @@ struct PastTorques {
     }
 };
 
+// User-defined effects in the loop.
+// Few models have them: what asks them is apart and called with values, so that the loop's own state may stay in registers.
+template <class R>
+class OwnInLoop {
+public:
+    OwnInLoop(const EffectRun& run, R w)
+        : run_(run),
+          torque_(at(OwnPlace::torque)),
+          friction_(at(OwnPlace::friction)),
+          actuator_(at(OwnPlace::actuator)),
+          sensor_(at(OwnPlace::sensor)),
+          shaft_(torque_ || friction_),
+          w_before_(w) {}
+
+    bool there() const { return run_.own != nullptr; }
+    bool shaft() const { return shaft_; }
+    bool friction() const { return friction_; }
+    bool actuator() const { return actuator_; }
+    bool sensor() const { return sensor_; }
+
+    [[gnu::noinline]] static R asked(const EffectRun& run, OwnPlace place, R w, R theta, R u, double t) {
+        Pack<R>::store(w, run.own_signals.velocity);
+        Pack<R>::store(theta, run.own_signals.angle);
+        Pack<R>::store(u, run.own_signals.torque);
+        run.own->ask(place, t);
+        return Pack<R>::load(run.own_answer);
+    }
+
+    // The torque with that of the effects at the shaft, evaluated at the predicted mean velocity.
+    [[gnu::always_inline]] R with_torque(R w, R theta, R T, double t) {
+        const R middle = w + (w - w_before_) * R(0.5);
+        w_before_ = w;
+        if (friction_) level_ = asked(run_, OwnPlace::friction, middle, theta, T, t > 0.0 ? t : 0.0);
+        return torque_ ? T + asked(run_, OwnPlace::torque, middle, theta, T, t > 0.0 ? t : 0.0) : T;
+    }
+    // The friction evaluated with it [N m].
+    R level() const { return level_; }
+
+private:
+    bool at(OwnPlace place) const { return run_.own != nullptr && run_.own->at(place); }
+
+    const EffectRun& run_;
+    bool torque_, friction_, actuator_, sensor_, shaft_;
+    R w_before_, level_ = R(0.0);
+};
+
 template <class R, class Plant>
 class EffectLoop {
 public:
-    EffectLoop(const EffectRun& run, const EffectConstants<R>& constants)
+    [[gnu::always_inline]] EffectLoop(const EffectRun& run, const EffectConstants<R>& constants)
         : run_(run),
-          set_(run.effects),
           c_(constants),
           plant_(constants, run.order),
-          pi_(run.loop.controller, Clock{run.sample_time}) {
+          pi_(run.loop.controller, Clock{run.sample_time}),
+          own_(run, plant_.velocity()) {
         const bool continuous = run.loop.kind == LoopKind::continuous;
         h_ = run.sample_time / run.substeps;
         if (continuous) pi_ = ControllerState<R>(run.loop.controller, Clock{h_});
-        turning_ = run.own != nullptr;
+        dry_ = run.effects.meets(effects_with(Hooks::law | Hooks::level | Hooks::friction)) || own_.friction();
+        turning_ = run.effects.meets(effects_that_turn()) || own_.there();
+        looking_back_ = run.effects.meets(effects_with(Hooks::tabulate));
         const Beginning<R> start{plant_.velocity(), c_.before, R(run.moving && !run.input.empty() ? run.input[0] : 0.0)};
-        Effects::each([&]<class E>() {
-            if (!set_.has<E>()) return;
+        Effects::each([&]<class E>() __attribute__((always_inline)) {
+            if (!run_.effects.has<E>()) return;
             const auto& c = c_.effects.template of<E>();
-            turning_ = turning_ || E::info.turns;
-            dry_ = dry_ || hook::law<E> || hook::level<E> || hook::friction<E>;
-            actuator_in_time_ = actuator_in_time_ || hook::actuator_dynamics<E>;
-            looking_back_ = looking_back_ || HasTable<E>;
-            filtering_ = filtering_ || hook::sensor_dynamics<E>;
             if constexpr (hook::controller<E>) E::controller(c, pi_);
             if constexpr (hook::law<E>) E::law(c, law_);
             if constexpr (hook::begin<E>) E::begin(c, states_.template of<E>(), start);
         });
         pi_.s = c_.stored;
-        if (run.own != nullptr) {
-            own_torque_ = run.own->at(OwnPlace::torque);
-            own_friction_ = run.own->at(OwnPlace::friction);
-            own_shaft_ = own_torque_ || own_friction_;
-            own_actuator_ = run.own->at(OwnPlace::actuator);
-            own_sensor_ = run.own->at(OwnPlace::sensor);
-            dry_ = dry_ || own_friction_;
-        }
         angle_ = R(run.start_angle);
         theta_middle_ = angle_ + plant_.velocity() * R(0.5 * h_);
-        own_w_before_ = plant_.velocity();
         if (looking_back_)
             for (std::size_t i = 0; i <= run.history_mask; ++i) Pack<R>::store(c_.before, run.history + i * width);
         // Friction that drives the shaft is none: such a candidate counts as diverged.
@@ -104,7 +138,7 @@ public:
         per_beta_ = R(1.0) / plant_.beta();
     }
 
-    void operator()() {
+    [[gnu::always_inline]] void operator()() {
         if (run_.loop.kind == LoopKind::continuous) continuous();
         else held();
     }
@@ -112,14 +146,7 @@ public:
 private:
     static constexpr std::size_t width = static_cast<std::size_t>(Pack<R>::width);
 
-    // All zero.
-    static typename Effects::States<R> no_states() {
-        typename Effects::States<R> s;
-        std::memset(static_cast<void*>(&s), 0, sizeof s);
-        return s;
-    }
-
-    void held() {
+    [[gnu::always_inline]] void held() {
         const bool open = run_.loop.kind == LoopKind::open;
         const double share = 1.0 / run_.substeps;
         for (std::size_t n = 0; n < run_.input.size(); ++n) {
@@ -133,7 +160,7 @@ private:
             for (int j = 0; j < run_.substeps; ++j) {
                 middle(here, next, (j + 0.5) * share);
                 substep(j, (static_cast<double>(n) + (j + 0.5) * share) * run_.sample_time);
-                if (filtering_) {
+                if (filtering()) {
                     theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
                     time_ = (static_cast<double>(n) + (j + 1) * share) * run_.sample_time;
                     filter();
@@ -142,7 +169,7 @@ private:
         }
     }
 
-    void continuous() {
+    [[gnu::always_inline]] void continuous() {
         const double share = 1.0 / run_.substeps;
         double r_before = run_.moving && !run_.input.empty() ? run_.input[0] : 0.0;
         R u_before = c_.before, u_long_before = c_.before;
@@ -158,7 +185,7 @@ private:
                 substep(0, (static_cast<double>(n) - 1.0 + (j + 0.5) * share) * run_.sample_time);
                 theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
                 time_ = (static_cast<double>(n) - 1.0 + (j + 1) * share) * run_.sample_time;
-                if (filtering_) filter();
+                if (filtering()) filter();
                 y = sensor();
                 u_long_before = u_before;
                 u_before = u;
@@ -198,19 +225,20 @@ private:
     // What the sensor measures, before it is filtered.
     [[gnu::always_inline]] R measured() const {
         R w = plant_.velocity();
-        if (own_sensor_) [[unlikely]]
-            w = asked(OwnPlace::sensor, w, held_, time_);
+        if (own_.sensor()) [[unlikely]]
+            w = own_.asked(run_, OwnPlace::sensor, w, theta_, held_, time_);
         return Effects::chain(w, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::sensor<E>)
-                if (set_.has<E>()) return E::sensor(c_.effects.template of<E>(), theta_, x);
+                if (run_.effects.has<E>()) return E::sensor(c_.effects.template of<E>(), theta_, x);
             return x;
         });
     }
 
+    [[gnu::always_inline]] bool filtering() const { return run_.effects.meets(effects_with(Hooks::sensor_dynamics)); }
     [[gnu::always_inline]] void filter() {
         Effects::chain(measured(), [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::sensor_dynamics<E>)
-                if (set_.has<E>()) [[likely]]
+                if (run_.effects.has<E>()) [[likely]]
                     return E::sensor_dynamics(c_.effects.template of<E>(), states_.template of<E>(), x);
             return x;
         });
@@ -220,16 +248,16 @@ private:
     [[gnu::always_inline]] R filter_output() const {
         return Effects::chain(plant_.velocity(), [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::sensor_dynamics<E>)
-                if (set_.has<E>()) return R(states_.template of<E>().output);
+                if (run_.effects.has<E>()) return R(states_.template of<E>().output);
             return x;
         });
     }
 
     [[gnu::always_inline]] R sensor() const {
-        const R y = filtering_ ? filter_output() : measured();
+        const R y = filtering() ? filter_output() : measured();
         return Effects::chain(y, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::reading<E>)
-                if (set_.has<E>()) return E::reading(c_.effects.template of<E>(), x);
+                if (run_.effects.has<E>()) return E::reading(c_.effects.template of<E>(), x);
             return x;
         });
     }
@@ -237,27 +265,19 @@ private:
     [[gnu::always_inline]] R control(R r, R y) {
         r = Effects::chain(r, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::command<E>)
-                if (set_.has<E>()) return E::command(c_.effects.template of<E>(), states_.template of<E>(), x);
+                if (run_.effects.has<E>()) return E::command(c_.effects.template of<E>(), states_.template of<E>(), x);
             return x;
         });
         return pi_.step(r - y);
     }
 
-    [[gnu::noinline]] R asked(OwnPlace place, R w, R u, double t) const {
-        Pack<R>::store(w, run_.own_signals.velocity);
-        Pack<R>::store(theta_, run_.own_signals.angle);
-        Pack<R>::store(u, run_.own_signals.torque);
-        run_.own->ask(place, t);
-        return Pack<R>::load(run_.own_answer);
-    }
-
     // The torque u is issued, to be held until the next.
     [[gnu::always_inline]] void act(R u) {
-        if (own_actuator_) [[unlikely]]
-            u = asked(OwnPlace::actuator, plant_.velocity(), u, time_);
+        if (own_.actuator()) [[unlikely]]
+            u = own_.asked(run_, OwnPlace::actuator, plant_.velocity(), theta_, u, time_);
         u = Effects::chain(u, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::actuator<E>)
-                if (set_.has<E>()) return E::actuator(c_.effects.template of<E>(), x);
+                if (run_.effects.has<E>()) return E::actuator(c_.effects.template of<E>(), x);
             return x;
         });
         held_ = u;
@@ -269,24 +289,24 @@ private:
 
     [[gnu::always_inline]] void substep(int j, double t) {
         R T = held_;
-        if (actuator_in_time_) {
+        if (run_.effects.meets(effects_with(Hooks::actuator_dynamics))) {
             const PastTorques past{run_, width, issued_, j};
             T = Effects::chain(T, [&]<class E>(R x) __attribute__((always_inline)) {
                 if constexpr (hook::actuator_dynamics<E>)
-                    if (set_.has<E>())
+                    if (run_.effects.has<E>())
                         return E::actuator_dynamics(c_.effects.template of<E>(), states_.template of<E>(), past, x);
                 return x;
             });
         }
         T = Effects::chain(T, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::torque<E>)
-                if (set_.has<E>()) return x - E::torque(c_.effects.template of<E>(), theta_);
+                if (run_.effects.has<E>()) return x - E::torque(c_.effects.template of<E>(), theta_);
             return x;
         });
 
         const R w = plant_.velocity();
-        if (own_shaft_) [[unlikely]]
-            T = with_own(w, T, t);
+        if (own_.shaft()) [[unlikely]]
+            T = own_.with_torque(w, theta_, T, t);
         const R w_free = plant_.free_velocity(T, friction_torque_);
         R w_next = w_free;
         if (dry_) {
@@ -298,69 +318,72 @@ private:
         angle_ = angle_ + (w + w_next) * R(0.5 * h_);
     }
 
-    // The torque with user-defined effects, evaluated at the predicted mean velocity.
-    // A function of its own, because few models have them.
-    [[gnu::noinline]] R with_own(R w, R T, double t) {
-        const R middle = w + (w - own_w_before_) * R(0.5);
-        own_w_before_ = w;
-        if (own_friction_) own_level_ = asked(OwnPlace::friction, middle, T, t > 0.0 ? t : 0.0);
-        return own_torque_ ? T + asked(OwnPlace::torque, middle, T, t > 0.0 ? t : 0.0) : T;
-    }
-
     [[gnu::always_inline]] R under_friction(R w, R w_free, double t) {
         FrictionStep<R> step{R(h_), w, w_free, plant_.beta(), law_};
         const auto add = [&](R level) __attribute__((always_inline)) {
             step.law.level_positive = step.law.level_positive + level;
             step.law.level_negative = step.law.level_negative + level;
         };
-        if (own_friction_) add(own_level_);
+        if (own_.friction()) add(own_.level());
         Effects::each([&]<class E>() __attribute__((always_inline)) {
             if constexpr (hook::level<E>)
-                if (set_.has<E>()) add(E::level(c_.effects.template of<E>(), R(t > 0.0 ? t : 0.0)));
+                if (run_.effects.has<E>()) add(E::level(c_.effects.template of<E>(), R(t > 0.0 ? t : 0.0)));
         });
         Effects::each([&]<class E>() __attribute__((always_inline)) {
             if constexpr (hook::friction<E>)
-                if (set_.has<E>()) [[unlikely]]  // keeps what it needs out of the registers of the others
+                if (run_.effects.has<E>()) [[unlikely]]  // keeps what it needs out of the registers of the others
                     E::friction(c_.effects.template of<E>(), states_.template of<E>(), step);
         });
         const R w_next = velocity_under_friction(step.law, w, step.w_free, step.beta);
         Effects::each([&]<class E>() __attribute__((always_inline)) {
             if constexpr (hook::after_friction<E>)
-                if (set_.has<E>()) [[unlikely]]
+                if (run_.effects.has<E>()) [[unlikely]]
                     E::after_friction(c_.effects.template of<E>(), states_.template of<E>(), step, w_next);
         });
         return w_next;
     }
 
     const EffectRun& run_;
-    const EffectSet set_;
     const EffectConstants<R>& c_;
     Plant plant_;
     ControllerState<R> pi_;
     double h_;
-    bool dry_ = false, actuator_in_time_ = false, looking_back_ = false, filtering_ = false, turning_ = false;
-    bool own_shaft_ = false, own_torque_ = false, own_friction_ = false, own_actuator_ = false, own_sensor_ = false;
+    bool dry_, turning_, looking_back_;
     double time_ = 0.0;
 
-    typename Effects::States<R> states_ = no_states();
+    OwnInLoop<R> own_;
+    typename Effects::States<R> states_{};  // all zero
     FrictionLaw<R> law_;
     R angle_, theta_ = R(0.0), theta_middle_;
     R held_ = R(0.0);
     R friction_torque_ = R(0.0), per_beta_;
-    R own_w_before_, own_level_ = R(0.0);
     std::size_t issued_ = 0;
 };
+
+template <class Loop>
+[[gnu::noinline]] void run_in_memory(Loop& loop) {
+    loop();
+}
+
+// Where a number takes one register, the compiler keeps the loop's state in registers.
+// Where it takes several, moving the state took up to 25 % more instructions: behind a call it stays in memory.
+template <class R, class Plant>
+[[gnu::always_inline]] inline void run_effects_on(const EffectRun& run, const EffectConstants<R>& c) {
+    EffectLoop<R, Plant> loop(run, c);
+    if constexpr (Pack<R>::registers == 1) loop();
+    else run_in_memory(loop);
+}
 
 // Runs the lanes whose constants are given, with the plant's order known to the compiler where it is a usual one.
 template <class R>
 void run_effects(const EffectRun& run, const EffectConstants<R>& c) {
-    if (run.two_masses) return EffectLoop<R, TwoMassPlant<R>>(run, c)();
+    if (run.two_masses) return run_effects_on<R, TwoMassPlant<R>>(run, c);
     switch (run.order) {
-        case 1: return EffectLoop<R, ObserverPlant<R, 1>>(run, c)();
-        case 2: return EffectLoop<R, ObserverPlant<R, 2>>(run, c)();
-        case 3: return EffectLoop<R, ObserverPlant<R, 3>>(run, c)();
-        case 5: return EffectLoop<R, ObserverPlant<R, 5>>(run, c)();
-        default: return EffectLoop<R, ObserverPlant<R, -1>>(run, c)();
+        case 1: return run_effects_on<R, ObserverPlant<R, 1>>(run, c);
+        case 2: return run_effects_on<R, ObserverPlant<R, 2>>(run, c);
+        case 3: return run_effects_on<R, ObserverPlant<R, 3>>(run, c);
+        case 5: return run_effects_on<R, ObserverPlant<R, 5>>(run, c);
+        default: return run_effects_on<R, ObserverPlant<R, -1>>(run, c);
     }
 }
 

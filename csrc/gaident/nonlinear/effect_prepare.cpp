@@ -136,7 +136,7 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
     Pace pace = own ? Pace::fine : Pace::sample;
     Effects::each([&]<class E>() {
         if (!model.effects.has<E>()) return;
-        if constexpr (requires { E::pace; }) pace = std::max(pace, E::pace);
+        pace = std::max(pace, E::pace);
         if constexpr (hook::substeps<E>) wanted = std::max(wanted, E::substeps(model.of(effect<E>), at));
     });
     if (pace != Pace::sample) {

@@ -48,7 +48,7 @@ A two-mass drive, simulated: the robot arm of the paper's Table III, a step of {
 loop, {SAMPLES} samples of {1e3 * SAMPLE_TIME} ms, noise {NOISE} rad/s. What is found in this record:
 """
 
-DIGITAL = PI(CONTROLLER.kp, CONTROLLER.ki)
+DIGITAL = PI(kp=CONTROLLER.kp, ki=CONTROLLER.ki)
 FRICTION = 0.04  # N m, Coulomb
 HIDDEN = {"coulomb_friction": {"torque": FRICTION}}
 """What the drive of the second part has beside its masses: effect -> parameters."""

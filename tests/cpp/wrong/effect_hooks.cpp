@@ -22,7 +22,18 @@ struct Brake {
     struct Coefficients {
         R torque;
     };
+#if defined(MISSPELT_PACE)
+    static constexpr Pace pase = Pace::fine;
+#elif defined(OTHER_PACE)
+    static constexpr int pace = 2;
+#else
+    static constexpr Pace pace = Pace::fine;
+#endif
+#if defined(MISSPELT_PREPARE)
+    static void prepair(const double* p, const Timing&, Coefficients<double>& c) { c.torque = p[0]; }
+#else
     static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.torque = p[0]; }
+#endif
 
 #if defined(MISSPELT_OPTION)
     static double substep(const double*, const Circumstances&) { return 2.0; }

@@ -250,13 +250,13 @@ def _fitted(case: _Case) -> Iterator[Explanation]:
                 continue
             solved = np.linalg.lstsq(table[used] / sizes, case.logged[used], rcond=1e-12)[0] / sizes
             torque = np.clip(table @ solved, -top, top)
-            gains = _Gains(float(solved[0]), float(solved[1]) if case.controller.ki else 0.0)
+            gains = _Gains(kp=float(solved[0]), ki=float(solved[1]) if case.controller.ki else 0.0)
             yield _named(case.controller, gains, case.dt, float(solved[-1]), shift, share, torque)
 
 
 def _named(controller: PI, gains: _Gains, dt: float, start: float, shift: int, share: float, torque: Vector) -> Explanation:
     """Says what of a fitted controller differs from the configured one."""
-    kp, ki = gains
+    kp, ki = gains.kp, gains.ki
     differs: list[str] = []
     cause, value = "", np.nan
     if shift:

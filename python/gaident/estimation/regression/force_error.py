@@ -250,7 +250,7 @@ def _led(model: Model, rec: Record, motion: Motion, cutoff_hz: float) -> Vector:
     state = np.zeros(mechanism.order + 2 * any(e.row.place == "plant" for e in mechanism.effects) + 1)
     state[0] = motion.velocity[0]
     with np.errstate(all="ignore"):
-        torque = run(mechanism, lead, PI(kp, INTEGRAL * kp / dt), state).torque
+        torque = run(mechanism, lead, PI(kp=kp, ki=INTEGRAL * kp / dt), state).torque
     held = torque.reshape(n, fine)
     return np.asarray(held[:, 0] if rec.torque_is == MEASURED else held.mean(axis=1))
 
