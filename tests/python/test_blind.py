@@ -14,7 +14,7 @@ import pytest
 import gaident as ga
 from blind_judge import CLASSES, DRIVERS, Judgement, judge
 from drive_cases import EFFECTS, random_case, random_plant, records
-from drive_rig import OUTSIDE, library
+from drive_rig import OUTSIDE, skip_without_library
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.parameterisation import Parameterisation
@@ -24,10 +24,7 @@ from gaident.models.simulate_many import simulate_values
 
 if not hasattr(ga, "diagnose"):
     pytest.skip("this gaident has no diagnose()", allow_module_level=True)
-try:
-    library()
-except RuntimeError as missing:
-    pytest.skip(str(missing), allow_module_level=True)
+skip_without_library()
 
 SEED = 20261121
 SCALES = Scales(1e-3, 1.0, 50.0, 1.0, 1e3, 10.0, 0.02, float("nan"), float("nan"), False, 1.0)
