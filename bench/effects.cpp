@@ -1,5 +1,5 @@
-// The loop with effects: ns per sample for one candidate and per candidate in lanes, next to the linear loop. Each row first checks its
-// answer: the lanes against the scalar loop bit for bit, the scalar loop against finer steps.
+// The loop with effects: ns per sample for one candidate and per candidate in lanes, next to the linear loop.
+// Each row first checks its answer: the lanes against the scalar loop bit for bit, the scalar loop against finer steps.
 #include "../csrc/gaident/nonlinear/effect_batch.hpp"
 
 #include "../csrc/gaident/numeric/denormals.hpp"

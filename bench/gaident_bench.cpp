@@ -1,6 +1,8 @@
-// Times the core without Python: us per generation beside the bound that the machine sets, ns per candidate and sample, us per candidate;
-// per arithmetic, instruction set, population, record length and loop. Every row first checks its answer against the referee. Times are
-// of this process's own processor time, which on a shared machine is steadier than the clock on the wall. `--quick`: fewer repetitions.
+// Times the core without Python: us per generation beside the bound that the machine sets, ns per candidate and sample, us per
+// candidate; per arithmetic, instruction set, population, record length and loop.
+// Every row first checks its answer against the referee.
+// Times are of this process's own processor time, which on a shared machine is steadier than the clock on the wall.
+// `--quick`: fewer repetitions.
 #include "../csrc/gaident/genetic/decode.hpp"
 #include "../csrc/gaident/numeric/denormals.hpp"
 #include "../csrc/gaident/identification/velocity_objective.hpp"
@@ -179,8 +181,9 @@ void referee_row() {
                 t.lowest * 4e6, t.highest * 4e6);
 }
 
-// What the sample loop of one generation has to do, in operations per number: a register of W candidates of largest order N costs, per
-// sample, N + 1 multiplications and 2 N + 1 additions (constant command) or 2 N + 2 and 3 N + 2 (any). Sorted by order, as they are run.
+// What the sample loop of one generation has to do, in operations per number: a register of W candidates of largest order N
+// costs, per sample, N + 1 multiplications and 2 N + 1 additions (constant command) or 2 N + 2 and 3 N + 2 (any).
+// Sorted by order, as they are run.
 struct Work {
     double multiply = 0.0, add = 0.0;
     // Seconds at the machine's issue rate: the additions alone, the multiplications alone, or all of them.
