@@ -54,21 +54,21 @@ def test_a_hidden_effect_is_named(effect: str) -> None:
     assert judged.exact, judged
 
 
-TWINS = ("torque_lag", "velocity_filter")
+EQUIVALENT = ("torque_lag", "velocity_filter")
 
 
-@pytest.mark.parametrize("effect", [e for e in CLASSES if e not in TWINS])
+@pytest.mark.parametrize("effect", [e for e in CLASSES if e not in EQUIVALENT])
 def test_a_member_of_a_class_is_reported_and_nothing_else(effect: str) -> None:
     judged = diagnosed((effect,))
     assert judged.in_set and not judged.wrong and not judged.extra, judged
 
 
 @pytest.mark.parametrize("torque", [True, False])
-@pytest.mark.parametrize("effect", TWINS)
+@pytest.mark.parametrize("effect", EQUIVALENT)
 def test_lag_and_filter_are_reported_and_never_told_apart(effect: str, torque: bool) -> None:
     judged = diagnosed((effect,), torque=torque)
     assert judged.in_set and not judged.wrong and not judged.extra, judged
-    assert judged.twins_together and not judged.named, judged
+    assert judged.equivalents_together and not judged.named, judged
 
 
 def test_a_load_and_uneven_dry_friction_are_never_told_apart() -> None:

@@ -19,7 +19,7 @@ AMBIGUOUS_SEEDS = (1, 3, 0, 5, 8)  # one step each; the first that leaves a choi
 
 
 def statistical(dia: ga.Diagnosis) -> bool:
-    """Whether a finding has a rival that is no structural twin."""
+    """Whether a finding has a rival that is no equivalent effect."""
     return any(not any({f.effect, a} <= t for t in EQUIVALENT) for f in dia.causes for a in f.alternatives)
 
 

@@ -151,8 +151,8 @@ def test_back_emf_apart_from_viscous_friction(here: Path) -> None:
     assert viscous["voltage"] == pytest.approx(D + KT * KE / R, rel=0.1)
     said = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT, torque_is="commanded")
     assert said.torque_is == "commanded" and said.torque is not None
-    thinned = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT, decimate=2)
-    assert len(thinned) == len(said) // 2
+    decimated = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT, decimate=2)
+    assert len(decimated) == len(said) // 2
 
 
 def test_the_diagnosis_finds_the_friction_behind_the_winding(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -212,7 +212,7 @@ class Diagnosis(SavedResult):
     def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str = "rotary") -> Figure:
         """Draw the extended model against the frequency response of the longest record, with coherence.
 
-        Friction and other effects bend the record's response; the model, simulated and estimated the same way, has them too.
+        Friction and other effects change the record's response; the model, simulated and estimated the same way, has them too.
 
         Parameters
         ----------

@@ -28,7 +28,7 @@ INITIAL_STATES = ("auto", "rest", "free")
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of the genetic search; `Settings()` is the best engine, `Settings.paper()` Table II to the letter.
+    """Settings of the genetic search; `Settings()` is the best engine, `Settings.paper()` is exactly Table II.
 
     Parameters
     ----------
