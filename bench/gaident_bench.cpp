@@ -10,6 +10,7 @@
 #include "../csrc/gaident/reference/cascade.hpp"
 #include "../csrc/gaident/simulation/simulate.hpp"
 #include "issue_rate.hpp"
+#include "require.hpp"
 
 #include <algorithm>
 #include <cstdio>
@@ -57,12 +58,6 @@ Figures time_of(F&& call) {
         runs.push_back(seconds_of(std::clock() - start) / static_cast<double>(count));
     }
     return figures(std::move(runs));
-}
-
-void require(bool right, const char* what) {
-    if (right) return;
-    std::fprintf(stderr, "gaident_bench: wrong answer: %s\n", what);
-    std::exit(1);
 }
 
 SearchRanges paper_ranges() { return {}; }
