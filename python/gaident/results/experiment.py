@@ -66,7 +66,7 @@ class Limits:
 
     @classmethod
     def of(cls, records: Record | Sequence[Record], controller: PI | None = None) -> Limits:
-        """Return the limits that records of the axis reached.
+        """Return what records show to be allowed.
 
         Parameters
         ----------
