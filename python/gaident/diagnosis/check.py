@@ -1,6 +1,6 @@
 """The check by a second method: the inverse-dynamics regression of the same records, and the force error on held-out data.
 
-The regression needs no start, no simulation and no noise model, so what goes astray in a search does not lead it astray.
+The regression needs no start, no simulation and no noise model, so that errors of a search do not reach it.
 Its inertia, dry friction, gravity and stiffness to ground are compared with those of the diagnosis.
 They contradict each other where
 
