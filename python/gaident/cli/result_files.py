@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gaident.cli.options import PICTURES
-from gaident.cli.output import apart, naming, save_figure, target_of
+from gaident.cli.output import apart, naming, save_figure, target_of, write
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from gaident.results.diagnosis import Diagnosis
     from gaident.results.identification import Identification
 
-__all__ = ["ResultFiles"]
+__all__ = ["ResultFiles", "write_report"]
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,16 @@ class ResultFiles:
         if self.picture is not None:
             save_figure(figure(), self.picture)
         if self.page is not None:
-            from gaident.cli.commands.report import write_report
-
             write_report(result, self.page, records, validation, axis)
         return [path for path in (self.result, self.picture, self.page) if path is not None]
+
+
+def write_report(
+    result: Diagnosis | Identification, target: Path, records: Sequence[Record], validation: Sequence[Record], axis: str
+) -> int:
+    """The page; returns its size [bytes]."""
+    from gaident.reporting.report import report_page
+
+    page = report_page(result, records, validation, axis).encode()
+    write(target, page)
+    return len(page)
