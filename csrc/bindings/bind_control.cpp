@@ -1,5 +1,5 @@
-// Controller, clock, loop and record as the objects that every other function takes; built by keyword, so that no number is told from
-// another by its place.
+// Controller, clock, loop and record as the objects that every other function takes; built by keyword, so that no number is told
+// from another by its place.
 #include "bindings.hpp"
 
 using namespace gaident;

@@ -1,12 +1,14 @@
-// A drive in continuous time, for blind tests: written from the definitions of the effects alone, sharing nothing with the library.
+// A drive in continuous time, for blind tests: written from the definitions of the effects alone, sharing nothing with the
+// library.
 //
 //   motor   J1 dw/dt = M - D1 w - Tc        M  = g (s^2 + 2 zz wz s + wz^2)/(s^2 + 2 zp wp s + wp^2) {T + q - f},  g = (wp/wz)^2
 //   load    J2 dw2/dt = Tc - D2 w2          Tc = K x + DG dx/dt + k3 x^3 beyond the gap, 0 inside; x = theta - theta2
 //
-// T: torque behind saturation, dead band, delay and lag; q: smooth shaft torques; f: dry friction. Every sample is cut at the instant
-// where the delayed torque changes and into substeps of a Runge-Kutta step of fourth order. Dry friction has three regimes
-// (sliding +, sliding -, at rest); the instant of a zero crossing is found by a secant iteration, and at rest w is exactly 0
-// until the torque that holds the shaft exceeds the friction's level. The controller is digital, as a drive has it.
+// T: torque behind saturation, dead band, delay and lag; q: smooth shaft torques; f: dry friction.
+// Every sample is cut at the instant where the delayed torque changes and into substeps of a Runge-Kutta step of fourth order.
+// Dry friction has three regimes (sliding +, sliding -, at rest); the instant of a zero crossing is found by a secant iteration,
+// and at rest w is exactly 0 until the torque that holds the shaft exceeds the friction's level.
+// The controller is digital, as a drive has it.
 //
 // Compiled and called by tests/python/drive_rig.py, which reads the list of fields below.
 #include <array>

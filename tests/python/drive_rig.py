@@ -153,6 +153,16 @@ def library() -> ctypes.CDLL:
     return loaded
 
 
+def skip_without_library() -> None:
+    """Skip the test, or on top of a file all of its tests, where the simulated drive cannot be compiled."""
+    import pytest  # here, because bench/ draws its drives without the tests' requirements
+
+    try:
+        library()
+    except RuntimeError as missing:
+        pytest.skip(str(missing), allow_module_level=True)
+
+
 def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:
     """The fields of the simulated drive that has these effects."""
     values = dict(fields())

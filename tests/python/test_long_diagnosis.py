@@ -57,8 +57,8 @@ def test_the_grid_is_as_coarse_as_what_is_wrong_allows() -> None:
     assert blocks_of(data, 0.1 * np.sin(2.0 * t)) == 8, "3500 samples are left"
     assert 1 < blocks_of(data, 0.1 * np.sin(2.0 * np.pi * 20.0 * t)) < 8
     assert blocks_of(data, 0.1 * np.sin(2.0 * np.pi * 400.0 * t)) == 1
-    looped = ga.Record(DT, command=np.sin(t), velocity=np.sin(t))
-    assert blocks_of(DataSet.of([looped], ga.PI(1.0, 1.0)), 0.1 * np.sin(2.0 * t)) == 1, "a controller samples as it does"
+    closed_loop = ga.Record(DT, command=np.sin(t), velocity=np.sin(t))
+    assert blocks_of(DataSet.of([closed_loop], ga.PI(1.0, 1.0)), 0.1 * np.sin(2.0 * t)) == 1, "a controller samples as it does"
 
 
 def test_a_floor_bounds_what_a_filter_makes_of_a_smooth_error() -> None:

@@ -154,8 +154,8 @@ def test_back_emf_apart_from_viscous_friction(here: Path) -> None:
     assert viscous["voltage"] == pytest.approx(D + KT * KE / R, rel=0.1)
     said = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT, torque_is="commanded")
     assert said.torque_is == "commanded" and said.torque is not None
-    thinned = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT, decimate=2)
-    assert len(thinned) == len(said) // 2
+    decimated = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT, decimate=2)
+    assert len(decimated) == len(said) // 2
 
 
 def test_the_friction_behind_a_winding_over_several_noises(log: dict[str, NDArray[np.float64]]) -> None:

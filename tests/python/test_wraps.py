@@ -109,8 +109,8 @@ def test_read_continues_a_position_and_results_say_so(tmp_path: Path) -> None:
     assert off[1:-1].max() < 0.5 * step / rec.dt + 1e-6 and off.max() < step / rec.dt + 1e-6
     assert len(read.notes) == 1 and "times, by 65536 counts, and was continued" in read.notes[0]
     # A gear's load side, a coarser log and an even axis see the continued one.
-    thinned = ga.read(path, counts_per_turn=65536, decimate=4)
-    assert thinned.position is not None and np.abs(np.diff(thinned.position)).max() < 0.4 and thinned.notes == read.notes
+    decimated = ga.read(path, counts_per_turn=65536, decimate=4)
+    assert decimated.position is not None and np.abs(np.diff(decimated.position)).max() < 0.4 and decimated.notes == read.notes
     even = ga.read(path, counts_per_turn=65536, resample=1e-3)
     assert even.position is not None and np.abs(np.diff(even.position)).max() < 0.1 and even.notes == read.notes
     for made in (read[5:], read.with_channels(command=None), read.shifted(torque=1), ga.Record.from_dict(read.to_dict())):

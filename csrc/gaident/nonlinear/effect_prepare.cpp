@@ -8,8 +8,9 @@ namespace {
 
 double resonance(const Pair<double>& f) { return f.e1 * f.e1 < 4.0 * f.e0 ? std::sqrt(f.e0) : 0.0; }
 
-// The state of a plant at the substep that continues as `start` does at the sample time. Both are compared by what they do under the
-// constant torque u: the differences y, dy, d2y, ... over whole samples. G and H take the state over one sample: dx = G x + H u.
+// The state of a plant at the substep that continues as `start` does at the sample time.
+// Both are compared by what they do under the constant torque u: the differences y, dy, d2y, ... over whole samples.
+// G and H take the state over one sample: dx = G x + H u.
 template <std::size_t n_max>
 bool same_motion(int n, const double (&G)[n_max][n_max], const double (&H)[n_max], const Delta<double>& plant,
                  const double* start, double u, double* x) {

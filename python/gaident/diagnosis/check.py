@@ -1,6 +1,6 @@
 """The check by a second method: the inverse-dynamics regression of the same records, and the force error on held-out data.
 
-The regression needs no start, no simulation and no noise model, so what goes astray in a search does not lead it astray.
+The regression needs no start, no simulation and no noise model, so that errors of a search do not reach it.
 Its inertia, dry friction, gravity and stiffness to ground are compared with those of the diagnosis.
 They contradict each other where
 
@@ -100,10 +100,10 @@ def _regression(records: Sequence[Record], model: Model, axis: str) -> InverseDy
 
 def _forces(records: Sequence[Record], gains: Gains, found: InverseDynamics | None) -> tuple[Fitness, Fitness, float | None]:
     """(before, after, force error of the regression), all over the same samples of the held-out data, through the same filter."""
-    judged = [(r, first) for r, first in gains.judged if r.torque is not None]
-    if len(judged) < len(gains.judged):
+    scored = [(r, first) for r, first in gains.scored if r.torque is not None]
+    if len(scored) < len(gains.scored):
         return gains.before, gains.after, None
-    rows, firsts = [r for r, _ in judged], [first for _, first in judged]
+    rows, firsts = [r for r, _ in scored], [first for _, first in scored]
     cutoff = band_of(gains.extended, rows)
 
     def of(model: Model | InverseDynamics) -> ForceError | None:
@@ -122,7 +122,7 @@ def _forces(records: Sequence[Record], gains: Gains, found: InverseDynamics | No
     second = None
     if found is not None:
         try:
-            part = [r[:first] for r, first in judged] if any(firsts) else list(records)
+            part = [r[:first] for r, first in scored] if any(firsts) else list(records)
             second = of(inverse_dynamics(part, terms=found.terms, cutoff_hz=found.cutoff_hz, axis=found.axis))
         except GaidentError:
             second = None

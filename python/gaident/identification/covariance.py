@@ -69,13 +69,13 @@ def covariance_of_factors(model: Model, plain: Matrix, coloured: Matrix, std: fl
     count = len(at_bound)
     bound = np.array([*at_bound, *[False] * (len(plain) - count)])
     scale = np.sqrt(np.diag(plain))
-    seen = np.flatnonzero(~bound & (scale > 0.0) & np.isfinite(scale))
+    shown = np.flatnonzero(~bound & (scale > 0.0) & np.isfinite(scale))
     cov = np.full((count, count), np.nan)
     free = np.flatnonzero(~bound[:count])
     cov[free, free] = np.inf
-    if len(seen):
-        size = np.outer(scale[seen], scale[seen])
-        block = np.ix_(seen, seen)
+    if len(shown):
+        size = np.outer(scale[shown], scale[shown])
+        block = np.ix_(shown, shown)
         values, vectors = np.linalg.eigh(plain[block] / size)
         known = values > 1e-13 * values[-1]
         inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
@@ -83,8 +83,8 @@ def covariance_of_factors(model: Model, plain: Matrix, coloured: Matrix, std: fl
         lost = np.sum(vectors[:, ~known] ** 2, axis=1) > 1e-6  # no decision: rounding of eigenvectors
         small[lost, :] = small[:, lost] = 0.0
         small[lost, lost] = np.inf
-        own = seen < count
-        cov[np.ix_(seen[own], seen[own])] = (small / size)[np.ix_(own, own)]
+        own = shown < count
+        cov[np.ix_(shown[own], shown[own])] = (small / size)[np.ix_(own, own)]
     return _transform(core_layout(model)[0], 0.5 * (cov + cov.T))
 
 

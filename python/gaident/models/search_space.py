@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gaident.checks import known_keys
 from gaident.errors import SpaceError
 
 if TYPE_CHECKING:
@@ -170,10 +171,8 @@ class SearchSpace:
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> SearchSpace:
         """Return the space of what `to_dict` gave; raise SpaceError for unknown keys."""
-        unknown = set(data) - {f.name for f in fields(cls)}
-        if unknown:
-            raise SpaceError(f"space holds unknown keys: {', '.join(sorted(unknown))}")
-        return cls(**data)
+        values: dict[str, Any] = known_keys(data, "the search space", [f.name for f in fields(cls)], (), SpaceError)
+        return cls(**values)
 
 
 def _pair(name: str, value: object, above_zero: bool) -> Range:

@@ -1,4 +1,4 @@
-"""How the loop stood when a record began."""
+"""The noise of a record's velocity, and whether the record begins at rest."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def _outside_runs(x: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 # no decision: samples that a spread is taken from
 def stretches(x: NDArray[np.float64], count: int = 64, length: int = 16384) -> list[NDArray[np.float64]]:
-    """Evenly spaced views of a long signal; of a shorter one the whole."""
+    """Evenly spaced parts of a long signal; of a shorter one the whole."""
     if len(x) <= count * length:
         return [x]
     return [x[i : i + length] for i in np.linspace(0, len(x) - length, count).astype(int).tolist()]
@@ -53,9 +53,8 @@ def starts_moving(rec: Record, controller: PI | None) -> bool:
     At rest the first velocity is noise: within six standard deviations of it, or one step of a quantised signal, of zero. In the
     continuous loop a command at sample 0 passes through at once, so a first velocity between 0 and 0.6 of that command is no
     motion.
-    A record whose input never changes counts as started at rest by a step at sample 0: with an unknown state before it, it
-    would say
-    nothing about zeros and gain (see `doubtful_start`).
+    A record whose input never changes counts as started at rest by a step at sample 0: with an unknown state before it, the
+    record would say nothing about zeros and gain (see `doubtful_start`).
     """
     return _first_is_motion(rec, controller) and not _constant_input(rec, controller)
 

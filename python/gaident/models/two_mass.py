@@ -67,7 +67,7 @@ def stiffness_gap(c: Vector) -> float:
     """(K_G by product - K_G by pairwise)/(K_G by pairwise) at D_G = 0: how far the sixth number contradicts.
 
     The product equation gives l R = prod A/b0 - m, so the gap is measured in l R; where l itself is next to
-    nothing (lossless load) it cannot blow the gap up.
+    nothing (lossless load) it does not make the gap large.
     """
     _, _, _, prod_a, sum_b, b0 = c
     _, m, _, _, R = phi_by_pairwise(c)

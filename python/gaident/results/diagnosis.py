@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from gaident.axis import linear_sentences, restored
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.errors import GaidentError, check_schema
-from gaident.files import write_whole
+from gaident.errors import check_schema
 from gaident.models.model import Model
 from gaident.providers import provided
 from gaident.results.estimate import Estimate
@@ -20,7 +18,7 @@ from gaident.results.finding import Finding
 from gaident.results.fitness import Comparison, Fitness
 from gaident.results.identification import Identification
 from gaident.results.inverse_dynamics import InverseDynamics
-from gaident.results.json_text import json_text
+from gaident.results.saved import SavedResult, undamaged
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,7 +30,7 @@ SCHEMA_VERSION = 1  # no decision: the version of a format
 
 
 @dataclass(frozen=True, repr=False)
-class Diagnosis:
+class Diagnosis(SavedResult):
     """What the simulation gets wrong, why, and what the extended model gains. Made by `diagnose`.
 
     Attributes
@@ -117,6 +115,8 @@ class Diagnosis:
     --------
     diagnose : Makes it, with an example.
     """
+
+    KIND: ClassVar[str] = "diagnosis"
 
     verdict: str
     findings: tuple[Finding, ...]
@@ -204,20 +204,18 @@ class Diagnosis:
         Raises
         ------
         GaidentError
-            Where a loaded diagnosis is given no records.
+            Where a loaded diagnosis is given no records, or `records` holds something else.
         SettingsError
             For another axis.
         """
-        given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
-        if not given:
-            raise GaidentError("records: a loaded diagnosis holds no data; give plot(records)")
+        given = self._drawn(records, "plot")
         figure: Figure = provided("plot_diagnosis")(self, given, axis or self.axis)
         return figure
 
     def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str | None = None) -> Figure:
         """Draw the extended model against the frequency response of the longest record, with coherence.
 
-        Friction and other effects bend the record's response; the model, simulated and estimated the same way, has them too.
+        Friction and other effects change the record's response; the model, simulated and estimated the same way, has them too.
 
         Parameters
         ----------
@@ -236,15 +234,14 @@ class Diagnosis:
         Raises
         ------
         GaidentError
-            Where a loaded diagnosis is given no records.
+            Where a loaded diagnosis is given no records, or `records` holds something else.
         RecordError
             Where they show no frequency response.
         """
-        given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
-        if not given:
-            raise GaidentError("records: a loaded diagnosis holds no data; give plot_bode(records)")
-        used = tuple(map(self.as_used, given))
-        figure: Figure = provided("plot_bode")(self.model, self.controller, used, hz, axis or self.axis)
+        given = self._drawn(records, "plot_bode")
+        figure: Figure = provided("plot_bode")(
+            self.model, self.controller, tuple(map(self.as_used, given)), hz, axis or self.axis
+        )
         return figure
 
     def _repr_html_(self) -> str:
@@ -319,7 +316,7 @@ class Diagnosis:
         Raises GaidentError where the data are something else or of a newer schema.
         """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
-        try:
+        with undamaged(cls.KIND):
             linear = data.get("linear_axis", {})  # files of gaident 0.1.0 lack it: their sentences are those of a rotary axis
             return cls(
                 verdict=data["verdict"],
@@ -373,13 +370,3 @@ class Diagnosis:
                 left_needed=data.get("left_needed", 0.0),
                 axis=data.get("axis", "rotary"),
             )
-        except (KeyError, TypeError, AttributeError, IndexError) as error:
-            raise GaidentError(f"the saved diagnosis is damaged: {error!r}; save it again") from error
-
-    def to_json(self) -> str:
-        """Return what `save` writes."""
-        return json_text(self.to_dict())
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write JSON for `gaident.load`; the file appears whole or not at all."""
-        write_whole(path, self.to_json().encode())

@@ -1,4 +1,5 @@
-// Effects as somebody might write them wrongly. It compiles with none of the macros below, and with each of them not (CMakeLists.txt).
+// Effects as somebody might write them wrongly.
+// It compiles with none of the macros below, and with each of them not (CMakeLists.txt).
 #include "gaident/effects/list.hpp"
 
 using namespace gaident;
