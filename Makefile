@@ -35,7 +35,7 @@ SOURCES := pyproject.toml CMakeLists.txt LICENSE README.md \
 ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
 endif
-.PHONY: help install demo test bench embedded tidy docs lint test-cpp test-python clean build-checked test-checked test-sanitized
+.PHONY: help install demo test bench real embedded tidy docs lint test-cpp test-python clean build-checked test-checked test-sanitized
 .DEFAULT_GOAL := help
 
 help: ## list the commands
@@ -78,6 +78,10 @@ bench: .venv/.tools ## build (plainly, without Python) and run the C++ benchmark
 	$(CMAKE) -B build/plain > build/plain/configure.log || { cat build/plain/configure.log; exit 1; }
 	$(BIN)/cmake --build build/plain --target gaident_bench
 	build/plain/bench/gaident_bench $(BENCH_FLAGS)
+
+real: .venv/.tested ## measured drives diagnosed and fitted (GAIDENT_DATA); fails where an answer is worse than the table's
+	@rm -f build/real.jsonl
+	$(BIN)/python bench/real.py --check --workers $(JOBS) --out build/real.jsonl
 
 embedded: ## the search in a drive: built for two emulated Cortex-M boards, run there, compared bit for bit (docs/dsp.md)
 	@csrc/embedded/tools.sh

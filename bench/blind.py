@@ -26,7 +26,6 @@ import sys
 import time
 import zlib
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -41,6 +40,7 @@ import blind_calibrate
 import blind_refit
 import numpy as np
 from blind_tables import limits_of, report
+from json_lines import read, work
 
 import gaident as ga
 from blind_judge import describes_noise, judge
@@ -113,15 +113,18 @@ def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float
             yield Cell(group, ("load_torque",), "multi", NOISE_KINDS[number % 3], True, number, settle=1500)
 
 
+def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI, Truth]:
+    """Record, validation record, controller and truth of a cell. Raises RuntimeError where its effect does not act there."""
+    rng = np.random.default_rng(cell.seed)
+    plant = next(p for p in iter(lambda: random_plant(rng), None) if p.name == cell.plant) if cell.plant else None
+    return random_case(cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, plant, settle=cell.settle)
+
+
 def run(cell: Cell, with_oracle: bool) -> dict[str, Any]:
     """One diagnosis and its judgement as a line of the file."""
     line: dict[str, Any] = {"key": cell.key, "cell": asdict(cell)}
-    rng = np.random.default_rng(cell.seed)
-    plant = next(p for p in iter(lambda: random_plant(rng), None) if p.name == cell.plant) if cell.plant else None
     try:
-        record, validation, controller, truth = random_case(
-            cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, plant, settle=cell.settle
-        )
+        record, validation, controller, truth = case_of(cell)
     except RuntimeError as none:  # this effect does not act there
         return line | {"impossible": str(none)}
     line |= {"plant": truth.plant.name, "factor": truth.factor, "effects": truth.effects}
@@ -165,36 +168,6 @@ def run_limit(effect: str, index: int, method: str) -> dict[str, Any]:
         return line | {"limit": asdict(getattr(importlib.import_module(module), function)(case))}
     except RuntimeError as none:
         return line | {"impossible": str(none)}
-
-
-def read(path: Path) -> dict[str, dict[str, Any]]:
-    """Lines by their key; a last line that was cut off is dropped."""
-    lines = {}
-    for text in path.read_text().splitlines() if path.exists() else []:
-        try:
-            line = json.loads(text)
-        except json.JSONDecodeError:
-            continue
-        lines[line["key"]] = line
-    return lines
-
-
-def work(path: Path, jobs: list[tuple[Any, ...]], workers: int) -> None:
-    """Run jobs (function, arguments ...) and write each result as it comes."""
-    started = time.perf_counter()
-    cut_off = path.exists() and not path.read_text().endswith("\n") and path.stat().st_size > 0
-    with path.open("a") as out, ProcessPoolExecutor(workers) as pool:
-        out.write("\n" if cut_off else "")
-        waiting = [pool.submit(*job) for job in jobs]
-        try:
-            for done, future in enumerate(as_completed(waiting), 1):
-                out.write(json.dumps(future.result()) + "\n")
-                out.flush()
-                if sys.stderr.isatty():
-                    print(f"\r{done} of {len(jobs)}, {time.perf_counter() - started:.0f} s", end="", file=sys.stderr)
-        except KeyboardInterrupt:
-            pool.shutdown(wait=False, cancel_futures=True)
-            print(f"\ninterrupted; what is done stands in {path}", file=sys.stderr)
 
 
 def calibrate(path: Path, out: Path, cases: int, seed: int, workers: int) -> None:

@@ -93,7 +93,7 @@ def _penalty(selection: Selection) -> float | None:
         fits = one.add(base)
     penalties = []
     for fit in fits:
-        simpler = one.in_view_of(base, fit)
+        simpler = one.under_predictor_of(base, fit)
         fall, less = (space.score(simpler) - space.score(fit) for space in (one, two))
         if fall > less:  # it is not where only the masses' resonance moves
             penalties.append(1.0 + fall / (fall - less))

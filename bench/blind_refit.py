@@ -155,7 +155,7 @@ def oracle(truth: Truth, velocity: Array, validation: Array) -> float:
 
 
 # Who comes near whom: the parent, the rest of the family, and what measured confusion tables say. None of them a generalisation
-# of the truth, and no structural twin.
+# of the truth, and no equivalent effect.
 NEAR = {
     "coulomb_friction": ("torque_dead_band", "unbalance", "quadratic_drag", "load_torque"),
     "stribeck_friction": ("coulomb_friction", "asymmetric_friction", "friction_drift", "presliding_friction"),

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import beta
 
-from blind_judge import CLASSES, DRIVERS, TWINS
+from blind_judge import CLASSES, DRIVERS, EQUIVALENT
 from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS
 from drive_rig import OUTSIDE
 
@@ -92,7 +92,7 @@ def effect_table(lines: list[Line]) -> str:
                      sum(right(x, "wrong") for x in some), share(right(x, "extra") for x in some),
                      "; ".join(f"{name} {100 * np.median(v):.2g}" for name, v in errors.items()) or "-",
                      median(gain_ratio(x) for x in some),
-                     share(right(x, "twins_together") for x in some) if effect in TWINS else ""])  # fmt: skip
+                     share(right(x, "equivalents_together") for x in some) if effect in EQUIVALENT else ""])  # fmt: skip
     drive = [x for x in lines if x["cell"]["effects"][0] not in NOISE_EFFECTS]
     apart = [x for x in drive if x["cell"]["effects"][0] not in CLASSES]
     errors_all = [v for x in drive for v in x["judged"]["parameter_errors"].values()]

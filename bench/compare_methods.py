@@ -79,7 +79,7 @@ def _simulator(task: Task, model: ga.Model) -> Predict:
 
 
 @dataclass(frozen=True)
-class Thinned:
+class Decimated:
     """A record's input and output at every d-th sample; the input is the mean over the samples that it stands for."""
 
     u: Vector
@@ -87,13 +87,13 @@ class Thinned:
     d: int
 
     @classmethod
-    def of(cls, task: Task, rec: ga.Record, d: int) -> Thinned:
+    def of(cls, task: Task, rec: ga.Record, d: int) -> Decimated:
         u, y = task.input_of(rec), rec.velocity
         n = len(y) // d
         return cls(u[: n * d].reshape(n, d).mean(axis=1), y[: n * d : d], d)
 
-    def cut(self, a: int, b: int) -> Thinned:
-        return Thinned(self.u[a:b], self.y[a:b], self.d)
+    def cut(self, a: int, b: int) -> Decimated:
+        return Decimated(self.u[a:b], self.y[a:b], self.d)
 
 
 @dataclass
@@ -102,18 +102,18 @@ class BlackBox:
 
     lag: int
     parameters: int
-    run: Callable[[Thinned], Vector]
+    run: Callable[[Decimated], Vector]
     detail: str
 
 
-Fit = Callable[[Thinned], BlackBox]
+Fit = Callable[[Decimated], BlackBox]
 
 
 def chosen(task: Task, candidates: list[Fit]) -> tuple[Predict, int, str]:
     """The candidate with the least free-run error on the last quarter of the training record, fitted again to all of it."""
     found: list[tuple[float, Fit, int]] = []
     for d in task.decimation:
-        data = Thinned.of(task, task.train, d)
+        data = Decimated.of(task, task.train, d)
         split = int(0.75 * len(data.y))
         fit, held = data.cut(0, split), data.cut(split, len(data.y))
         for candidate in candidates:
@@ -122,10 +122,10 @@ def chosen(task: Task, candidates: list[Fit]) -> tuple[Predict, int, str]:
             with np.errstate(over="ignore", invalid="ignore"):
                 found.append((float(np.sqrt(np.mean(error**2))), candidate, d))
     _, best, d = min(found, key=lambda entry: entry[0] if np.isfinite(entry[0]) else np.inf)
-    box = best(Thinned.of(task, task.train, d))
+    box = best(Decimated.of(task, task.train, d))
 
     def predict(rec: ga.Record) -> Vector:
-        data = Thinned.of(task, rec, d)
+        data = Decimated.of(task, rec, d)
         out = np.full(len(rec), np.nan)
         out[: len(data.y) * d : d] = safe(box, data)
         return out
@@ -133,7 +133,7 @@ def chosen(task: Task, candidates: list[Fit]) -> tuple[Predict, int, str]:
     return predict, box.parameters, f"{box.detail}, every {d}. sample" if d > 1 else box.detail
 
 
-def safe(box: BlackBox, data: Thinned) -> Vector:
+def safe(box: BlackBox, data: Decimated) -> Vector:
     """The free run, infinite where it leaves every bound."""
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
@@ -148,7 +148,7 @@ def lagged(u: Vector, y: Vector, L: int) -> Vector:
     return np.column_stack([*(y[L - i : n - i] for i in range(1, L + 1)), *(u[L - i : n - i] for i in range(L + 1))])
 
 
-def free_run(step: Callable[[Vector], float], data: Thinned, L: int) -> Vector:
+def free_run(step: Callable[[Vector], float], data: Decimated, L: int) -> Vector:
     """The output from its own past; the first L are the measured ones."""
     y = data.y.copy()
     bound = 1e3 * (1e-9 + np.abs(data.y).max())
@@ -163,7 +163,7 @@ def free_run(step: Callable[[Vector], float], data: Thinned, L: int) -> Vector:
 
 def arx(task: Task) -> tuple[Predict, int, str]:
     def candidate(L: int) -> Fit:
-        def fit(data: Thinned) -> BlackBox:
+        def fit(data: Decimated) -> BlackBox:
             X = np.column_stack([lagged(data.u, data.y, L), np.ones(len(data.y) - L)])
             theta = np.linalg.lstsq(X, data.y[L:], rcond=None)[0]
             return BlackBox(L, len(theta), lambda d: free_run(lambda x: float(theta[:-1] @ x + theta[-1]), d, L), f"order {L}")
@@ -179,7 +179,7 @@ def polynomial(task: Task) -> tuple[Predict, int, str]:
     from sysidentpy.parameter_estimation import LeastSquares
 
     def candidate(degree: int, L: int) -> Fit:
-        def fit(data: Thinned) -> BlackBox:
+        def fit(data: Decimated) -> BlackBox:
             su, sy = np.abs(data.u).max(), np.abs(data.y).max()
             model = FROLS(
                 order_selection=True, n_info_values=20, info_criteria="bic", ylag=L, xlag=L,
@@ -189,7 +189,7 @@ def polynomial(task: Task) -> tuple[Predict, int, str]:
                 warnings.simplefilter("ignore")
                 model.fit(X=(data.u / su).reshape(-1, 1), y=(data.y / sy).reshape(-1, 1))
 
-            def run(d: Thinned) -> Vector:
+            def run(d: Decimated) -> Vector:
                 return np.asarray(sy * model.predict(X=(d.u / su).reshape(-1, 1), y=(d.y[:L] / sy).reshape(-1, 1)))
 
             return BlackBox(L, len(model.theta), run, f"degree {degree}, lags {L}")
@@ -203,7 +203,7 @@ def network(task: Task) -> tuple[Predict, int, str]:
     from sklearn.neural_network import MLPRegressor
 
     def candidate(L: int, width: int, seed: int) -> Fit:
-        def fit(data: Thinned) -> BlackBox:
+        def fit(data: Decimated) -> BlackBox:
             su, sy = data.u.std() + 1e-12, data.y.std() + 1e-12
             net = MLPRegressor(
                 hidden_layer_sizes=(width, width), activation="tanh", solver="lbfgs", max_iter=500, random_state=seed

@@ -1,14 +1,14 @@
-// The loop with effects: ns per sample for one candidate and per candidate in lanes, next to the linear loop. Each row first checks its
-// answer: the lanes against the scalar loop bit for bit, the scalar loop against finer steps.
+// The loop with effects: ns per sample for one candidate and per candidate in lanes, next to the linear loop.
+// Each row first checks its answer: the lanes against the scalar loop bit for bit, the scalar loop against finer steps.
 #include "../csrc/gaident/nonlinear/effect_batch.hpp"
 
 #include "../csrc/gaident/numeric/denormals.hpp"
 #include "../csrc/gaident/plant/roots.hpp"
+#include "require.hpp"
 
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <vector>
 
 using namespace gaident;
@@ -16,12 +16,6 @@ using namespace gaident;
 namespace {
 
 constexpr std::size_t samples = 3500, many = 48;
-
-void require(bool right, const char* what) {
-    if (right) return;
-    std::fprintf(stderr, "gaident_bench: wrong answer: %s\n", what);
-    std::exit(1);
-}
 
 // Two masses as in Table III, each a few per cent another.
 std::vector<EffectModel> drives(bool with_effects) {

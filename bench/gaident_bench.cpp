@@ -1,6 +1,8 @@
-// Times the core without Python: us per generation beside the bound that the machine sets, ns per candidate and sample, us per candidate;
-// per arithmetic, instruction set, population, record length and loop. Every row first checks its answer against the referee. Times are
-// of this process's own processor time, which on a shared machine is steadier than the clock on the wall. `--quick`: fewer repetitions.
+// Times the core without Python: us per generation beside the bound that the machine sets, ns per candidate and sample, us per
+// candidate; per arithmetic, instruction set, population, record length and loop.
+// Every row first checks its answer against the referee.
+// Times are of this process's own processor time, which on a shared machine is steadier than the clock on the wall.
+// `--quick`: fewer repetitions.
 #include "../csrc/gaident/genetic/decode.hpp"
 #include "../csrc/gaident/numeric/denormals.hpp"
 #include "../csrc/gaident/identification/velocity_objective.hpp"
@@ -8,6 +10,7 @@
 #include "../csrc/gaident/reference/cascade.hpp"
 #include "../csrc/gaident/simulation/simulate.hpp"
 #include "issue_rate.hpp"
+#include "require.hpp"
 
 #include <algorithm>
 #include <cstdio>
@@ -55,12 +58,6 @@ Figures time_of(F&& call) {
         runs.push_back(seconds_of(std::clock() - start) / static_cast<double>(count));
     }
     return figures(std::move(runs));
-}
-
-void require(bool right, const char* what) {
-    if (right) return;
-    std::fprintf(stderr, "gaident_bench: wrong answer: %s\n", what);
-    std::exit(1);
 }
 
 SearchRanges paper_ranges() { return {}; }
@@ -179,8 +176,9 @@ void referee_row() {
                 t.lowest * 4e6, t.highest * 4e6);
 }
 
-// What the sample loop of one generation has to do, in operations per number: a register of W candidates of largest order N costs, per
-// sample, N + 1 multiplications and 2 N + 1 additions (constant command) or 2 N + 2 and 3 N + 2 (any). Sorted by order, as they are run.
+// What the sample loop of one generation has to do, in operations per number: a register of W candidates of largest order N
+// costs, per sample, N + 1 multiplications and 2 N + 1 additions (constant command) or 2 N + 2 and 3 N + 2 (any).
+// Sorted by order, as they are run.
 struct Work {
     double multiply = 0.0, add = 0.0;
     // Seconds at the machine's issue rate: the additions alone, the multiplications alone, or all of them.

@@ -1,4 +1,5 @@
-// How many multiplications and additions per second this machine starts, in registers of one instruction set: what no sample loop can pass.
+// How many multiplications and additions per second this machine starts, in registers of one instruction set: what no sample loop
+// can pass.
 #pragma once
 
 struct IssueRate {

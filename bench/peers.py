@@ -160,10 +160,7 @@ def generation_table(options: argparse.Namespace) -> None:
             flush=True,
         )
     for name, call in peer_runs.PER_GENERATION.items():
-        if not wanted(options, name):
-            continue
-        if label(name) is None:
-            print(f"| {name} | not installed (`pip install .[peers]`; pygmo has wheels for Linux only) | | |")
+        if not at_hand(options, name):
             continue
         coded = "194 bits" if call.__name__.startswith("bits") else "6 numbers, structure given"
         for numba in (False, True):
@@ -296,16 +293,23 @@ def optimum_table(options: argparse.Namespace, record: str) -> None:
     for name, call in peer_runs.ON_NUMBERS.items():
         runs[name] = lambda p, k, limit, call=call: peer_run(call, p, k, limit)
     for name, run in runs.items():
-        if not wanted(options, name):
-            continue
-        if label(name) is None:
-            print(f"| {name} | not installed (`pip install .[peers]`; pygmo has wheels for Linux only) | | |")
+        if not at_hand(options, name):
             continue
         optimum_row(label(name), run, record, *how)
 
 
 def wanted(options: argparse.Namespace, name: str) -> bool:
     return not options.only or name in options.only
+
+
+def at_hand(options: argparse.Namespace, name: str) -> bool:
+    """Whether a library is wanted and installed; one that is only wanted gets a row that says so."""
+    if not wanted(options, name):
+        return False
+    if label(name) is None:
+        print(f"| {name} | not installed (`pip install .[peers]`; pygmo has wheels for Linux only) | | |")
+        return False
+    return True
 
 
 def main() -> None:

@@ -2,10 +2,12 @@
 
     python bench/real.py --out real.jsonl [--workers 2] [--only TEXT ...] [--skip-diagnosis | --skip-plain]
     python bench/real.py --out real.jsonl --report          # tables only, from what is there
+    python bench/real.py --out new.jsonl --check            # fails where an answer is worse than in real_expected.py
 
 Every finished part of a case is a line of the file: stop at will, start again and it goes on. A case has two parts: the plain
 figures, and the diagnosis of the same training data. The recorded data are in the folder that GAIDENT_DATA names. --only takes
 the cases whose key ("joint 6/decimated 2") contains one of the texts. The published answers are asserted at the end.
+With --check (`make real`), cases whose data are not here are left out and named.
 """
 
 from __future__ import annotations
@@ -27,9 +29,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "python")
 import numpy as np
 import real_fits as fits
 import real_models as models
-from blind import read, work
+from json_lines import read, work
+from real_expected import worse
 from real_judge import judge, said
-from real_records import Case, Drive, Parts, cases, parts_of
+from real_records import Case, Drive, Parts, cases, missing, parts_of
 from real_tables import assert_published, report
 
 import gaident as ga
@@ -54,7 +57,7 @@ def run_diagnosis(case: Case) -> dict[str, Any]:
     line: dict[str, Any] = {"key": f"{case.key}/diagnosis", "case": case.key, "part": "diagnosis", "version": ga.__version__}
     training = parts.training if len(parts.training) > 1 else parts.training[0]
     try:
-        dia = ga.diagnose(training, controller=case.row.controller)
+        dia = ga.diagnose(training, controller=case.row.controller, axis=case.row.axis)
     except Exception as failure:  # a crash is a result, too
         return line | {"crash": f"{type(failure).__name__}: {failure}", "seconds": time.perf_counter() - started}
     what = said(dia)
@@ -140,10 +143,22 @@ def main() -> None:
     which.add_argument("--skip-diagnosis", action="store_true")
     which.add_argument("--skip-plain", action="store_true")
     parser.add_argument("--report", action="store_true")
+    parser.add_argument("--check", action="store_true", help="exit code 1 where an answer is worse than in real_expected.py")
     options = parser.parse_args()
+    if options.check and options.skip_diagnosis:
+        parser.error("--check asserts what the diagnosis says: leave --skip-diagnosis out")
     options.out.parent.mkdir(parents=True, exist_ok=True)
     there = read(options.out)
     chosen = [case for case in cases() if any(text in case.key for text in options.only)]
+    absent: dict[str, list[str]] = {}
+    for case in chosen if options.check else []:
+        if reason := missing(case):
+            absent.setdefault(reason, []).append(case.key)
+    for reason, keys in absent.items():
+        print(f"left out, {reason}: {', '.join(keys)}")
+    chosen = [case for case in chosen if not any(case.key in keys for keys in absent.values())]
+    if not chosen:
+        return
     runs = {"plain": run_plain, "diagnosis": run_diagnosis}
     if options.skip_diagnosis or options.skip_plain:
         del runs["diagnosis" if options.skip_diagnosis else "plain"]
@@ -153,6 +168,10 @@ def main() -> None:
     lines = read(options.out)
     print(report(lines))
     assert_published(lines)
+    if options.check:
+        found = worse(lines, chosen, whole=chosen == cases() and not options.skip_plain)
+        print("", *(f"worse: {text}" for text in found), f"{len(chosen)} cases, {len(found)} worse than expected", sep="\n")
+        sys.exit(1 if found else 0)
 
 
 if __name__ == "__main__":

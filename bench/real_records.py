@@ -34,6 +34,8 @@ LOAD = frozenset({"load_torque"})
 EMPS_GAIN = 35.15065188248547  # N/V
 JOINT_GAINS = {1: 10.0, 2: 10.6956, 6: 10.1232}  # N m/A
 ACTUATOR_GAINS = {1: 1.0, 2: 1.0, 3: 0.8, 4: 0.8}  # N m s/rad
+ACTUATOR_RANGE = 25.0  # of the position's counter, in its own unit
+ACTUATOR_POSITION = {1: 1.0, 2: 1.0, 3: 0.5, 4: 0.5}  # rad per unit: at every held speed of 3 and 4 it moves 1.99 times as fast
 EPOS_TORQUE = 9.84e-3  # N m, at 100 %
 RPM = np.pi / 30.0
 TRAINING = 0.7
@@ -110,9 +112,11 @@ def joint(number: int) -> tuple[list[ga.Record], list[ga.Record]]:
 
 
 def actuator(motor: int, run: int) -> tuple[list[ga.Record], list[ga.Record]]:
-    """Its irregular log on the even axis of its usual step."""
-    log = np.load(data_folder() / "joint_actuators" / f"motor_{motor:02d}_run_{run:02d}.npz")
+    """Its irregular log on the even axis of its usual step; the position starts again after its range and is continued."""
+    log = dict(np.load(data_folder() / "joint_actuators" / f"motor_{motor:02d}_run_{run:02d}.npz"))
     from gaident.data.signals.resampling import resampled
+
+    log["position"] = ACTUATOR_POSITION[motor] * np.unwrap(log["position"], period=ACTUATOR_RANGE)
 
     dt = round(float(np.median(np.diff(log["time"]))), 4)
     channels = {"command": "velocity_cmd", "velocity": "velocity", "torque": "torque_feedback", "position": "position"}
@@ -181,6 +185,26 @@ DRIVES: dict[str, Drive] = {
     **{f"ced {r}": Drive(ced, {"record": r}, FEW, None, allowed=frozenset(), split=0.8) for r in (11, 12)},
     "rack and pinion": Drive(rack, {}, FEW, None, allowed=frozenset({"quadratic_drag"})),
 }
+
+
+FOLDERS: dict[Callable[..., Any], str] = {
+    emps: "emps",
+    hsm150: "hsm150",
+    joint: "robot_joints",
+    actuator: "joint_actuators",
+    epos: "epos_screws",
+    ced: "ced",
+    rack: "rack_pinion",
+}
+"""Where each loader reads."""
+
+
+def missing(case: Case) -> str:
+    """Which folder of data the case lacks here, in words; "" where it is there."""
+    if not os.environ.get("GAIDENT_DATA"):
+        return "GAIDENT_DATA does not name a folder of recorded data"
+    folder = Path(os.environ["GAIDENT_DATA"]) / FOLDERS[case.row.load]
+    return "" if folder.is_dir() else f"no recorded data: {folder} does not exist"
 
 
 def cases() -> list[Case]:

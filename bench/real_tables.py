@@ -66,6 +66,16 @@ def best_plain(lines: Lines, case: str, figure: str = "velocity") -> tuple[str, 
     return (min(kept)[1], min(kept)[0]) if kept else None
 
 
+def ratios(lines: Lines, figure: str) -> list[float]:
+    """Ascending: the extended model's error over that of the best plain fit, of each case that has both."""
+    found = []
+    for case in cases():
+        best, extended = best_plain(lines, case.key, figure), method_of(lines, case.key, "extended").get(figure)
+        if best and extended is not None:
+            found.append(extended / best[1] if math.isfinite(extended) else math.inf)
+    return sorted(found)
+
+
 def report(lines: Lines) -> str:
     parts = [_figures(lines, "velocity"), _figures(lines, "force"), _names(lines), _stability(lines), _sums(lines)]
     return "\n\n".join(parts)
@@ -78,7 +88,9 @@ def _table(head: list[str], rows: list[list[str]]) -> str:
 
 
 def _number(value: float | None) -> str:
-    return "" if value is None else "diverges" if not math.isfinite(value) or value > 1e6 else f"{value:.3g}"
+    if value is None or math.isnan(value):  # not there; or the model cannot be led along a motion
+        return "" if value is None else "none"
+    return "diverges" if not math.isfinite(value) or value > 1e6 else f"{value:.3g}"
 
 
 def _figures(lines: Lines, figure: str) -> str:
@@ -133,17 +145,12 @@ def _sums(lines: Lines) -> str:
     outcomes = Counter("crash" if j is None else j["outcome"] for j in judged)
     text = ["Sums", ""] + [f"{name}: {outcomes[name]} of {len(judged)}" for name in (*OUTCOMES, "crash") if outcomes[name]]
     for figure in ("velocity", "force"):
-        ratios = []
-        for case in cases():
-            best, extended = best_plain(lines, case.key, figure), method_of(lines, case.key, "extended").get(figure)
-            if best and extended is not None:
-                ratios.append(extended / best[1] if math.isfinite(extended) else math.inf)
-        if ratios:
-            ratios.sort()
+        sizes = ratios(lines, figure)
+        if sizes:
             text += [
-                f"{figure}: extended / best plain: median {ratios[len(ratios) // 2]:.3g}; at most {CLOSE} in "
-                f"{sum(r <= CLOSE for r in ratios)}, below 1 in {sum(r < 1.0 for r in ratios)}, above {MUCH:g} in "
-                f"{sum(r > MUCH for r in ratios)} of {len(ratios)}"
+                f"{figure}: extended / best plain: median {sizes[len(sizes) // 2]:.3g}; at most {CLOSE} in "
+                f"{sum(r <= CLOSE for r in sizes)}, below 1 in {sum(r < 1.0 for r in sizes)}, above {MUCH:g} in "
+                f"{sum(r > MUCH for r in sizes)} of {len(sizes)}"
             ]
     best = Counter(found[0] for c in cases() if (found := best_plain(lines, c.key)))
     return "\n".join([*text, "best plain fit: " + ", ".join(f"{name} {count}" for name, count in best.most_common())])

@@ -1,8 +1,10 @@
-// The regression guard: fails when the fast path executes 15 % more instructions than it did (counts.txt), on records so short that
-// this is a loss of some 20 to 30 % in the sample loop. It counts and does not time, so a busy machine changes nothing; what costs time
-// but no instructions is for gaident_bench to show.
-// Of the loop with effects it counts a few samples with each effect alone and with all of them, eight candidates in lanes and one by itself.
-// No random numbers, and nothing but the loop: 5 % more instructions fail.
+// The regression guard: fails when the fast path executes 12 % more instructions than it did (counts.txt), on records so short
+// that this is a loss of some 20 to 30 % in the sample loop.
+// It counts and does not time, so a busy machine changes nothing; what costs time but no instructions is for gaident_bench to
+// show.
+// Of the loop with effects it counts a few samples with each effect alone and with all of them, eight candidates in lanes and one
+// by itself.
+// No random numbers, and nothing but the loop: 2 % more instructions fail.
 // Compilers differ: with one that has no rows the most stored for any is the guide and twice that the limit.
 //
 //     gaident_guard COUNTS            compare; exit code 0: held, 1: lost, 2: wrong use, 77: nothing can be counted here
@@ -25,12 +27,13 @@ using namespace gaident;
 
 namespace {
 
-constexpr double most_share = 1.15, most_share_effects = 1.05, most_share_elsewhere = 2.0;
+constexpr double most_share = 1.15, most_share_effects = 1.02, most_share_elsewhere = 2.0;
 constexpr int population = 8, cannot_count = 77;  // all lanes of the widest set in double
 constexpr double Ts = 0.444e-3, kp = 0.0232 * 5.5637, ki = 1.367 * 5.5637;
 
-// The first samples of the paper's two-mass record, without noise: its step, or a staircase, so that a fast path for steps does not hide a
-// loss elsewhere. Short: a trap costs microseconds.
+// The first samples of the paper's two-mass record, without noise: its step, or a staircase, so that a fast path for steps does
+// not hide a loss elsewhere.
+// Short: a trap costs microseconds.
 constexpr std::size_t samples = 100;
 enum class Command { step, staircase };
 
@@ -62,7 +65,8 @@ public:
           objective_(data_.experiment, ranges(), settings_),
           breeder_(objective_, settings_, Random(3), kernels.words) {
         breeder_.randomise(0, population);
-        // Behind a hold the structures are converted apart, eight lanes each: one structure, so that there is one conversion to count.
+        // Behind a hold the structures are converted apart, eight lanes each: one structure, so that there is one conversion to
+        // count.
         fixed_ = kind == LoopKind::sampled;
         for (std::size_t i = 0; fixed_ && i < population; ++i) objective_.genome().set_structure(breeder_[i], 1, 2);
         breeder_.evaluate();
@@ -133,7 +137,8 @@ constexpr Sizes sizes[] = {
     {"velocity_quantisation", {0.6}},
 };
 
-// The loop with effects, two masses, two substeps, from rest, without what a run costs that has no samples. `chosen`: all but those of the coupling, or one by name.
+// The loop with effects, two masses, two substeps, from rest, without what a run costs that has no samples.
+// `chosen`: all but those of the coupling, or one by name.
 double effect_instructions(const EffectKernel* lanes, const std::string& chosen) {
     const std::complex<double> poles[] = {-15.41, {-10.30, 150.9}, {-10.30, -150.9}};
     const std::complex<double> zeros[] = {{-4.26, 93.98}, {-4.26, -93.98}};

@@ -1,5 +1,6 @@
 // How many instructions a piece of code executes, counted by the processor's trap flag: with it set every instruction ends in a
-// trap, which Linux hands over as SIGTRAP. Slow (about a microsecond each) and the same at every run, whatever else the machine does.
+// trap, which Linux hands over as SIGTRAP.
+// Slow (about a microsecond each) and the same at every run, whatever else the machine does.
 // An iteration of a repeated string instruction traps too, at the same address: such an instruction counts once.
 #pragma once
 

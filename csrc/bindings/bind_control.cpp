@@ -1,5 +1,5 @@
-// Controller, clock, loop and record as the objects that every other function takes; built by keyword, so that no number is told from
-// another by its place.
+// Controller, clock, loop and record as the objects that every other function takes; built by keyword, so that no number is told
+// from another by its place.
 #include "bindings.hpp"
 
 #include "gaident/control/servo.hpp"
@@ -92,7 +92,7 @@ void bind_control(py::module_& m) {
              py::arg("position_every"));
     py::class_<Controller>(m, "Controller")
         .def(py::init([](double kp, double ki, double torque_limit, double integrator_limit) {
-                 return Controller{kp, ki, torque_limit, integrator_limit};
+                 return Controller{.kp = kp, .ki = ki, .torque_limit = torque_limit, .integrator_limit = integrator_limit};
              }),
              py::kw_only(), py::arg("kp"), py::arg("ki"), py::arg("torque_limit") = endless,
              py::arg("integrator_limit") = endless);

@@ -135,8 +135,9 @@ OwnPlace own_place_named(const std::string& name) {
     throw std::invalid_argument("own: '" + name + "' is no place for an effect of one's own");
 }
 
-// Python functions as own effects: function(velocity, angle, torque, time, *parameters), arrays of one number per lane, read only but for
-// the answer. To be used with the GIL held.
+// Python functions as own effects: function(velocity, angle, torque, time, *parameters), arrays of one number per lane, read only
+// but for the answer.
+// To be used with the GIL held.
 class PyOwnEffects : public OwnEffects {
 public:
     PyOwnEffects(const std::vector<std::tuple<std::string, py::function, RealArray>>& effects, std::size_t models) {

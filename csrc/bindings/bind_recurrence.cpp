@@ -33,8 +33,8 @@ py::dict effect_numbers(const PreparedEffects& made, EffectSet effects) {
     return d;
 }
 
-// {"a", "b"} of the linear plant at the sample time where no effect is left (substeps 0), else of the plant at the substep, or of two
-// masses, and the effects' numbers as the loop with effects uses them. substeps 0: as many as the model needs.
+// {"a", "b"} of the linear plant at the sample time where no effect is left (substeps 0), else of the plant at the substep, or of
+// two masses, and the effects' numbers as the loop with effects uses them. substeps 0: as many as the model needs.
 py::dict recurrence(const EffectModel& model, const Clock& clock, const Loop& loop, int substeps, double top_speed) {
     if (substeps < 0 || substeps > max_substeps) throw std::invalid_argument("substeps: 0 (as needed) to 64");
     const EffectModel left = reduced(model, false);

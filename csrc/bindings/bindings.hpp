@@ -31,12 +31,13 @@ struct PyRecord {
     PyRecord(const gaident::Clock& clock, RealArray in, RealArray out, const std::string& start, double velocity0);
 };
 
-// Runs `work` on a thread of its own with the GIL released; every 50 ms looks for Ctrl-C (sets `stop`, waits for the work to end, raises
-// KeyboardInterrupt) and calls `tick`. A Python exception raised by `tick` stops the work likewise.
+// Runs `work` on a thread of its own with the GIL released; every 50 ms looks for Ctrl-C (sets `stop`, waits for the work to end,
+// raises KeyboardInterrupt) and calls `tick`.
+// A Python exception raised by `tick` stops the work likewise.
 void run_interruptibly(std::atomic<bool>& stop, const std::function<void()>& work, const std::function<void()>& tick);
 
-// The same without `tick` for work that runs over so many samples; where these are few it is over before a thread for it would have
-// started, and before anyone could press Ctrl-C.
+// The same without `tick` for work that runs over so many samples; where these are few it is over before a thread for it would
+// have started, and before anyone could press Ctrl-C.
 void run_interruptibly(std::atomic<bool>& stop, std::size_t samples, const std::function<void()>& work);
 
 void bind_control(py::module_& m);

@@ -15,8 +15,9 @@ struct gaident_search {
 
 extern "C" {
 
-gaident_settings gaident_paper_settings(double kp, double ki, double sample_time, double peak) {
-    return {kp, ki, sample_time, peak, 0, 0.9, 0.01, 2, 1.0, 2.0};
+gaident_settings gaident_paper_settings(gaident_loop loop) {
+    return {
+        .loop = loop, .seed = 0, .crossover = 0.9, .mutation = 0.01, .tournament = 2, .error_weight = 1.0, .order_weight = 2.0};
 }
 
 size_t gaident_bytes() { return sizeof(gaident_search); }
@@ -26,17 +27,20 @@ gaident_search* gaident_configure(void* memory, size_t bytes, const gaident_sett
     const auto positive = [](double x) { return x > 1e-30 && x < 1e30; };  // in any arithmetic
     if (memory == nullptr || s == nullptr || bytes < sizeof(gaident_search)) return nullptr;
     if (reinterpret_cast<uintptr_t>(memory) % alignof(gaident_search) != 0) return nullptr;
-    if (!positive(s->kp) || !(s->ki == 0.0 || positive(s->ki)) || !positive(s->sample_time) || !positive(s->peak)) return nullptr;
+    const gaident_loop& loop = s->loop;
+    const gaident_controller& controller = loop.controller;
+    if (!positive(controller.kp) || !(controller.ki == 0.0 || positive(controller.ki))) return nullptr;
+    if (!positive(loop.sample_time) || !positive(loop.peak)) return nullptr;
     if (!rate(s->crossover) || !rate(s->mutation) || (s->mutation > 0.0 && s->mutation < 1e-6)) return nullptr;
     if (s->tournament < 1 || s->tournament > population) return nullptr;
     if (!positive(s->error_weight) || !positive(s->error_weight * s->error_weight)) return nullptr;
     if (!(s->order_weight >= 0.0 && s->order_weight < 1e30)) return nullptr;
     const FlushDenormals flush;
     StaticSetup<InDrive> setup = paper_setup();
-    setup.controller.kp = s->kp;
-    setup.controller.ki = s->ki;
-    setup.clock.period = s->sample_time;
-    setup.peak = s->peak;
+    setup.controller.kp = controller.kp;
+    setup.controller.ki = controller.ki;
+    setup.clock.period = loop.sample_time;
+    setup.peak = loop.peak;
     setup.tournament = s->tournament;
     setup.crossover = s->crossover;
     setup.mutation = s->mutation;

@@ -1,6 +1,8 @@
 /* gaident in a drive: identification of the plant inside a velocity loop, while the drive works. C99.
  *
  *     static uint64_t memory[...];                             gaident_bytes() bytes, aligned to 8
+ *     gaident_loop loop = {.controller = {.kp = ..., .ki = ...}, .sample_time = ..., .peak = ...};
+ *     gaident_settings settings = gaident_paper_settings(loop);
  *     gaident_search *g = gaident_configure(memory, sizeof memory, &settings);
  *     in the control task:      gaident_feed(g, command, velocity);    until it returns 0: the record is full
  *     in a background task:     gaident_run(g, 1);                     one generation more; or gaident_work(g, n) for shorter slices
@@ -21,11 +23,21 @@ extern "C" {
 
 typedef struct gaident_search gaident_search;
 
+/* The velocity controller, a PI: T = kp e + ki integral of e dt, e = command - velocity. */
 typedef struct {
-    double kp;           /* proportional gain of the velocity controller [N m s/rad] */
-    double ki;           /* its integral gain [N m/rad] */
-    double sample_time;  /* [s] */
-    double peak;         /* largest velocity or command to be expected [rad/s]; sets the fixed-point scaling */
+    double kp; /* proportional gain [N m s/rad] */
+    double ki; /* integral gain [N m/rad] */
+} gaident_controller;
+
+/* The loop that is recorded. */
+typedef struct {
+    gaident_controller controller;
+    double sample_time; /* [s] */
+    double peak;        /* largest velocity or command to be expected [rad/s]; sets the fixed-point scaling */
+} gaident_loop;
+
+typedef struct {
+    gaident_loop loop;
     uint64_t seed;       /* the same seed gives the same run, here and on the desk */
     double crossover;    /* rate per pair, 0..1; the paper: 0.9 */
     double mutation;     /* rate per bit, 1e-6..1; the paper: 0.01 */
@@ -54,7 +66,7 @@ typedef struct {
 } gaident_model;
 
 /* The paper's settings (Table II) for a loop. */
-gaident_settings gaident_paper_settings(double kp, double ki, double sample_time, double peak);
+gaident_settings gaident_paper_settings(gaident_loop loop);
 
 /* Memory that a search takes [bytes]. */
 size_t gaident_bytes(void);

@@ -1,5 +1,6 @@
-// The paper's run in a drive: the two-mass record, 50 individuals, 1000 generations. Says per generation the smallest cost and a hash of
-// the whole population with its costs, all in bits, so that two machines can be compared line by line; lines with # are this machine's own.
+// The paper's run in a drive: the two-mass record, 50 individuals, 1000 generations.
+// Says per generation the smallest cost and a hash of the whole population with its costs, all in bits, so that two machines can
+// be compared line by line; lines with # are this machine's own.
 #include "../gaident/numeric/denormals.hpp"
 #include "paper_search.hpp"
 #include "record.hpp"  // made by make_tables.cpp

@@ -1,4 +1,5 @@
-// Run on the build machine: writes what a drive reads instead of computing it, as C++ that any arithmetic can take over (genes.hpp, record.hpp; record.h for C).
+// Run on the build machine: writes what a drive reads instead of computing it, as C++ that any arithmetic can take over
+// (genes.hpp, record.hpp; record.h for C).
 //
 //     the values of all codes of a gene (the logarithm of K needs a libm, which a drive has not got)
 //     the paper's two-mass record, Table IV's identified model with 0.3 rad/s of noise

@@ -1,4 +1,5 @@
-// The paper's search as this program is compiled for it: arithmetic by GAIDENT_ARITHMETIC, sizes and ranges here, its constants in flash.
+// The paper's search as this program is compiled for it: arithmetic by GAIDENT_ARITHMETIC, sizes and ranges here, its constants
+// in flash.
 #pragma once
 
 #include "../gaident/numeric/c30.hpp"

@@ -30,7 +30,12 @@ static void say_number(const char* what, uint64_t n) {
 }
 
 int main(void) {
-    gaident_settings settings = gaident_paper_settings(recorded_kp, recorded_ki, recorded_sample_time, 50.0);
+    const gaident_loop loop = {
+        .controller = {.kp = recorded_kp, .ki = recorded_ki},
+        .sample_time = recorded_sample_time,
+        .peak = 50.0,
+    };
+    gaident_settings settings = gaident_paper_settings(loop);
     settings.seed = 1;
     search = gaident_configure(memory, sizeof memory, &settings);
     if (search == 0) {

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
-from gaident.policy.table import CALIBRATED, EFFORT, Row, rows
+from gaident.policy.table import CALIBRATED, EFFORT, SHOWN_BY, Row, rows
 
-PAGE = Path(__file__).resolve().parents[1] / "theory" / "policy.md"
+DOCS = Path(__file__).resolve().parents[1]
+PAGE = DOCS / "theory" / "policy.md"
+MEASURED = DOCS.parent / "bench" / "rows" / "measured.json"
 
 HEAD = """\
 # The policy: every number that decides
@@ -21,7 +27,9 @@ Other numbers decide nothing: the tolerance of a solver, the step of a differenc
 They stand where they are used, with a name and the remark `no decision`, which says why.
 The bounds and starts of each effect's parameters stand in the effect's row of `diagnosis/library/terms.py`.
 
-"Measured by" names the bench whose tables change where the number is wrong.
+"Measured by" names the command that measures this one number: a calibration, or the same cases with the number at its value, at
+half of it and at twice.
+[What was measured](#what-changes-at-half-and-at-twice) stands at the end of this page.
 
 ## Calibrated numbers
 
@@ -67,6 +75,37 @@ Budgets: more of these may find more, and changes no decision about what was fou
 """
 
 
+CHANGES = """\
+## What changes at half and at twice
+
+    python bench/policy.py NAME
+
+runs cases with the number as it is, at half and at twice.
+Of a share between one half and 1, what is missing to 1 is doubled and halved; a probability is moved by ten.
+Its row says which cases show it: {cases}.
+What each kind holds stands in `bench/rows/cases.py`.
+
+A case runs once while every number is watched: it is carried through the arithmetic together with what it would be if it were
+moved, and where a comparison or a rounding would come out otherwise, that is noted.
+"No decision changes" is the range within which every comparison of all cases comes out the same, in steps of a quarter octave and
+up to two octaves either way: a range that ends at a quarter or at four times the value may be wider.
+Outside of it some comparison changes, which need not change what is said: the cases are run again.
+"Nothing" means that every case said the same, down to parameters of three digits, notes and the next experiment.
+"Said otherwise" is another verdict, finding, structure or term, "the rest" what else differs.
+"Not run" are cases in which a comparison changes and that were not run again: they are open.
+
+"Read in" counts the cases that used the number at all; what no case reads is not measured by them.
+
+| number | cases | seed | on | read in | no decision changes | below | above |
+|---|---|---|---|---|---|---|---|
+{changes}
+Moved either way, {free} change nothing that is said in these cases: they are no finer than a factor of two, or these cases do
+not show them.
+
+Not measured, or at another value: {open}.
+"""
+
+
 def page() -> str:
     """The page's text."""
     parts = []
@@ -75,7 +114,47 @@ def page() -> str:
             parts.append(EFFORTS + "".join(map(_line, found)))
         else:
             parts.append(DECIDING.format(group=group) + "".join(_line(r, f"`{r.command}`") for r in found))
-    return _head() + "\n".join(parts)
+    return _head() + "\n".join([*parts, _changes()])
+
+
+def _changes() -> str:
+    """What was measured of each number, from the file that `bench/policy.py --write` makes."""
+    deciding = {r.name: r for r in rows() if r.cases}
+    found = json.loads(MEASURED.read_text(encoding="utf-8"))
+    valid = [m for name, row in deciding.items() for m in found if m["name"] == name and m["value"] == row.value and m["used"]]
+    names = {m["name"] for m in valid}
+    moving = {m["name"] for m in valid if not all(map(_nothing, m["at"]))}
+    kinds = [f"`{kind}`" for kind in SHOWN_BY]
+    return CHANGES.format(
+        cases=f"{', '.join(kinds[:-1])} or {kinds[-1]}",
+        changes="".join(map(_changed, valid)),
+        free=_names([name for name in deciding if name in names - moving]),
+        open=_names([name for name in deciding if name not in names]),
+    )
+
+
+def _changed(m: Mapping[str, Any]) -> str:
+    low, high = m["unchanged"]
+    cells = (f"`{m['name']}` = {m['value']:g}", f"{m['cases']} {m['kind']}", str(m["seed"]), m["date"], str(m["used"]))
+    return "| " + " | ".join([*cells, f"{low:.3g} to {high:.3g}", *map(_at, m["at"])]) + " |\n"
+
+
+def _nothing(at: Mapping[str, Any]) -> bool:
+    return not at["missing"] and not at["said"]
+
+
+def _at(at: Mapping[str, Any]) -> str:
+    outcomes = Counter(text.replace("->", "to") for text in at["changed"].values())
+    told = [f"{n} {text}" for text, n in outcomes.items()]
+    other = at["said"] - len(at["changed"])
+    told += [f"{other} said otherwise"] if other > 0 else []
+    told += [f"the rest of {at['other']}"] if at["other"] else []
+    told += [f"{at['missing']} not run"] if at["missing"] else []
+    return f"{at['value']:.3g}: {', '.join(told) or 'nothing'}"
+
+
+def _names(names: Sequence[str]) -> str:
+    return ", ".join(f"`{name}`" for name in names) or "none"
 
 
 def _head() -> str:

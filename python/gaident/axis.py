@@ -1,6 +1,6 @@
 """A rotary and a linear axis: what each calls the same thing, and sentences that are written for both at once.
 
-Inside, a linear axis has m, m/s and N in the places of rad, rad/s and N m. What it is called is settled where a sentence is
+Inside, a linear axis has m, m/s and N in the places of rad, rad/s and N m. What it is called is decided where a sentence is
 made: the words and units that differ stand in braces, and both sentences are made from the same numbers.
 
     >>> limit = say("a limit above {:.3g} {N m} would not have shown: no more {torque} was asked for", 1.25)

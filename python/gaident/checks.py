@@ -1,4 +1,4 @@
-"""Checks that the classes of this room share: a number, a name out of a list, the keys of a dictionary."""
+"""Checks that several rooms share: a number, a name out of a list, the keys of a dictionary."""
 
 from __future__ import annotations
 

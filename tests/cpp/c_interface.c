@@ -36,10 +36,10 @@ static gaident_search* fed(const gaident_settings* settings, double bad) {
     } while (0)
 
 int main(void) {
-    double kp, ki, sample_time, peak;
-    CHECK(scanf("%lf %lf %lf %lf", &kp, &ki, &sample_time, &peak) == 4);
+    gaident_loop loop;
+    CHECK(scanf("%lf %lf %lf %lf", &loop.controller.kp, &loop.controller.ki, &loop.sample_time, &loop.peak) == 4);
     for (int i = 0; i < samples; ++i) CHECK(scanf("%lf %lf", &command[i], &velocity[i]) == 2);
-    gaident_settings settings = gaident_paper_settings(kp, ki, sample_time, peak);
+    gaident_settings settings = gaident_paper_settings(loop);
     settings.seed = 1;
     gaident_model model;
 
@@ -50,10 +50,10 @@ int main(void) {
     CHECK(gaident_configure((char*)memory + 4, sizeof memory - 4, &settings) == NULL);
     const double none[] = {NAN, INFINITY, -1.0, 1e-40};
     for (int i = 0; i < 4; ++i) {
-        REFUSED(kp, none[i]);
-        REFUSED(ki, none[i]);
-        REFUSED(sample_time, none[i]);
-        REFUSED(peak, none[i]);
+        REFUSED(loop.controller.kp, none[i]);
+        REFUSED(loop.controller.ki, none[i]);
+        REFUSED(loop.sample_time, none[i]);
+        REFUSED(loop.peak, none[i]);
         REFUSED(crossover, i < 3 ? none[i] : 1.1);
         REFUSED(mutation, none[i]);
         REFUSED(error_weight, i < 3 ? none[i] : 1e20);
@@ -63,7 +63,7 @@ int main(void) {
     REFUSED(tournament, 51);
 
     /* A sample that is none, or far beyond the peak, is told, and no model comes of it. */
-    const double bad[] = {NAN, INFINITY, -2.1 * peak, 1e300};
+    const double bad[] = {NAN, INFINITY, -2.1 * loop.peak, 1e300};
     for (int i = 0; i < 4; ++i) {
         gaident_search* g = fed(&settings, bad[i]);
         CHECK(g != NULL && gaident_ready(g) == -1);

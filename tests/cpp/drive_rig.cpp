@@ -1,12 +1,14 @@
-// A drive in continuous time, for blind tests: written from the definitions of the effects alone, sharing nothing with the library.
+// A drive in continuous time, for blind tests: written from the definitions of the effects alone, sharing nothing with the
+// library.
 //
 //   motor   J1 dw/dt = M - D1 w - Tc        M  = g (s^2 + 2 zz wz s + wz^2)/(s^2 + 2 zp wp s + wp^2) {T + q - f},  g = (wp/wz)^2
 //   load    J2 dw2/dt = Tc - D2 w2          Tc = K x + DG dx/dt + k3 x^3 beyond the gap, 0 inside; x = theta - theta2
 //
-// T: torque behind saturation, dead band, delay and lag; q: smooth shaft torques; f: dry friction. Every sample is cut at the instant
-// where the delayed torque changes and into substeps of a Runge-Kutta step of fourth order. Dry friction has three regimes
-// (sliding +, sliding -, at rest); the instant of a zero crossing is found by a secant iteration, and at rest w is exactly 0
-// until the torque that holds the shaft exceeds the friction's level. The controller is digital, as a drive has it.
+// T: torque behind saturation, dead band, delay and lag; q: smooth shaft torques; f: dry friction.
+// Every sample is cut at the instant where the delayed torque changes and into substeps of a Runge-Kutta step of fourth order.
+// Dry friction has three regimes (sliding +, sliding -, at rest); the instant of a zero crossing is found by a secant iteration,
+// and at rest w is exactly 0 until the torque that holds the shaft exceeds the friction's level.
+// The controller is digital, as a drive has it.
 //
 // Compiled and called by tests/python/drive_rig.py, which reads the list of fields below.
 #include <array>
@@ -79,6 +81,7 @@ struct Drive {  // SI units, rad; neutral values
     double uneven_depth = 0;
     double uneven_order = 1;
     double uneven_phase = 0;
+    double loaded = 0;  // dry friction as a share of the torque that gravity and the load put on the axis
     double root = 0;        // drag root sqrt|w| sign(w),
     double hysteretic = 0;  // share of a Bouc-Wen spring in K,
     double yield = 1;       // and its yield twist, rad
@@ -95,7 +98,7 @@ public:
     explicit Rig(const Drive& drive)
         : d(drive),
           dry(d.friction_positive != 0 || d.friction_negative != 0 || d.viscous_positive != 0 || d.viscous_negative != 0 ||
-              d.stribeck != 0 || d.drifting != 0 || d.uneven != 0),
+              d.stribeck != 0 || d.drifting != 0 || d.uneven != 0 || d.loaded != 0),
           extra(d.wp > 0),
           g(extra ? (d.wp / d.wz) * (d.wp / d.wz) : 1) {}
 
@@ -136,6 +139,7 @@ private:
         if (d.stribeck != 0) f += d.stribeck * std::exp(-(speed / d.stribeck_velocity) * (speed / d.stribeck_velocity));
         if (d.drifting != 0) f += d.drifting * (1 + d.drift_rate * t);
         if (d.uneven != 0) f += d.uneven * (1 + d.uneven_depth * std::sin(d.uneven_order * x[angle] + d.uneven_phase));
+        if (d.loaded != 0) f += d.loaded * std::abs(d.load + d.unbalance * std::sin(x[angle] + d.unbalance_phase));
         return f;
     }
 

@@ -1,23 +1,28 @@
-// By how much a fitness in fixed point may differ from double's at the most, for a record under a constant command: from the binary points
-// alone, candidate by candidate.
+// By how much a fitness in fixed point may differ from double's at the most, for a record under a constant command: from the
+// binary points alone, candidate by candidate.
 //
-// Coefficients. A FixedNumber is right within u = 2^-31 of itself, a quotient within 2 u. So the same templates, run in a number that
-// carries its error along, bound the error of every coefficient (all terms are positive, nothing cancels): da[i], db[i].
+// Coefficients.
+// A FixedNumber is right within u = 2^-31 of itself, a quotient within 2 u.
+// So the same templates, run in a number that carries its error along, bound the error of every coefficient (all terms are
+// positive, nothing cancels): da[i], db[i].
 //
 // States. With the deviation from rest, the run in fixed point is (closed_loop.hpp, without input)
 //
 //     x[i](n+1) = x[i](n) + x[i+1](n) - a[i] y(n) + e[i](n),   y = x[0],   |e[i]| <= r[i] + da[i] Y
 //
-// r[i] = 2^-(point+1) being half the last bit of the state's word (the 16 guard bits make it a ten-thousandth more), Y the largest |y| of
-// this run. Where it starts it is off by s[i]: roundings of the state, of the command it is taken from, and of the coefficients. With
-// g[i](n) the answer of y to a unit in x[i], it is off from double's run by
+// r[i] = 2^-(point+1) being half the last bit of the state's word (the 16 guard bits make it a ten-thousandth more), Y the
+// largest |y| of this run.
+// Where it starts it is off by s[i]: roundings of the state, of the command it is taken from, and of the coefficients.
+// With g[i](n) the answer of y to a unit in x[i], it is off from double's run by
 //
-//     |dy(n)| <= R(n) + C(n) Y,   R = sum_i ( s[i] |g[i](n)| + r[i] G[i](n) ),   C = sum_i da[i] G[i](n),   G[i](n) = sum_(k<n) |g[i](k)|
+//     |dy(n)| <= R(n) + C(n) Y,   R = sum_i ( s[i] |g[i](n)| + r[i] G[i](n) ),   C = sum_i da[i] G[i](n),
+//     G[i](n) = sum_(k<n) |g[i](k)|
 //
 // and Y <= (max|y| of double's run + max R)/(1 - max C).
 //
-// Sum of squares. An error e(n) of double's run becomes one within d(n) = |dy(n)| + two roundings of the samples, and from every square
-// less than one unit of the sum's last bit is dropped:
+// Sum of squares.
+// An error e(n) of double's run becomes one within d(n) = |dy(n)| + two roundings of the samples, and from every square less than
+// one unit of the sum's last bit is dropped:
 //
 //     |dF| <= Wf1^2 sum_n ( 2 |e(n)| d(n) + d(n)^2 + 2^-sum_point ) + 4 u F
 #pragma once

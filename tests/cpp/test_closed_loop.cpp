@@ -85,7 +85,7 @@ TEST_CASE("closed_loop: Table V from Table IV") {
 TEST_CASE("closed_loop: the algebraic loop divides by 1 + b0 (kp + ki Ts/2)") {
     Delta<double> gain_only;  // G = 4: y = 4 u, u = kp e + I
     gain_only.b[0] = 4.0;
-    const Delta<double> h = close_loop(gain_only, Controller{0.5, 100.0}, Clock{1e-3});
+    const Delta<double> h = close_loop(gain_only, Controller{.kp = 0.5, .ki = 100.0}, Clock{1e-3});
     CHECK(h.order == 1);
     const double lead = 1.0 + 4.0 * 0.55;
     CHECK_NEAR(h.b[0], 4.0 * 0.55 / lead, 1e-16);

@@ -49,8 +49,9 @@ private:
     std::vector<Word> starts_;
 };
 
-// Eight fields of four bits: a field of ones costs nothing, any other 1 more than it has ones, so that a climber goes to the zeros and stays
-// there. Whole fields that are right have to come from either parent.
+// Eight fields of four bits: a field of ones costs nothing, any other 1 more than it has ones, so that a climber goes to the
+// zeros and stays there.
+// Whole fields that are right have to come from either parent.
 class Trap final : public Objective {
 public:
     Layout layout() const override { return {fields * 4, 0, starts_}; }
@@ -78,8 +79,10 @@ struct Point {
     int iterations = 0;
 };
 
-// Species s = 0..3 has 12 (s + 1) bits. What it lacks to the true species, 2, costs it 20 a step, and every zero costs 1: the optimum of
-// species s costs 10 + 20 max(0, 2 - s). An iteration of the local search makes one zero a one.
+// Species s = 0..3 has 12 (s + 1) bits.
+// What it lacks to the true species, 2, costs it 20 a step, and every zero costs 1: the optimum of species s costs 10 + 20 max(0,
+// 2 - s).
+// An iteration of the local search makes one zero a one.
 class Towers final : public SpeciesObjective<Point> {
 public:
     explicit Towers(std::size_t smallest = 0, bool long_one = false, double least = 0.0) : long_(long_one), least_(least) {
@@ -254,7 +257,8 @@ TEST_CASE("counting: every species reaches its optimum; the progress names the l
         CHECK(t.species[i].bits.size() == static_cast<std::size_t>(Towers::size(i)));
     }
     CHECK(t.species[2].cost == 10.0 && t.species[3].cost == 10.0);
-    // A species that cannot win is left where its first starts ended, or gets what a larger one lends: never better than its optimum.
+    // A species that cannot win is left where its first starts ended, or gets what a larger one lends: never better than its
+    // optimum.
     for (std::size_t i = 0; i < 2; ++i) CHECK(t.species[i].cost >= Towers::optimum(i) && t.species[i].cost < worst_cost);
     CHECK(progress.species == 4 && progress.leading == 2);
     CHECK(progress.best == t.best_fitness && progress.done == t.history.size());

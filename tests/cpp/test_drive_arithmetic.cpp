@@ -205,7 +205,7 @@ TEST_CASE("counting: the cascade of factor modules and the coefficients, per str
         Factors<CountedWord> f;
         f.structure = {static_cast<int>(k.p), static_cast<int>(k.q)};
         operations = {};
-        close_loop(bilinear_plant(f, 1e-3), Controller{1.0, 1.0}, Clock{1e-3});
+        close_loop(bilinear_plant(f, 1e-3), Controller{.kp = 1.0, .ki = 1.0}, Clock{1e-3});
         const Operations made{operations.multiplies, operations.adds, operations.divides, 0, 0};
         std::printf("(%zu,%zu): cascade {%ld, %ld, %ld}, coefficients {%ld, %ld, %ld}\n", k.p, k.q, c.multiplies, c.adds,
                     c.divides, made.multiplies, made.adds, made.divides);

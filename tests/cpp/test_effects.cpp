@@ -1,5 +1,5 @@
-// The loop with effects: elementary functions, registry, neutral parameters, lanes against scalar, standstill. Accuracy against an
-// independent integrator is tested in tests/python/test_effects.py.
+// The loop with effects: elementary functions, registry, neutral parameters, lanes against scalar, standstill.
+// Accuracy against an independent integrator is tested in tests/python/test_effects.py.
 #include "../../csrc/gaident/nonlinear/effect_batch.hpp"
 #include "../../csrc/gaident/plant/roots.hpp"
 

@@ -302,7 +302,8 @@ TEST_CASE("kernels: groups are loaded as prepare() does it, bit for bit, structu
 
 namespace {
 
-// Many groups in one call, of rising order, the last one partly used: the sums of each group on its own, and of the scalar recurrence.
+// Many groups in one call, of rising order, the last one partly used: the sums of each group on its own, and of the scalar
+// recurrence.
 template <class T>
 void compare_many() {
     using Group = typename In<T>::Group;

@@ -184,8 +184,10 @@ TEST_CASE("mirror: two records, and records that begin in motion, cost what doub
             return bound / exact[i];
         };
     };
-    // What a candidate's fitness may be off, relative to double's. Fixed point's: derived. The floats': measured, the worst of these 200 is
-    // 6.6e-6 and 1.5e-5, of 4000 others 1.1e-5 and 2.5e-5 (docs/dsp.md has more figures).
+    // What a candidate's fitness may be off, relative to double's.
+    // Fixed point's: derived.
+    // The floats': measured, the worst of these 200 is 6.6e-6 and 1.5e-5, of 4000 others 1.1e-5 and 2.5e-5 (docs/dsp.md has more
+    // figures).
     const auto within = [](double tolerance) { return [tolerance](std::size_t) { return tolerance; }; };
     const struct {
         const char* name;

@@ -14,10 +14,10 @@ from drive_cases import NOISE_EFFECTS
 from drive_rig import OUTSIDE
 
 # Truth -> what no record of command, velocity and torque can tell from it: always reported together.
-TWINS = {"torque_lag": "velocity_filter", "velocity_filter": "torque_lag"}
+EQUIVALENT = {"torque_lag": "velocity_filter", "velocity_filter": "torque_lag"}
 # Members of structural classes: reported, but an exact name is not asked for. A load and dry friction of two levels are the same
 # torque as long as the shaft turns; a load alone, or unequal viscous parts, may be told apart.
-CLASSES = (*TWINS, "load_torque", "asymmetric_friction")
+CLASSES = (*EQUIVALENT, "load_torque", "asymmetric_friction")
 # What `driver` may say about an effect outside the library, and what such an effect really contains of the library.
 DRIVERS = {
     "torque_hum": ("time",),
@@ -42,7 +42,7 @@ class Judgement:
     in_set: bool = False  # every hidden effect in some finding's set
     wrong: list[str] = field(default_factory=list)  # named, and not there
     parts: list[str] = field(default_factory=list)  # named, and a true part of something outside the library
-    twins_together: bool | None = None
+    equivalents_together: bool | None = None
     extra: int = 0  # findings in which no hidden effect occurs
     parameter_errors: dict[str, float] = field(default_factory=dict)  # "effect.parameter" -> relative error
     column: str = ""
@@ -69,8 +69,8 @@ def judge(dia: Any, effects: dict[str, dict[str, float]]) -> Judgement:
     judged.in_set = all(any(name in each for each in sets) for name in truth)
     judged.exact = sorted(named) == sorted(truth) and len(findings) == len(truth)
     judged.extra = sum(not set(each) & (set(truth) | parts) for each in sets)
-    if len(truth) == 1 and truth[0] in TWINS:
-        judged.twins_together = any({truth[0], TWINS[truth[0]]} <= set(each) for each in sets)
+    if len(truth) == 1 and truth[0] in EQUIVALENT:
+        judged.equivalents_together = any({truth[0], EQUIVALENT[truth[0]]} <= set(each) for each in sets)
     judged.parameter_errors = parameter_errors(findings, effects)
     judged.column = column(judged)
     return judged

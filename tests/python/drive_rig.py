@@ -107,6 +107,7 @@ FIELDS: dict[str, dict[str, str]] = {
     "extra_resonance": {"frequency": "wp", "damping": "zp", "zero_frequency": "wz", "zero_damping": "zz"},
     "torque_hum": {"amplitude": "hum", "frequency": "hum_frequency", "phase": "hum_phase"},
     "uneven_friction": {"torque": "uneven", "depth": "uneven_depth", "order": "uneven_order", "phase": "uneven_phase"},
+    "load_dependent_friction": {"share": "loaded"},
     "root_drag": {"coefficient": "root"},
     "hysteretic_spring": {"share": "hysteretic", "yield_twist": "yield"},
 }
@@ -150,6 +151,16 @@ def library() -> ctypes.CDLL:
     pointer = ctypes.POINTER(ctypes.c_double)
     loaded.drive_rig_run.argtypes = [pointer, ctypes.c_int, ctypes.c_double, ctypes.c_int, *[pointer] * 9]
     return loaded
+
+
+def skip_without_library() -> None:
+    """Skip the test, or on top of a file all of its tests, where the simulated drive cannot be compiled."""
+    import pytest  # here, because bench/ draws its drives without the tests' requirements
+
+    try:
+        library()
+    except RuntimeError as missing:
+        pytest.skip(str(missing), allow_module_level=True)
 
 
 def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:

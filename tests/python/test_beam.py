@@ -55,7 +55,7 @@ class Counting:
             worth=lambda fuller, simpler: self.score(fuller) < self.score(simpler),
             prefers=lambda other, s: self.score(other) < self.score(s),
             search=self.search,
-            settled=lambda s: False,
+            leaves_noise=lambda s: False,
             size=len,
             most=4,
             width=3,
@@ -101,7 +101,7 @@ def test_a_pair_that_only_together_explains_is_found_beside_a_third_that_leads()
 
 def test_where_the_best_settles_no_other_is_grown() -> None:
     problem = Counting({state(1): 4.0, state(2): 1.5, state(2, 3): 8.0, state(1, 2): -4.0})
-    assert problem.beam(settled=lambda s: s == {1}).run([state()]) == {1}
+    assert problem.beam(leaves_noise=lambda s: s == {1}).run([state()]) == {1}
     assert state(2) not in problem.asked
 
 
@@ -152,7 +152,7 @@ def test_of_one_state_the_better_version_is_kept() -> None:
         worth=lambda fuller, simpler: True,
         prefers=lambda other, s: False,
         search=lambda s: s,
-        settled=lambda s: False,
+        leaves_noise=lambda s: False,
         size=lambda s: s[0],
         most=3,
         width=2,

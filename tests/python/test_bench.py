@@ -123,9 +123,9 @@ def test_a_difference_equation_runs_freely_as_it_was_made(compare_methods: Modul
     X = compare_methods.lagged(u, y, 2)
     theta = np.linalg.lstsq(X, y[2:], rcond=None)[0]
     np.testing.assert_allclose(theta, [1.5, -0.7, 0.3, 0.0, 0.1], atol=1e-10)
-    free = compare_methods.free_run(lambda x: float(theta @ x), compare_methods.Thinned(u, y, 1), 2)
+    free = compare_methods.free_run(lambda x: float(theta @ x), compare_methods.Decimated(u, y, 1), 2)
     np.testing.assert_allclose(free, y, atol=1e-9)
-    unstable = compare_methods.free_run(lambda x: 2.0 * float(x[0]) + 1.0, compare_methods.Thinned(u, y, 1), 2)
+    unstable = compare_methods.free_run(lambda x: 2.0 * float(x[0]) + 1.0, compare_methods.Decimated(u, y, 1), 2)
     assert np.all(np.isinf(unstable[-10:]))
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,13 +22,15 @@ pytestmark = pytest.mark.skipif(shutil.which("g++") is None and shutil.which("c+
 def bench() -> SimpleNamespace:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(BENCH))
+        import real_expected
         import real_fits
         import real_judge
         import real_models
         import real_records
         import real_tables
 
-        return SimpleNamespace(fits=real_fits, judge=real_judge, models=real_models, records=real_records, tables=real_tables)
+        rooms = {"models": real_models, "records": real_records, "tables": real_tables, "expected": real_expected}
+        return SimpleNamespace(fits=real_fits, judge=real_judge, **rooms)
 
 
 def driven(eight: list[float], bench: SimpleNamespace, position: bool = False, n: int = 6000) -> ga.Record:
@@ -138,6 +143,52 @@ def test_the_tables_and_the_published_answers(bench: SimpleNamespace) -> None:
     lines[f"{case}/plain"]["methods"]["rigid"] = figures | {"velocity": 0.05}
     with pytest.raises(AssertionError, match="joint 1/whole, rigid"):
         bench.tables.assert_published(lines)
+
+
+def test_an_answer_that_is_worse_than_the_table_is_told(bench: SimpleNamespace) -> None:
+    case, worse = bench.records.Case("joint 1", "whole"), bench.expected.worse
+
+    def told(outcome: str, case: Any = case) -> list[str]:
+        judged = {"outcome": outcome, "name": "nothing", "false": [["torque_dead_band"]] if outcome == "wrong" else []}
+        return list(worse({f"{case.key}/diagnosis": {"judged": judged}}, [case], False))
+
+    assert told("right") == [] and told("in set") == ["joint 1/whole: in set (nothing), was right"]
+    assert told("missed") == ["joint 1/whole: missed (nothing), was right"]
+    missed, in_set = (bench.records.Case(drive, "whole") for drive in ("joint 2", "hsm150 measured"))
+    assert told("missed", missed) == told("right", missed) == told("in set", in_set) == [] != told("missed", in_set)
+    for one in (case, missed):
+        assert told("wrong", one) == [f"{one.key}: named [['torque_dead_band']], which is false"]
+    assert worse({f"{case.key}/diagnosis": {"crash": "ValueError: x"}}, [case], False) == ["joint 1/whole: ValueError: x"]
+    assert worse({}, [case], False) == ["joint 1/whole: no diagnosis"]
+    names = {c.key for c in bench.records.cases()} | set(bench.records.DRIVES)
+    assert set(bench.expected.LEAST) <= names and set(bench.expected.LEAST.values()) <= set(bench.expected.RANK)
+
+
+def test_the_median_over_the_best_plain_fit_is_held(bench: SimpleNamespace) -> None:
+    case = bench.records.Case("joint 1", "whole")
+    lines: dict[str, Any] = {f"{case.key}/plain": {"methods": {"rigid": {"velocity": 1.0}}}}
+    for error, expected in (
+        (1.1, []),
+        (1.3, ["the free-run error is 1.3 times that of the best plain fit in the median, was 1.12"]),
+    ):
+        lines[f"{case.key}/diagnosis"] = {"judged": {"outcome": "right"}, "methods": {"extended": {"velocity": error}}}
+        assert bench.expected.worse(lines, [case], True) == expected
+        assert bench.expected.worse(lines, [case], False) == []
+
+
+def test_cases_without_data_are_left_out_by_name(bench: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    assert set(bench.records.FOLDERS) == {row.load for row in bench.records.DRIVES.values()}
+    joint = bench.records.Case("joint 1", "whole")
+    monkeypatch.delenv("GAIDENT_DATA", raising=False)
+    assert bench.records.missing(joint) == "GAIDENT_DATA does not name a folder of recorded data"
+    monkeypatch.setenv("GAIDENT_DATA", str(tmp_path))
+    assert bench.records.missing(joint) == f"no recorded data: {tmp_path / 'robot_joints'} does not exist"
+    (tmp_path / "robot_joints").mkdir()
+    assert bench.records.missing(joint) == "" != bench.records.missing(bench.records.Case("emps", "whole"))
+    (tmp_path / "robot_joints").rmdir()  # the whole command, where nothing is there
+    call = [sys.executable, str(BENCH / "real.py"), "--check", "--out", str(tmp_path / "real.jsonl")]
+    done = subprocess.run(call, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and done.stdout.count("left out, no recorded data") == 7, done.stderr
 
 
 def test_joint_6_gives_the_figures_that_were_found_apart(bench: SimpleNamespace, data_dir: Any) -> None:

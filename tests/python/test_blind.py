@@ -14,7 +14,7 @@ import pytest
 import gaident as ga
 from blind_judge import CLASSES, DRIVERS, Judgement, judge
 from drive_cases import EFFECTS, random_case, random_plant, records
-from drive_rig import OUTSIDE, library
+from drive_rig import OUTSIDE, skip_without_library
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.parameterisation import Parameterisation
@@ -24,10 +24,7 @@ from gaident.models.simulate_many import simulate_values
 
 if not hasattr(ga, "diagnose"):
     pytest.skip("this gaident has no diagnose()", allow_module_level=True)
-try:
-    library()
-except RuntimeError as missing:
-    pytest.skip(str(missing), allow_module_level=True)
+skip_without_library()
 
 SEED = 20261121
 SCALES = Scales(1e-3, 1.0, 50.0, 1.0, 1e3, 10.0, 0.02, float("nan"), float("nan"), False, 1.0)
@@ -57,21 +54,21 @@ def test_a_hidden_effect_is_named(effect: str) -> None:
     assert judged.exact, judged
 
 
-TWINS = ("torque_lag", "velocity_filter")
+EQUIVALENT = ("torque_lag", "velocity_filter")
 
 
-@pytest.mark.parametrize("effect", [e for e in CLASSES if e not in TWINS])
+@pytest.mark.parametrize("effect", [e for e in CLASSES if e not in EQUIVALENT])
 def test_a_member_of_a_class_is_reported_and_nothing_else(effect: str) -> None:
     judged = diagnosed((effect,))
     assert judged.in_set and not judged.wrong and not judged.extra, judged
 
 
 @pytest.mark.parametrize("torque", [True, False])
-@pytest.mark.parametrize("effect", TWINS)
+@pytest.mark.parametrize("effect", EQUIVALENT)
 def test_lag_and_filter_are_reported_and_never_told_apart(effect: str, torque: bool) -> None:
     judged = diagnosed((effect,), torque=torque)
     assert judged.in_set and not judged.wrong and not judged.extra, judged
-    assert judged.twins_together and not judged.named, judged
+    assert judged.equivalents_together and not judged.named, judged
 
 
 def test_a_load_and_uneven_dry_friction_are_never_told_apart() -> None:

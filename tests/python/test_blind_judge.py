@@ -57,10 +57,10 @@ def test_noise_effects_count_where_they_were_hidden() -> None:
     assert judged.exact and judged.parameter_errors["outliers.fraction"] == pytest.approx(0.5)
 
 
-def test_twins_must_stand_together() -> None:
-    assert said(LAG, finding("velocity_filter", "torque_lag")).twins_together
-    assert said(LAG, finding("torque_lag")).twins_together is False
-    assert said(COULOMB, finding("coulomb_friction")).twins_together is None
+def test_equivalents_must_stand_together() -> None:
+    assert said(LAG, finding("velocity_filter", "torque_lag")).equivalents_together
+    assert said(LAG, finding("torque_lag")).equivalents_together is False
+    assert said(COULOMB, finding("coulomb_friction")).equivalents_together is None
 
 
 def test_true_parts_of_the_unknown_are_no_wrong_names() -> None:

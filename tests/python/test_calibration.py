@@ -10,7 +10,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from drive_rig import library
+from drive_rig import skip_without_library
 from gaident.policy.table import CALIBRATED, POLICY, rows
 from test_codebase import ROOT
 
@@ -52,10 +52,7 @@ def test_what_the_command_writes(calibrate: ModuleType, tmp_path: Path) -> None:
 
 
 def test_a_record_without_effects_is_measured(calibrate: ModuleType) -> None:
-    try:
-        library()
-    except RuntimeError as missing:
-        pytest.skip(str(missing))
+    skip_without_library()
     blind = importlib.import_module("blind")
     cells = [c for c in blind.cells("clean", 1, 5) if c.kind == "step" and calibrate.wanted(c)]
     assert [c.noise for c in cells] == ["white", "encoder", "coloured"]

@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from drive_rig import Plant, library, rig
+from drive_rig import Plant, rig, skip_without_library
 from gaident.diagnosis.check import Check, checked
 from gaident.diagnosis.gains import Gains
 from gaident.results.diagnosis import Fitness
 
-try:
-    library()
-except RuntimeError as missing:
-    pytest.skip(str(missing), allow_module_level=True)
+skip_without_library()
 
 PLANT = Plant(J=3e-4, D=1.5e-3, kp=0.03, ki=1.9, dt=1e-3)
 TIME = 1e-3 * np.arange(6000)

@@ -93,9 +93,9 @@ def test_channels_are_guessed_from_names_and_units(file: str, channels: dict[str
 def test_twins_are_not_guessed_and_a_force_may_be_a_voltage(tmp_path: Path) -> None:
     t = np.arange(50) * 1e-3
     rows = "\n".join(f"{x:.3f},{np.sin(x):.6f},{np.cos(x):.6f},{x * x:.6f}" for x in t)
-    (tmp_path / "twins.csv").write_text(f"t [s],u1,u2,w1\n{rows}\n")
+    (tmp_path / "alike.csv").write_text(f"t [s],u1,u2,w1\n{rows}\n")
     (tmp_path / "force.csv").write_text(f"t [s],Force [V],Input [V],speed [rpm]\n{rows}\n")
-    assert {channel: c.name for channel, c in guess_channels(columns(tmp_path / "twins.csv")).channels.items()} == {
+    assert {channel: c.name for channel, c in guess_channels(columns(tmp_path / "alike.csv")).channels.items()} == {
         "velocity": "w1"
     }
     guess = guess_channels(columns(tmp_path / "force.csv"))

@@ -160,7 +160,7 @@ def test_a_number_that_was_zero_within_its_deviation_moved_by_no_share() -> None
     for old, moved in ((-0.00043, ""), (0.0, ""), (0.05, "+67.2 %")):
         dia = SimpleNamespace(**{**vars(fake()), "mechanics": {"resonance_damping": damping}})
         dia.base_shift = {"resonance_damping": (old, 0.0836)}
-        table = summary(dia).split("How far the effects had bent the linear model")[1].split("\n\n")[0]
+        table = summary(dia).split("How far the effects had biased the linear model")[1].split("\n\n")[0]
         assert f"{old:.5g}" in table and ("%" in table) == bool(moved) and moved in table
 
 

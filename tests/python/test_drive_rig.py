@@ -10,12 +10,21 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS, nominal_plants, random_case, random_plant, random_truth
-from drive_rig import NOISES, OUTSIDE, Array, Effects, Plant, RanAwayError, drive_values, fields, library, rig, run_drive
+from drive_rig import (
+    NOISES,
+    OUTSIDE,
+    Array,
+    Effects,
+    Plant,
+    RanAwayError,
+    drive_values,
+    fields,
+    rig,
+    run_drive,
+    skip_without_library,
+)
 
-try:
-    library()
-except RuntimeError as missing:
-    pytest.skip(str(missing), allow_module_level=True)
+skip_without_library()
 
 ONE = Plant(J=3e-4, D=2e-3, kp=0.03, ki=1.9, dt=1e-3)
 TWO = Plant(J=2e-4, D=1e-3, JL=3e-4, DL=2e-3, KG=20.0, DG=1e-3, kp=0.03, ki=1.5, dt=0.5e-3)

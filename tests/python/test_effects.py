@@ -16,47 +16,13 @@ import pytest
 
 import gaident as ga
 from clock import fastest
+from effect_sizes import SIZES
 from fine_integrator import Array, FineCase, FineRun, integrate
 from gaident import _core
 from gaident.cli import main
 from gaident.models import Structure, factor_parameters, initial_state, simulate_values
 
 # Typical sizes of each effect on a small servo drive.
-SIZES: dict[str, dict[str, float]] = {
-    "coulomb_friction": {"torque": 0.05},
-    "stribeck_friction": {"torque": 0.04, "static_torque": 0.07, "stribeck_velocity": 2.0},
-    "asymmetric_friction": {
-        "torque_positive": 0.05,
-        "torque_negative": 0.035,
-        "viscous_positive": 0.0,
-        "viscous_negative": 4e-4,
-    },
-    "presliding_friction": {"torque": 0.05, "stiffness": 3.0},
-    "lugre_friction": {
-        "torque": 0.04,
-        "static_torque": 0.07,
-        "stribeck_velocity": 2.0,
-        "stiffness": 10.0,
-        "damping": 0.005,
-    },
-    "quadratic_drag": {"coefficient": 1.5e-5},
-    "load_torque": {"torque": 0.03},
-    "unbalance": {"amplitude": 0.05, "phase": 0.3},
-    "cogging": {"amplitude": 0.03, "order": 12.0, "phase": 0.4},
-    "friction_drift": {"torque": 0.05, "rate": -0.2},
-    "backlash": {"gap": 0.01},
-    "hardening_stiffness": {"cubic_stiffness": 1e4},
-    "torque_saturation": {"limit": 0.5},
-    "torque_dead_band": {"width": 0.03},
-    "transport_delay": {"delay": 0.73e-3},
-    "torque_lag": {"time_constant": 1e-3},
-    "integrator_clamp": {"limit": 0.05},
-    "command_rate_limit": {"rate": 3000.0},
-    "velocity_filter": {"time_constant": 1e-3},
-    "velocity_ripple": {"amplitude": 0.005, "order": 2.0, "phase": 0.2},
-    "velocity_quantisation": {"step": 0.6},
-    "extra_resonance": {"frequency": 900.0, "damping": 0.02, "zero_frequency": 800.0, "zero_damping": 0.02},
-}
 TWO_MASSES = ("backlash", "hardening_stiffness")
 CONTROLLER_ONLY = ("integrator_clamp", "command_rate_limit")
 ONE = ga.OneMass(5e-4, 0.005)

@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from drive_rig import Plant, library, rig
+from drive_rig import Plant, rig, skip_without_library
 from gaident.estimation.regression.force_error import needed_torque
 
-try:
-    library()
-except RuntimeError as missing:
-    pytest.skip(str(missing), allow_module_level=True)
+skip_without_library()
 
 ONE = Plant(J=3e-4, D=1.5e-3, kp=0.03, ki=1.9, dt=1e-3)
 TWO = Plant(J=3e-4, D=2e-3, JL=3e-4, DL=1e-3, KG=12.0, DG=1e-3, kp=0.04, ki=1.2, dt=1e-3)

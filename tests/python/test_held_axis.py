@@ -11,12 +11,9 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from drive_rig import Array, Effects, Noise, Plant, library, rig
+from drive_rig import Array, Effects, Noise, Plant, rig, skip_without_library
 
-try:
-    library()
-except RuntimeError as missing:
-    pytest.skip(str(missing), allow_module_level=True)
+skip_without_library()
 
 PLANT = Plant(J=3e-4, D=1.5e-3, kp=0.03, ki=1.9, dt=2e-3)
 TIME = PLANT.dt * np.arange(2000)

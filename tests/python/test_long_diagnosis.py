@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import importlib
+from typing import Any
+
 import numpy as np
 import pytest
 
 import gaident as ga
 from gaident.diagnosis.records.folded import folded
+from gaident.diagnosis.selection import select
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_record
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import ShaftNoise, autoregression
+from gaident.estimation.objective import OutputErrors
 
 DT = 1e-3
 
@@ -52,8 +57,8 @@ def test_the_grid_is_as_coarse_as_what_is_wrong_allows() -> None:
     assert blocks_of(data, 0.1 * np.sin(2.0 * t)) == 8, "3500 samples are left"
     assert 1 < blocks_of(data, 0.1 * np.sin(2.0 * np.pi * 20.0 * t)) < 8
     assert blocks_of(data, 0.1 * np.sin(2.0 * np.pi * 400.0 * t)) == 1
-    looped = ga.Record(DT, command=np.sin(t), velocity=np.sin(t))
-    assert blocks_of(DataSet.of([looped], ga.PI(1.0, 1.0)), 0.1 * np.sin(2.0 * t)) == 1, "a controller samples as it does"
+    closed_loop = ga.Record(DT, command=np.sin(t), velocity=np.sin(t))
+    assert blocks_of(DataSet.of([closed_loop], ga.PI(1.0, 1.0)), 0.1 * np.sin(2.0 * t)) == 1, "a controller samples as it does"
 
 
 def test_a_floor_bounds_what_a_filter_makes_of_a_smooth_error() -> None:
@@ -99,6 +104,32 @@ def test_a_long_record_names_its_cause_beside_a_small_remainder() -> None:
     assert cause.parameters["viscous_negative"].value == pytest.approx(70.0, rel=0.2)
     assert 1.0 / dia.model.gain == pytest.approx(90.0, rel=0.02)
     assert dia.gain_interval[0] > 0.5 and dia.samples == 10_000
+
+
+def test_output_errors_are_weighed_anew_on_all_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The prefilter of a coarse grid ends at a tenth of its sample rate: what it removes is what that grid could not show."""
+    rec = axis(8000, noise=1e-4)
+    assert rec.torque is not None
+    torque = rec.torque + 2.0 * np.random.default_rng(2).standard_normal(len(rec))
+    found: list[select.Selection] = []
+
+    def kept(*arguments: Any) -> select.Selection:
+        found.append(select.selected(*arguments))
+        return found[-1]
+
+    monkeypatch.setattr(importlib.import_module("gaident.diagnosis.diagnose"), "selected", kept)
+    rec = ga.Record(DT, velocity=rec.velocity, torque=torque, torque_is="measured")
+    dia = ga.diagnose(rec)
+    assert [f.effect for f in dia.causes] == ["asymmetric_friction"]
+    family = found[0].space.objective.family
+    assert (
+        isinstance(family, OutputErrors)
+        and family.prefilter is not None
+        and family.prefilter.dt == DT
+        and family.inertia is not None
+    )
+    assert family.prefilter.cutoff == ga.inverse_dynamics(rec).cutoff_hz > 0.1 / (2 * DT)
+    assert 10.0 < family.samples < 0.2 * len(rec)
 
 
 def test_an_effect_that_makes_held_out_data_worse_is_refused() -> None:

@@ -9,20 +9,17 @@ import pytest
 
 import gaident as ga
 from drive_cases import Truth, random_case
-from drive_rig import library, rig
+from drive_rig import rig, skip_without_library
 from gaident.diagnosis.library.terms import EQUIVALENT
 from gaident.policy.table import POLICY
 
-try:
-    library()
-except RuntimeError as missing:
-    pytest.skip(str(missing), allow_module_level=True)
+skip_without_library()
 
 AMBIGUOUS_SEEDS = (1, 3, 0, 5, 8)  # one step each; the first that leaves a choice is taken
 
 
 def statistical(dia: ga.Diagnosis) -> bool:
-    """Whether a finding has a rival that is no structural twin."""
+    """Whether a finding has a rival that is no equivalent effect."""
     return any(not any({f.effect, a} <= t for t in EQUIVALENT) for f in dia.causes for a in f.alternatives)
 
 

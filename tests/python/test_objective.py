@@ -14,9 +14,10 @@ from gaident.estimation import uncertainty
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.noise_model import WHITE, ShaftNoise
-from gaident.estimation.objective import Hypothesis, Innovations, Objective
+from gaident.estimation.objective import Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import OpenLoop
+from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.term import Scales
 from gaident.estimation.uncertainty import estimates_of
 
@@ -90,6 +91,23 @@ def test_a_record_of_which_no_sample_counts_leaves_nothing() -> None:
     np.testing.assert_array_equal(row, np.tile(np.repeat([1.0, 0.0, 1.0], (60, 50, 40)), (2, 1)))
     assert objective.count == 100.0 - 2 * objective.head
     np.testing.assert_array_equal(masked((60, 50), list(range(110))).bridged(np.ones((1, 110))), np.zeros((1, 110)))
+
+
+def test_what_stands_in_masked_samples_passes_no_prefilter() -> None:
+    """A prefilter without phase spreads every sample both ways; over masked ones it sees the straight line between the others."""
+    lengths, gaps = (900, 700), [0, 1, 400, 401, 402, 899, 900, 1300]
+    weigh = Prefilter(DT, 4.0, 40.0, 4)
+    objective = masked(lengths, gaps).under(OutputErrors(50.0, weigh))
+    e = np.cumsum(np.random.default_rng(3).standard_normal(sum(lengths)))
+    spoiled = e.copy()
+    spoiled[gaps] = 1e3
+    found, same = objective.whitened(np.vstack([e, spoiled]), WHITE)
+    np.testing.assert_array_equal(found, same)
+    np.testing.assert_array_equal(found, weigh.of(objective.bridged(e[None, :]), lengths)[0] * objective.counted)
+    assert not found[gaps].any() and objective.count == sum(lengths) - 2 * objective.head - 5
+    # The mask costs next to nothing beside it: the line is near what stood there.
+    whole = masked(lengths, []).under(OutputErrors(50.0, weigh)).whitened(e[None, :], WHITE)[0]
+    assert np.std((found - whole)[objective.counted > 0.0]) < 0.1 * np.std(whole)
 
 
 def test_the_covariance_of_a_fit_is_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -52,7 +52,7 @@ def record(controller: ga.PI | None) -> ga.Record:
     return ga.Record(DT, command=COMMAND, torque=TORQUE, velocity=np.zeros(N))
 
 
-TWINS: list[tuple[str, dict[str, float], str, Callable[..., Any]]] = [
+COUNTERPARTS: list[tuple[str, dict[str, float], str, Callable[..., Any]]] = [
     ("coulomb_friction", {"torque": 0.05}, "friction", lambda s, torque: torque),
     ("quadratic_drag", {"coefficient": 2e-5}, "torque", lambda s, coefficient: -coefficient * s.velocity * np.abs(s.velocity)),
     ("load_torque", {"torque": 0.03}, "torque", lambda s, torque: -torque),
@@ -67,7 +67,7 @@ TWINS: list[tuple[str, dict[str, float], str, Callable[..., Any]]] = [
 
 
 @pytest.mark.parametrize("loop", LOOPS)
-@pytest.mark.parametrize(("name", "values", "acts", "function"), TWINS, ids=[t[0] for t in TWINS])
+@pytest.mark.parametrize(("name", "values", "acts", "function"), COUNTERPARTS, ids=[t[0] for t in COUNTERPARTS])
 def test_a_built_in_effect_written_again_is_the_same(
     loop: str, name: str, values: dict[str, float], acts: str, function: Callable[..., Any]
 ) -> None:

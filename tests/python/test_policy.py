@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import importlib.util
 import re
 from collections.abc import Iterator
@@ -10,16 +11,16 @@ from dataclasses import FrozenInstanceError, fields
 
 import pytest
 
-from drive_cases import EFFECTS
-from gaident.policy.table import EFFORT, POLICY, Policy, rows
+from gaident.policy.table import EFFORT, POLICY, SHOWN_BY, Policy, rows
 from test_codebase import PACKAGE, ROOT
 
-# Rooms in which a number that a module names in capitals, NAME = 0.3, is a row of the policy, or says on its line why it decides
-# nothing: `# no decision: a start of a fit`.
-NAMED = ("diagnosis", "estimation", "identification")
+# Rooms that decide about a model. A number there is a row of the policy, or says on its line (or on a line of its own above) why
+# it decides nothing: `# no decision: a start of a fit`. `data` decides how a file is read, `show` how a result is drawn.
+DECIDE = ("diagnosis", "estimation", "identification", "models", "results")
 MARK = "# no decision: "
-# In the diagnosis a number without a name stands in no comparison and bounds nothing, counts no iterations and cuts no list, but
-# for these, and what only guards a division or stands for no limit.
+# Numbers with a name in capitals are found wherever a module or class has them. Others stand in no comparison and bound nothing,
+# count no iterations, cut no list, are no default, and no factor of a standard deviation; nor does a local name stand there for
+# them. Free are these, what only guards a division or stands for no limit, and 2 pi; a 2 is a count, a 2.0 is a factor.
 FREE = (-1, 0, 1, 2)
 BOUNDS = {"max", "min", "maximum", "minimum", "clip"}
 FITS = {"fit", "fitted", "refitted", "continued", "reestimated", "evolved", "start"}
@@ -74,28 +75,114 @@ def numbers_named(text: str) -> list[str]:
 
 
 def numbers_inside(text: str) -> list[str]:
-    """Numbers without a name in comparisons, bounds, iterations, defaults and ends of lists: "line: number"."""
-    found = []
+    """Numbers without a name in capitals that may decide: "line: number", but for lines that say that they decide nothing.
+
+    They stand in comparisons, bounds, iterations, defaults and ends of lists, or have a local name that stands there.
+    """
+    found: list[ast.Constant] = []
     for node in ast.walk(ast.parse(text)):
         parts: list[ast.expr] = []
         if isinstance(node, ast.Compare):
             parts = [node]
-        elif isinstance(node, ast.Slice) and isinstance(node.upper, ast.Constant):
+        elif isinstance(node, ast.Slice) and isinstance(node.upper, ast.Constant) and node.lower is None:
             parts = [node.upper]
+        elif isinstance(node, ast.BinOp):
+            parts = of_a_deviation(node)
         elif isinstance(node, ast.Call):
-            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-            parts = node.args if name in BOUNDS else [a for a in node.args if isinstance(a, ast.Constant) and name in FITS]
+            name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            parts = bounded(node) or [a for a in node.args if isinstance(a, ast.Constant) and name in FITS]
         elif isinstance(node, (ast.FunctionDef, ast.Lambda)):
             parts = [*node.args.defaults, *(d for d in node.args.kw_defaults if d is not None)]
-        found += [f"{n.lineno}: {n.value}" for part in parts for n in literals(part)]
-    return sorted(set(found))
+            found += local_numbers(node) if isinstance(node, ast.FunctionDef) else []
+        found += [n for part in parts for n in literals(part)]
+    kept = {n for n in found if not excused(text.splitlines(), n.lineno)}
+    return [f"{line}: {value}" for line, value in sorted({(n.lineno, n.value) for n in kept})]
+
+
+def excused(lines: list[str], number: int) -> bool:
+    """Whether a line, or a comment that stands alone above it, says why it decides nothing."""
+    above = lines[number - 2].strip() if number > 1 else ""
+    return bool(lines[number - 1].partition(MARK)[2].strip() or (above.startswith(MARK) and above[len(MARK) :].strip()))
+
+
+def local_numbers(function: ast.FunctionDef) -> list[ast.Constant]:
+    """Numbers of a function that have a local name, or are a factor of what has one, where that name is compared or bounds."""
+    decides = {
+        name.id
+        for node in ast.walk(function)
+        for part in ([node.left, *node.comparators] if isinstance(node, ast.Compare) else bounded(node))
+        for name in made_of(part, (ast.Add, ast.Sub, ast.Mult, ast.Div))
+        if isinstance(name, ast.Name)
+    }
+    found: list[ast.expr] = []
+    for node in ast.walk(function):
+        pairs: list[tuple[ast.expr, ast.expr]] = []
+        if isinstance(node, ast.Assign):
+            for target in node.targets:
+                both = isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple)
+                pairs += zip(target.elts, node.value.elts, strict=False) if both else [(target, node.value)]  # type: ignore[attr-defined]
+        elif isinstance(node, (ast.AnnAssign, ast.NamedExpr)) and node.value is not None:
+            pairs = [(node.target, node.value)]
+        for target, value in pairs:
+            if isinstance(target, ast.Name) and target.id in decides:
+                found += made_of(value, (ast.Mult, ast.Div))  # a sum of several terms is a formula
+    return [n for part in found for n in literals(part) if n is part]
+
+
+def bounded(node: ast.AST) -> list[ast.expr]:
+    """Arguments of a call that bounds."""
+    if not isinstance(node, ast.Call):
+        return []
+    return node.args if getattr(node.func, "attr", getattr(node.func, "id", "")) in BOUNDS else []
+
+
+def made_of(node: ast.expr, operators: tuple[type[ast.operator], ...]) -> Iterator[ast.expr]:
+    """Names and numbers that a value is made of by some operators, but nothing inside of calls and indices."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, operators) and not of_a_turn(node):
+        yield from made_of(node.left, operators)
+        yield from made_of(node.right, operators)
+    elif isinstance(node, ast.UnaryOp):
+        yield from made_of(node.operand, operators)
+    elif isinstance(node, ast.IfExp):
+        yield from made_of(node.body, operators)
+        yield from made_of(node.orelse, operators)
+    else:
+        yield node
+
+
+def of_a_turn(node: ast.expr) -> bool:
+    """Whether an expression is a number of turns: 2 pi."""
+    return numeric(node) and any(isinstance(n, ast.Attribute) and n.attr == "pi" for n in ast.walk(node))
+
+
+def of_a_deviation(node: ast.AST) -> list[ast.expr]:
+    """The factors of so many standard deviations, 2.0 * inertia.std; 100 * std is a percentage."""
+    if not (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult)):
+        return []
+    names = [getattr(side, "attr", getattr(side, "id", "")) for side in (node.left, node.right)]
+    factors = [n for n in (node.left, node.right) if isinstance(n, ast.Constant) and isinstance(n.value, float)]
+    return list(factors) if any(re.fullmatch(r"std|sigma|.*_std|deviation", name) for name in names) else []
 
 
 def literals(node: ast.expr) -> Iterator[ast.Constant]:
-    """Numbers in an expression that may decide; indices are none, nor what is next to nothing or to infinity."""
+    """Numbers in an expression that may decide; indices and powers are none, nor what is next to nothing or to infinity.
+
+    A 2 is a count, a 2.0 is a factor, but for that of 2 pi.
+    """
     number = isinstance(node, ast.Constant) and isinstance(node.value, (int, float)) and not isinstance(node.value, bool)
-    if number and abs(node.value) not in FREE and 1e-8 < abs(node.value) < 1e100:
-        yield node
+    if number:
+        free = FREE if isinstance(node.value, int) else FREE[:-1]
+        if abs(node.value) not in free and 1e-8 < abs(node.value) < 1e100:
+            yield node
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+        yield from literals(node.left)
+        return
+    if (
+        isinstance(node, ast.BinOp)
+        and numeric(node)
+        and any(isinstance(n, ast.Attribute) and n.attr == "pi" for n in ast.walk(node))
+    ):
+        return
     for inner in ast.iter_child_nodes(node):
         if isinstance(inner, ast.expr) and not (isinstance(node, ast.Subscript) and inner is node.slice):
             yield from literals(inner)
@@ -122,23 +209,24 @@ def test_every_number_that_decides_has_the_command_that_measures_it() -> None:
     assert not beside, "a number with a command decides: it is no effort"
 
 
-def test_the_commands_can_be_called() -> None:
-    """The script is there, and knows the options, groups and effects that a command names."""
-    for command in {r.command for r in rows() if r.command}:
-        program, script, *arguments = command.split()
-        assert program == "python" and (ROOT / script).is_file(), command
-        text, option = (ROOT / script).read_text(), ""
-        groups = re.search(r"^GROUPS = \((.*)\)$", text, re.MULTILINE)
-        for argument in arguments:
-            if argument.startswith("--"):
-                option = argument
-                assert f'"{option}"' in text, command
-            elif option == "--effects":
-                assert argument in EFFECTS, command
-            elif option == "--only":
-                assert groups is not None and f'"{argument}"' in groups[1], command
-            else:
-                assert argument.isdigit(), command
+def test_the_commands_can_be_called(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The script is there, and takes what a command names; that of a row measures this row."""
+    monkeypatch.syspath_prepend(str(ROOT / "bench"))
+    for row in rows():
+        if not row.command:
+            continue
+        program, script, *arguments = row.command.split()
+        assert program == "python" and (ROOT / script).is_file(), row
+        if script == "bench/policy.py":
+            assert arguments == [row.name], row
+        else:
+            assert all(a.isdigit() or f'"{a}"' in (ROOT / script).read_text() for a in arguments), row
+        assert [r.name for r in importlib.import_module("policy").options_of([row.name]).rows] == [row.name]
+
+
+def test_a_row_that_decides_says_which_cases_show_it() -> None:
+    assert {r.cases for r in rows() if r.command} == set(SHOWN_BY)
+    assert not [r.name for r in rows() if bool(r.cases) != bool(r.command)]
 
 
 def test_the_page_of_the_policy_is_what_the_policy_says() -> None:
@@ -166,12 +254,12 @@ def test_every_number_of_the_policy_is_used() -> None:
 
 
 def test_a_number_with_a_name_is_in_the_policy_or_says_why_not() -> None:
-    found = [f"{module}.{name}" for module, text in modules(*NAMED).items() for name in numbers_named(text)]
+    found = [f"{module}.{name}" for module, text in modules(*DECIDE).items() for name in numbers_named(text)]
     assert not found, f"a number that decides is a row of policy/table.py, others say '{MARK}why': {', '.join(found)}"
 
 
 def test_no_number_without_a_name_decides() -> None:
-    texts = modules("diagnosis")
+    texts = modules(*DECIDE)
     assert set(TABLES) <= set(texts)
     found = [f"{module}:{number}" for module, text in texts.items() if module not in TABLES for number in numbers_inside(text)]
     assert not found, f"a number that decides is a row of policy/table.py, others have a name and '{MARK}why': {', '.join(found)}"
@@ -197,7 +285,24 @@ def test_what_counts_as_a_number_of_its_own() -> None:
         ("ls.fit(objective, x, 8)", ["8"]),
         ("lambda x, most=7: x", ["7"]),
         ("def f(x, *, most=7): ...", ["7"]),
-        ("0.0 < x <= 1 and abs(y) < 2.0 * z and len(u) > 1", []),
+        ("x < 2.0 * floor", ["2.0"]),
+        ("x > y + 2.0", ["2.0"]),
+        ("bound = x.value + 2.5 * x.std", ["2.5"]),
+        ("bound = 2.0 * noise_std", ["2.0"]),
+        ("def f(x):\n limit = 3.0\n return x < limit", ["3.0"]),
+        ("def f(x):\n limit: float = 3.0\n return max(x, limit)", ["3.0"]),
+        ("def f(x, y):\n near, far = 3.0 * y, 5.0\n return near < x", ["3.0"]),
+        ("def f(x, y):\n limit = 3.0 if y else 4.0\n return 1.0 - limit < x", ["3.0", "4.0"]),
+        ("def f(x):\n if x < (limit := 3.0):\n  return limit", ["3.0"]),
+        ("def f(x, limit=3.0): ...", ["3.0"]),
+        ("x < 0.3  # no decision: a start", []),
+        ("# no decision: a start\nx < 0.3", []),
+        ("x < 0.3  # no decision: ", ["0.3"]),
+        ("def f(x):\n scale = 3.0\n return scale * x", []),
+        ("def f(a, b):\n root = b * b - 4.0 * a\n return root < 0", []),
+        ("f'{100 * std:.2g} %'", []),
+        ("x < 2.0 * np.pi and y < z**3", []),
+        ("0.0 < x <= 1 and abs(y) < 2 * z and len(u) > 1", []),
         ("x[:, 3] > x[:, 4]", []),
         ("max(x, 1e-300)", []),
         ("0.25 * x + 3.0", []),
@@ -205,4 +310,4 @@ def test_what_counts_as_a_number_of_its_own() -> None:
     ],
 )
 def test_what_counts_as_a_number_that_decides(line: str, numbers: list[str]) -> None:
-    assert numbers_inside(line) == [f"1: {n}" for n in numbers]
+    assert [found.split(": ")[1] for found in numbers_inside(line)] == numbers

@@ -36,7 +36,7 @@ def emps_record(path: Path) -> ga.Record:
 @pytest.fixture(scope="module")
 def emps(data_dir: Path) -> ga.Diagnosis:
     training, other = (emps_record(folder(data_dir, "emps") / f) for f in FILES)
-    return ga.diagnose(training, validation=other)
+    return ga.diagnose(training, validation=other, axis="linear")
 
 
 def filtered(path: Path) -> tuple[Vector, Vector, Vector]:
@@ -52,7 +52,7 @@ def filtered(path: Path) -> tuple[Vector, Vector, Vector]:
     return v[kept], np.gradient(v, rec.dt)[kept], force[kept]
 
 
-def thinned(x: Vector) -> Vector:
+def decimated(x: Vector) -> Vector:
     from scipy.signal import decimate
 
     return np.asarray(decimate(x, 10))
@@ -60,8 +60,8 @@ def thinned(x: Vector) -> Vector:
 
 def relative(model: Vector, force: Vector) -> float:
     """Error of a force [%]."""
-    y = thinned(force)
-    return float(100.0 * np.linalg.norm(thinned(model) - y) / np.linalg.norm(y))
+    y = decimated(force)
+    return float(100.0 * np.linalg.norm(decimated(model) - y) / np.linalg.norm(y))
 
 
 def emps_force(dia: ga.Diagnosis, v: Vector, a: Vector) -> Vector:
@@ -116,8 +116,8 @@ def test_emps_force_error_of_the_same_structure_by_inverse_least_squares(emps: g
         return (a, v * forward, v * backward, 1.0 * forward, -1.0 * backward)
 
     v, a, force = filtered(folder(data_dir, "emps") / FILES[0])
-    A = np.column_stack([thinned(c) for c in columns(v, a)])
-    theta = np.linalg.lstsq(A, thinned(force), rcond=None)[0]
+    A = np.column_stack([decimated(c) for c in columns(v, a)])
+    theta = np.linalg.lstsq(A, decimated(force), rcond=None)[0]
     for file, most in zip(FILES, (3.1, 5.4), strict=True):
         v, a, force = filtered(folder(data_dir, "emps") / file)
         model = np.column_stack(columns(v, a)) @ theta

@@ -95,11 +95,11 @@ def test_the_users_arrays_stay_as_they_are(n: int, drawn: tuple[int, int]) -> No
 
 @given(records())
 def test_copies_and_pickles_are_equal_and_locked(rec: Record) -> None:
-    for twin in (copy.copy(rec), copy.deepcopy(rec), pickle.loads(pickle.dumps(rec))):
-        assert twin == rec
-        assert twin.digest == rec.digest
-        assert hash(twin) == hash(rec)
-        assert not twin.velocity.flags.writeable
+    for copied in (copy.copy(rec), copy.deepcopy(rec), pickle.loads(pickle.dumps(rec))):
+        assert copied == rec
+        assert copied.digest == rec.digest
+        assert hash(copied) == hash(rec)
+        assert not copied.velocity.flags.writeable
 
 
 @given(records(), st.integers(0, 10_000), st.sampled_from(["velocity", "other"]))

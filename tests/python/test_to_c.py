@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from effect_sizes import SIZES
 from gaident.errors import ModelError
 
 DT = 1e-3
@@ -21,38 +22,6 @@ ONE = ga.OneMass(J=3e-4, D=0.004).model()
 TWO = ga.TwoMass(JM=1.02e-4, DM=0.003, JL=5.815e-4, DL=0.008, KG=2.59, DG=1e-3).model()
 THREE = ga.Model(4000.0, [-12.0, -6 + 160j, -6 - 160j, -20 + 420j, -20 - 420j], [-3 + 95j, -3 - 95j, -8 + 380j, -8 - 380j])
 
-EFFECTS: dict[str, dict[str, float]] = {
-    "coulomb_friction": {"torque": 0.05},
-    "stribeck_friction": {"torque": 0.04, "static_torque": 0.08, "stribeck_velocity": 2.0},
-    "asymmetric_friction": {
-        "torque_positive": 0.05, "torque_negative": 0.03, "viscous_positive": 1e-3, "viscous_negative": 0.0,
-    },
-    "presliding_friction": {"torque": 0.05, "stiffness": 30.0},
-    "lugre_friction": {
-        "torque": 0.04,
-        "static_torque": 0.07,
-        "stribeck_velocity": 2.0,
-        "stiffness": 10.0,
-        "damping": 0.005,
-    },
-    "quadratic_drag": {"coefficient": 2e-5},
-    "load_torque": {"torque": 0.03},
-    "unbalance": {"amplitude": 0.05, "phase": 0.4},
-    "cogging": {"amplitude": 0.03, "order": 4.0, "phase": 1.0},
-    "friction_drift": {"torque": 0.05, "rate": -2.0},
-    "backlash": {"gap": 0.01},
-    "hardening_stiffness": {"cubic_stiffness": 3e3},
-    "torque_saturation": {"limit": 0.4},
-    "torque_dead_band": {"width": 0.03},
-    "transport_delay": {"delay": 1.7e-3},
-    "torque_lag": {"time_constant": 0.8e-3},
-    "integrator_clamp": {"limit": 0.1},
-    "command_rate_limit": {"rate": 900.0},
-    "velocity_filter": {"time_constant": 1.5e-3},
-    "velocity_ripple": {"amplitude": 4e-3, "order": 8.0, "phase": 0.3},
-    "velocity_quantisation": {"step": 0.5},
-    "extra_resonance": {"frequency": 500.0, "damping": 0.05, "zero_frequency": 430.0, "zero_damping": 0.05},
-}  # fmt: skip
 ROUNDED = 1e-9  # of the largest velocity: the order of the sums differs, nothing else
 
 CASES: dict[str, tuple[ga.Model, ga.PI | None, dict[str, object]]] = {
@@ -68,20 +37,20 @@ CASES: dict[str, tuple[ga.Model, ga.PI | None, dict[str, object]]] = {
         ga.PI(0.02, 0.6, torque_limit=0.4, integrator_limit=0.3),
         {},
     ),
-    "effect_alone": (ONE.with_effect("stribeck_friction", **EFFECTS["stribeck_friction"]), None, {"substeps": 3}),
+    "effect_alone": (ONE.with_effect("stribeck_friction", **SIZES["stribeck_friction"]), None, {"substeps": 3}),
     "neutral": (TWO.with_effect("coulomb_friction", torque=0.0), CONTROLLER, {}),
     "filtered_ripple": (
-        ONE.with_effect("velocity_ripple", **EFFECTS["velocity_ripple"]).with_effect("velocity_filter", time_constant=1e-3),
+        ONE.with_effect("velocity_ripple", **SIZES["velocity_ripple"]).with_effect("velocity_filter", time_constant=1e-3),
         CONTROLLER,
         {},
     ),
 }
-for _name, _values in EFFECTS.items():
+for _name, _values in SIZES.items():
     CASES[_name] = (TWO.with_effect(_name, **_values), CONTROLLER, {})
 _all = ONE
 for _name in ("coulomb_friction", "stribeck_friction", "presliding_friction", "friction_drift", "cogging", "torque_saturation",
               "torque_dead_band", "transport_delay", "torque_lag", "command_rate_limit", "velocity_filter"):  # fmt: skip
-    _all = _all.with_effect(_name, **EFFECTS[_name])
+    _all = _all.with_effect(_name, **SIZES[_name])
 CASES["many"] = (_all, CONTROLLER, {})
 
 COMMAND = np.repeat([20.0, 60.0, -40.0, -5.0, 5.0, 0.0], N // 6)
@@ -130,14 +99,14 @@ def test_c_is_what_is_simulated(compiled: ctypes.CDLL, name: str) -> None:
 
 
 def test_every_effect_has_its_case() -> None:
-    assert set(EFFECTS) == {row.name for row in ga.effects.table() if row.simulated}
+    assert set(SIZES) == {row.name for row in ga.effects.table() if row.simulated}
 
 
 def test_the_file_says_what_it_is(tmp_path: Path) -> None:
     text = CASES["many"][0].to_c(tmp_path / "my-axis.c", DT, CONTROLLER)
     assert (tmp_path / "my-axis.c").read_text() == text
     assert "my_axis_step(my_axis_state *s, double input)" in text
-    assert "transport_delay: delay 0.0017" in text and "command [rad/s]" in text
+    assert "transport_delay: delay 0.00073" in text and "command [rad/s]" in text
     assert re.findall(r"#include <(.*)>", text) == ["math.h"]
     assert "drive_step" in ONE.to_c(None, DT) and list(tmp_path.iterdir()) == [tmp_path / "my-axis.c"]
 

@@ -72,6 +72,24 @@ def test_whatever_is_made_of_a_record_keeps_what_its_torque_is(tmp_path: Path) -
     assert bare.torque_is == "commanded" == DataSet.of([bare], ga.PI(0.1, 1.0)).driven[0].torque_is
 
 
+def test_a_finding_beside_a_measured_torque_has_a_p_value() -> None:
+    """Output errors decide there: what is drawn is weighed as torques, as the record is."""
+    n = 1200
+    drive = np.repeat(np.tile([1.0, -0.6, 0.4, -1.0], 3), n // 12)
+    truth = ga.OneMass(J=0.01, D=0.03).model().with_effect("coulomb_friction", torque=0.15)
+    velocity = ga.simulate(truth, ga.Record(2e-3, velocity=np.zeros(n), torque=drive))
+    rng = np.random.default_rng(4)
+    rec = ga.Record(
+        2e-3,
+        velocity=velocity + 0.02 * rng.standard_normal(n),
+        torque=drive + 0.02 * rng.standard_normal(n),
+        torque_is="measured",
+    )
+    dia = ga.diagnose(rec, bootstrap=2, seed=3)
+    (cause,) = dia.causes
+    assert cause.effect == "coulomb_friction" and cause.p_value == pytest.approx(1 / 3), "no gain of two draws is as large"
+
+
 @pytest.mark.parametrize("kind", ["measured", "commanded", None])
 def test_a_proposed_experiment_is_tried_on_records_of_the_same_kind_of_torque(
     kind: str | None, monkeypatch: pytest.MonkeyPatch

@@ -83,16 +83,19 @@ def test_the_current_of_a_known_winding(inductance: float) -> None:
 
 
 def test_the_winding_is_estimated_from_voltage_current_and_velocity(log: dict[str, NDArray[np.float64]]) -> None:
-    off = []
+    values: dict[str, list[float]] = {"resistance": [], "back_emf_constant": [], "inductance": []}
     for seed in range(6):
         noise = np.random.default_rng(seed).standard_normal((2, len(VOLTAGE)))
         found = ga.estimate_winding(log["voltage"], log["current"] + 0.05 * noise[0], log["velocity"] + 0.05 * noise[1], DT)
-        p = found.parameters
-        assert p["resistance"].value == pytest.approx(R, rel=0.02) and p["back_emf_constant"].value == pytest.approx(KE, rel=0.02)
-        off.append([(p["resistance"].value - R) / p["resistance"].std, (p["back_emf_constant"].value - KE) / KE])
-        assert p["resistance"].std < 0.02 * R and p["back_emf_constant"].std < 0.02 * KE
+        for name, list_ in values.items():
+            list_.append(found.parameters[name].value)
+        assert found.parameters["resistance"].std < 1e-3 * R and found.parameters["back_emf_constant"].std < 1e-3 * KE
         assert found.error < 0.1 and "resistance  0.8" in found.summary() and found.cutoff_hz <= 100.0
-    assert float(np.abs(np.array(off)[:, 0]).max()) < 5.0
+    # The noise moves each by less than a thousandth; the mean is off by the central difference, which sees less of the
+    # slope of a current with a time constant below a sample, so that its inductance is too large: 16 %, and R 0.15 %.
+    for name, true, off, scatter in (("resistance", R, 2e-3, 3e-4), ("back_emf_constant", KE, 5e-4, 5e-4)):
+        assert abs(float(np.mean(values[name])) / true - 1.0) < off and float(np.std(values[name])) < scatter * true, name
+    assert float(np.mean(values["inductance"])) == pytest.approx(1.16 * L, rel=0.02)
     offset = ga.estimate_winding(log["voltage"] + 0.3, log["current"], log["velocity"], DT)
     assert offset.parameters["offset"].value == pytest.approx(0.3, abs=0.05)
     assert offset.winding.resistance == pytest.approx(R, rel=0.02)
@@ -145,14 +148,41 @@ def test_back_emf_apart_from_viscous_friction(here: Path) -> None:
         p = ga.inverse_dynamics(rec, terms=("inertia", "viscous", "coulomb")).parameters
         viscous[name] = p["viscous"].value
         if name != "voltage":
-            assert abs(p["coulomb"].value - FRICTION) < 3 * p["coulomb"].std < 0.3 * FRICTION, name
-            assert p["inertia"].value == pytest.approx(J, rel=0.05), name
-            assert abs(p["viscous"].value - D) < 0.2 * KT * KE / R, name
+            assert p["coulomb"].value == pytest.approx(FRICTION, rel=0.12) and p["coulomb"].std < 0.1 * FRICTION, name
+            assert p["inertia"].value == pytest.approx(J, rel=5e-3), name
+            assert abs(p["viscous"].value - D) < 0.02 * KT * KE / R, name
     assert viscous["voltage"] == pytest.approx(D + KT * KE / R, rel=0.1)
     said = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT, torque_is="commanded")
     assert said.torque_is == "commanded" and said.torque is not None
-    thinned = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT, decimate=2)
-    assert len(thinned) == len(said) // 2
+    decimated = ga.read("motor.csv", {**COLUMNS, "voltage": "U"}, resistance=R, torque_constant=KT, decimate=2)
+    assert len(decimated) == len(said) // 2
+
+
+def test_the_friction_behind_a_winding_over_several_noises(log: dict[str, NDArray[np.float64]]) -> None:
+    """A winding's torque is the mean over the sample that follows, which a regression of instants sees half a sample early.
+
+    Put on its instant, the dry friction of a known winding comes back within 0.5 %, else 11 % too large.
+    That of an estimated one is off by its inductance, that of a sampled current by what the current does between the samples.
+    """
+    found: dict[str, list[tuple[float, float]]] = {}
+    for seed in range(6):
+        noise = np.random.default_rng(seed).standard_normal((2, len(VOLTAGE)))
+        i, w = log["current"] + 0.05 * noise[0], log["velocity"] + 0.05 * noise[1]
+        known = ga.Winding(R, KT, L).torque(VOLTAGE, w, DT)
+        estimated = ga.estimate_winding(VOLTAGE, i, w, DT).winding.torque(VOLTAGE, w, DT)
+        for name, torque in (("mean", known), ("known", centred(known)), ("estimated", centred(estimated)), ("current", KT * i)):
+            rec = ga.Record(DT, velocity=w, torque=torque, torque_is="measured")
+            p = ga.inverse_dynamics(rec, terms=("inertia", "viscous", "coulomb")).parameters
+            found.setdefault(name, []).append((p["coulomb"].value / FRICTION, p["viscous"].value / D))
+    off = {"mean": (0.11, -0.20), "known": (0.0, 0.005), "estimated": (-0.03, 0.05), "current": (-0.03, 0.045)}
+    for name, values in found.items():
+        assert np.abs(np.mean(values, axis=0) - 1.0 - off[name]).max() < 0.01, (name, np.mean(values, axis=0))
+        assert np.std(values, axis=0).max() < 0.01, name  # six noises agree: what is off is no chance
+
+
+def centred(torque: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Means over the samples that follow, as seen at the samples."""
+    return 0.5 * (torque + np.concatenate([torque[:1], torque[:-1]]))
 
 
 def test_the_diagnosis_finds_the_friction_behind_the_winding(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -164,7 +194,8 @@ def test_the_diagnosis_finds_the_friction_behind_the_winding(here: Path, capsys:
     causes = {f["effect"]: f for f in data["findings"] if not f["is_noise"]}
     assert "coulomb_friction" in causes, data["findings"]
     torque = causes["coulomb_friction"]["parameters"]["torque"]
-    assert abs(torque["value"] - FRICTION) < 2 * torque["std"] < 0.3 * FRICTION
+    # 2.3 % too large with each of three noises, a quarter of the deviation that it states.
+    assert torque["value"] == pytest.approx(FRICTION, rel=0.04) and torque["std"] < 0.12 * FRICTION
     options = ["--columns", "time=t,velocity=n,voltage=U,current=i"]
     assert main(["identify", "motor.csv", *options]) == 0
     assert "The winding was estimated from voltage, current and velocity" in " ".join(capsys.readouterr().out.split())

@@ -1,4 +1,5 @@
-// The linear closed loop as ONE difference equation (equation 7), in delta form: nearly all of the time of a genetic run is spent here.
+// The linear closed loop as ONE difference equation (equation 7), in delta form: nearly all of the time of a genetic run is spent
+// here.
 //
 // With the plant B/A and the controller ((kp + ki Ts/2) delta + ki Ts)/delta,
 //
@@ -35,9 +36,10 @@ template <class R, int N>
 //     x[i](n+1)  = x[i](n) + x[i+1](n) + b[i+1] r(n) - a[i] y(n),   x[N] = 0
 //
 // y enters last: what does not depend on it is ready before it is, which shortens the chain from one sample to the next.
-// `N` is the order when known at compile time, so that the state lives in registers; -1 otherwise. Without input (r = 0) the terms in b
-// are left out. Coefficients C and states X are of the signals' own type R, but for a drive's arithmetic that keeps them in memory words
-// and computes in wider registers (c30.hpp, fixed.hpp).
+// `N` is the order when known at compile time, so that the state lives in registers; -1 otherwise.
+// Without input (r = 0) the terms in b are left out.
+// Coefficients C and states X are of the signals' own type R, but for a drive's arithmetic that keeps them in memory words and
+// computes in wider registers (c30.hpp, fixed.hpp).
 template <class R, int N, bool driven = true, class C = R, class X = R>
 [[gnu::always_inline]] inline R recurrence_step(int order, const C* a, const std::type_identity_t<C>* b, X* x, R r) {
     const int n = N >= 0 ? N : order;
@@ -51,8 +53,8 @@ template <class R, int N, bool driven = true, class C = R, class X = R>
     return y;
 }
 
-// Under a constant command r a PI loop rests at y = r, since its a[N-1] is its b[N], and its states at x[i] = at_rest(i) r. Deviations
-// from that rest obey the recurrence without input, which is nearly half the work.
+// Under a constant command r a PI loop rests at y = r, since its a[N-1] is its b[N], and its states at x[i] = at_rest(i) r.
+// Deviations from that rest obey the recurrence without input, which is nearly half the work.
 template <class A, class B>
 [[gnu::always_inline]] inline auto at_rest(int i, const A& a, const B& b) {
     using R = std::remove_cvref_t<decltype(b(0))>;
@@ -66,7 +68,8 @@ void steady_state(const Delta<R>& h, double y0, double r0, R* x) {
     for (int i = 0; i < h.order; ++i) x[i] = i == 0 ? y - h.b[0] * r : h.a[i - 1] * y - h.b[i] * r;
 }
 
-// From the plant's states (observer form) and the controller's stored torque s to the states of the closed loop's difference equation:
+// From the plant's states (observer form) and the controller's stored torque s to the states of the closed loop's difference
+// equation:
 // (D + N) Y = N R + (delta + 1) (B s + delta X),  X = x[0] delta^(n-1) + ... + x[n-1].
 template <class R>
 void loop_state(const Delta<R>& plant, const Controller& c, const Clock& clock, const R* x, R s, R* out) {

@@ -20,8 +20,8 @@ inline void rate_limited(std::span<double> command, double step, double start) {
     for (double& r : command) r = before = follow(step, r, before);
 }
 
-// How a controller keeps its integrator from winding up at the torque limit: held; held where the error would drive it further; set
-// back to what the limited torque leaves of it.
+// How a controller keeps its integrator from winding up at the torque limit: held; held where the error would drive it further;
+// set back to what the limited torque leaves of it.
 enum class Hold { held, held_back, tracked };
 
 // e(n) -> u(n) of a PI with the torque limit U: I' = clamp(I(n-1) + newest e(n) + before e(n-1), +-clamp), v = kp e(n) + I',

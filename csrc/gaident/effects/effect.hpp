@@ -2,11 +2,11 @@
 //
 //     static constexpr EffectInfo info           its row in the table: name, place, meaning, parameters with units and ranges
 //     static constexpr Hooks hooks               which of the functions with a dash below it has
+//     static constexpr Pace pace                 how fine the substeps must be
 //     template <class R> struct Coefficients     what the sample loop needs of the parameters: members of type R; absent: none
+//     static void prepare(p, Timing, c)          parameters -> coefficients; absent where there are none
 //     template <class R> struct State            its memory, all zero where the record begins; absent: none
-//     static void prepare(p, Timing, c)          parameters -> coefficients
-//     static constexpr Pace pace                 how fine the substeps must be; absent: one a sample is enough
-//   - static double substeps(p, Circumstances)   how many a sample it asks for beyond that
+//   - static double substeps(p, Circumstances)   how many a sample it asks for beyond its pace
 //
 // and a hook, the place in the loop where it acts.
 // R is double or lanes of doubles; on R there are selections and no branches.
@@ -30,11 +30,11 @@
 //
 //   - begin(c, s, Beginning)   its state where the record begins in motion
 //   - possible(p)              false where there is no such drive
+//   - tabulate(p, Timing, t)   makes a `Table` t for what is not a number per lane; reach(t, steps): how many torques back it looks
 //
-// and a `Table` made by tabulate(p, Timing, table), for what is not a number per lane, with reach(table, steps), how many torques
-// back it looks.
 // The compiler compares `hooks` with the functions that are there (registry.hpp).
-// One that is misspelt, or takes other arguments, is an error, and so is an effect that has no function that acts at its place.
+// One that is misspelt, or takes other arguments, is an error, and so is an effect that has no function that acts at its place,
+// no pace, or coefficients that nothing prepares.
 // Neutral parameters make an effect the identity. Effects do not know one another.
 #pragma once
 
@@ -69,6 +69,7 @@ enum class Hooks : std::uint32_t {
     begin = 1U << 14,
     substeps = 1U << 15,
     possible = 1U << 16,
+    tabulate = 1U << 17,
 };
 constexpr Hooks operator|(Hooks a, Hooks b) {
     return static_cast<Hooks>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));

@@ -87,6 +87,7 @@ struct EffectSet {
             if (has(static_cast<Effect>(i)) && property(effect_table[static_cast<std::size_t>(i)])) return true;
         return false;
     }
+    constexpr bool meets(EffectSet others) const { return (bits & others.bits) != 0; }
     constexpr bool needs_two_masses() const {
         return any([](const EffectInfo& info) { return info.needs_two_masses; });
     }
@@ -94,6 +95,23 @@ struct EffectSet {
     constexpr void remove(Effect e) { bits &= ~bit(e); }
     friend constexpr bool operator==(EffectSet, EffectSet) = default;
 };
+
+// The effects that have one of these functions.
+constexpr EffectSet effects_with(Hooks hooks) {
+    EffectSet set;
+    Effects::each([&]<class E>() {
+        if ((E::hooks & hooks) != Hooks::none) set.add(effect<E>);
+    });
+    return set;
+}
+// Those that depend on the shaft's angle.
+constexpr EffectSet effects_that_turn() {
+    EffectSet set;
+    Effects::each([&]<class E>() {
+        if (E::info.turns) set.add(effect<E>);
+    });
+    return set;
+}
 
 // A candidate: the linear drive and its effects.
 struct EffectModel {

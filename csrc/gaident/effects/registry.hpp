@@ -3,8 +3,10 @@
 #pragma once
 
 #include "effect.hpp"
+#include "friction/law.hpp"
 
 #include <array>
+#include <concepts>
 #include <cstdint>
 #include <stdexcept>
 #include <string>
@@ -97,15 +99,20 @@ concept actuator_dynamics = requires(C<E> c, S<E> s, const Past& past, double x)
 template <class E>
 concept torque = requires(C<E> c, double x) { E::torque(c, x); };
 template <class E>
-concept law = requires { &E::template law<double>; };
+concept law = requires(C<E> c, FrictionLaw<double>& sum) { E::law(c, sum); };
 template <class E>
 concept level = requires(C<E> c, double x) { E::level(c, x); };
 template <class E>
-concept friction = requires { &E::template friction<double>; };
+concept friction = requires(C<E> c, S<E> s, FrictionStep<double>& step) { E::friction(c, s, step); };
 template <class E>
-concept after_friction = requires { &E::template after_friction<double>; };
+concept after_friction =
+    requires(C<E> c, S<E> s, const FrictionStep<double>& step, double x) { E::after_friction(c, s, step, x); };
 template <class E>
-concept coupling = requires(C<E> c, double x) { E::coupling(c, x, x, x, x); };
+concept coupling = requires(C<E> c, double x) {
+    E::coupling(c, x, x, x, x);
+    E::mean_coupling(c, x, x, x, x, x);
+    E::loaded_twist(c, x, x, x);
+};
 template <class E>
 concept sensor = requires(C<E> c, double x) { E::sensor(c, x, x); };
 template <class E>
@@ -120,6 +127,19 @@ template <class E>
 concept substeps = requires(const double* p, const Circumstances& at) { E::substeps(p, at); };
 template <class E>
 concept possible = requires(const double* p) { E::possible(p); };
+template <class E>
+concept tabulate = HasTable<E> && requires(const double* p, const Timing& time, TableOf<E>& table) {
+    E::tabulate(p, time, table);
+    E::reach(table, time.steps);
+};
+
+// What every effect has, not listed in `hooks`.
+template <class E>
+concept pace = requires {
+    { E::pace } -> std::same_as<const Pace&>;
+};
+template <class E>
+concept prepare = requires(const double* p, const Timing& time, CoefficientsOf<E, double>& c) { E::prepare(p, time, c); };
 
 template <class E>
 constexpr Hooks all_of() {
@@ -131,7 +151,7 @@ constexpr Hooks all_of() {
            if_there(coupling<E>, Hooks::coupling) | if_there(sensor<E>, Hooks::sensor) |
            if_there(sensor_dynamics<E>, Hooks::sensor_dynamics) | if_there(reading<E>, Hooks::reading) |
            if_there(plant<E>, Hooks::plant) | if_there(begin<E>, Hooks::begin) | if_there(substeps<E>, Hooks::substeps) |
-           if_there(possible<E>, Hooks::possible);
+           if_there(possible<E>, Hooks::possible) | if_there(tabulate<E>, Hooks::tabulate);
 }
 
 // Those of which an effect at this place has to have one.
@@ -156,6 +176,9 @@ struct Checked {
         "a function in the effect's `hooks` is missing, misspelt or takes other arguments, or one that it has is not listed");
     static_assert(!E::info.simulated || (E::hooks & acting_at(E::info.place)) != Hooks::none,
                   "the effect has no function that acts at its place");
+    static_assert(pace<E>, "the effect's `pace` is missing, misspelt or no Pace");
+    static_assert(prepare<E> == HasCoefficients<E>,
+                  "the effect's `prepare` or its `Coefficients` are missing, misspelt, or do not go together");
     static constexpr bool right = true;
 };
 

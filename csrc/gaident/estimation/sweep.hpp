@@ -38,7 +38,8 @@ struct Chunk {
     std::size_t history;
 
     std::size_t groups() const { return columns.size(); }
-    // [sample][lane]: lane 0 is e in every group, lane l > 0 of group g is de/dx of unknowns[7 g + l - 1], what is left means nothing.
+    // [sample][lane]: lane 0 is e in every group, lane l > 0 of group g is de/dx of unknowns[7 g + l - 1], what is left means
+    // nothing.
     // `history` rows of earlier samples stand in front, zeros before the record.
     const double* rows(std::size_t g) const { return columns[g].data() + history * width; }
 };
@@ -54,7 +55,8 @@ public:
     using OnOutputs = std::function<void(std::size_t record, std::size_t first, std::span<const double> y)>;
     void outputs(std::span<const double> x, const Unknowns& unknowns, const OnOutputs& on_outputs);
 
-    // sums[i] = sum of squares of e at points[i], or of e filtered by 1 - sum phi_i z^-i where phi is not empty. At most double_lanes points.
+    // sums[i] = sum of squares of e at points[i], or of e filtered by 1 - sum phi_i z^-i where phi is not empty.
+    // At most double_lanes points.
     void errors(std::span<const double* const> points, const Unknowns& unknowns, std::span<const double> phi, double* sums);
 
     // e filtered: rows that lack part of their past are zero.

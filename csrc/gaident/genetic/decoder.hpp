@@ -1,5 +1,5 @@
-// decode() (decode.hpp) for many chromosomes, straight into the lanes of a group: the same values bit for bit, but every field's value is
-// looked up by its code, and where a structure's genes lie is found once per structure.
+// decode() (decode.hpp) for many chromosomes, straight into the lanes of a group: the same values bit for bit, but every field's
+// value is looked up by its code, and where a structure's genes lie is found once per structure.
 #pragma once
 
 #include "decode.hpp"

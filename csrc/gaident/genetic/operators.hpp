@@ -112,8 +112,9 @@ struct Mating {
     Word cross_below;  // threshold of the crossover rate
 };
 
-// Children [first + from, first + count) of `next`, pair by pair: the mother's tournament, the father's, the chance of crossover and its
-// cuts. `spare` takes the second child where their number is odd.
+// Children [first + from, first + count) of `next`, pair by pair: the mother's tournament, the father's, the chance of crossover
+// and its cuts.
+// `spare` takes the second child where their number is odd.
 template <class Source, class Cost>
 void mate(Source& random, const Mating& m, const Word* starts, int words, const Word* now, const Cost* costs, std::size_t from,
           Word* next, Word* spare) {

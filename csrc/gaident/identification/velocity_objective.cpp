@@ -12,8 +12,9 @@ namespace gaident {
 
 namespace {
 
-// Power of white noise on a smooth signal, from its third differences (median, so robust), whose variance is 1 + 9 + 9 + 1 = 20 times
-// the noise's. Of a long record an evenly spaced part will do.
+// Power of white noise on a smooth signal, from its third differences (median, so robust), whose variance is 1 + 9 + 9 + 1 = 20
+// times the noise's.
+// Of a long record an evenly spaced part will do.
 double noise_power(std::span<const double> w) {
     constexpr std::size_t enough = 4096;
     const std::size_t stride = std::max<std::size_t>(1, w.size() / enough);

@@ -1,4 +1,5 @@
-// The velocity loop as the objective of a search: how well a plant, simulated in its loop, gives the measured velocity of the records.
+// The velocity loop as the objective of a search: how well a plant, simulated in its loop, gives the measured velocity of the
+// records.
 //
 //     cost = fitness (equation 6) for the genetic search, the sum of squared errors for the local fit
 //
@@ -17,7 +18,8 @@ SearchRanges with_smaller(SearchRanges ranges);
 
 class VelocityObjective final : public SpeciesObjective<Refined> {
 public:
-    // Species that are not asked for: none, or the smaller structures that lead to those in the ranges. The experiment is borrowed.
+    // Species that are not asked for: none, or the smaller structures that lead to those in the ranges.
+    // The experiment is borrowed.
     enum class Smaller : bool { left_out, searched };
 
     VelocityObjective(const Experiment& experiment, const SearchRanges& ranges, const PlantCoding& coding,

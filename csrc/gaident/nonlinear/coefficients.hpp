@@ -1,5 +1,6 @@
-// What the loop with effects needs to know of one candidate (R = double) or of one per lane: the parameters as the sample loop uses
-// them, for its substep. Numbers only, so that candidates are laid side by side without naming each.
+// What the loop with effects needs to know of one candidate (R = double) or of one per lane: the parameters as the sample loop
+// uses them, for its substep.
+// Numbers only, so that candidates are laid side by side without naming each.
 #pragma once
 
 #include "../effects/list.hpp"

@@ -168,8 +168,7 @@ private:
         run.position = job_.record.position;
         run.start_angle = job_.record.start_angle;
         run.tables = tables.data();
-        bool looks_back = false;
-        Effects::each([&]<class E>() { looks_back = looks_back || (HasTable<E> && set.has<E>()); });
+        const bool looks_back = set.meets(effects_with(Hooks::tabulate));
         std::size_t ring = 2;
         while (ring < static_cast<std::size_t>(back) + 2) ring *= 2;
         std::vector<double> history(looks_back ? ring * width : 0);

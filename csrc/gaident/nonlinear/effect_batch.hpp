@@ -31,8 +31,8 @@ struct EffectJob {
     const std::atomic<bool>* stop = nullptr;  // once it is set no further models are begun, and Stopped is thrown
 };
 
-// `starts`: as EffectModel's linear part takes it in prepare(), one per model or none (rest). Models without any effect give no angle
-// of their own: theirs is the trapezoidal integral of the velocity.
+// `starts`: as EffectModel's linear part takes it in prepare(), one per model or none (rest).
+// Models without any effect give no angle of their own: theirs is the trapezoidal integral of the velocity.
 void simulate_effects(const EffectJob& job, std::span<const EffectModel> models, std::span<const double* const> starts,
                       const EffectOutputs& out);
 

@@ -10,57 +10,12 @@
 #pragma once
 
 #include "../control/servo.hpp"
+#include "effect_run.hpp"
 #include "mechanism.hpp"
-#include "own_effects.hpp"
 
 #include <span>
 
 namespace gaident {
-
-// What lanes of one run have in common.
-struct EffectRun {
-    EffectSet effects;
-    Loop loop;
-    double sample_time = 0.0;  // of the controller
-    int log_every = 1;         // outputs are written for the first of so many samples
-    int substeps = 1;
-    int order = 0;                     // of the plant in observer form
-    bool two_masses = false;           // the coupling is not linear
-    bool moving = false;               // the record does not start at rest
-    std::span<const double> input;     // command, or torque in open loop
-    std::span<const double> velocity_feedforward, torque_feedforward;  // of a servo, or empty
-    std::span<const double> position;                                  // measured, or empty
-    double start_angle = 0.0;
-
-    // Written where not null, lanes side by side: input.size() / log_every * width numbers.
-    double* velocity = nullptr;
-    double* torque = nullptr;
-    double* angle = nullptr;
-
-    const Effects::Tables* tables = nullptr;  // one per lane
-    double* history = nullptr;                // past torques: (history_mask + 1) * width numbers
-    std::size_t history_mask = 0;
-
-    OwnEffects* own = nullptr;           // asked through these
-    OwnSignals own_signals{};            // width numbers each,
-    const double* own_answer = nullptr;  // and answering there
-};
-
-// The torques issued so far, as an effect of the actuator looks back on them.
-struct PastTorques {
-    const EffectRun& run;
-    std::size_t width, newest;
-    int substep;
-
-    // Number `at`, counted as `newest` is.
-    [[gnu::always_inline]] double torque(std::size_t at, std::size_t lane) const {
-        return run.history[(at & run.history_mask) * width + lane];
-    }
-    template <class E>
-    [[gnu::always_inline]] const typename E::Table& table(std::size_t lane) const {
-        return run.tables[lane].template of<E>();
-    }
-};
 
 // Control: ControllerState, or Servo.
 template <class R, class Plant, class Control>
@@ -68,45 +23,31 @@ class EffectLoop {
     static constexpr bool is_servo = std::same_as<Control, Servo<R>>;
 
 public:
-    EffectLoop(const EffectRun& run, const EffectConstants<R>& constants)
+    [[gnu::always_inline]] EffectLoop(const EffectRun& run, const EffectConstants<R>& constants)
         : run_(run),
-          set_(run.effects),
           c_(constants),
           plant_(constants, run.order),
-          pi_(controller_of(run)) {
+          pi_(controller_of(run)),
+          own_(run, plant_.velocity()) {
         const bool continuous = run.loop.kind == LoopKind::continuous;
         h_ = run.sample_time / run.substeps;
         if constexpr (!is_servo)
             if (continuous) pi_ = ControllerState<R>(run.loop.controller, Clock{h_});
-        turning_ = run.own != nullptr;
-        const bool placed = run.loop.kind == LoopKind::servo && run.loop.servo.position_gain > 0.0;
-        const R command = run.moving && !run.input.empty() ? (placed ? plant_.velocity() : R(run.input[0])) : R(0.0);
-        const Beginning<R> start{plant_.velocity(), c_.before, command};
-        Effects::each([&]<class E>() {
-            if (!set_.has<E>()) return;
+        dry_ = run.effects.meets(effects_with(Hooks::law | Hooks::level | Hooks::friction)) || own_.friction();
+        turning_ = run.effects.meets(effects_that_turn()) || own_.there();
+        looking_back_ = run.effects.meets(effects_with(Hooks::tabulate));
+        const Beginning<R> start{plant_.velocity(), c_.before, first_command()};
+        Effects::each([&]<class E>() __attribute__((always_inline)) {
+            if (!run_.effects.has<E>()) return;
             const auto& c = c_.effects.template of<E>();
-            turning_ = turning_ || E::info.turns;
-            dry_ = dry_ || hook::law<E> || hook::level<E> || hook::friction<E>;
-            actuator_in_time_ = actuator_in_time_ || hook::actuator_dynamics<E>;
-            looking_back_ = looking_back_ || HasTable<E>;
-            filtering_ = filtering_ || hook::sensor_dynamics<E>;
             if constexpr (hook::controller<E>) E::controller(c, pi_);
             if constexpr (hook::law<E>) E::law(c, law_);
             if constexpr (hook::begin<E>) E::begin(c, states_.template of<E>(), start);
         });
         if constexpr (!is_servo) pi_.s = c_.stored;
         else if (run.moving) pi_.rest(start.command, start.velocity, c_.stored);
-        if (run.own != nullptr) {
-            own_torque_ = run.own->at(OwnPlace::torque);
-            own_friction_ = run.own->at(OwnPlace::friction);
-            own_shaft_ = own_torque_ || own_friction_;
-            own_actuator_ = run.own->at(OwnPlace::actuator);
-            own_sensor_ = run.own->at(OwnPlace::sensor);
-            dry_ = dry_ || own_friction_;
-        }
         angle_ = R(run.start_angle);
         theta_middle_ = angle_ + plant_.velocity() * R(0.5 * h_);
-        own_w_before_ = plant_.velocity();
         if (looking_back_)
             for (std::size_t i = 0; i <= run.history_mask; ++i) Pack<R>::store(c_.before, run.history + i * width);
         // Friction that drives the shaft is none: such a candidate counts as diverged.
@@ -114,7 +55,7 @@ public:
         per_beta_ = R(1.0) / plant_.beta();
     }
 
-    void operator()() {
+    [[gnu::always_inline]] void operator()() {
         if (run_.loop.kind == LoopKind::continuous) continuous();
         else held();
     }
@@ -127,14 +68,15 @@ private:
         else return Control(run.loop.controller, Clock{run.sample_time});
     }
 
-    // All zero.
-    static typename Effects::States<R> no_states() {
-        typename Effects::States<R> s;
-        std::memset(static_cast<void*>(&s), 0, sizeof s);
-        return s;
+    // The velocity command where the record begins in motion; under a position controller the velocity, which it keeps.
+    R first_command() const {
+        if (!run_.moving || run_.input.empty()) return R(0.0);
+        if constexpr (is_servo)
+            if (run_.loop.servo.position_gain > 0.0) return plant_.velocity();
+        return R(run_.input[0]);
     }
 
-    void held() {
+    [[gnu::always_inline]] void held() {
         const bool open = run_.loop.kind == LoopKind::open;
         const double share = 1.0 / run_.substeps;
         for (std::size_t n = 0; n < run_.input.size(); ++n) {
@@ -142,14 +84,14 @@ private:
             theta_ = run_.position.empty() ? angle_ : R(here);
             time_ = static_cast<double>(n) * run_.sample_time;
             const R y = sensor();
-            const R u = open ? R(run_.input[n]) : control(n, y);
+            const R u = open ? R(run_.input[n]) : control_at(n, y);
             if constexpr (!is_servo) write(n, y, u);
             else if (n % static_cast<std::size_t>(run_.log_every) == 0) write(n / static_cast<std::size_t>(run_.log_every), y, u);
             act(u);
             for (int j = 0; j < run_.substeps; ++j) {
                 middle(here, next, (j + 0.5) * share);
                 substep(j, (static_cast<double>(n) + (j + 0.5) * share) * run_.sample_time);
-                if (filtering_) {
+                if (filtering()) {
                     theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
                     time_ = (static_cast<double>(n) + (j + 1) * share) * run_.sample_time;
                     filter();
@@ -158,7 +100,7 @@ private:
         }
     }
 
-    void continuous() {
+    [[gnu::always_inline]] void continuous() {
         const double share = 1.0 / run_.substeps;
         double r_before = run_.moving && !run_.input.empty() ? run_.input[0] : 0.0;
         R u_before = c_.before, u_long_before = c_.before;
@@ -174,7 +116,7 @@ private:
                 substep(0, (static_cast<double>(n) - 1.0 + (j + 0.5) * share) * run_.sample_time);
                 theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
                 time_ = (static_cast<double>(n) - 1.0 + (j + 1) * share) * run_.sample_time;
-                if (filtering_) filter();
+                if (filtering()) filter();
                 y = sensor();
                 u_long_before = u_before;
                 u_before = u;
@@ -214,19 +156,20 @@ private:
     // What the sensor measures, before it is filtered.
     [[gnu::always_inline]] R measured() const {
         R w = plant_.velocity();
-        if (own_sensor_) [[unlikely]]
-            w = asked(OwnPlace::sensor, w, held_, time_);
+        if (own_.sensor()) [[unlikely]]
+            w = own_.asked(run_, OwnPlace::sensor, w, theta_, held_, time_);
         return Effects::chain(w, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::sensor<E>)
-                if (set_.has<E>()) return E::sensor(c_.effects.template of<E>(), theta_, x);
+                if (run_.effects.has<E>()) return E::sensor(c_.effects.template of<E>(), theta_, x);
             return x;
         });
     }
 
+    [[gnu::always_inline]] bool filtering() const { return run_.effects.meets(effects_with(Hooks::sensor_dynamics)); }
     [[gnu::always_inline]] void filter() {
         Effects::chain(measured(), [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::sensor_dynamics<E>)
-                if (set_.has<E>()) [[likely]]
+                if (run_.effects.has<E>()) [[likely]]
                     return E::sensor_dynamics(c_.effects.template of<E>(), states_.template of<E>(), x);
             return x;
         });
@@ -236,21 +179,21 @@ private:
     [[gnu::always_inline]] R filter_output() const {
         return Effects::chain(plant_.velocity(), [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::sensor_dynamics<E>)
-                if (set_.has<E>()) return R(states_.template of<E>().output);
+                if (run_.effects.has<E>()) return R(states_.template of<E>().output);
             return x;
         });
     }
 
     [[gnu::always_inline]] R sensor() const {
-        const R y = filtering_ ? filter_output() : measured();
+        const R y = filtering() ? filter_output() : measured();
         return Effects::chain(y, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::reading<E>)
-                if (set_.has<E>()) return E::reading(c_.effects.template of<E>(), x);
+                if (run_.effects.has<E>()) return E::reading(c_.effects.template of<E>(), x);
             return x;
         });
     }
 
-    [[gnu::always_inline]] R control(std::size_t n, R y) {
+    [[gnu::always_inline]] R control_at(std::size_t n, R y) {
         if constexpr (is_servo) {
             const auto fed = [&](std::span<const double> signal) { return R(signal.empty() ? 0.0 : signal[n]); };
             const R r = pi_.command(n, R(run_.input[n]), fed(run_.velocity_feedforward), angle_);
@@ -265,26 +208,18 @@ private:
     [[gnu::always_inline]] R shaped(R r) {
         return Effects::chain(r, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::command<E>)
-                if (set_.has<E>()) return E::command(c_.effects.template of<E>(), states_.template of<E>(), x);
+                if (run_.effects.has<E>()) return E::command(c_.effects.template of<E>(), states_.template of<E>(), x);
             return x;
         });
     }
 
-    [[gnu::noinline]] R asked(OwnPlace place, R w, R u, double t) const {
-        Pack<R>::store(w, run_.own_signals.velocity);
-        Pack<R>::store(theta_, run_.own_signals.angle);
-        Pack<R>::store(u, run_.own_signals.torque);
-        run_.own->ask(place, t);
-        return Pack<R>::load(run_.own_answer);
-    }
-
     // The torque u is issued, to be held until the next.
     [[gnu::always_inline]] void act(R u) {
-        if (own_actuator_) [[unlikely]]
-            u = asked(OwnPlace::actuator, plant_.velocity(), u, time_);
+        if (own_.actuator()) [[unlikely]]
+            u = own_.asked(run_, OwnPlace::actuator, plant_.velocity(), theta_, u, time_);
         u = Effects::chain(u, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::actuator<E>)
-                if (set_.has<E>()) return E::actuator(c_.effects.template of<E>(), x);
+                if (run_.effects.has<E>()) return E::actuator(c_.effects.template of<E>(), x);
             return x;
         });
         held_ = u;
@@ -296,24 +231,24 @@ private:
 
     [[gnu::always_inline]] void substep(int j, double t) {
         R T = held_;
-        if (actuator_in_time_) {
+        if (run_.effects.meets(effects_with(Hooks::actuator_dynamics))) {
             const PastTorques past{run_, width, issued_, j};
             T = Effects::chain(T, [&]<class E>(R x) __attribute__((always_inline)) {
                 if constexpr (hook::actuator_dynamics<E>)
-                    if (set_.has<E>())
+                    if (run_.effects.has<E>())
                         return E::actuator_dynamics(c_.effects.template of<E>(), states_.template of<E>(), past, x);
                 return x;
             });
         }
         T = Effects::chain(T, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::torque<E>)
-                if (set_.has<E>()) return x - E::torque(c_.effects.template of<E>(), theta_);
+                if (run_.effects.has<E>()) return x - E::torque(c_.effects.template of<E>(), theta_);
             return x;
         });
 
         const R w = plant_.velocity();
-        if (own_shaft_) [[unlikely]]
-            T = with_own(w, T, t);
+        if (own_.shaft()) [[unlikely]]
+            T = own_.with_torque(w, theta_, T, t);
         const R w_free = plant_.free_velocity(T, friction_torque_);
         R w_next = w_free;
         if (dry_) {
@@ -325,73 +260,82 @@ private:
         angle_ = angle_ + (w + w_next) * R(0.5 * h_);
     }
 
-    // The torque with user-defined effects, evaluated at the predicted mean velocity.
-    // A function of its own, because few models have them.
-    [[gnu::noinline]] R with_own(R w, R T, double t) {
-        const R middle = w + (w - own_w_before_) * R(0.5);
-        own_w_before_ = w;
-        if (own_friction_) own_level_ = asked(OwnPlace::friction, middle, T, t > 0.0 ? t : 0.0);
-        return own_torque_ ? T + asked(OwnPlace::torque, middle, T, t > 0.0 ? t : 0.0) : T;
-    }
-
     [[gnu::always_inline]] R under_friction(R w, R w_free, double t) {
         FrictionStep<R> step{R(h_), w, w_free, plant_.beta(), law_};
         const auto add = [&](R level) __attribute__((always_inline)) {
             step.law.level_positive = step.law.level_positive + level;
             step.law.level_negative = step.law.level_negative + level;
         };
-        if (own_friction_) add(own_level_);
+        if (own_.friction()) add(own_.level());
         Effects::each([&]<class E>() __attribute__((always_inline)) {
             if constexpr (hook::level<E>)
-                if (set_.has<E>()) add(E::level(c_.effects.template of<E>(), R(t > 0.0 ? t : 0.0)));
+                if (run_.effects.has<E>()) add(E::level(c_.effects.template of<E>(), R(t > 0.0 ? t : 0.0)));
         });
         Effects::each([&]<class E>() __attribute__((always_inline)) {
             if constexpr (hook::friction<E>)
-                if (set_.has<E>()) [[unlikely]]  // keeps what it needs out of the registers of the others
+                if (run_.effects.has<E>()) [[unlikely]]  // keeps what it needs out of the registers of the others
                     E::friction(c_.effects.template of<E>(), states_.template of<E>(), step);
         });
         const R w_next = velocity_under_friction(step.law, w, step.w_free, step.beta);
         Effects::each([&]<class E>() __attribute__((always_inline)) {
             if constexpr (hook::after_friction<E>)
-                if (set_.has<E>()) [[unlikely]]
+                if (run_.effects.has<E>()) [[unlikely]]
                     E::after_friction(c_.effects.template of<E>(), states_.template of<E>(), step, w_next);
         });
         return w_next;
     }
 
     const EffectRun& run_;
-    const EffectSet set_;
     const EffectConstants<R>& c_;
     Plant plant_;
     Control pi_;
     double h_;
-    bool dry_ = false, actuator_in_time_ = false, looking_back_ = false, filtering_ = false, turning_ = false;
-    bool own_shaft_ = false, own_torque_ = false, own_friction_ = false, own_actuator_ = false, own_sensor_ = false;
+    bool dry_, turning_, looking_back_;
     double time_ = 0.0;
 
-    typename Effects::States<R> states_ = no_states();
+    OwnInLoop<R> own_;
+    typename Effects::States<R> states_{};  // all zero
     FrictionLaw<R> law_;
     R angle_, theta_ = R(0.0), theta_middle_;
     R held_ = R(0.0);
     R friction_torque_ = R(0.0), per_beta_;
-    R own_w_before_, own_level_ = R(0.0);
     std::size_t issued_ = 0;
 };
+
+template <class Loop>
+[[gnu::noinline]] void run_in_memory(Loop& loop) {
+    loop();
+}
+
+// Where a number takes one register, the compiler keeps the loop's state in registers.
+// Where it takes several, moving the state took up to 25 % more instructions: behind a call it stays in memory.
+template <class R, class Plant>
+[[gnu::always_inline]] inline void run_effects_on(const EffectRun& run, const EffectConstants<R>& c) {
+    EffectLoop<R, Plant, ControllerState<R>> loop(run, c);
+    if constexpr (Pack<R>::registers == 1) loop();
+    else run_in_memory(loop);
+}
+
+template <class R, class Plant>
+[[gnu::noinline]] void run_servo_on(const EffectRun& run, const EffectConstants<R>& c) {
+    EffectLoop<R, Plant, Servo<R>> loop(run, c);
+    run_in_memory(loop);
+}
 
 // Runs the lanes whose constants are given, with the plant's order known to the compiler where it is a usual one.
 template <class R>
 void run_effects(const EffectRun& run, const EffectConstants<R>& c) {
-    const auto under = [&]<class Plant>() {
-        if (run.loop.kind == LoopKind::servo) EffectLoop<R, Plant, Servo<R>>(run, c)();
-        else EffectLoop<R, Plant, ControllerState<R>>(run, c)();
-    };
-    if (run.two_masses) return under.template operator()<TwoMassPlant<R>>();
+    if (run.loop.kind == LoopKind::servo) {
+        if (run.two_masses) return run_servo_on<R, TwoMassPlant<R>>(run, c);
+        return run_servo_on<R, ObserverPlant<R, -1>>(run, c);
+    }
+    if (run.two_masses) return run_effects_on<R, TwoMassPlant<R>>(run, c);
     switch (run.order) {
-        case 1: return under.template operator()<ObserverPlant<R, 1>>();
-        case 2: return under.template operator()<ObserverPlant<R, 2>>();
-        case 3: return under.template operator()<ObserverPlant<R, 3>>();
-        case 5: return under.template operator()<ObserverPlant<R, 5>>();
-        default: return under.template operator()<ObserverPlant<R, -1>>();
+        case 1: return run_effects_on<R, ObserverPlant<R, 1>>(run, c);
+        case 2: return run_effects_on<R, ObserverPlant<R, 2>>(run, c);
+        case 3: return run_effects_on<R, ObserverPlant<R, 3>>(run, c);
+        case 5: return run_effects_on<R, ObserverPlant<R, 5>>(run, c);
+        default: return run_effects_on<R, ObserverPlant<R, -1>>(run, c);
     }
 }
 

@@ -8,8 +8,9 @@ namespace {
 
 double resonance(const Pair<double>& f) { return f.e1 * f.e1 < 4.0 * f.e0 ? std::sqrt(f.e0) : 0.0; }
 
-// The state of a plant at the substep that continues as `start` does at the sample time. Both are compared by what they do under the
-// constant torque u: the differences y, dy, d2y, ... over whole samples. G and H take the state over one sample: dx = G x + H u.
+// The state of a plant at the substep that continues as `start` does at the sample time.
+// Both are compared by what they do under the constant torque u: the differences y, dy, d2y, ... over whole samples.
+// G and H take the state over one sample: dx = G x + H u.
 template <std::size_t n_max>
 bool same_motion(int n, const double (&G)[n_max][n_max], const double (&H)[n_max], const Delta<double>& plant,
                  const double* start, double u, double* x) {
@@ -136,7 +137,7 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
     Pace pace = own ? Pace::fine : Pace::sample;
     Effects::each([&]<class E>() {
         if (!model.effects.has<E>()) return;
-        if constexpr (requires { E::pace; }) pace = std::max(pace, E::pace);
+        pace = std::max(pace, E::pace);
         if constexpr (hook::substeps<E>) wanted = std::max(wanted, E::substeps(model.of(effect<E>), at));
     });
     if (pace != Pace::sample) {

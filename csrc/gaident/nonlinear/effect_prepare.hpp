@@ -18,8 +18,8 @@ struct EffectRecord {
     double top_speed = 0.0;  // of the measured velocity [rad/s], for the choice of substeps
 };
 
-// The model without the effects whose parameters are neutral, and with those that change the mechanism linearly multiplied into its factors:
-// these also where they are neutral and the record begins in motion, as their states are among those given.
+// The model without the effects whose parameters are neutral, and with those that change the mechanism linearly multiplied into
+// its factors: these also where they are neutral and the record begins in motion, as their states are among those given.
 EffectModel reduced(const EffectModel& model, bool moving);
 
 // Steps per sample that the reduced model needs: a power of two, so that neighbouring models have the same.

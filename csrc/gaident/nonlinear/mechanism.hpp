@@ -1,5 +1,5 @@
-// The mechanism behind a zero-order hold of one substep, asked twice: which velocity w+ a torque would bring, then to move, under the total
-// torque, to the velocity that friction left.
+// The mechanism behind a zero-order hold of one substep, asked twice: which velocity w+ a torque would bring, then to move, under
+// the total torque, to the velocity that friction left.
 #pragma once
 
 #include "coefficients.hpp"
@@ -45,7 +45,8 @@ struct ObserverPlant {
 //     mean_coupling(c, K, D, x0, x1, dx)     its mean along a twist that goes evenly from x0 to x1
 //     loaded_twist(c, K, linear, x)          the twist that carries the torque K linear, from that without the effect
 //
-// and is the identity where all its coefficients are zero, as those of an effect that is not there are: computing it costs less than asking.
+// and is the identity where all its coefficients are zero, as those of an effect that is not there are: computing it costs less
+// than asking.
 // Each leaves in x is left of the twist to the effects that follow.
 template <class R>
 struct TwoMassPlant {

@@ -1,11 +1,15 @@
-// The float of the paper's processor, the TMS320C30 (TMS320C3x User's Guide, chapter 5): no rounding, no denormals, no infinities.
+// The float of the paper's processor, the TMS320C30 (TMS320C3x User's Guide, chapter 5): no rounding, no denormals, no
+// infinities.
 //
 //     word, 32 bits       e (8, two's complement) | s | f (23)       value 01.f * 2^e or, s = 1, 10.f * 2^e; e = -128 is 0
 //     register, 40 bits   the same with f of 31 bits
 //
-// Every addition and subtraction works on registers: the mantissa of the smaller exponent is shifted right, what falls out is dropped, the
-// sum is normalised. A multiplication cuts both operands to words first and keeps 32 bits of the product. A store cuts a register to a word.
-// All of this rounds towards minus infinity. Beyond the range a result takes the largest number of its sign, below it 0.
+// Every addition and subtraction works on registers: the mantissa of the smaller exponent is shifted right, what falls out is
+// dropped, the sum is normalised.
+// A multiplication cuts both operands to words first and keeps 32 bits of the product.
+// A store cuts a register to a word.
+// All of this rounds towards minus infinity.
+// Beyond the range a result takes the largest number of its sign, below it 0.
 // The processor has no division: 1/v is five steps of Newton's x (2 - v x) from x = 2^(-e-1).
 #pragma once
 

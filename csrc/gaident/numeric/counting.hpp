@@ -1,5 +1,6 @@
-// Numbers that count what is done with them, for the cycle budget (docs/dsp.md): a CountedWord lies in memory, a Counted stands in a
-// register. Host only: the counts belong to the thread.
+// Numbers that count what is done with them, for the cycle budget (docs/dsp.md): a CountedWord lies in memory, a Counted stands
+// in a register.
+// Host only: the counts belong to the thread.
 #pragma once
 
 #include "arithmetic.hpp"

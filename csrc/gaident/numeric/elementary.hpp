@@ -9,20 +9,20 @@
 
 namespace gaident {
 
-// How many candidates a number stands for, and how they lie in memory.
+// How many candidates a number stands for, how many registers it takes, and how they lie in memory.
 template <class R>
 struct Pack;
 
 template <>
 struct Pack<double> {
-    static constexpr int width = 1;
+    static constexpr int width = 1, registers = 1;
     [[gnu::always_inline]] static inline double load(const double* p) { return *p; }
     [[gnu::always_inline]] static inline void store(double x, double* p) { *p = x; }
 };
 
 template <int W, class Isa>
 struct Pack<Lanes<double, W, Isa>> {
-    static constexpr int width = W;
+    static constexpr int width = W, registers = Lanes<double, W, Isa>::registers;
     [[gnu::always_inline]] static inline Lanes<double, W, Isa> load(const double* p) { return Lanes<double, W, Isa>::load(p); }
     [[gnu::always_inline]] static inline void store(const Lanes<double, W, Isa>& x, double* p) { x.store(p); }
 };
@@ -40,21 +40,32 @@ template <class T, int W, class Isa>
     return r;
 }
 
+// A vector of words in `bytes` bytes.
+template <std::size_t bytes>
+struct Words {
+    typedef long long Type __attribute__((vector_size(bytes)));
+};
+
+// Whether the words of a comparison's result are all true. Its halves are joined until one word is left.
+template <std::size_t bytes>
+[[gnu::always_inline]] inline bool all_true(const typename Words<bytes>::Type& words) {
+    typename Words<bytes / 2>::Type half[2];
+    __builtin_memcpy(half, &words, sizeof half);
+    if constexpr (bytes == 2 * sizeof(long long)) return (half[0] & half[1])[0] != 0;
+    else return all_true<bytes / 2>(half[0] & half[1]);
+}
+
 // Whether a > b everywhere: for short cuts that change no result.
 [[gnu::always_inline]] inline bool all_above(double a, double b) { return a > b; }
 
 template <int W, class Isa>
 [[gnu::always_inline]] inline bool all_above(const Lanes<double, W, Isa>& a, const Lanes<double, W, Isa>& b) {
     using L = Lanes<double, W, Isa>;
-    typedef long long Mask __attribute__((vector_size(Isa::register_bytes)));
+    using Mask = typename Words<Isa::register_bytes>::Type;
     Mask all = Mask(a.v[0] > b.v[0]);
 #pragma GCC unroll 8
     for (int i = 1; i < L::registers; ++i) all &= Mask(a.v[i] > b.v[i]);
-    long long lane[L::per_register], every = -1;
-    __builtin_memcpy(lane, &all, sizeof lane);
-#pragma GCC unroll 8
-    for (int i = 0; i < L::per_register; ++i) every &= lane[i];
-    return every != 0;
+    return all_true<Isa::register_bytes>(all);
 }
 
 template <class R>

@@ -2,8 +2,9 @@
 //
 //     H(delta) = (b[0] delta^N + b[1] delta^(N-1) + ... + b[N]) / (delta^N + a[0] delta^(N-1) + ... + a[N-1]).
 //
-// In powers of z the poles of a fast-sampled loop lie close together at z = 1 and cancellation destroys the coefficients (more than half of
-// random order-7 models are wrong by over 1 % in 32 bits). In delta, with every polynomial *built* in delta, nothing cancels.
+// In powers of z the poles of a fast-sampled loop lie close together at z = 1 and cancellation destroys the coefficients (more
+// than half of random order-7 models are wrong by over 1 % in 32 bits).
+// In delta, with every polynomial *built* in delta, nothing cancels.
 #pragma once
 
 #include "factors.hpp"
@@ -22,8 +23,9 @@ struct Delta {
     R b[room_for(N) + 1]{};
 };
 
-// Whether 24 bits hold the polynomial delta^N + a[0] delta^(N-1) + ...: rounding a[i] moves it, where |z| = 1 and so |delta| <= 2, by up to
-// 2^-24 |a[i]| |delta|^(N-1-i). The sum of these, relative to delta^N at its largest, is 2^-24 (k - 1) with
+// Whether 24 bits hold the polynomial delta^N + a[0] delta^(N-1) + ...: rounding a[i] moves it, where |z| = 1 and so |delta| <=
+// 2, by up to 2^-24 |a[i]| |delta|^(N-1-i).
+// The sum of these, relative to delta^N at its largest, is 2^-24 (k - 1) with
 //
 //     k = 1 + sum_i |a[i]| 2^-(i+1)        (1 with all poles at z = 1, 2^N with all at z = -1)
 //

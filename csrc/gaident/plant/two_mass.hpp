@@ -1,5 +1,5 @@
-// Two masses on a shaft, built from a linear model with p = 1, q = 2 so that both are the same system exactly (docs/paper.md, six numbers, shaft
-// damping D_G free), and their motion over one substep h:
+// Two masses on a shaft, built from a linear model with p = 1, q = 2 so that both are the same system exactly (docs/paper.md, six
+// numbers, shaft damping D_G free), and their motion over one substep h:
 //
 //     J_M dw_M/dt = T - c - D_M w_M,   J_L dw_L/dt = c - D_L w_L,   dx/dt = w_M - w_L,   c = K_G x + D_G dx/dt + correction
 //

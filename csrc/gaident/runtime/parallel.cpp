@@ -41,7 +41,8 @@ void Workers::share(std::size_t n, const Work& work) {
     announce();
     while (piece(job, lock)) {
     }
-    // What others still have under way may have been shared in turn. Work that is older than this may take far longer than this does.
+    // What others still have under way may have been shared in turn.
+    // Work that is older than this may take far longer than this does.
     while (job.running > 0)
         if (!piece_after(&job, lock)) await_news(lock);
     jobs_.erase(std::find(jobs_.begin(), jobs_.end(), &job));

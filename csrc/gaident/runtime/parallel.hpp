@@ -1,5 +1,5 @@
-// Threads: for independent pieces of work only (trials, species, models to be fitted, candidates of a long record), never inside one
-// small generation.
+// Threads: for independent pieces of work only (trials, species, models to be fitted, candidates of a long record), never inside
+// one small generation.
 #pragma once
 
 #include <algorithm>
@@ -27,8 +27,8 @@ public:
     using Work = std::function<void(std::size_t)>;
     void share(std::size_t n, const Work& work);
 
-    // Calls work(strand, 0) ... work(strand, steps-1) of every strand, one strand's steps one after the other but by whoever is free: so
-    // three equal strands keep two threads busy to the end.
+    // Calls work(strand, 0) ... work(strand, steps-1) of every strand, one strand's steps one after the other but by whoever is
+    // free: so three equal strands keep two threads busy to the end.
     void share_strands(std::size_t strands, std::size_t steps, const std::function<void(std::size_t, std::size_t)>& work);
 
     // So many threads have begun beside the caller's.

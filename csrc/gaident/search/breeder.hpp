@@ -21,8 +21,9 @@ public:
 
     void randomise(std::size_t first, std::size_t count);
     void evaluate();
-    // The order in which random words are drawn is part of the definition: group by group, first for every two children the mother's
-    // tournament, the father's, the chance of crossover and its cuts; then the mutations of all the group's children in one piece.
+    // The order in which random words are drawn is part of the definition: group by group, first for every two children the
+    // mother's tournament, the father's, the chance of crossover and its cuts; then the mutations of all the group's children in
+    // one piece.
     void breed(std::span<const Group> groups);
     void generation(std::span<const Group> groups) {
         breed(groups);

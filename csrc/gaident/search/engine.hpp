@@ -5,8 +5,9 @@
 
 namespace gaident {
 
-// The paper's run, `trials` times: one population, every species in it; the best candidate ever seen is reported. The result depends on
-// the seed alone. Throws std::invalid_argument for settings or trials out of their range, Stopped where that is asked for.
+// The paper's run, `trials` times: one population, every species in it; the best candidate ever seen is reported.
+// The result depends on the seed alone.
+// Throws std::invalid_argument for settings or trials out of their range, Stopped where that is asked for.
 std::vector<Trial> search(const Objective& objective, const Settings& settings, int trials, std::uint64_t seed,
                           const Resources& resources);
 

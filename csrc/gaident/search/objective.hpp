@@ -1,4 +1,5 @@
-// What a search is made for: an objective gives every chromosome its cost. The engine knows of the problem what stands here, and no more.
+// What a search is made for: an objective gives every chromosome its cost.
+// The engine knows of the problem what stands here, and no more.
 //
 // The functions of an objective are called by several threads at once; an evaluator belongs to one thread at a time.
 #pragma once
@@ -38,8 +39,10 @@ struct Species {
     bool asked = true;  // false: searched only because its optimum is a start for larger ones, and not reported
 };
 
-// An objective with several species, and with a local search in each of them. `Fit` is a local optimum, or a point on the way to one: it
-// can be made without arguments and has the member `cost`, then worst_cost. Species are numbered from 0.
+// An objective with several species, and with a local search in each of them.
+// `Fit` is a local optimum, or a point on the way to one: it can be made without arguments and has the member `cost`, then
+// worst_cost.
+// Species are numbered from 0.
 template <class Fit>
 class SpeciesObjective : public Objective {
 public:
@@ -50,8 +53,8 @@ public:
     // Whether an optimum of species `small` is a start for species `large`.
     virtual bool leads_to(std::size_t small, std::size_t large) const = 0;
 
-    // Starts of a local search: a chromosome; at most `count` in species `to`, made from an optimum of a species that leads to it; the best
-    // in species `to`, to which `from` reduces, its cost worst_cost where there is none.
+    // Starts of a local search: a chromosome; at most `count` in species `to`, made from an optimum of a species that leads to
+    // it; the best in species `to`, to which `from` reduces, its cost worst_cost where there is none.
     virtual Fit start(const Word* chromosome) const = 0;
     virtual std::vector<Fit> enlarged(const Fit& from, std::size_t to, std::size_t count) const = 0;
     virtual Fit reduced(const Fit& from, std::size_t to) const = 0;

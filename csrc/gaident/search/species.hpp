@@ -1,10 +1,13 @@
-// The default engine: one population per species, so that no species is lost before its parameters are any good (docs/identification.md).
+// The default engine: one population per species, so that no species is lost before its parameters are tuned
+// (docs/identification.md).
 //
-// In rounds: some generations of the genetic search inside each species, then a local search from each species' best. From small species to
-// large, an optimum is also a start for the larger ones, and the leader's in the end for the smaller ones. A first round is quick. Where it
-// leaves more than the least cost expected, rounds with many more starts follow until one finds no better optimum close to the best.
-// Species that are not asked for are searched as well where they lead to those that are: from random starts alone the optimum of a large
-// species is rarely found, from the optimum of a smaller one nearly always.
+// In rounds: some generations of the genetic search inside each species, then a local search from each species' best.
+// From small species to large, an optimum is also a start for the larger ones, and the leader's in the end for the smaller ones.
+// A first round is quick.
+// Where it leaves more than the least cost expected, rounds with many more starts follow until one finds no better optimum close
+// to the best.
+// Species that are not asked for are searched as well where they lead to those that are: from random starts alone the optimum of
+// a large species is rarely found, from the optimum of a smaller one nearly always.
 // Species are not compared here.
 #pragma once
 
@@ -71,7 +74,8 @@ private:
     };
     static constexpr Effort quick{2, 2, 3}, thorough{5, 6, 10};
     static constexpr int more_iterations = 4, full_iterations = 40;
-    // Where the least cost is more than so many times what is expected, there may be a better optimum: 1.2 times the root mean square.
+    // Where the least cost is more than so many times what is expected, there may be a better optimum: 1.2 times the root mean
+    // square.
     static constexpr double near_expected = 1.2 * 1.2;
     // How many islands the search has where one evaluation takes long.
     static constexpr std::size_t most_islands = 4;
@@ -139,7 +143,8 @@ private:
         return false;
     }
 
-    // Where the local searches of a species may start: its best individual (from == own index), or a smaller one's optimum, enlarged.
+    // Where the local searches of a species may start: its best individual (from == own index), or a smaller one's optimum,
+    // enlarged.
     struct Source {
         std::size_t species, from;
         std::vector<Fit> starts;
@@ -152,9 +157,9 @@ private:
         double within_reach = 0.0;
     };
 
-    // The level after `before`, and the end of the fits of that one. All starts get a few iterations, the most promising some more, and the
-    // best of each species goes on to its optimum: unless it stays so far behind what a smaller or equal structure has reached that it
-    // cannot win.
+    // The level after `before`, and the end of the fits of that one.
+    // All starts get a few iterations, the most promising some more, and the best of each species goes on to its optimum: unless
+    // it stays so far behind what a smaller or equal structure has reached that it cannot win.
     Level fit_level(Level& before, const Effort& effort) {
         Level level{before.last, before.last, {}, 0.0};
         while (level.last < all_.size() && all_[level.last].level == all_[level.first].level) ++level.last;
@@ -163,8 +168,8 @@ private:
             for (std::size_t j = 0; j < level.first; ++j)
                 if (objective_.leads_to(j, i)) (j < before.first ? early : late).push_back({i, j, {}});
         for (std::size_t i = level.first; i < level.last; ++i) early.push_back({i, i, {}});
-        // The few fits that go on to the end would leave threads idle: what does not need them is done beside them. Begun last, of what is
-        // listed first, is work that shares its own parts.
+        // The few fits that go on to the end would leave threads idle: what does not need them is done beside them.
+        // Begun last, of what is listed first, is work that shares its own parts.
         share(early.size() + before.best.size(), [&](std::size_t k) {
             if (k < early.size()) first_fits(early[k], effort);
             else to_the_end(before, k - early.size());
@@ -205,8 +210,8 @@ private:
             fit = objective_.improved(fit, full_iterations);
     }
 
-    // What a larger species has found, a smaller one may lack: each that is close to the best lends its optimum, reduced, the largest
-    // first, so that what it gave goes on to the next smaller one.
+    // What a larger species has found, a smaller one may lack: the optimum of each that is close to the best, reduced, is a start
+    // there; the largest first, so that its optimum reaches the smallest step by step.
     void fit_smaller() {
         for (std::size_t from = all_.size(); from-- > 0;) {
             if (trial_.species[from].cost > close_to_best * lead()) continue;

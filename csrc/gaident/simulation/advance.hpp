@@ -1,5 +1,5 @@
-// The kernel that a loop needs: one difference equation for the whole loop where it is linear, controller and plant apart where the
-// controller's limits act.
+// The kernel that a loop needs: one difference equation for the whole loop where it is linear, controller and plant apart where
+// the controller's limits act.
 #pragma once
 
 #include "kernels/kernels.hpp"

@@ -226,8 +226,8 @@ void narrow(const DoubleGroup& from, int offset, FloatGroup& to) {
     for (int lane = 0; lane < DoubleGroup::width; ++lane) to.s[offset + lane] = static_cast<float>(from.s[lane]);
 }
 
-// Groups that a thread takes together: neighbours of one order, since the kernels run two or three registers side by side faster than one
-// after the other, and no more than three.
+// Groups that a thread takes together: neighbours of one order, since the kernels run two or three registers side by side faster
+// than one after the other, and no more than three.
 template <class G>
 std::vector<int> sets_of(const G* groups, int count) {
     std::vector<int> first{0};
@@ -241,8 +241,9 @@ std::vector<int> sets_of(const G* groups, int count) {
 
 }  // namespace
 
-// Advances groups over a record; adds each lane's squared errors. Where that is long work, sets of groups are shared, a chunk of the record
-// at a time: which thread takes which chunk changes nothing in what is computed.
+// Advances groups over a record; adds each lane's squared errors.
+// Where that is long work, sets of groups are shared, a chunk of the record at a time: which thread takes which chunk changes
+// nothing in what is computed.
 template <class T, class G>
 void Batch::advance(const View<T>& view, const Record& record, G* groups, int lanes, double* sums) const {
     constexpr std::size_t long_work = 1 << 18;  // samples of a candidate: near 0.1 ms
@@ -333,8 +334,8 @@ void Batch::run(std::size_t r, const Candidates& candidates, double* sums) {
 
 void Batch::errors(const Candidates& candidates, std::span<double> sums) {
     const std::size_t count = candidates.size();
-    // Candidates of one order share their lanes: sorting by order keeps the sum of group orders small; within an order by q, so that
-    // structures stay together.
+    // Candidates of one order share their lanes: sorting by order keeps the sum of group orders small; within an order by q, so
+    // that structures stay together.
     constexpr std::size_t most_q = max_plant_order / 2, keys = (max_plant_order + 1) * (most_q + 1);
     std::uint32_t at[keys + 1] = {};
     std::size_t largest = 0;

@@ -59,14 +59,17 @@ struct Prepared {
 // `start` holds start_states() numbers, or is null: then the record's own start (rest, or steady motion) is used.
 Prepared prepare(const Factors<double>& g, const Record& record, const Loop& loop, const double* start);
 
-// Responses and initial states of up to eight candidates on one record: as prepare(), bit for bit in the continuous loop. Behind a hold
-// all must have the same structure, and the last digits differ, since the fastest lane decides how often the exponential is doubled. starts[i], where not null, is candidate i's `start`; an empty span means none has one. Lanes
-// beyond the candidates repeat the last.
+// Responses and initial states of up to eight candidates on one record: as prepare(), bit for bit in the continuous loop.
+// Behind a hold all must have the same structure, and the last digits differ, since the fastest lane decides how often the
+// exponential is doubled. starts[i], where not null, is candidate i's `start`; an empty span means none has one.
+// Lanes beyond the candidates repeat the last.
 void load_group(const Experiment& experiment, const Record& record, std::span<const Factors<double>* const> candidates,
                 std::span<const double* const> starts, DoubleGroup& group);
 
-// Error sums of candidates of any mixture of structures. All memory is taken in the constructor. In float a candidate that 24 bits cannot
-// hold (float_suffices) is run in double all the same, and so is every loop with limits, where a rounded torque goes through the plant.
+// Error sums of candidates of any mixture of structures.
+// All memory is taken in the constructor.
+// In float a candidate that 24 bits cannot hold (float_suffices) is run in double all the same, and so is every loop with limits,
+// where a rounded torque goes through the plant.
 class Batch {
 public:
     Batch(const Experiment& experiment, std::size_t capacity, bool in_float);

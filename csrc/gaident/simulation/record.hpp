@@ -9,7 +9,7 @@ namespace gaident {
 
 enum class Start : std::uint8_t {
     rest,    // every state zero
-    steady,  // constant velocity `velocity0` under constant input: where the start is not at rest, the genetic search assumes this
+    steady,  // constant velocity `velocity0` under constant input: what the genetic search assumes of a start in motion
     free,    // unknown: the local fit estimates the state, starting from `steady`
 };
 

@@ -8,8 +8,9 @@
 
 namespace gaident {
 
-// Runs the model over `input`; writes velocity and torque (in open loop the torque is the input). Coefficients are computed in double
-// and rounded to R, as the genetic search does. `start`: see prepare(); null means rest.
+// Runs the model over `input`; writes velocity and torque (in open loop the torque is the input).
+// Coefficients are computed in double and rounded to R, as the genetic search does.
+// `start`: see prepare(); null means rest.
 template <class R>
 void simulate(const Factors<double>& g, std::span<const double> input, double sample_time, const Loop& loop, const double* start,
               std::span<double> velocity, std::span<double> torque) {
@@ -44,8 +45,8 @@ void simulate(const Factors<double>& g, std::span<const double> input, double sa
     }
 }
 
-// In 32-bit arithmetic: plain floats where they hold the loop's polynomial, pairs of floats where they do not, and where a limit keeps
-// controller and plant apart, so that a torque rounded to 24 bits would go through the plant.
+// In 32-bit arithmetic: plain floats where they hold the loop's polynomial, pairs of floats where they do not, and where a limit
+// keeps controller and plant apart, so that a torque rounded to 24 bits would go through the plant.
 inline void simulate_in_float(const Factors<double>& g, std::span<const double> input, double sample_time, const Loop& loop,
                               const double* start, std::span<double> velocity, std::span<double> torque) {
     Record record;

@@ -55,8 +55,8 @@ struct Plain {
     }
 };
 
-// The values of the genes by the bits of their fields, from tables made beforehand, so that no logarithm is needed to decode. Every A and
-// B has the same ranges.
+// The values of the genes by the bits of their fields, from tables made beforehand, so that no logarithm is needed to decode.
+// Every A and B has the same ranges.
 template <class Number>
 struct GeneValues {
     const Number *gain = nullptr, *real = nullptr, *imaginary = nullptr;
@@ -112,8 +112,8 @@ struct RecordView {
     bool settles;  // under a constant command: the recurrence runs without input
 };
 
-// The closed loop's states at the record's beginning: at rest, or from `start` on; where the record settles, their deviations from where
-// the constant command takes them.
+// The closed loop's states at the record's beginning: at rest, or from `start` on; where the record settles, their deviations
+// from where the constant command takes them.
 template <class A>
 void begin(const Delta<typename A::Number>& h, Structure s, const RecordView<A>& record, const typename A::Scaling& scaling,
            typename A::State* x, const double* start = nullptr) {

@@ -1,18 +1,20 @@
 // Where the binary points of a fixed-point search stand: from the ranges of its genes and the record's peak, before the run.
 //
-// A signal has the point at which peak * 2^headroom still fits a word; headroom is the word's split. State x[i] of the recurrence is, in
-// terms of the output and its differences d^k y (substitute x[i+1] = d x[i] - b[i+1] r + a[i] y),
+// A signal has the point at which peak * 2^headroom still fits a word; headroom is the word's split.
+// State x[i] of the recurrence is, in terms of the output and its differences d^k y (substitute x[i+1] = d x[i] - b[i+1] r + a[i]
+// y),
 //
 //     x[i] = d^i y + a[0] d^(i-1) y + ... + a[i-1] y - b[0] d^i r - ... - b[i] r
 //
-// and, summed up over T samples (substitute x[i](n+1) - x[i](n) = x[i+1] + b[i+1] r - a[i] y from the last state on) from where it may
-// start, at rest or away from it (closed_loop.hpp: at_rest),
+// and, summed up over T samples (substitute x[i](n+1) - x[i](n) = x[i+1] + b[i+1] r - a[i] y from the last state on) from where
+// it may start, at rest or away from it (closed_loop.hpp: at_rest),
 //
 //     |x[i]| <= peak (|a[i-1] - b[i]| + sum_j (a[i+j] + b[i+j+1]) T^(j+1) / (j+1)!)
 //
-// The coefficients are largest for the structure's fastest and strongest plant, the end of every range, and a difference is at most
-// min(1, a[0]) of what it is taken of. The smaller bound counts: the first for the early states, the second for the last. So each structure
-// has its own points, one per state.
+// The coefficients are largest for the structure's fastest and strongest plant, the end of every range, and a difference is at
+// most min(1, a[0]) of what it is taken of.
+// The smaller bound counts: the first for the early states, the second for the last.
+// So each structure has its own points, one per state.
 #pragma once
 
 #include "candidate.hpp"

@@ -1,6 +1,6 @@
-// A search on the desk in the arithmetic of a drive: genes, coefficients, recurrence and fitness all in it, in the very lines that run
-// there (candidate.hpp), so that the run is that of static_search.hpp bit for bit. Costs come back as doubles, which hold every number
-// of every arithmetic.
+// A search on the desk in the arithmetic of a drive: genes, coefficients, recurrence and fitness all in it, by the same
+// templates (candidate.hpp), so that the run is that of static_search.hpp bit for bit.
+// Costs come back as doubles, which hold every number of every arithmetic.
 #pragma once
 
 #include "../simulation/fitness.hpp"
@@ -25,16 +25,17 @@ protected:
     std::size_t overflows_ = 0;
 };
 
-// By name; throws std::invalid_argument for a name that is none, and for loops that a drive's search does not know: only the continuous
-// one, without limits.
+// By name; throws std::invalid_argument for a name that is none, and for loops that a drive's search does not know: only the
+// continuous one, without limits.
 std::unique_ptr<Mirror> make_mirror(std::string_view arithmetic, const Experiment& experiment, const Genome& genome,
                                     const FitnessWeights& weights);
 
 // The names: "drive_double", "drive_float", "c30", "fixed", ...
 std::vector<std::string_view> mirror_names();
 
-// One model's velocity in such an arithmetic; `in_z`: not in delta form but in powers of z, the coefficients computed in double and rounded
-// once, which is kinder than a drive could be. Returns whether it left the arithmetic's range; from there on the velocity is NaN.
+// One model's velocity in such an arithmetic; `in_z`: not in delta form but in powers of z, the coefficients computed in double
+// and rounded once, which is more exact than in a drive.
+// Returns whether it left the arithmetic's range; from there on the velocity is NaN.
 bool mirror_velocity(std::string_view arithmetic, bool in_z, const Factors<double>& g, std::span<const double> input,
                      double sample_time, const Loop& loop, std::span<double> velocity);
 

@@ -1,13 +1,15 @@
-// The paper's search (Table II) with all its memory inside the object: no heap, no libm, no exceptions, sizes known when compiled. What
-// runs in a drive, in slices, while the drive does its work; the random words are drawn in the order of breeder.hpp, so the same seed gives
-// the run that the desk makes.
+// The paper's search (Table II) with all its memory inside the object: no heap, no libm, no exceptions, sizes known when
+// compiled.
+// What runs in a drive, in slices, while the drive does its work; the random words are drawn in the order of breeder.hpp, so the
+// same seed gives the run that the desk makes.
 //
 //     StaticSearch(setup)         once
 //     feed(command, velocity)     sample by sample, until it says that the record is full
 //     work(n)                     n individuals evaluated, or one population bred; again and again
 //     best(), best_fitness()      at any time
 //
-// One task may feed and another one work, on one processor or on two, once it has seen full(). All else is for the task that works.
+// One task may feed and another one work, on one processor or on two, once it has seen full().
+// All else is for the task that works.
 #pragma once
 
 #include "candidate.hpp"
@@ -51,8 +53,9 @@ public:
     }
     StaticSearch(const StaticSearch&) = delete;
 
-    // Whether there was room for the sample [rad/s]. One that is not finite or beyond twice the peak, whose deviation from the command a
-    // word may not hold, spoils the record: no model comes of it.
+    // Whether there was room for the sample [rad/s].
+    // One that is not finite or beyond twice the peak, whose deviation from the command a word may not hold, spoils the record:
+    // no model comes of it.
     bool feed(double command, double velocity) {
         const int k = samples();
         if (k == max_samples) return false;
@@ -66,8 +69,9 @@ public:
     int samples() const { return samples_.load(std::memory_order_acquire); }
     bool spoiled() const { return spoiled_; }
 
-    // Goes on by at most `n` individuals; returns the number of generations evaluated so far. A slice ends where a population is bred, too,
-    // so the longest is that of `n` evaluations or of one breeding, whichever takes longer.
+    // Goes on by at most `n` individuals; returns the number of generations evaluated so far.
+    // A slice ends where a population is bred, too, so the longest is that of `n` evaluations or of one breeding, whichever takes
+    // longer.
     int work(int n) {
         if (!begun_) begin();
         else if (next_individual_ == population) breed();

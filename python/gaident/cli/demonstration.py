@@ -48,7 +48,7 @@ A two-mass drive, simulated: the robot arm of the paper's Table III, a step of {
 loop, {SAMPLES} samples of {1e3 * SAMPLE_TIME} ms, noise {NOISE} rad/s. What is found in this record:
 """
 
-DIGITAL = PI(CONTROLLER.kp, CONTROLLER.ki)
+DIGITAL = PI(kp=CONTROLLER.kp, ki=CONTROLLER.ki)
 FRICTION = 0.04  # N m, Coulomb
 HIDDEN = {"coulomb_friction": {"torque": FRICTION}}
 """What the drive of the second part has beside its masses: effect -> parameters."""
@@ -67,7 +67,7 @@ The truth: a dry friction of {FRICTION} N m, an inertia of {TRUTH.J:.4g} kg m^2,
 EMPS_STORY = "A ball-screw axis, measured (EMPS, Janot, Gautier and Brunot 2019; m, m/s, N, kg)"
 EMPS_TRUTH = """\
 Published for this axis: a mass of 95.1 kg and a dry friction of 20.4 N. The friction, which no linear model
-holds, bends the mass found here; the falsified verdict says so without knowing the truth."""
+holds, biases the mass found here; the falsified verdict says so without knowing the truth."""
 EMPS_FORCE = 35.15065188248547  # N/V, of the data set's authors: force = EMPS_FORCE * vir
 EMPS_CUTOFF = 100.0  # Hz, theirs too
 

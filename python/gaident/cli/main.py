@@ -1,7 +1,7 @@
 """The command line: arguments -> the package's functions, exit codes, and nothing else.
 
-Exit codes: 0 done, 1 the work failed, 2 wrong use, 130 Ctrl-C, each but 0 with exactly one line on stderr; 141, without a word,
-where the reader of the output goes away (as of a process that SIGPIPE ends: `gaident effects | head -2`).
+Exit codes: 0 done, 1 the work failed, 2 wrong use, 130 Ctrl-C, each but 0 with exactly one line on stderr; 141, without a
+message, where the reader of the output closes the pipe (as of a process that SIGPIPE ends: `gaident effects | head -2`).
 """
 
 from __future__ import annotations

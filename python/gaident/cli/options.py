@@ -129,7 +129,7 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
     _add_controller_options(sub)
     _add_space_options(sub)
     g = sub.add_argument_group("the search")
-    g.add_argument("--paper", action="store_true", help="the paper's genetic algorithm to the letter (Table II)")
+    g.add_argument("--paper", action="store_true", help="exactly the paper's genetic algorithm (Table II)")
     g.add_argument("--trials", type=int, default=1, metavar="N", help="independent genetic runs (default 1)")
     _add_run_options(g)
     g.add_argument(

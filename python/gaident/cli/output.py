@@ -23,7 +23,6 @@ __all__ = [
     "apart",
     "csv_targets",
     "csv_text",
-    "draw",
     "naming",
     "print_json",
     "proposal_csv",
@@ -116,13 +115,6 @@ def summary_of(idn: Identification, axis: str) -> str:
     from gaident.show.summary import identification_summary
 
     return identification_summary(idn, axis)
-
-
-def draw(idn: Identification, records: Sequence[Record], axis: str, path: Path) -> None:
-    """The identification's main picture."""
-    from gaident.show.plots import plot_identification
-
-    save_figure(plot_identification(idn, records, axis), path)
 
 
 def save_figure(figure: Figure, path: Path) -> None:

@@ -4,7 +4,7 @@
 
 x: a channel of the first log over its clock t; y: the same motion in the second over its clock t'; t0: offset, rho: difference of
 the clocks' rates, g and c: scale and zero of the second sensor.
-Coarsely by the cross-correlation over the lag for a range of rho, then by least squares in (t0, rho, g, c).
+They are found coarsely by the cross-correlation over the lag for a range of rho, then by least squares in (t0, rho, g, c).
 The covariance is the sandwich (J'J)^-1 S (J'J)^-1 with the autocorrelation of e in S (Newey, West, "A simple, positive
 semi-definite, heteroskedasticity and autocorrelation consistent covariance matrix", Econometrica 55, 1987).
 """
@@ -28,8 +28,8 @@ __all__ = ["Alignment", "align"]
 _LEAST_CORRELATION = 0.5
 _SURE = 3.0  # standard deviations from which a difference of the rates is one
 _RIVAL = 10.0  # units of n ln J: what a second offset, or another rate, must be worse by
-_WIDER = 2.0  # times max_rate: as far as the fit may go
-_ANY = 50.0  # times max_rate: as far as it is asked about where it ran into that
+_WIDER = 2.0  # times max_rate: bound of the rate in the fit
+_ANY = 50.0  # times max_rate: the bound of a second fit, where the first one ends at its bound
 _ORDER = ("velocity", "position", "command", "torque")
 
 

@@ -52,7 +52,7 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
         if "velocity" not in values and "position" not in values:
             values["velocity"] = np.zeros(len(next(iter(values.values()))))
         elif "velocity" not in values:
-            if wanted.velocity_cutoff_hz is not None:  # all alike: what is filtered alone is another plant
+            if wanted.velocity_cutoff_hz is not None:  # all channels alike: filtered alone, a velocity is that of another plant
                 values = {channel: low_pass(x, dt, wanted.velocity_cutoff_hz) for channel, x in values.items()}
                 said.append(f"All channels went through the same zero-phase low-pass of {wanted.velocity_cutoff_hz:g} Hz.")
             values["velocity"] = differentiate(values["position"], dt)

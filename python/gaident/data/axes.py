@@ -58,7 +58,7 @@ def read_axes(path: str | os.PathLike[str] | Any, axes: Mapping[str, Mapping[str
     """
     if not isinstance(axes, Mapping) or not axes or not all(isinstance(own, Mapping) for own in axes.values()):
         raise ReadError(f"axes={axes!r:.80} is no mapping of axes; give axes={{'x': {{'velocity': 'axis1.w', ...}}, ...}}")
-    text = {key: common.pop(key, None) for key in ("delimiter", "decimal", "skip", "encoding")}
+    text = {key: common.pop(key, None) for key in TextOptions.__dataclass_fields__}
     found = {}
     with open_log(path, TextOptions(**text)) as table:
         stem = "" if is_frame(path) else Path(path).stem

@@ -87,12 +87,12 @@ def axis_of(block: Table, wanted: Wanted, time: Column | None) -> TimeAxis | Non
     part = part_of(block, time)
     values = part.whole()
     if explicit or (part.bad is None and values.dtype.kind in "iuf" and np.isfinite(values).all()):
-        return TimeAxis(time, second_of(block, wanted, time), float(wanted.dt), judged=explicit)
+        return TimeAxis(time, second_of(block, wanted, time), float(wanted.dt), strict=explicit)
     return None
 
 
 def second_of(block: Table, wanted: Wanted, time: Column) -> float:
-    """What one unit of the time column is in s; without any word on it, what its first value looks like."""
+    """What one unit of the time column is in s; where nothing says it, what its first value suggests."""
     if "time" in wanted.units or time.unit is not None:
         return si_factor(block, wanted, "time", time)
     values = part_of(block, time).whole()

@@ -240,9 +240,9 @@ class _Gathered:
         notes = [self.bad, self.irregular if self.irregular and not self.bad else ""]
         if self.samples and self.lowest == self.highest and not self.bad:
             notes.append("one number" if self.samples == 1 else "constant")
-        held = np.isfinite(self.lowest)
+        lowest, highest = (self.lowest, self.highest) if np.isfinite(self.lowest) else (None, None)
         return ColumnInfo(
-            column.key, column.names, column.unit, self.samples, self.lowest if held else None, self.highest if held else None,
+            column.key, column.names, column.unit, self.samples, lowest, highest,
             column.period if step is None and column.clock is None else step, self.is_time,
             self.even and self.samples > 2, ", ".join(filter(None, notes)), kind_of_column((column.key, *column.names)),
         )  # fmt: skip

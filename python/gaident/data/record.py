@@ -1,4 +1,4 @@
-"""Record: what one run of the drive left behind."""
+"""Record: one measured run of a drive."""
 
 from __future__ import annotations
 
@@ -288,8 +288,8 @@ class Record:
         count = -(-len(self) // factor)
         if count < MINIMUM_SAMPLES:
             raise RecordError(f"decimate({factor}) leaves {count} samples, but at least {MINIMUM_SAMPLES} are needed")
-        thinned: Mapping[str, Any] = {key: decimated(values, factor) for key, values in self.channels()}
-        return self.with_channels(dt=self.dt * factor, **thinned)
+        kept: Mapping[str, Any] = {key: decimated(values, factor) for key, values in self.channels()}
+        return self.with_channels(dt=self.dt * factor, **kept)
 
     def shifted(self, **samples: int) -> Record:
         """Return the record with channels moved against the others, for a log that wrote them on another line.

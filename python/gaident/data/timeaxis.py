@@ -33,12 +33,12 @@ class TimeAxis:
     0.666666 ms is regular, and so is 0.667, 1.333, 2.000.
     """
 
-    def __init__(self, column: Column, second: float, given: float | None = None, judged: bool = True) -> None:
+    def __init__(self, column: Column, second: float, given: float | None = None, strict: bool = True) -> None:
         """second: what one of the column's units is in s; given: the dt [s] that must agree, None if there is none.
 
-        judged: whether an irregular axis is refused, as it is where the column was named as the time.
+        strict: whether an irregular axis is refused, as it is where the column was named as the time.
         """
-        self.column, self.second, self.given, self.judged = column, second, given, judged
+        self.column, self.second, self.given, self.strict = column, second, given, strict
         self.count, self.start, self.last, self.step, self.rounding = 0, 0.0, 0.0, 0.0, 0.0
 
     def push(self, table: Table, t: NDArray[np.float64]) -> None:
@@ -55,7 +55,7 @@ class TimeAxis:
             return
         if self.given is not None:
             _check_given(table, self.column, float(np.median(np.diff(whole))) * self.second, self.second, self.given)
-        if self.judged:
+        if self.strict:
             self._check(table, whole, shift)
 
     def sample_time(self, table: Table) -> float:

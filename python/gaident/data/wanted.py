@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from gaident.arguments import arg
@@ -27,9 +27,9 @@ class Wanted:
     columns: Mapping[str, str | int | None] | None
     units: Mapping[str, str | float]
     dt: float | None
-    name: str | None
     constants: Constants
-    velocity_cutoff_hz: float | None
+    name: str | None = None
+    velocity_cutoff_hz: float | None = None
     decimate: int = 1
     resample: float | None = None
     gear_ratio: float | None = None
@@ -93,30 +93,17 @@ def wanted_of(
     units: Mapping[str, str | float] | None = None,
     dt: float | None = None,
     *,
-    counts_per_turn: float | None = None,
-    torque_constant: float | None = None,
-    rated_torque: float | None = None,
-    torque_per_volt: float | None = None,
-    resistance: float | None = None,
-    inductance: float | None = None,
-    back_emf_constant: float | None = None,
-    velocity_cutoff_hz: float | None = None,
     load_side: str | Sequence[str] = (),
     shift: Mapping[str, int] | None = None,
-    name: str | None = None,
     **more: Any,
 ) -> Wanted:
     """The arguments of `read` that say what a record is made of, checked. Raises ReadError or RecordError."""
+    constants = {f.name: more.pop(f.name) for f in fields(Constants) if f.name in more}
     return Wanted(
         columns=columns,
         units={} if units is None else units,
         dt=dt,
-        name=name,
-        constants=Constants(
-            *(counts_per_turn, torque_constant, rated_torque, torque_per_volt),
-            *(resistance, inductance, back_emf_constant),
-        ),
-        velocity_cutoff_hz=velocity_cutoff_hz,
+        constants=Constants(**constants),
         load_side=(load_side,) if isinstance(load_side, str) else tuple(load_side),
         shift={} if shift is None else shift,
         **more,

@@ -114,11 +114,11 @@ class Winding:
         ndarray of shape (n,)
             u [N m].
         """
-        current, settled, dt = self._courses(voltage, velocity, dt)
+        current, steady, dt = self._courses(voltage, velocity, dt)
         if self.inductance == 0.0:
-            return self.torque_constant * settled
+            return self.torque_constant * steady
         samples = self.inductance / (self.resistance * dt)  # of the time constant L/R
-        return np.asarray(self.torque_constant * (settled + (current - settled) * samples * -np.expm1(-1.0 / samples)))
+        return np.asarray(self.torque_constant * (steady + (current - steady) * samples * -np.expm1(-1.0 / samples)))
 
     def _courses(self, voltage: ArrayLike, velocity: ArrayLike, dt: float) -> tuple[Vector, Vector, float]:
         """(i(n), s(n) that it goes to, dt), checked."""

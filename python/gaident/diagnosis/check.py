@@ -1,6 +1,6 @@
 """The check by a second method: the inverse-dynamics regression of the same records, and the force error on held-out data.
 
-The regression needs no start, no simulation and no noise model, so what goes astray in a search does not lead it astray.
+The regression needs no start, no simulation and no noise model, so that errors of a search do not reach it.
 Its inertia, dry friction, gravity and stiffness to ground are compared with those of the diagnosis.
 They contradict each other where
 
@@ -63,17 +63,23 @@ class Check:
 
 
 def checked(
-    records: Sequence[Record], gains: Gains, model: Model, mechanics: Mapping[str, Estimate], effects: Effects, driven: bool
+    records: Sequence[Record],
+    gains: Gains,
+    model: Model,
+    mechanics: Mapping[str, Estimate],
+    effects: Effects,
+    driven: bool,
+    axis: str = "rotary",
 ) -> Check:
     """The check of a diagnosis.
 
     records: as they were fitted; model: the extended one; mechanics: name -> Estimate; effects: effect -> its parameters;
-    driven: whether a torque drives the simulation, for lack of a controller.
+    driven: whether a torque drives the simulation, for lack of a controller; axis: rotary or linear.
     """
     nothing = Check(None, None, (), gains.before, gains.after, (), Text(""))
     if not all(r.torque is not None for r in records):
         return nothing
-    found = _regression(records, model)
+    found = _regression(records, model, axis)
     before, after, second = _forces(records, gains, found)
     if found is None:
         return replace(nothing, before=before, after=after, reason=_reason(effects, driven))
@@ -84,20 +90,20 @@ def checked(
     return Check(found, second, comparisons, before, after, notes, _reason(effects, driven))
 
 
-def _regression(records: Sequence[Record], model: Model) -> InverseDynamics | None:
+def _regression(records: Sequence[Record], model: Model, axis: str) -> InverseDynamics | None:
     """None where the records do not show one."""
     try:
-        return inverse_dynamics(list(records), cutoff_hz=band_of(model, records, below=POLICY.rigid_band))
+        return inverse_dynamics(list(records), cutoff_hz=band_of(model, records, below=POLICY.rigid_band), axis=axis)
     except GaidentError:
         return None
 
 
 def _forces(records: Sequence[Record], gains: Gains, found: InverseDynamics | None) -> tuple[Fitness, Fitness, float | None]:
     """(before, after, force error of the regression), all over the same samples of the held-out data, through the same filter."""
-    judged = [(r, first) for r, first in gains.judged if r.torque is not None]
-    if len(judged) < len(gains.judged):
+    scored = [(r, first) for r, first in gains.scored if r.torque is not None]
+    if len(scored) < len(gains.scored):
         return gains.before, gains.after, None
-    rows, firsts = [r for r, _ in judged], [first for _, first in judged]
+    rows, firsts = [r for r, _ in scored], [first for _, first in scored]
     cutoff = band_of(gains.extended, rows)
 
     def of(model: Model | InverseDynamics) -> ForceError | None:
@@ -116,8 +122,8 @@ def _forces(records: Sequence[Record], gains: Gains, found: InverseDynamics | No
     second = None
     if found is not None:
         try:
-            part = [r[:first] for r, first in judged] if any(firsts) else list(records)
-            second = of(inverse_dynamics(part, terms=found.terms, cutoff_hz=found.cutoff_hz))
+            part = [r[:first] for r, first in scored] if any(firsts) else list(records)
+            second = of(inverse_dynamics(part, terms=found.terms, cutoff_hz=found.cutoff_hz, axis=found.axis))
         except GaidentError:
             second = None
     return fitness(gains.before, gains.mechanism), fitness(gains.after, gains.extended), None if second is None else second.rms

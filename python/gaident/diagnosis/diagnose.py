@@ -15,10 +15,9 @@ from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
 from gaident.diagnosis.controller.log_shift import aligned
-from gaident.diagnosis.experiments.excitation import excitation
-from gaident.diagnosis.explain.wording import basis_of, evidence_of, far_off
+from gaident.diagnosis.experiments.excitation import decided_by_the_angle, excitation
+from gaident.diagnosis.explain.wording import basis_of, evidence_of, far_off, noise_findings
 from gaident.diagnosis.gains import Gains, measured_gains
-from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
 from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, LOAD, TWO_LEVELS, conditional_classes
 from gaident.diagnosis.mechanics import base_shift, mechanics_of
 from gaident.diagnosis.note import Note
@@ -59,6 +58,7 @@ def diagnose(
     bootstrap: int = 0,
     seed: int = 0,
     progress: ProgressCallback | None = None,
+    axis: str = "rotary",
 ) -> Diagnosis:
     """Show what the model of an axis gets wrong, name the physical cause where the data allow it, and measure the gain.
 
@@ -88,6 +88,8 @@ def diagnose(
         Seed of the random numbers; the same seed gives the same result.
     progress : callable, optional
         Called now and then with (fraction done, message), see `gaident.progress`.
+    axis : {"rotary", "linear"}
+        "linear" (m, m/s, N): positions are lengths, and no effect that returns with every turn is tried.
 
     Returns
     -------
@@ -119,7 +121,7 @@ def diagnose(
     records, loop, under, cascade = torque_driven(records_of(rec, "rec"), controller)
     held = () if validation is None else torque_driven(records_of(validation, "validation"), controller).records
     controller = loop
-    checked(records, held, controller, identification, bootstrap, seed, progress)
+    checked(records, held, controller, identification, bootstrap, seed, progress, axis)
     records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
     moved = aligned(records, held, controller)
@@ -132,7 +134,7 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.02, "identifying the linear model")
         idn = identification if identification is not None else identify(list(moved.records), controller, seed=seed)
-        work = _Work(moved.records, moved.held, logged, idn, noise_std, note, cascade)
+        work = _Work(moved.records, moved.held, logged, idn, noise_std, note, axis, cascade)
         work.search()
         result = moved.noted(replace(work.report(seed), noise=noise_std, bootstrap=bootstrap))
         result = replace(result, notes=(*under, *result.notes)) if under else result
@@ -155,6 +157,7 @@ class _Work:
     idn: Identification
     noise: float | None
     note: Note
+    axis: str
     cascade: Cascade | None = None
 
     def __post_init__(self) -> None:
@@ -167,7 +170,7 @@ class _Work:
         self.clean = tuple(clean)
         self.step = quantisation(self.records)
         read = as_read(self.records, clean, self.controller)
-        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.cascade)
+        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis, self.cascade)
         self.scales = scales_of(data)
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.logged.replays)
         self.notes += notes
@@ -179,7 +182,7 @@ class _Work:
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
         self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
         self.spoiled = int(sum(len(h) for h in hit))
-        self.excited = excitation(self.clean, shown)
+        self.excited = excitation(self.clean, shown, axis=self.axis)
 
     def _shown(self, effect: str) -> bool:
         return effect in self.at_controller.effects
@@ -201,7 +204,7 @@ class _Work:
         if self.data.torque_measured:
             behind = say("the {torque} was measured behind the actuator, which it does not show")
             not_testable |= {t.name: behind for t in LIBRARY.values() if t.place == "actuator"}
-        out = {*not_testable, *self.at_controller.decided}
+        out = {*not_testable, *self.at_controller.decided, *decided_by_the_angle(self.clean)}
         allowed = [t for t in LIBRARY.values() if t.name not in out and (self.controller is not None or not t.in_controller)]
         self.not_testable = not_testable
         found = selected(self.objective, self.scales, self.idn.model, allowed, self._equivalent_here, self._say)
@@ -252,7 +255,8 @@ class _Work:
                 self.notes = said
                 self.take(instead)
                 return self.report(seed)
-        findings = [*self._noise_findings(), *(replace(f, gain=gains.of(f.effect)) for f in self.controller_steps)]
+        findings = noise_findings(self.spoiled, sum(len(r) for r in self.records), self.step)
+        findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         for effect in causes:
             gain, rivals = self.rivals[effect]
             alternatives = self._alternatives(effect, rivals, offset is None)
@@ -281,7 +285,7 @@ class _Work:
                 of_driver = say(" that depends on {}", called(driver)) if self.left.gains[driver] > self.left.needed else ""
                 text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
                 self.notes.append(say(text, " and ".join(dropped), of_driver))
-        check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None)
+        check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None, self.axis)
         self.notes += check.notes
         if self.final.parameters.held and LOAD.name in self.final.effects:
             self.notes.append(
@@ -329,6 +333,7 @@ class _Work:
             torque_logged=self.data.torque_logged,
             loop_follows=self.at_controller.follows,
             version=version(),
+            axis=self.axis,
             records=self.records,
             validation_records=self.held,
         )
@@ -369,27 +374,6 @@ class _Work:
         turns = max(e.reversals, int(min(e.speeds, default=0.0) < 0.0 < max(e.speeds, default=0.0)))
         classes = conditional_classes(turns, len(e.steps), self.data.torque_logged)
         return set().union(*(c for c in classes if effect in c)) - {effect} - set(self.not_testable)
-
-    def _noise_findings(self) -> list[Finding]:
-        found = []
-        total = sum(len(r) for r in self.records)
-        if self.spoiled:
-            fraction = self.spoiled / total
-            samples = "{} of {} samples leave the signal and come back; they are left out of every fit."
-            found.append(
-                Finding(
-                    OUTLIERS,
-                    {"fraction": Estimate(fraction, float(np.sqrt(self.spoiled) / total), "1")},
-                    evidence=say(samples, self.spoiled, total),
-                    is_noise=True,
-                )
-            )
-        if self.step > 0.0:
-            text = say(
-                "All velocities lie on a lattice of {:.4g} {rad/s}: the resolution of the encoder or of the log.", self.step
-            )
-            found.append(Finding(QUANTISATION, {"step": Estimate(self.step, 0.0, "rad/s")}, evidence=text, is_noise=True))
-        return found
 
     def _determined(self, effect: str, parameters: Mapping[str, Estimate]) -> bool:
         """Whether the records say how large an effect is; else its name would rest on nothing, and a note says so."""

@@ -1,6 +1,6 @@
 """Before and after: the free-run simulation, linear and extended, on data that no parameter was fitted to.
 
-With validation records these are used whole. Without, parameters are fitted again to the first 70 % of each record and judged
+With validation records these are used whole. Without, parameters are fitted again to the first 70 % of each record and scored
 on the rest of one continuous run, which is not restarted; where a record is too short for that, the figures are in-sample and say
 so.
 """
@@ -43,7 +43,7 @@ IN_SAMPLE = "in-sample"
 class Gains:
     """before, after, interval of the total fall, how it was held out, and each effect's own fall.
 
-    harmful: effects without which the extended model is better on the held-out data, beyond chance. judged: records, each with
+    harmful: effects without which the extended model is better on the held-out data, beyond chance. scored: records, each with
     the first sample that is held out; mechanism, extended: the models, without and with the effects, fitted to the rest.
     """
 
@@ -52,7 +52,7 @@ class Gains:
     interval: tuple[float, float]
     held_out: str
     steps: dict[str, float]
-    judged: tuple[tuple[Record, int], ...]
+    scored: tuple[tuple[Record, int], ...]
     mechanism: Model
     extended: Model
     harmful: tuple[str, ...] = ()
@@ -75,24 +75,24 @@ def measured_gains(
     """Errors of the linear model, of each stage and of the extended model."""
     part: tuple[int, ...] | None
     if held:
-        judged, words, part = [(r, 0) for r in held], "validation records", None
+        scored, words, part = [(r, 0) for r in held], "validation records", None
     elif all(len(r) >= POLICY.least_held for r in records):
-        judged = [(r, held_from(r)) for r in records]
-        part = tuple(first for _, first in judged)
-        by_time = all(first == int(POLICY.fitted_share * len(r)) for r, first in judged)
+        scored = [(r, held_from(r)) for r in records]
+        part = tuple(first for _, first in scored)
+        by_time = all(first == int(POLICY.fitted_share * len(r)) for r, first in scored)
         words = f"the last 30 % of {'the record' if by_time else 'its path'}, parameters fitted to the first 70 %"
     else:
-        judged, words, part = [(r, 0) for r in records], IN_SAMPLE, None
-    judged = [(_turned(r, controller, final), first) for r, first in judged]
+        scored, words, part = [(r, 0) for r in records], IN_SAMPLE, None
+    scored = [(_turned(r, controller, final), first) for r, first in scored]
     stages = _stages(final, objective, part)
     chain = [linear]
     named = list(at_controller.items())
     bare = stages[0].parameters.model(stages[0].x)
     chain += [_with(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
     chain += [_with(f.parameters.model(f.x), at_controller) for f in stages[1:]]
-    errors = [free_run_errors(m, judged, controller) for m in chain]
+    errors = [free_run_errors(m, scored, controller) for m in chain]
     levels = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in errors]
-    base = free_run_errors(stages[0].parameters.model(stages[0].x), judged, controller)
+    base = free_run_errors(stages[0].parameters.model(stages[0].x), scored, controller)
     level0 = float(np.sqrt(np.mean(np.concatenate(base) ** 2)))
     # The linear mechanism, refitted, may be better than the identified model already.
     previous = min(levels[0], level0) if np.isfinite(level0) else levels[0]
@@ -102,9 +102,9 @@ def measured_gains(
         previous = level
     if len(errors) == 1:
         errors.append(errors[0])
-    spread = np.concatenate([r.velocity[first:] for r, first in judged])
-    step = quantisation(tuple(r for r, _ in judged))
-    floor = float(np.mean([noise_std(r.velocity, step) for r, _ in judged])) if noise is None else noise
+    spread = np.concatenate([r.velocity[first:] for r, first in scored])
+    step = quantisation(tuple(r for r, _ in scored))
+    floor = float(np.mean([noise_std(r.velocity, step) for r, _ in scored])) if noise is None else noise
     rounding = step / float(np.sqrt(12.0))
     floor = max(floor, rounding)
     size = float(np.sqrt(np.mean((spread - spread.mean()) ** 2)))
@@ -115,12 +115,12 @@ def measured_gains(
 
     # Where the simulated loop is known not to be the drive's, the torque drives the models that are compared.
     driver = controller if objective.data.loop_follows or not objective.data.torque_logged else None
-    extended = errors[-1] if driver is controller else free_run_errors(chain[-1], judged, None)
+    extended = errors[-1] if driver is controller else free_run_errors(chain[-1], scored, None)
     extended_level = float(np.sqrt(np.mean(np.concatenate(extended) ** 2)))
     harmful = []
     for effect in final.effects if words != IN_SAMPLE else ():
         less = stages[0] if len(final.effects) == 1 else _without(stages[-1], effect, _part(objective, part))
-        spared = free_run_errors(_with(less.parameters.model(less.x), at_controller), judged, driver)
+        spared = free_run_errors(_with(less.parameters.model(less.x), at_controller), scored, driver)
         level = float(np.sqrt(np.mean(np.concatenate(spared) ** 2)))
         if level < (1.0 - POLICY.harm) * extended_level and _interval(spared, extended)[1] < 0.0:
             harmful.append(effect)
@@ -130,7 +130,7 @@ def measured_gains(
         interval=_interval(errors[0], errors[-1]),
         held_out=words,
         steps=steps,
-        judged=tuple(judged),
+        scored=tuple(scored),
         mechanism=bare,
         extended=chain[-1],
         harmful=tuple(harmful),
@@ -195,10 +195,10 @@ def _stages(final: Fit, objective: Objective, part: tuple[int, ...] | None) -> l
     return fits[::-1]
 
 
-def free_run_errors(model: Model, judged: Sequence[tuple[Record, int]], controller: Controller | None) -> list[Vector]:
+def free_run_errors(model: Model, scored: Sequence[tuple[Record, int]], controller: Controller | None) -> list[Vector]:
     """Measured minus simulated velocity of each record from a sample on [rad/s]; 1e150 where a simulation diverges."""
     errors = []
-    for r, first in judged:
+    for r, first in scored:
         state = start_state(model, r, controller)
         with np.errstate(over="ignore", invalid="ignore"):
             e = (r.velocity - simulate(model, r, controller, state))[first:]

@@ -1,4 +1,4 @@
-"""The linear part of an extended model as a mechanic calls it, with standard deviations.
+"""The mechanical parameters of the linear part of an extended model, with standard deviations.
 
 One mass: J = 1/|K|, D = a/|K|, and k = c/|K| of a spring that holds it.
 Two masses, motor and load on a damped shaft, with the numerator s^2 + f1 s + f0 and

@@ -5,18 +5,18 @@ errors. With the information I, the number of independent samples,
 
     BIC = I ln(V/N) + k ln I                  (Schwarz 1978)
 
-Under a noise model that makes the errors white, every sample counts: I = N. The plain errors of a model that is not exact are
-slow: neighbouring samples say the same, and
+Under a noise model that makes the errors white, every sample counts: I = N. Before whitening the errors of a model that is not
+exact are slow: neighbouring samples say the same, and
 
     I = N / (1 + 2 sum_k rho(k))              (effective sample size; Bartlett 1946)
 
 with rho the autocorrelation of the errors about their mean, up to its first fall below a twentieth.
 
-**The specification test** (Hausman 1978). Whitened and plain least squares estimate the same parameters where the errors are
-stationary noise; whitened, they are only more precise. With x_W and x_P the two estimates and V_P the sum of squared plain
-errors,
+**The specification test** (Hausman 1978). Least squares of whitened errors and of output errors estimate the same parameters
+where the errors are stationary noise; whitened, they are only more precise. With x_W and x_O the two estimates and V_O the sum
+of squared output errors,
 
-    H = I ln(V_P(x_W) / V_P(x_P))
+    H = I ln(V_O(x_W) / V_O(x_O))
 
 is then near chi-square with as many degrees of freedom as there are parameters that a fit moves. A larger H says that what the
 model leaves is no stationary noise (a friction that changes with load, angle and temperature, a torque that is itself measured):
@@ -67,6 +67,7 @@ def effective_samples(error: Vector) -> float:
     rho = np.fft.irfft(np.abs(np.fft.rfft(error, size)) ** 2, size)[:count] / power
     dead = np.flatnonzero(rho < DEAD)
     memory = int(dead[0]) if len(dead) else count
+    # no decision: the variance of a mean of correlated samples
     return float(max(count / (1.0 + 2.0 * float(rho[1:memory].sum())), 1.0))
 
 
@@ -78,15 +79,15 @@ class Specification(NamedTuple):
 
     @property
     def contradicts(self) -> bool:
-        """Whether whitened and plain estimate contradict each other."""
+        """Whether the estimates of whitened and of output errors contradict each other."""
         return self.statistic > self.bound
 
 
-def specification_statistic(whitened_estimate: float, plain_estimate: float, information: float) -> float:
-    """H from the sums of squared plain errors at both estimates; 0 where the whitened one is no worse."""
-    if not 0.0 < plain_estimate < whitened_estimate:
+def specification_statistic(whitened_estimate: float, output_estimate: float, information: float) -> float:
+    """H from the sums of squared output errors at both estimates; 0 where the whitened one is no worse."""
+    if not 0.0 < output_estimate < whitened_estimate:
         return 0.0
-    return float(information * np.log(whitened_estimate / plain_estimate))
+    return float(information * np.log(whitened_estimate / output_estimate))
 
 
 def chi_square_bound(freedom: int, level: float) -> float:

@@ -39,7 +39,7 @@ class DataSet:
     as the controller read them, which may hold samples that the fit leaves out. finest: no substep of a simulation is much
     shorter [s]; resolution: step of the lattice that all velocities lie on [rad/s], 0: none; known_noise: standard deviation
     of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
-    makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator.
+    makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear";
     cascade: the whole controller where the log has no line for each of its samples; the torque is then known on the lines only.
     """
 
@@ -56,6 +56,7 @@ class DataSet:
     known_noise: float | None = None
     loop_follows: bool = True
     torque_measured: bool = False
+    axis: str = "rotary"
     cascade: Cascade | None = None
 
     @classmethod
@@ -66,6 +67,7 @@ class DataSet:
         spoiled: bool = False,
         read: Sequence[Record] | None = None,
         resolution: float = 0.0,
+        axis: str = "rotary",
         cascade: Cascade | None = None,
     ) -> DataSet:
         """The records as driven by their torque; spoiled: some velocities are not what the controller read."""
@@ -76,7 +78,7 @@ class DataSet:
         seen = tuple(records if read is None else read)
         measured = any(r.torque_is == MEASURED for r in records)
         found = cls(tuple(records), controller, driven, turned, free, moving, spoiled, seen, resolution=resolution)
-        return replace(found, torque_measured=measured, cascade=cascade)
+        return replace(found, torque_measured=measured, axis=axis, cascade=cascade)
 
     @property
     def dt(self) -> float:

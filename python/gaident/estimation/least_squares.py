@@ -15,6 +15,7 @@ __all__ = ["evolved", "fit", "reestimated", "scored"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
+NEARBY = 0.15, 0.3, 0.7  # no decision: of a base parameter, of its unit at least, of a step of an effect: where it is searched
 SETTLED = 0.02  # no decision: of the noise variance: a fall of the cost by less changes no decision
 
 
@@ -27,7 +28,7 @@ def fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFil
 def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, iterations: int) -> Fit:
     limits, steps = hypothesis.parameters.limits(), hypothesis.parameters.steps()
     x = np.clip(x, *limits)
-    damping, converged = 1e-2, False
+    damping, converged = 1e-2, False  # no decision: a start
     v, J = objective.linearised(hypothesis, x, noise)
     cost = min(float(v @ v), WORST) if np.all(np.isfinite(v)) else WORST
     count = max(objective.count, 1.0)
@@ -50,14 +51,14 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
         costs = objective.costs(hypothesis, X, noise)
         best = int(np.argmin(costs))
         if not costs[best] < cost:
-            if damping > 1e5:
+            if damping > 1e5:  # no decision: nothing is gained by smaller steps
                 converged = True
                 break
             damping *= 1e5
             continue
         fall = cost - float(costs[best])
         x, cost = X[best], float(costs[best])
-        damping = float(np.clip(damping * 10.0 ** (best - 3.0), 1e-9, 1e9))
+        damping = float(np.clip(damping * 10.0 ** (best - 3.0), 1e-9, 1e9))  # no decision: the grid of a solver
         if fall < SETTLED * cost / count:
             converged = True
             break
@@ -90,7 +91,7 @@ def scored(objective: Objective, found: Fit) -> Fit:
 
 def _scored(objective: Objective, found: Fit) -> Fit:
     noise = objective.own_noise(found)
-    v = objective.weighed(found, noise)
+    v = objective.whitened_errors(found, noise)
     return objective.fitted(found.hypothesis, found.x, noise, float(v @ v), found.converged)
 
 
@@ -119,12 +120,14 @@ def evolved(objective: Objective, found: Fit, generations: int) -> Fit:
 
     hypothesis, parameters = found.hypothesis, found.parameters
     limits, steps = parameters.limits(), parameters.steps()
-    reach = np.where(np.arange(parameters.size) < parameters.base, 0.15 * np.maximum(np.abs(found.x), 0.3), 0.7 * steps)
-    reach[0] = 0.15
+    part, least, of_step = NEARBY
+    reach = np.where(np.arange(parameters.size) < parameters.base, part * np.maximum(np.abs(found.x), least), of_step * steps)
+    reach[0] = part  # ln K
     moved = np.flatnonzero(steps > 0.0)
     low, high = np.maximum(found.x - reach, limits[0])[moved], np.minimum(found.x + reach, limits[1])[moved]
     if np.any(low >= high) or not np.all(np.isfinite(found.x)):
         return found
+    # no decision: inside of the bounds
     start = low + (high - low) * np.clip((found.x[moved] - low) / (high - low), 1e-6, 1.0 - 1e-6)
 
     def costs(columns: Matrix) -> Vector:

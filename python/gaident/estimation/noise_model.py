@@ -151,18 +151,18 @@ class ShaftNoise:
 
     @cached_property
     def _open(self) -> Grid:
-        return self._filters(looped=False)
+        return self._filters(closed=False)
 
     @cached_property
     def _closed(self) -> Grid:
-        return self._filters(looped=True)
+        return self._filters(closed=True)
 
-    def filters(self, places: Sequence[tuple[int, int]], looped: bool = False) -> list[NoiseFilter | None]:
+    def filters(self, places: Sequence[tuple[int, int]], closed: bool = False) -> list[NoiseFilter | None]:
         """The filters of TAUS[i] and SIZES[j]; None outside the grid or where there is none."""
-        grid = self._closed if looped and self.controller is not None else self._open
+        grid = self._closed if closed and self.controller is not None else self._open
         return [grid.get(k) for k in places]
 
-    def _filters(self, looped: bool) -> Grid:
+    def _filters(self, closed: bool) -> Grid:
         """The whole grid at once, so that no filter depends on which others were asked for."""
         plant = discretised(self.model, self.dt)
         places = [(i, j) for i in range(len(TAUS)) for j in range(len(SIZES))]
@@ -180,14 +180,14 @@ class ShaftNoise:
         K = (A @ PH[:, :, None])[:, :, 0] / (1.0 + (PH @ H).real)[:, None]
         unfiltered: NDArray[Any] = np.linalg.eigvals(plant.A)
         filtered: NDArray[Any] = np.linalg.eigvals(A - K[:, :, None] * H)
-        if looped:
+        if closed:
             unfiltered = np.linalg.eigvals(disturbed(plant, self.controller, self.dt).A)
             filtered = np.append(filtered, np.ones((len(A), 1)), axis=1)
         numerators = _polynomials(np.append(np.tile(unfiltered, (len(A), 1)), phis[:, None], axis=1))
         denominators = _polynomials(filtered)
         return {k: NoiseFilter(numerators[n], denominators[n], 2) if known[n] else None for n, k in enumerate(places)}
 
-    def best(self, cost: Callable[[NoiseFilter], float], looped: bool) -> NoiseFilter | None:
+    def best(self, cost: Callable[[NoiseFilter], float], closed: bool) -> NoiseFilter | None:
         """The filter of least cost, downhill from the middle of the grid, in large steps and then in small ones.
 
         Always from there, so that the filter of an error is a matter of this error alone.
@@ -199,10 +199,10 @@ class ShaftNoise:
                 i, j = here
                 around = [(i + stride * u, j + stride * v) for u in (-1, 0, 1) for v in (-1, 0, 1)]
                 new = [k for k in around if k not in costs]
-                for k, f in zip(new, self.filters(new, looped), strict=True):
+                for k, f in zip(new, self.filters(new, closed), strict=True):
                     costs[k] = np.inf if f is None else cost(f)
                 best = min(around, key=costs.__getitem__)
                 if not costs[best] < costs[here]:
                     break
                 here = best
-        return self.filters([here], looped)[0] if np.isfinite(costs[here]) else None
+        return self.filters([here], closed)[0] if np.isfinite(costs[here]) else None

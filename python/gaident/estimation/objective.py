@@ -2,7 +2,7 @@
 
     e(n) = w(n) - w_model(n; x),   v = H^-1 e,   minimise V(x) = sum of v^2 over the samples in use
 
-What becomes of e is the choice of a noise family:
+e is the *raw* error. What becomes of it is the choice of a noise family:
 
 *Innovations*: every hypothesis has a noise filter H^-1 of its own, which is part of it and counts in its criterion, so that no
 effect is whitened away by a filter that was estimated without it, and none is favoured by one estimated with it.
@@ -12,7 +12,8 @@ White noise of a variance f (`floor`) is then added to the error of every hypoth
 is that of e plus this noise, and V/N becomes V/N + f |h|^2, h the impulse response of H^-1.
 
 *Output errors*: the same filter for every hypothesis, none (H = 1) or a prefilter (see `prefilter.py`), with the information of
-the independent samples (see `criterion.py`). That is what is left where the errors are a misfit and no stationary noise.
+the independent samples (see `criterion.py`). Behind a prefilter errors are *weighed*, alike for all hypotheses, and not
+*whitened*, by a filter of each. That is what is left where the errors are a misfit and no stationary noise.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from gaident.estimation.noise_model import HIGHEST, ON_TOP, WHITE, NoiseFilter, 
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import Predictor
 from gaident.estimation.prefilter import Prefilter
-from gaident.estimation.projection import WORST, project_out, sums_of_squares
+from gaident.estimation.projection import WORST, project_out, slopes, sums_of_squares
 from gaident.estimation.term import Term
 
 __all__ = ["Fit", "Hypothesis", "Innovations", "NoiseFamily", "Objective", "OutputErrors"]
@@ -41,6 +42,7 @@ Matrix = NDArray[np.float64]
 Index = NDArray[np.intp]
 T = TypeVar("T")
 
+HEAD = 12  # no decision: parts of the shortest record, of which a filter's start takes one at most
 LOST = 1e60  # no decision: rad/s: the error of a model that diverges, every sample; its squares stay numbers
 
 
@@ -114,11 +116,11 @@ class NoiseFamily(Protocol):
         ...
 
     def prefiltered(self, E: Matrix, lengths: Sequence[int], inertias: Vector | None = None) -> Matrix:
-        """Rows of plain errors behind a filter that no hypothesis estimates; inertias: of each row."""
+        """Rows of raw errors behind a filter that no hypothesis estimates; inertias: of each row."""
         ...
 
     def estimated(self, objective: Objective, error: Vector, closed: bool) -> NoiseFilter:
-        """The filter of one row of plain errors."""
+        """The filter of one row of raw errors."""
         ...
 
 
@@ -157,7 +159,7 @@ class Innovations:
 
 @dataclass(frozen=True, eq=False)
 class OutputErrors:
-    """Plain errors behind one prefilter, None: as they are; samples: how many of them are independent.
+    """Raw errors behind one prefilter, None: as they are; samples: how many of them are independent.
 
     inertia: where the torque is measured, that of the regression [kg m^2], which noise on the torque does not bias. Compared as
     velocities, errors of a noisy torque get smaller with a heavier axis that follows it less; as torques they do not. A lighter
@@ -224,7 +226,7 @@ class Objective:
         return self.data.lengths
 
     def errors(self, hypothesis: Hypothesis, X: Matrix) -> Matrix:
-        """Rows of plain errors."""
+        """Rows of raw errors: measured minus simulated velocity [rad/s]."""
         self.counter.simulations += len(X)
         with np.errstate(invalid="ignore", over="ignore"):
             E = self.measured - hypothesis.predictor.velocities(hypothesis.parameters, X)
@@ -232,14 +234,14 @@ class Objective:
         return E
 
     def error(self, fit: Fit) -> Vector:
-        """The plain error of a fit."""
+        """The raw error of a fit."""
         return self.once(("error", fit.hypothesis, fit.x.tobytes()), lambda: self.errors(fit.hypothesis, fit.x[None, :])[0])
 
-    def plain_errors(self, fit: Fit) -> Vector:
-        """Those of a fit under no noise model, 0 where samples do not count."""
-        return self.weighed(fit, WHITE)
+    def unwhitened_errors(self, fit: Fit) -> Vector:
+        """The errors of a fit under no noise filter, 0 where samples do not count: raw, or weighed by the family's prefilter."""
+        return self.whitened_errors(fit, WHITE)
 
-    def weighed(self, fit: Fit, noise: NoiseFilter) -> Vector:
+    def whitened_errors(self, fit: Fit, noise: NoiseFilter) -> Vector:
         """The errors of a fit under a noise filter; its cost is their sum of squares."""
         rows = self.whitened(self.error(fit)[None, :], noise, fit.parameters.inertias(fit.x[None, :]))
         return np.asarray(rows[0])
@@ -298,7 +300,7 @@ class Objective:
     @property
     def head(self) -> int:
         """Samples at the start of each record that never count, so that filters of all orders are judged on the same ones."""
-        return min(HIGHEST, min(self.lengths) // 12)
+        return min(HIGHEST, min(self.lengths) // HEAD)
 
     @cached_property
     def count(self) -> float:
@@ -311,7 +313,7 @@ class Objective:
         return self.family.information(self.count)
 
     def noise_of(self, error: Vector, closed: bool) -> NoiseFilter:
-        """The noise filter of one row of plain errors, of a model in its loop or not."""
+        """The noise filter of one row of raw errors, of a model in its loop or not."""
         if float(np.abs(error).max()) >= LOST:
             return WHITE
         return self.family.estimated(self, error, closed)
@@ -334,13 +336,13 @@ class Objective:
         """(v, J) at x: J[j] = dv/dx_j, forward differences; rows of entries that are not moved are 0."""
         X, h = self._neighbours(hypothesis, x)
         V = self.whitened(self.errors(hypothesis, X), noise, hypothesis.parameters.inertias(X))
-        return V[0], _slopes(V, h)
+        return V[0], slopes(V, h)
 
     def sensitivities(self, hypothesis: Hypothesis, x: Vector) -> tuple[Matrix, Vector]:
         """(J, e) at x: J[j] = de/dx_j of the errors before all filters, 0 for samples that do not count; e as it is."""
         X, h = self._neighbours(hypothesis, x)
         E = self.errors(hypothesis, X)
-        return _slopes(self.bridged(E) * self.counted, h), E[0]
+        return slopes(self.bridged(E) * self.counted, h), E[0]
 
     def _neighbours(self, hypothesis: Hypothesis, x: Vector) -> tuple[Matrix, Vector]:
         """(rows: x, and x with each entry moved that is moved, steps: 0 for entries that are not)."""
@@ -353,9 +355,14 @@ class Objective:
         X[np.arange(1, len(moved) + 1), moved] += h[moved]
         return X, np.where(steps > 0.0, h, 0.0)
 
-    def plain(self, rows: Matrix, error: Vector) -> float:
-        """Sum of squared errors of the free run, before all filters, beside what the rows can explain."""
+    def raw_rest(self, rows: Matrix, error: Vector) -> float:
+        """Sum of squared raw errors beside what the rows can explain."""
         rest = project_out(self.bridged(rows) * self.counted, self.bridged(error[None, :]) * self.counted)[0]
+        return float(rest @ rest)
+
+    def unwhitened_rest(self, rows: Matrix, error: Vector) -> float:
+        """Sum of squared errors before whitening beside what the rows can explain; rows and error raw."""
+        rest = project_out(self.whitened(rows, WHITE), self.whitened(error[None, :], WHITE))[0]
         return float(rest @ rest)
 
     def bic(self, cost: float, noise: NoiseFilter, numbers: int) -> float:
@@ -383,12 +390,3 @@ class Objective:
     def weighted(self, weight: Vector) -> Objective:
         """The same with other samples left out."""
         return Objective(self.data, weight, self.family, self.measured, self.counter)
-
-
-def _slopes(V: Matrix, h: Vector) -> Matrix:
-    """Rows of differences over the steps h, 0 where there is none. V: the row at x, and one for each step."""
-    J = np.zeros((len(h), V.shape[1]))
-    moved = np.flatnonzero(h)
-    with np.errstate(invalid="ignore", over="ignore"):
-        J[moved] = (V[1:] - V[0]) / h[moved][:, None]
-    return J

@@ -63,8 +63,8 @@ class Prefilter:
     def _smooth(self, E: Matrix) -> Matrix:
         from scipy.signal import sosfiltfilt
 
-        settled = int(2.0 / (self.cutoff * self.dt))  # samples, two periods of the cutoff
-        return np.asarray(sosfiltfilt(self._sections, E, axis=1, padlen=min(settled, E.shape[1] - 1)))
+        padding = int(2.0 / (self.cutoff * self.dt))  # samples, two periods of the cutoff
+        return np.asarray(sosfiltfilt(self._sections, E, axis=1, padlen=min(padding, E.shape[1] - 1)))
 
     @cached_property
     def _sections(self) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["orthonormal_rows", "project_out", "sums_of_squares"]
+__all__ = ["orthonormal_rows", "project_out", "slopes", "sums_of_squares"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -37,3 +37,12 @@ def project_out(J: Matrix, V: Matrix) -> Matrix:
     """Rows of V without what the rows of J can explain."""
     basis = orthonormal_rows(J)
     return np.asarray(V - (V @ basis.T) @ basis)
+
+
+def slopes(V: Matrix, h: Vector) -> Matrix:
+    """Rows of differences over the steps h, 0 where there is none. V: the row at x, and one for each step."""
+    J = np.zeros((len(h), V.shape[1]))
+    moved = np.flatnonzero(h)
+    with np.errstate(invalid="ignore", over="ignore"):
+        J[moved] = (V[1:] - V[0]) / h[moved][:, None]
+    return J

@@ -116,7 +116,7 @@ def steady_covariances(A: Complex, H: Complex, Q: Complex) -> Complex:
     """`steady_covariance` of many A and Q (k, m, m) by doubling, side by side; nan where there is none."""
     a, g, p = A.conj().swapaxes(1, 2), np.broadcast_to(np.outer(H.conj(), H), A.shape), Q
     eye = np.eye(A.shape[-1])
-    settled = np.zeros(len(A), dtype=bool)
+    converged = np.zeros(len(A), dtype=bool)
     out = np.full_like(A, np.nan)
     with np.errstate(all="ignore"):
         for _ in range(60):
@@ -127,10 +127,10 @@ def steady_covariances(A: Complex, H: Complex, Q: Complex) -> Complex:
             a = a @ after
             p = p + step
             p = 0.5 * (p + p.conj().swapaxes(1, 2))
-            new = ~settled & (np.abs(step).max(axis=(1, 2)) <= 1e-12 * np.abs(p).max(axis=(1, 2)))
+            new = ~converged & (np.abs(step).max(axis=(1, 2)) <= 1e-12 * np.abs(p).max(axis=(1, 2)))
             out[new] = p[new]
-            settled |= new
-            if np.all(settled | ~np.isfinite(p).all(axis=(1, 2))):
+            converged |= new
+            if np.all(converged | ~np.isfinite(p).all(axis=(1, 2))):
                 break
     return out
 

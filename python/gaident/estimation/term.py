@@ -77,6 +77,7 @@ class Term:
     multimodal: bool = False  # a stop or an impact more or less makes valleys: fitted in the loop first, searched globally
     domains: frozenset[str] = frozenset()  # signals whose free function imitates it
     levels: bool = False  # its first coordinate is the level of dry friction
+    late: bool = False  # it makes the measured velocity late, which a logged angle shows
     resonates: bool = False  # a pair of poles and zeros in series with the mechanism: a second mass in disguise
     poles: Callable[[Vector], tuple[complex, ...]] | None = None  # poles in series [rad/s] of natural parameters
     seen_angle: Callable[[Vector, Vector, Vector], Vector] | None = None  # (seen angle, velocity, parameters) -> true angle

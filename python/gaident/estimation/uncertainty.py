@@ -88,7 +88,7 @@ def estimates_of(objective: Objective, fit: Fit) -> dict[str, dict[str, Estimate
         slot = fit.parameters.slot(effect)
         z, part = fit.x[slot], cov[slot, slot]
         values = term.natural(z[None, :])[0]
-        h = 1e-6 * np.maximum(np.abs(z), np.array(term.steps(fit.parameters.scales)))
+        h = 1e-6 * np.maximum(np.abs(z), np.array(term.steps(fit.parameters.scales)))  # no decision: the step of a difference
         h[h == 0.0] = 1.0
         moved = term.natural(z + np.diag(h))
         slopes = (moved - values) / h[:, None]
@@ -96,7 +96,7 @@ def estimates_of(objective: Objective, fit: Fit) -> dict[str, dict[str, Estimate
         variances = np.einsum("ij,ik,kj->j", slopes, finite, slopes)
         lost = np.any((np.abs(slopes) > 0.0) & ~np.isfinite(np.diag(part))[:, None], axis=0)
         span = np.maximum(limits[1, slot] - limits[0, slot], 1e-300)
-        near = (z <= limits[0, slot] + 1e-6 * span) | (z >= limits[1, slot] - 1e-6 * span)
+        near = (z <= limits[0, slot] + 1e-6 * span) | (z >= limits[1, slot] - 1e-6 * span)  # no decision: rounding at a bound
         bound = np.any((np.abs(slopes) > 0.0) & near[:, None], axis=0)
         row = next(r for r in table() if r.name == effect)
         result[effect] = {}

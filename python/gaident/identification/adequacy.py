@@ -50,12 +50,13 @@ def regressor_lags(lengths: Sequence[int], open_loop: bool) -> list[int]:
     open_loop: the input is a torque. It acts from the next sample on, and if a controller made it, it carries the noise of its
     own sample: lag 0 would then be correlated with the residual by construction and is left out.
     """
+    # no decision: lags that a record can show; the test has a level
     return [k for k in LAGS if k < min(lengths) // 4 and not (open_loop and k == 0)]
 
 
 def white_lags(lengths: Sequence[int]) -> int:
     """Lags of the whiteness test."""
-    return min(20, sum(lengths) // 5)
+    return min(20, sum(lengths) // 5)  # no decision: lags that a record can show; the test has a level
 
 
 def assess(s: Sums) -> Adequacy:

@@ -69,22 +69,22 @@ def covariance_of_factors(model: Model, plain: Matrix, coloured: Matrix, std: fl
     count = len(at_bound)
     bound = np.array([*at_bound, *[False] * (len(plain) - count)])
     scale = np.sqrt(np.diag(plain))
-    seen = np.flatnonzero(~bound & (scale > 0.0) & np.isfinite(scale))
+    shown = np.flatnonzero(~bound & (scale > 0.0) & np.isfinite(scale))
     cov = np.full((count, count), np.nan)
     free = np.flatnonzero(~bound[:count])
     cov[free, free] = np.inf
-    if len(seen):
-        size = np.outer(scale[seen], scale[seen])
-        block = np.ix_(seen, seen)
+    if len(shown):
+        size = np.outer(scale[shown], scale[shown])
+        block = np.ix_(shown, shown)
         values, vectors = np.linalg.eigh(plain[block] / size)
         known = values > 1e-13 * values[-1]
         inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
         small = std**2 * inverse @ (coloured[block] / size) @ inverse
-        lost = np.sum(vectors[:, ~known] ** 2, axis=1) > 1e-6
+        lost = np.sum(vectors[:, ~known] ** 2, axis=1) > 1e-6  # no decision: rounding of eigenvectors
         small[lost, :] = small[:, lost] = 0.0
         small[lost, lost] = np.inf
-        own = seen < count
-        cov[np.ix_(seen[own], seen[own])] = (small / size)[np.ix_(own, own)]
+        own = shown < count
+        cov[np.ix_(shown[own], shown[own])] = (small / size)[np.ix_(own, own)]
     return _transform(core_layout(model)[0], 0.5 * (cov + cov.T))
 
 
@@ -129,7 +129,7 @@ def estimates(model: Model, cov: Matrix, at_bound_core: Sequence[bool]) -> dict[
         elif name.endswith("_e1"):
             stem = name[: -len("_e1")]
             e1, e0 = float(values[i]), float(values[i + 1])
-            w, im = np.sqrt(e0), np.sqrt(max(e0 - 0.25 * e1**2, 1e-300))
+            w, im = np.sqrt(e0), np.sqrt(max(e0 - 0.25 * e1**2, 1e-300))  # no decision: roots of a quadratic
             add(f"{stem}_real", -0.5 * e1, {i: -0.5}, "rad/s", bound[i], w)
             add(f"{stem}_imaginary", float(im), {i: -0.25 * e1 / im, i + 1: 0.5 / im}, "rad/s", bound[i + 1], float(w))
             add(f"{stem}_frequency", float(w), {i + 1: 0.5 / w}, "rad/s", bound[i + 1], float(w))
@@ -158,4 +158,4 @@ def usable_covariance(model: Model, cov: Matrix) -> Matrix | None:
         return None
     size = np.sqrt(np.diag(fixed))
     correlation = fixed / np.outer(size, size)
-    return fixed if np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0] > -1e-9 else None
+    return fixed if np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0] > -1e-9 else None  # no decision: a symmetric part

@@ -156,7 +156,7 @@ def identify(
 
 
 @dataclass(frozen=True)
-class _Judged:
+class _Assessed:
     """A fit with what its residual says about it."""
 
     candidate: Candidate
@@ -195,6 +195,7 @@ class _Work:
         """The core's view of (record, whether it starts in motion)."""
         c = self.controller
         rows = [
+            # no decision: a start
             core.record(r.dt, _input(r, c), r.velocity, "free" if moving else "rest", float(r.velocity[:3].mean()))
             for r, moving in parts
         ]
@@ -223,10 +224,10 @@ class _Work:
             progress=None if progress is None else report,
         )
 
-    def select(self, found: list[_core.Trial]) -> tuple[_Judged, list[Candidate]]:
+    def select(self, found: list[_core.Trial]) -> tuple[_Assessed, list[Candidate]]:
         """The winner, and all structures compared with their BIC (the plain engine compares none)."""
         if not self.settings.species:
-            return self.judged(self.plain_best(found)), []
+            return self.assessed(self.plain_best(found)), []
         merged = [min((t.species[i] for t in found), key=lambda s: s.cost) for i in range(len(found[0].species))]
         candidates = [Candidate(s) for s in merged if s.cost < 1e300]
         if not candidates:
@@ -238,11 +239,11 @@ class _Work:
         noise = selection.noise_of(self.experiment, min(candidates, key=lambda c: c.cost), self.lengths)
         scores = self.scored(candidates, noise)
         winner = selection.smallest_close(scores)
-        best = self.judged(self.polished(scores[winner]))
+        best = self.assessed(self.refined(scores[winner]))
         if best.adequacy.falsified:
             scores += self.scored(self.on_all_samples([c for c in others if selection.is_chain(c)]), noise)
             chain = selection.smallest_mechanism(scores, self.samples)
-            best = best if chain is None or chain == winner else self.judged(self.polished(scores[chain]))
+            best = best if chain is None or chain == winner else self.assessed(self.refined(scores[chain]))
         return best, scores
 
     def within_reach(self, candidates: list[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
@@ -257,7 +258,7 @@ class _Work:
 
     def on_all_samples(self, candidates: list[Candidate]) -> list[Candidate]:
         """Fits of the parts, fitted to all samples; the start states of the whole records are other ones."""
-        starts = [(*c.as_start()[:3], np.zeros(0)) for c in candidates]
+        starts = [(*c.as_start()[:3], np.zeros(0)) for c in candidates]  # no decision: the first numbers of a start
         tolerance = selection.tolerance(self.samples)
         fits = self.experiment.refine(starts, self.ranges, [], WHOLE_ITERATIONS, self.workers, tolerance)
         return [Candidate(f) for f in fits if f.cost < 1e300]
@@ -281,7 +282,7 @@ class _Work:
         s = self.settings
         return _core.decode(words=trial.best, ranges=self.ranges, gray=s.code == "gray", logarithmic=s.scale == "logarithmic")
 
-    def polished(self, c: Candidate) -> Candidate:
+    def refined(self, c: Candidate) -> Candidate:
         """The local fit taken to the end."""
         done = self.experiment.go_on([c.fit], self.ranges, [], FINAL_ITERATIONS, FINAL_TOLERANCE, 1)[0]
         best = Candidate(done if done.cost <= c.cost else c.fit, c.bic)
@@ -298,7 +299,7 @@ class _Work:
             at += n
         return states
 
-    def judged(self, c: Candidate) -> _Judged:
+    def assessed(self, c: Candidate) -> _Assessed:
         """Whether the data contradict this candidate, and the sums its uncertainty is made of."""
         order = highest_order(self.lengths)
         products, largest = self.experiment.residual_sums(c.fit, max(order, adequacy.white_lags(self.lengths)))
@@ -306,16 +307,16 @@ class _Work:
         lags = adequacy.regressor_lags(self.lengths, self.controller is None)
         plain, coloured, white = self.experiment.fit_sums(c.fit, noise.phi, lags, 0.01 * largest)
         sums = adequacy.Sums(products, white, len(plain), self.lengths, noise, self.quiet)
-        return _Judged(c, float(products[0]), noise, plain, coloured, adequacy.assess(sums))
+        return _Assessed(c, float(products[0]), noise, plain, coloured, adequacy.assess(sums))
 
     @cached_property
     def quiet(self) -> float:
         """Noise of the measured velocity as its third differences show it [rad/s]."""
         return math.sqrt(sum(len(r) * noise_std(r.velocity) ** 2 for r in self.records) / self.samples)
 
-    def report(self, best: _Judged, scored: list[Candidate], found: list[_core.Trial], seed: int) -> Identification:
+    def report(self, best: _Assessed, scored: list[Candidate], found: list[_core.Trial], seed: int) -> Identification:
         """Uncertainty, mechanics, and everything the user sees."""
-        model, judged, error_sum, bic = best.candidate.model, best.adequacy, best.error_sum, best.candidate.bic
+        model, verdict, error_sum, bic = best.candidate.model, best.adequacy, best.error_sum, best.candidate.bic
         at_bound = best.candidate.at_bound
         cov = covariance.covariance_of_factors(model, best.plain, best.coloured, best.noise.std, at_bound)
         parameters = covariance.estimates(model, cov, at_bound)
@@ -324,7 +325,7 @@ class _Work:
         s = self.settings
         lowest = min((c.bic for c in scored), default=0.0)
         # Where every structure is contradicted a criterion that supposes one of them true ranks nothing.
-        close = [] if judged.falsified else scored
+        close = [] if verdict.falsified else scored
         close = [c for c in close if c.bic <= bic + POLICY.rival_margin and (c.p, c.q) != (model.p, model.q)]
         rivals = sorted((Rival(c.p, c.q, c.bic - bic, c.model) for c in close), key=lambda r: r.delta_bic)
         states = {d: tuple(x.tolist()) for d, x in zip(self.digests, self.states(best.candidate), strict=True) if len(x)}
@@ -339,9 +340,9 @@ class _Work:
             rivals=tuple(rivals),
             structures=tuple(Structure(c.p, c.q, c.cost, c.bic - lowest) for c in scored),
             trials=tuple(self.outcome(t) for t in found),
-            adequacy=judged,
+            adequacy=verdict,
             warnings=warnings_of(
-                judged,
+                verdict,
                 parameters,
                 mechanics,
                 rivals,
@@ -374,7 +375,7 @@ class _Work:
         )
 
 
-def _spread(records: Sequence[Record], block: int = 1 << 18) -> float:
+def _spread(records: Sequence[Record], block: int = 1 << 18) -> float:  # no decision: samples of a block, for memory
     """Sum of squares of the velocity about its mean, a block at a time."""
     mean = sum(float(r.velocity.sum()) for r in records) / sum(len(r) for r in records)
     parts = (r.velocity[i : i + block] - mean for r in records for i in range(0, len(r), block))

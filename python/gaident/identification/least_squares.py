@@ -3,7 +3,7 @@
     w(n) = sum_{i=0..N} alpha_i r(n-i) + sum_{i=1..N} beta_i w(n-i) + v(n) = phi(n)' theta + v(n)
     theta = (alpha_0..alpha_N, beta_1..beta_N),   D(z) = 1 - beta_1/z - ... - beta_N/z^N
 
-Plain        sum_n phi(n) v(n) = 0, least squares. Noise on w stands in phi as well and bends theta (errors in variables); the
+Plain        sum_n phi(n) v(n) = 0, least squares. Noise on w stands in phi as well and biases theta (errors in variables); the
              finer the sampling, the more.
 Instruments  sum_n z(n) v(n) = 0, z(n) = phi(n) of the noise-free answer of the last estimate: no bias from noise that is
              independent of r.

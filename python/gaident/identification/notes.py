@@ -19,7 +19,7 @@ __all__ = ["open_loop_notes", "reading_notes", "record_notes", "warnings_of"]
 
 
 def warnings_of(
-    judged: Adequacy,
+    adequacy: Adequacy,
     parameters: dict[str, Estimate],
     mechanics: OneMass | TwoMass | None,
     rivals: Sequence[Rival],
@@ -29,9 +29,9 @@ def warnings_of(
 ) -> tuple[str, ...]:
     """The sentences, those about the records (`started`) first."""
     notes = list(started)
-    if judged.falsified or judged.undecided:
-        notes.append(judged.sentence)
-    if judged.falsified and larger_fits_better:
+    if adequacy.falsified or adequacy.undecided:
+        notes.append(adequacy.sentence)
+    if adequacy.falsified and larger_fits_better:
         notes.append(
             "Larger structures come closer, but only by absorbing what no linear structure holds; the smallest mechanism "
             f"is reported, ({model.p},{model.q})."
@@ -60,7 +60,7 @@ def _shaft_notes(mechanics: OneMass | TwoMass) -> list[str]:
     if not isinstance(mechanics, TwoMass) or not std > 0.0 or found < POLICY.contradiction * std:
         return []
     damped = mechanics.with_shaft_damping
-    remedy = "an effect that the model lacks bends them; trust neither"
+    remedy = "an effect that the model lacks biases them; trust neither"
     if damped is not None and damped.physical:
         remedy = (
             f"use mechanics.with_shaft_damping (JM = {damped.JM:.4g}, JL = {damped.JL:.4g}, KG = {damped.KG:.4g}, "

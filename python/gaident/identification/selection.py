@@ -139,13 +139,13 @@ def smallest_mechanism(scores: Sequence[Candidate], samples: int) -> int | None:
 
     An information criterion supposes that one of the models is true. Where none is, every module more absorbs a little of what
     is missing, and the largest structure wins without meaning anything. Then only chains of masses (p = 1, q = 0, 2, 4, ...) are
-    considered, and a mass more has to halve the whitened error sum, which noise-like misfit does not let it do.
+    considered, and a mass more has to halve the whitened error sum (`another_mass`), which noise-like misfit does not let it do.
     """
     chains = {c.q: i for i, c in enumerate(scores) if is_chain(c)}
     if not chains:
         return None
     chosen = chains[min(chains)]
     for q in sorted(chains):
-        if scores[chains[q]].bic < scores[chosen].bic - samples * math.log(2.0):
+        if scores[chains[q]].bic < scores[chosen].bic - samples * math.log(POLICY.another_mass):
             chosen = chains[q]
     return chosen

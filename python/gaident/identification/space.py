@@ -14,6 +14,7 @@ from gaident.data.record import Record
 from gaident.errors import SpaceError
 from gaident.models.drive_torque import torque_blocks
 from gaident.models.search_space import SearchSpace
+from gaident.policy.table import POLICY
 
 __all__ = ["derive_space"]
 
@@ -63,6 +64,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
             raise SpaceError(
                 f"the {what} of the record is constant: nothing can be identified from it; use a record in which the drive moves"
             )
+    # no decision: what a double can invert
     rigid = float(np.linalg.solve(gram, right)[0]) if np.linalg.cond(gram) < 1e14 else 0.0
     found = [k for k in (rigid, steps / energy) if np.isfinite(k) and k > 0.0]
     if not found:
@@ -82,7 +84,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
     return SearchSpace(
         gain=(min(found) / 30.0, max(found) * 1000.0),
         real=(-10.0 / longest, 1.0 / dt),
-        imaginary=(min(0.5 / longest, 0.1 / dt), 0.8 * math.pi / dt),
+        imaginary=(min(0.5 / longest, 0.1 / dt), 0.8 * math.pi / dt),  # no decision: a range to search
         p=(0, 3) if controller is not None and controller.loop == "continuous" else (1, 3),
         source=f"derived from the data: K about {shown}, sample time {1e3 * dt:.4g} ms",
     )
@@ -106,8 +108,8 @@ def _held_gain(records: Sequence[Record], controller: PI | None) -> list[float]:
         for row in line:
             x -= np.array([_dot(one, row) for one in x])[:, None] * row
         products = np.array([[_dot(one, other) for other in x] for one in x])
-        gram += products[:3, :3]
-        right += products[:3, 3]
+        gram += products[:3, :3]  # no decision: the place of a block
+        right += products[:3, 3]  # no decision: the place of a block
     sizes = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     K, _, c = np.linalg.lstsq(gram / np.outer(sizes, sizes), right / sizes, rcond=1e-12)[0] / sizes
     return [float(K)] if K > 0.0 and c > 0.0 else []
@@ -126,15 +128,16 @@ def _check_scales(records: Sequence[Record], controller: PI | None, only_certain
     together = sum(_dot(r, w) for r, w in pairs)
     commands, velocities = sum(_dot(r, r) for r, _ in pairs), sum(_dot(w, w) for _, w in pairs)
     size = math.sqrt(commands * velocities)
-    if together < -0.9 * size < 0.0:
+    if together < -POLICY.one_course * size < 0.0:
         raise SpaceError(
             "the velocity runs against its command all along: reverse the sign of one of them (for example by a unit of -1)"
         )
-    if not 0.0 < 0.9 * size < together:
+    if not 0.0 < POLICY.one_course * size < together:
         return
     factor = together / velocities
-    rpm = next((name for name, rate in (("command", 9.549), ("velocity", 1 / 9.549)) if 0.8 < factor / rate < 1.25), None)
-    if 1.0 / 3.0 <= factor <= 3.0 or (only_certain and rpm is None and factor > 3.0):
+    near, most = POLICY.near_rpm, POLICY.same_unit
+    rpm = next((name for name, rate in (("command", 9.549), ("velocity", 1 / 9.549)) if 1 / near < factor / rate < near), None)
+    if 1.0 / most <= factor <= most or (only_certain and rpm is None and factor > most):
         return
     hint = f"they are in different units: give {arg('units', '...', 'command')} or {arg('units', '...', 'velocity')}"
     if rpm:

@@ -18,6 +18,7 @@ from gaident.models.model import Model
 from gaident.models.roots import polynomial_roots
 from gaident.models.two_mass import Matrix, Vector
 from gaident.models.two_mass_fit import deviations, fit_two_masses
+from gaident.policy.table import POLICY
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,7 @@ class TwoMass:
     JL: float
     DL: float
     KG: float
-    DG: float = 0.0
+    DG: float = 0.0  # no decision: a shaft without damping, where none is given
     inconsistency: float | None = None
     std: Mapping[str, float] = field(default_factory=dict, hash=False)
     with_shaft_damping: TwoMass | None = None
@@ -338,7 +339,7 @@ def _notes(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str,
         text = say("{} = {:.4g} {}", name, value, unit_text(drive.UNITS[name]))
         if name in positive and value <= 0.0:
             found.append(say("{} is not positive", text))
-        elif name in not_negative and value < -max(2.0 * drive.std.get(name, 0.0), rounding):
+        elif name in not_negative and value < -max(POLICY.below_zero * drive.std.get(name, 0.0), rounding):
             found.append(say("{} is negative", text))
     return tuple(found)
 

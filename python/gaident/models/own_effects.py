@@ -141,7 +141,7 @@ OWN: dict[str, Own] = {}
 """The registered effects, in the order of their registration."""
 
 
-def starts(p: Parameter, count: int = 5) -> tuple[float, ...]:
+def starts(p: Parameter, count: int = 5) -> tuple[float, ...]:  # no decision: starts of a search
     """Where a search begins: as given, or spread between the bounds, the neutral value left out."""
     if p.starts:
         return p.starts
@@ -150,6 +150,7 @@ def starts(p: Parameter, count: int = 5) -> tuple[float, ...]:
         return tuple(p.lowest * (p.highest / p.lowest) ** share for share in shares)
     span = p.highest - p.lowest
     values = [p.lowest + span * share for share in shares]
+    # no decision: starts of a search
     kept = tuple(v for v in values if abs(v - p.neutral) > 0.01 * span or math.isnan(p.neutral))
     return kept or (p.lowest + 0.75 * span,)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gaident.checks import known_keys
 from gaident.errors import SpaceError
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ class SearchSpace:
             if not (math.isfinite(lo) and math.isfinite(hi)):
                 raise SpaceError(f"{name} is {value!r}: both ends must be finite")
             if name in ("p", "q"):
-                if lo != int(lo) or hi != int(hi) or not 0 <= lo <= hi <= 7:
+                if lo != int(lo) or hi != int(hi) or not 0 <= lo <= hi <= 7:  # no decision: what an argument may be
                     raise SpaceError(f"{name} is {value!r}: give whole numbers with 0 <= lowest <= highest <= 7")
                 object.__setattr__(self, name, (int(lo), int(hi)))
                 continue
@@ -93,6 +94,7 @@ class SearchSpace:
             )
         if self.imaginary[0] < 0.0:
             raise SpaceError(f"imaginary is {self.imaginary!r}: give the positive half, pairs are conjugate by themselves")
+        # no decision: what an argument may be
         if isinstance(self.bits, bool) or not isinstance(self.bits, int) or not 2 <= self.bits <= 16:
             raise SpaceError(f"bits is {self.bits!r}: it must be a whole number from 2 to 16")
         if self.gain_scale is not None and not (isinstance(self.gain_scale, Real) and 0.0 < self.gain_scale < math.inf):
@@ -105,9 +107,9 @@ class SearchSpace:
         resonance_hz: Range,
         damping: Range | None = None,
         *,
-        p: tuple[int, int] = (0, 3),
-        q: tuple[int, int] = (0, 3),
-        bits: int = 10,
+        p: tuple[int, int] = (0, 3),  # no decision: a range to search
+        q: tuple[int, int] = (0, 3),  # no decision: a range to search
+        bits: int = 10,  # no decision: the resolution of a search
     ) -> SearchSpace:
         """Return the ranges of an axis as an engineer knows it.
 
@@ -139,7 +141,7 @@ class SearchSpace:
         resonance_hz = _pair("resonance_hz", resonance_hz, above_zero=True)
         damping = None if damping is None else _pair("damping", damping, above_zero=False)
         top = 2.0 * math.pi * resonance_hz[1]
-        real = top if damping is None else max(damping[1] / inertia[0], 0.3 * top)
+        real = top if damping is None else max(damping[1] / inertia[0], 0.3 * top)  # no decision: a range to search
         return cls(
             gain=(1.0 / inertia[1], 10.0 / inertia[0]),
             real=(0.0, real),
@@ -156,6 +158,7 @@ class SearchSpace:
 
         scale = self.gain_scale
         if scale is None:
+            # no decision: the scale of a search
             scale = 1.0 if paper else 0.1 * math.sqrt(max(self.real[1], 1e-9) * self.imaginary[1])
         return _core.SearchRanges(
             gain=self.gain, real=self.real, imaginary=self.imaginary, p=self.p, q=self.q, bits=self.bits, gain_scale=scale
@@ -168,10 +171,8 @@ class SearchSpace:
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> SearchSpace:
         """Return the space of what `to_dict` gave; raise SpaceError for unknown keys."""
-        unknown = set(data) - {f.name for f in fields(cls)}
-        if unknown:
-            raise SpaceError(f"space holds unknown keys: {', '.join(sorted(unknown))}")
-        return cls(**data)
+        values: dict[str, Any] = known_keys(data, "the search space", [f.name for f in fields(cls)], (), SpaceError)
+        return cls(**values)
 
 
 def _pair(name: str, value: object, above_zero: bool) -> Range:

@@ -236,7 +236,7 @@ def _simulated(
         return *_core_simulate(plant, rec.dt, source, controller, start, arithmetic), None
     if arithmetic != "double":
         raise ModelError(
-            f'arithmetic is {arithmetic!r}: a model with effects, or under another controller than a bare PI, is '
+            f"arithmetic is {arithmetic!r}: a model with effects, or under another controller than a bare PI, is "
             'simulated in "double" only'
         )
     starts = start.reshape(1, -1) if state is not None else np.zeros((0, 0))

@@ -16,7 +16,7 @@ from gaident.models.model import Model, require_strictly_proper
 
 Signal = NDArray[np.float64]
 AnyModel = Model | OneMass | TwoMass
-MAX_SUBSTEPS = 64
+MAX_SUBSTEPS = 64  # no decision: what an argument may be
 
 
 def as_model(model: AnyModel) -> Model:

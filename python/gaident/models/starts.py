@@ -1,4 +1,4 @@
-"""How the loop stood when a record began."""
+"""The noise of a record's velocity, and whether the record begins at rest."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from gaident.axis import Text, say
 from gaident.control.pi import PI
 from gaident.data.record import Record
+from gaident.policy.table import POLICY
 
 __all__ = ["doubtful_start", "noise_std", "starts_moving", "stretches"]
 
@@ -23,6 +24,7 @@ def noise_std(velocity: NDArray[np.float64], step: float = 0.0) -> float:
     """
     thirds = np.concatenate([np.diff(w, 3)[_outside_runs(w)] for w in stretches(velocity)])
     least = step / np.sqrt(12.0)
+    # no decision: of white noise, third differences and the median
     return float(max(1.4826 * np.median(np.abs(thirds)) / np.sqrt(20.0), least)) if len(thirds) else float(least)
 
 
@@ -37,8 +39,9 @@ def _outside_runs(x: NDArray[np.float64]) -> NDArray[np.bool_]:
     return clear
 
 
+# no decision: samples that a spread is taken from
 def stretches(x: NDArray[np.float64], count: int = 64, length: int = 16384) -> list[NDArray[np.float64]]:
-    """Evenly spaced views of a long signal; of a shorter one the whole."""
+    """Evenly spaced parts of a long signal; of a shorter one the whole."""
     if len(x) <= count * length:
         return [x]
     return [x[i : i + length] for i in np.linspace(0, len(x) - length, count).astype(int).tolist()]
@@ -50,9 +53,8 @@ def starts_moving(rec: Record, controller: PI | None) -> bool:
     At rest the first velocity is noise: within six standard deviations of it, or one step of a quantised signal, of zero. In the
     continuous loop a command at sample 0 passes through at once, so a first velocity between 0 and 0.6 of that command is no
     motion.
-    A record whose input never changes counts as started at rest by a step at sample 0: with an unknown state before it, it
-    would say
-    nothing about zeros and gain (see `doubtful_start`).
+    A record whose input never changes counts as started at rest by a step at sample 0: with an unknown state before it, the
+    record would say nothing about zeros and gain (see `doubtful_start`).
     """
     return _first_is_motion(rec, controller) and not _constant_input(rec, controller)
 
@@ -80,11 +82,12 @@ def _first_is_motion(rec: Record, controller: PI | None) -> bool:
     steps = np.concatenate([np.abs(np.diff(part)) for part in stretches(w)])
     moves = steps[steps > 0.0]
     # Repeats betray a quantised signal.
-    quantum = float(moves.min()) if len(moves) and len(moves) < 0.9 * len(steps) else 0.0
-    tolerance = max(6.0 * noise_std(w), 1.5 * quantum, 1e-3 * max(float(w.max()), -float(w.min())))
+    quantum = float(moves.min()) if len(moves) and len(moves) < POLICY.repeats * len(steps) else 0.0
+    top = max(float(w.max()), -float(w.min()))
+    tolerance = max(POLICY.above_noise * noise_std(w), POLICY.rest_steps * quantum, POLICY.negligible * top)
     first = float(w[0])
     if controller is not None and controller.loop == "continuous" and rec.command is not None and rec.command[0] != 0.0:
         passed = first / float(rec.command[0])
-        if 0.0 <= passed <= 0.6:
+        if 0.0 <= passed <= POLICY.rest_share:
             return False
     return abs(first) > tolerance

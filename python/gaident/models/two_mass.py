@@ -22,7 +22,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 # Zeros with a damping ratio below half of this do not determine K_G by the product equation.
-WEAK_DAMPING = 1e-3
+WEAK_DAMPING = 1e-3  # no decision: the weight of one equation beside another
 
 
 def coefficients_of_mechanics(mechanics: Vector) -> Vector:
@@ -67,7 +67,7 @@ def stiffness_gap(c: Vector) -> float:
     """(K_G by product - K_G by pairwise)/(K_G by pairwise) at D_G = 0: how far the sixth number contradicts.
 
     The product equation gives l R = prod A/b0 - m, so the gap is measured in l R; where l itself is next to
-    nothing (lossless load) it cannot blow the gap up.
+    nothing (lossless load) it does not make the gap large.
     """
     _, _, _, prod_a, sum_b, b0 = c
     _, m, _, _, R = phi_by_pairwise(c)
@@ -112,10 +112,10 @@ def mechanics_with_shaft_damping(c: Vector) -> Vector | None:
     m = sum_a - load
     d0, d1 = 0.5 * (m - prod_a / b0), 0.5 * load  # d = d0 + d1 R
     a, b, e = b0 - d1 * d1, -(pair_a - b0 - m * load + 2.0 * d0 * d1), -d0 * d0
-    discriminant = b * b - 4.0 * a * e
+    discriminant = b * b - 4.0 * a * e  # no decision: roots of a quadratic
     if discriminant < 0.0:
         return None
-    half = -0.5 * (b + np.copysign(np.sqrt(discriminant), b))
+    half = -0.5 * (b + np.copysign(np.sqrt(discriminant), b))  # no decision: roots of a quadratic
     roots = [half / a] if a != 0.0 else []
     roots += [e / half] if half != 0.0 else []
     if not roots:

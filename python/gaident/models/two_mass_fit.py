@@ -79,7 +79,7 @@ def least_squares_phi(c: Vector, whitening: Matrix) -> Vector:
     phi = phi_by_pairwise(c)
     size = phi_scales(phi)
     residual = whitening @ (coefficients_of_phi(phi) - c)
-    damping = 1e-6
+    damping = 1e-6  # no decision: the start of a solver
     for _ in range(200):
         J = whitening @ jacobian_of_phi(phi) * size
         augmented = np.vstack([J, np.diag(np.sqrt(damping) * np.linalg.norm(J, axis=0))])
@@ -88,10 +88,10 @@ def least_squares_phi(c: Vector, whitening: Matrix) -> Vector:
         trial = phi + size * step
         new_residual = whitening @ (coefficients_of_phi(trial) - c)
         if new_residual @ new_residual <= residual @ residual:
-            phi, residual, damping = trial, new_residual, 0.1 * damping
+            phi, residual, damping = trial, new_residual, 0.1 * damping  # no decision: the step of a solver
         else:
             damping *= 10.0
-        if longest < 1e-11 or damping > 1e12:
+        if longest < 1e-11 or damping > 1e12:  # no decision: the end of a solver
             break
     return phi
 

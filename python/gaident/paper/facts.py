@@ -63,12 +63,12 @@ class Mechanism:
 
     def controller(self, loop: str = "continuous") -> PI:
         """The PI with the printed gains."""
-        return PI(KP, KI, loop=loop)
+        return PI(kp=KP, ki=KI, loop=loop)
 
     def scaled_controller(self, loop: str = "continuous") -> PI:
         """The PI with which Table V follows from Table IV."""
         factor = LOOP_GAIN_FACTORS[self.key]
-        return PI(KP * factor, KI * factor, loop=loop)
+        return PI(kp=KP * factor, ki=KI * factor, loop=loop)
 
 
 ONE_MASS = Mechanism(

@@ -122,18 +122,18 @@ $bias_one_mass
 <h3>Two masses</h3>
 $conventional_two
 $bias_two_masses
-<p>Noise on the velocity stands in the regressors of equation (7), and at this sampling it bends plain least squares beyond
+<p>Noise on the velocity stands in the regressors of equation (7), and at this sampling it biases plain least squares beyond
 use; the paper&rsquo;s columns agree with each other, so its records were presumably cleaner than $noise rad/s or averaged,
 which it does not say. Without friction the two unbiased methods agree with each other and with the
 truth. In the coefficients the genetic identification spreads less, as the known controller is built into it. In the
 mechanics, for which the way back from the polynomial uses the controller too, the regression, told the order, spreads no
 more with one mass and less with two: K<sub>G</sub> by $KG_spread_refined % against $KG_spread_genetic %. With friction every
-linear method is bent, the genetic one too: the damping by $damping_one % and $damping_two %.</p>
+linear method is biased, the genetic one too: the damping by $damping_one % and $damping_two %.</p>
 
 <h2>4. Beyond the paper: the friction it suspects</h2>
 <p>The paper blames &ldquo;unstructured uncertainties, e.g., nonlinear friction&rdquo; for the misfit of the nominal model and
 lets the linear parameters absorb it. That looks adequate, because a step in one direction cannot show dry friction: it is a
-constant torque there, which the integrator cancels and J and D swallow. Commands that reverse show it, <code>gaident
+constant torque there, which the integrator cancels and J and D take up. Commands that reverse show it, <code>gaident
 diagnose</code> names it, and with it in the model the mechanical parameters return to nominal.</p>
 <h3>One mass</h3>
 $friction_table_one

@@ -33,7 +33,7 @@ def report(
     path: str | os.PathLike[str],
     records: Records = None,
     validation: Records = None,
-    axis: str = "rotary",
+    axis: str | None = None,
 ) -> None:
     """Write a result as one HTML page that needs nothing else: no network, no other file, no Python.
 
@@ -52,8 +52,8 @@ def report(
         None: as used. A loaded result holds none, and its page says what is left out for that.
     validation : Record or sequence of Record, optional
         The records that were held out, likewise.
-    axis : {"rotary", "linear"}
-        "linear": units of m and N.
+    axis : {"rotary", "linear"}, optional
+        "linear": units of m and N; None: those of a diagnosis' axis, else rotary.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def report(
 
 
 def report_page(
-    result: Diagnosis | Identification, records: Records = None, validation: Records = None, axis: str = "rotary"
+    result: Diagnosis | Identification, records: Records = None, validation: Records = None, axis: str | None = None
 ) -> str:
     """The text of what `report` writes."""
     from plotly.offline import get_plotlyjs
@@ -89,9 +89,10 @@ def report_page(
     return page(result, view_of(result, records, validation, axis), get_plotlyjs())
 
 
-def view_of(result: Diagnosis | Identification, records: Records, validation: Records, axis: str) -> View:
+def view_of(result: Diagnosis | Identification, records: Records, validation: Records, axis: str | None) -> View:
     """What a page shows beside the result: the records with what the models make of them."""
-    checked_axis(axis)
+    if axis is not None:
+        checked_axis(axis)
     if not isinstance(result, Diagnosis | Identification):
         raise GaidentError(f"result is {type(result).__name__}: give a Diagnosis or an Identification")
     given = _records(records, result.records, "records")
@@ -112,7 +113,8 @@ def view_of(result: Diagnosis | Identification, records: Records, validation: Re
             response = response_of(used, result.model, result.controller)
         except GaidentError as error:
             missing = message_of(error)
-    return View(tuple(runs), curve, response, missing, axis, _made_with())
+    own = result.axis if isinstance(result, Diagnosis) else "rotary"
+    return View(tuple(runs), curve, response, missing, axis or own, _made_with())
 
 
 def _records(given: Records, own: Sequence[Record], name: str) -> tuple[Record, ...]:

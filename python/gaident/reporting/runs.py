@@ -1,7 +1,7 @@
 """One record and what the models of a result make of it: worked out once for the pictures and for the page.
 
 The missing torque is that of the linear part of a diagnosed model, its parameters as refitted together with the effects: a
-linear model fitted alone has bent its damping and inertia to swallow part of them, and would show the rest distorted.
+linear model fitted alone has a part of them in its damping and inertia, and would show the rest distorted.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ class Adequacy:
             return (
                 "The linear model is falsified: the residual still depends on the input or the motion "
                 f"(p = {self.independence_p:.1g}), and its own past predicts {100 * self.predictable:.0f} % of its power. "
-                "Do not trust the mechanical parameters; an effect that is not in the model bends them."
+                "Do not trust the mechanical parameters; an effect that is not in the model biases them."
             )
         if self.undecided:
             if not math.isfinite(self.excess):

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from gaident.axis import linear_sentences, restored
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.errors import GaidentError, check_schema
-from gaident.files import write_whole
+from gaident.errors import check_schema
 from gaident.models.model import Model
 from gaident.providers import provided
 from gaident.results.estimate import Estimate
@@ -20,7 +18,7 @@ from gaident.results.finding import Finding
 from gaident.results.fitness import Comparison, Fitness
 from gaident.results.identification import Identification
 from gaident.results.inverse_dynamics import InverseDynamics
-from gaident.results.json_text import json_text
+from gaident.results.saved import SavedResult, undamaged
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,11 +26,11 @@ if TYPE_CHECKING:
 __all__ = ["Diagnosis"]
 
 SCHEMA = "gaident/diagnosis"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 1  # no decision: the version of a format
 
 
 @dataclass(frozen=True, repr=False)
-class Diagnosis:
+class Diagnosis(SavedResult):
     """What the simulation gets wrong, why, and what the extended model gains. Made by `diagnose`.
 
     Attributes
@@ -108,6 +106,8 @@ class Diagnosis:
         What both methods say of the same quantity; a contradiction is one of the notes, too.
     force_reason : str
         Why the force error is the figure to go by here, in words; empty where the free run is as good a figure.
+    axis : {"rotary", "linear"}
+        Kind of the axis, as it was given to `diagnose`.
     records, validation_records : tuple of Record
         The data; empty where the diagnosis was loaded from a file.
 
@@ -115,6 +115,8 @@ class Diagnosis:
     --------
     diagnose : Makes it, with an example.
     """
+
+    KIND: ClassVar[str] = "diagnosis"
 
     verdict: str
     findings: tuple[Finding, ...]
@@ -151,6 +153,7 @@ class Diagnosis:
     comparisons: tuple[Comparison, ...] = ()
     force_reason: str = ""
     left_needed: float = 0.0
+    axis: str = "rotary"
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
@@ -178,20 +181,20 @@ class Diagnosis:
         """
         return rec.shifted(**moves) if (moves := self.log_shifts.get(rec.digest)) else rec
 
-    def summary(self, axis: str = "rotary") -> str:
-        """Return the result as text; axis="linear" for units of m and N."""
-        text: str = provided("diagnosis_summary")(self, axis)
+    def summary(self, axis: str | None = None) -> str:
+        """Return the result as text, in the units of its axis; axis="linear" for m and N, "rotary" for rad and N m."""
+        text: str = provided("diagnosis_summary")(self, axis or self.axis)
         return text
 
-    def plot(self, records: Record | Sequence[Record] | None = None, axis: str = "rotary") -> Figure:
+    def plot(self, records: Record | Sequence[Record] | None = None, axis: str | None = None) -> Figure:
         """Draw what is wrong and what is left.
 
         Parameters
         ----------
         records : Record or sequence of Record, optional
             What to draw; None: the records used.
-        axis : {"rotary", "linear"}
-            "linear": units of m and N.
+        axis : {"rotary", "linear"}, optional
+            "linear": units of m and N; None: those of the axis.
 
         Returns
         -------
@@ -201,20 +204,18 @@ class Diagnosis:
         Raises
         ------
         GaidentError
-            Where a loaded diagnosis is given no records.
+            Where a loaded diagnosis is given no records, or `records` holds something else.
         SettingsError
             For another axis.
         """
-        given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
-        if not given:
-            raise GaidentError("records: a loaded diagnosis holds no data; give plot(records)")
-        figure: Figure = provided("plot_diagnosis")(self, given, axis)
+        given = self._drawn(records, "plot")
+        figure: Figure = provided("plot_diagnosis")(self, given, axis or self.axis)
         return figure
 
-    def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str = "rotary") -> Figure:
+    def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str | None = None) -> Figure:
         """Draw the extended model against the frequency response of the longest record, with coherence.
 
-        Friction and other effects bend the record's response; the model, simulated and estimated the same way, has them too.
+        Friction and other effects change the record's response; the model, simulated and estimated the same way, has them too.
 
         Parameters
         ----------
@@ -222,8 +223,8 @@ class Diagnosis:
             What the longest is taken of; None: the records used.
         hz : bool
             Frequencies in Hz instead of rad/s.
-        axis : {"rotary", "linear"}
-            "linear": units of m and N.
+        axis : {"rotary", "linear"}, optional
+            "linear": units of m and N; None: those of the axis.
 
         Returns
         -------
@@ -233,14 +234,14 @@ class Diagnosis:
         Raises
         ------
         GaidentError
-            Where a loaded diagnosis is given no records.
+            Where a loaded diagnosis is given no records, or `records` holds something else.
         RecordError
             Where they show no frequency response.
         """
-        given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
-        if not given:
-            raise GaidentError("records: a loaded diagnosis holds no data; give plot_bode(records)")
-        figure: Figure = provided("plot_bode")(self.model, self.controller, tuple(map(self.as_used, given)), hz, axis)
+        given = self._drawn(records, "plot_bode")
+        figure: Figure = provided("plot_bode")(
+            self.model, self.controller, tuple(map(self.as_used, given)), hz, axis or self.axis
+        )
         return figure
 
     def _repr_html_(self) -> str:
@@ -299,12 +300,14 @@ class Diagnosis:
             "comparisons": [asdict(c) for c in self.comparisons],
             "force_reason": self.force_reason,
             "left_needed": self.left_needed,
+            "axis": self.axis,
             "linear_axis": linear_sentences(self._sentences()),
         }
 
     def _sentences(self) -> list[str]:
         """Everything that is said in words."""
-        return [*self.notes, *(f.evidence for f in self.findings), *self.not_testable.values(), *self.one_sided.values()]
+        told = [*self.notes, *(f.evidence for f in self.findings), *self.not_testable.values(), *self.one_sided.values()]
+        return [*told, self.force_reason]
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Diagnosis:
@@ -313,7 +316,7 @@ class Diagnosis:
         Raises GaidentError where the data are something else or of a newer schema.
         """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
-        try:
+        with undamaged(cls.KIND):
             linear = data.get("linear_axis", {})  # files of gaident 0.1.0 lack it: their sentences are those of a rotary axis
             return cls(
                 verdict=data["verdict"],
@@ -363,16 +366,7 @@ class Diagnosis:
                     Comparison(c["name"], Estimate(**c["diagnosis"]), Estimate(**c["regression"]), c["differs"])
                     for c in data.get("comparisons", ())
                 ),
-                force_reason=data.get("force_reason", ""),
+                force_reason=restored(data.get("force_reason", ""), linear),
                 left_needed=data.get("left_needed", 0.0),
+                axis=data.get("axis", "rotary"),
             )
-        except (KeyError, TypeError, AttributeError, IndexError) as error:
-            raise GaidentError(f"the saved diagnosis is damaged: {error!r}; save it again") from error
-
-    def to_json(self) -> str:
-        """Return what `save` writes."""
-        return json_text(self.to_dict())
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write JSON for `gaident.load`; the file appears whole or not at all."""
-        write_whole(path, self.to_json().encode())

@@ -65,7 +65,7 @@ class Limits:
             object.__setattr__(self, field.name, number)
 
     @classmethod
-    def of(cls, records: Record | Sequence[Record], controller: PI | None = None) -> Limits:
+    def of(cls, records: Record | Sequence[Record], controller: PI | None = None, axis: str = "rotary") -> Limits:
         """Return what records show to be allowed.
 
         Parameters
@@ -74,19 +74,21 @@ class Limits:
             Records of the axis.
         controller : PI, optional
             The velocity loop; its torque limit, if it has one, is the limit of the torque.
+        axis : {"rotary", "linear"}
+            Kind of the axis.
 
         Returns
         -------
         Limits
             Highest speed, torque and duration of the records.
-            Their travel too, but for an axis that has gone through a turn or more, which is taken to turn freely.
+            Their travel too, but for a rotary axis that has gone through a turn or more, which is taken to turn freely.
 
         Raises
         ------
         SettingsError
-            Where nothing moves.
+            Where nothing moves, or for another axis.
         """
-        found: Limits = provided("limits_of")(records, controller)
+        found: Limits = provided("limits_of")(records, controller, axis)
         return found
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,6 @@ from gaident.axis import linear_sentences, restored
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import GaidentError, check_schema
-from gaident.files import write_whole
 from gaident.models.mechanics import Mechanics, mechanics_from_dict
 from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
@@ -23,7 +21,7 @@ from gaident.models.starts import starts_moving
 from gaident.providers import provided
 from gaident.results.adequacy import Adequacy
 from gaident.results.estimate import Estimate
-from gaident.results.json_text import json_text
+from gaident.results.saved import SavedResult, undamaged
 from gaident.results.settings import Settings
 from gaident.results.structures import Rival, Structure, TrialOutcome
 
@@ -33,11 +31,11 @@ if TYPE_CHECKING:
 __all__ = ["Identification"]
 
 SCHEMA = "gaident/identification"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 1  # no decision: the version of a format
 
 
 @dataclass(frozen=True, repr=False)
-class Identification:
+class Identification(SavedResult):
     """Structure, parameters and what they are worth. Made by `identify`.
 
     Attributes
@@ -89,6 +87,8 @@ class Identification:
     --------
     identify : Makes it, with an example.
     """
+
+    KIND: ClassVar[str] = "identification"
 
     model: Model
     controller: PI | None
@@ -183,15 +183,9 @@ class Identification:
         Raises
         ------
         GaidentError
-            Where a loaded identification is given no records.
+            Where a loaded identification is given no records, or `records` holds something else.
         """
-        given = self.records if records is None else (records,) if isinstance(records, Record) else records
-        if not isinstance(given, Sequence) or not all(isinstance(r, Record) for r in given):
-            raise GaidentError(f"records is {type(records).__name__}: give a gaident.Record or a list of them")
-        chosen = tuple(given)
-        if not chosen:
-            raise GaidentError("records: a loaded identification holds no data; give plot(records)")
-        figure: Figure = provided("plot_identification")(self, chosen, axis=axis)
+        figure: Figure = provided("plot_identification")(self, self._drawn(records, "plot"), axis=axis)
         return figure
 
     def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str = "rotary") -> Figure:
@@ -216,11 +210,12 @@ class Identification:
 
         Raises
         ------
+        GaidentError
+            Where `records` holds something else than records.
         RecordError
             Where the record shows no frequency response.
         """
-        given = self.records if records is None else (records,) if isinstance(records, Record) else tuple(records)
-        figure: Figure = provided("plot_bode")(self.model, self.controller, given, hz, axis)
+        figure: Figure = provided("plot_bode")(self.model, self.controller, self._chosen(records), hz, axis)
         return figure
 
     def plot_poles(self, hz: bool = False) -> Figure:
@@ -288,7 +283,7 @@ class Identification:
         Raises GaidentError where the data are something else or of a newer schema.
         """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
-        try:
+        with undamaged(cls.KIND):
             return cls(
                 model=Model.from_dict(data["model"]),
                 controller=None if data["controller"] is None else PI.from_dict(data["controller"]),
@@ -311,13 +306,3 @@ class Identification:
                 initial_states={d: tuple(s) for d, s in data["initial_states"].items()},
                 version=data["gaident_version"],
             )
-        except (KeyError, TypeError, AttributeError) as error:
-            raise GaidentError(f"the saved identification is damaged: {error!r}; save it again") from error
-
-    def to_json(self) -> str:
-        """Return what `save` writes."""
-        return json_text(self.to_dict())
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write JSON for `gaident.load`; the file appears whole or not at all."""
-        write_whole(path, self.to_json().encode())

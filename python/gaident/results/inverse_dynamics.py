@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.errors import GaidentError
 from gaident.providers import provided
 from gaident.results.estimate import Estimate
+from gaident.results.saved import undamaged
 
 __all__ = ["InverseDynamics"]
 
@@ -116,13 +116,11 @@ class InverseDynamics:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> InverseDynamics:
         """The inverse of `to_dict`. Raises GaidentError where the data are something else."""
-        try:
+        with undamaged("regression"):
             lists = {name: tuple(data[name]) for name in ("terms", "coefficients", "not_tried", "digests")}
             rivals = tuple((tuple(terms), float(worse)) for terms, worse in data["rivals"])
             parameters = {name: Estimate(**e) for name, e in data["parameters"].items()}
             return cls(**{**data, **lists, "rivals": rivals, "parameters": parameters})
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise GaidentError(f"the saved regression is damaged: {error!r}; save it again") from error
 
     def __repr__(self) -> str:
         listed = ", ".join(f"{name} {e.value:.4g}" for name, e in self.parameters.items())

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, fields
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
+from gaident.checks import known_keys
 from gaident.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ INITIAL_STATES = ("auto", "rest", "free")
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of the genetic search; `Settings()` is the best engine, `Settings.paper()` Table II to the letter.
+    """Settings of the genetic search; `Settings()` is the best engine, `Settings.paper()` is exactly Table II.
 
     Parameters
     ----------
@@ -114,7 +115,7 @@ class Settings:
             value = getattr(self, name)
             if not isinstance(value, (int, float)) or not 0.0 <= value <= 1.0:
                 raise SettingsError(f"{name} is {value!r}: it is a probability, from 0 to 1")
-        if 0.0 < self.mutation < 1e-6:
+        if 0.0 < self.mutation < 1e-6:  # no decision: what an argument may be
             raise SettingsError(f"mutation is {self.mutation!r}: rates below 1e-6 never flip a bit; use 0 to have none")
         for name in ("error_weight", "order_weight"):
             value = getattr(self, name)
@@ -178,7 +179,5 @@ class Settings:
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Settings:
         """Return the settings of what `to_dict` gave; raise SettingsError for unknown keys."""
-        unknown = set(data) - {f.name for f in fields(cls)}
-        if unknown:
-            raise SettingsError(f"settings hold unknown keys: {', '.join(sorted(unknown))}")
-        return cls(**data)
+        values: dict[str, Any] = known_keys(data, "the dictionary of settings", [f.name for f in fields(cls)], (), SettingsError)
+        return cls(**values)

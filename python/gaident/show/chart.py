@@ -18,7 +18,7 @@ __all__ = ["BINS", "PALETTES", "Band", "Chart", "Mark", "Panel", "Trace", "Vecto
 
 Vector = NDArray[np.float64]
 
-# Okabe and Ito's colours, told apart by every eye; lighter where the page is dark.
+# Okabe and Ito's colours, which colour-blind readers can tell apart; lighter where the page is dark.
 PALETTES: dict[str, dict[str, str]] = {
     "light": {
         "ink": "#1b1f24",

@@ -103,7 +103,7 @@ def smoothed(x: Vector, width: int) -> Vector:
 
 def branches(velocity: Vector, dt: float) -> tuple[Mask, Mask]:
     """(accelerating, decelerating) samples: the speed |w| grows or falls by more than a fifth of its typical rate of change."""
-    w = smoothed(velocity, max(5, len(velocity) // 300))
+    w = _slow(velocity)
     rate = np.gradient(w, dt) * np.sign(w)
     typical = float(np.sqrt(np.mean(rate**2)))
     return rate > 0.2 * typical, rate < -0.2 * typical
@@ -111,16 +111,10 @@ def branches(velocity: Vector, dt: float) -> tuple[Mask, Mask]:
 
 def binned_mean(x: Vector, y: Vector, bins: int = 40, used: Mask | None = None) -> Binned:
     """Over `bins` equal bins of +-max |x|, with an edge at 0; bins of fewer than eight samples are left out."""
-    top = float(np.abs(x).max()) * (1.0 + 1e-9) or 1.0
-    index = np.clip(((x / top + 1.0) * 0.5 * (bins // 2 * 2)).astype(int), 0, bins // 2 * 2 - 1)
+    index = _symmetric_bins(x, bins)
     if used is not None:
         index, x, y = index[used], x[used], y[used]
-    count = np.bincount(index, minlength=bins)
-    kept = count >= LEAST_IN_BIN
-    n = np.maximum(count, 1)
-    mean = np.bincount(index, y, minlength=bins) / n
-    square = np.bincount(index, (y - mean[index]) ** 2, minlength=bins) / n
-    return Binned((np.bincount(index, x, minlength=bins) / n)[kept], mean[kept], np.sqrt(square)[kept], count[kept])
+    return _binned(index, x, y, bins)
 
 
 def order_lines(position: Vector, torque: Vector, velocity: Vector, highest: float = 40.0) -> OrderLines:
@@ -128,13 +122,13 @@ def order_lines(position: Vector, torque: Vector, velocity: Vector, highest: flo
 
     What depends on the velocity alone (the mean per velocity bin) is taken out first: dry friction is no line.
     """
-    w = smoothed(velocity, max(5, len(velocity) // 300))
-    moving = np.abs(w) > 0.02 * float(np.abs(w).max(initial=0.0))
+    w = _slow(velocity)
+    moving = _moving(w)
     theta, d, speed = position[moving], torque[moving], w[moving]
     turns = float(np.ptp(theta)) / math.tau if len(theta) else 0.0
     if turns < 0.05 or len(theta) < 50:
         return OrderLines(np.zeros(0), np.zeros(0), np.zeros(0), turns)
-    rest = d - _of_velocity(d, speed)
+    rest = _without_velocity(d, speed)
     weight = np.abs(speed) / float(np.sum(np.abs(speed)))
     # Collected over small steps of angle, the sums over all orders are one Fourier transform.
     per_turn = max(2.0 * highest, min(16.0 * highest, MOST_STEPS / turns))
@@ -218,25 +212,50 @@ def over_period(position: Vector, torque: Vector, velocity: Vector, period: floa
 
     What depends on the velocity alone is taken out first, as in `order_lines`: what is left belongs to the place.
     """
-    w = smoothed(velocity, max(5, len(velocity) // 300))
-    moving = np.abs(w) > 0.02 * float(np.abs(w).max(initial=0.0))
+    w = _slow(velocity)
+    moving = _moving(w)
     if not np.any(moving):
         return Binned(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64))
-    d = torque[moving] - _of_velocity(torque[moving], w[moving])
+    d = _without_velocity(torque[moving], w[moving])
     place = np.mod(position[moving] - (0.0 if period == math.tau else float(position.min())), period)
-    index = np.minimum((place / period * bins).astype(int), bins - 1)
+    return _binned(np.minimum((place / period * bins).astype(int), bins - 1), place, d, bins)
+
+
+def _binned(index: NDArray[np.int64], x: Vector, y: Vector, bins: int) -> Binned:
+    """Means of x and y over the samples of each bin; bins of fewer than LEAST_IN_BIN samples are left out."""
     count = np.bincount(index, minlength=bins)
     kept = count >= LEAST_IN_BIN
-    n = np.maximum(count, 1)
-    mean = np.bincount(index, d, minlength=bins) / n
-    square = np.bincount(index, (d - mean[index]) ** 2, minlength=bins) / n
-    return Binned((np.bincount(index, place, minlength=bins) / n)[kept], mean[kept], np.sqrt(square)[kept], count[kept])
+    mean = _bin_means(index, y, bins)
+    variance = _bin_means(index, (y - mean[index]) ** 2, bins)
+    return Binned(_bin_means(index, x, bins)[kept], mean[kept], np.sqrt(variance)[kept], count[kept])
 
 
-def _of_velocity(torque: Vector, velocity: Vector) -> Vector:
-    """The mean torque of each sample's velocity bin, forty over +-max |w|."""
-    top = float(np.abs(velocity).max()) * (1.0 + 1e-9)
-    index = ((velocity / top + 1.0) * 20.0).astype(int)
-    count = np.maximum(np.bincount(index, minlength=40), 1)
-    mean: Vector = (np.bincount(index, torque, minlength=40) / count)[index]
+def _bin_means(index: NDArray[np.int64], y: Vector, bins: int) -> Vector:
+    """The mean of y per bin, 0 where a bin is empty; shape (bins,)."""
+    mean: Vector = np.bincount(index, y, minlength=bins) / np.maximum(np.bincount(index, minlength=bins), 1)
     return mean
+
+
+def _symmetric_bins(x: Vector, bins: int) -> NDArray[np.int64]:
+    """The bin of each sample, an even number of equal bins over +-max |x|, with an edge at 0."""
+    top = float(np.abs(x).max()) * (1.0 + 1e-9) or 1.0
+    index: NDArray[np.int64] = np.clip(((x / top + 1.0) * 0.5 * (bins // 2 * 2)).astype(int), 0, bins // 2 * 2 - 1)
+    return index
+
+
+def _slow(velocity: Vector) -> Vector:
+    """The velocity behind a moving average over a three-hundredth of the record, at least five samples."""
+    return smoothed(velocity, max(5, len(velocity) // 300))
+
+
+def _moving(w: Vector) -> Mask:
+    """The samples with more than 2 % of the largest speed."""
+    moving: Mask = np.abs(w) > 0.02 * float(np.abs(w).max(initial=0.0))
+    return moving
+
+
+def _without_velocity(torque: Vector, velocity: Vector) -> Vector:
+    """The torque without the mean of each sample's velocity bin, forty over +-max |w|."""
+    index = _symmetric_bins(velocity, 40)
+    rest: Vector = torque - _bin_means(index, torque, 40)[index]
+    return rest

@@ -230,10 +230,10 @@ def fall_words(dia: Diagnosis) -> str:
 
 
 def _mechanics(dia: Diagnosis, axis: str) -> list[str]:
-    """The linear part of the reported model as a mechanic calls it."""
+    """The linear part of the reported model, by its mechanical parameters."""
     if not dia.mechanics:
         return []
-    head = "Mechanics, bent by what is left" if dia.driver is not None else "Mechanics"
+    head = "Mechanics, biased by what is left" if dia.driver is not None else "Mechanics"
     head += ", fitted together with the effects" if dia.model.effects else ""
     rows = []
     for name, e in dia.mechanics.items():
@@ -258,7 +258,7 @@ def _base(dia: Diagnosis, axis: str) -> list[str]:
             change = moved_words(old, new, e.std)
             u = "" if e.unit == "1" else unit(e.unit, axis)
             rows.append((mechanical_name(name, axis), number(old, 5), number(new, 5), change, u))
-    return ["How far the effects had bent the linear model", *table(rows)] if len(rows) > 1 and dia.model.effects else []
+    return ["How far the effects had biased the linear model", *table(rows)] if len(rows) > 1 and dia.model.effects else []
 
 
 def moved_words(old: float, new: float, std: float | None) -> str:

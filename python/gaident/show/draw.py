@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["chart_figure", "draw_panel", "grid_figure", "headed", "label_x", "line", "new_figure", "picture", "tidy"]
 
-# Okabe and Ito's colours: told apart by every eye, and in grey by their lightness.
+# Okabe and Ito's colours: colour-blind readers can tell them apart, and their lightness differs in a grey print.
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
 GREY = "#999999"
 

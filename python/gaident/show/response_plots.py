@@ -61,5 +61,5 @@ def response_chart(r: Responses, axis: str, hz: bool = True) -> Chart:
     text = f"{said(m.sentence, axis)} Bars: 2 standard deviations."
     if hidden:
         text += f" {hidden} of {len(sure)} points are not drawn, as their coherence is what chance gives (dashed)."
-    text += " Friction and other nonlinear effects bend the record's response; the model estimated the same way has them too."
+    text += " Friction and other nonlinear effects change the record's response; the model estimated the same way has them too."
     return Chart("response", "frequency [Hz]" if hz else "frequency [rad/s]", panels, text, log=True, height=600)

@@ -1,4 +1,5 @@
-// Effects as somebody might write them wrongly. It compiles with none of the macros below, and with each of them not (CMakeLists.txt).
+// Effects as somebody might write them wrongly.
+// It compiles with none of the macros below, and with each of them not (CMakeLists.txt).
 #include "gaident/effects/list.hpp"
 
 using namespace gaident;
@@ -22,7 +23,18 @@ struct Brake {
     struct Coefficients {
         R torque;
     };
+#if defined(MISSPELT_PACE)
+    static constexpr Pace pase = Pace::fine;
+#elif defined(OTHER_PACE)
+    static constexpr int pace = 2;
+#else
+    static constexpr Pace pace = Pace::fine;
+#endif
+#if defined(MISSPELT_PREPARE)
+    static void prepair(const double* p, const Timing&, Coefficients<double>& c) { c.torque = p[0]; }
+#else
     static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.torque = p[0]; }
+#endif
 
 #if defined(MISSPELT_OPTION)
     static double substep(const double*, const Circumstances&) { return 2.0; }

@@ -19,6 +19,7 @@ struct TorqueDeadBand {
     struct Coefficients {
         R width;
     };
+    static constexpr Pace pace = Pace::sample;
     static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.width = p[0]; }
     // In the continuous loop of one mass the torque crosses the band between the controller's steps.
     static double substeps(const double*, const Circumstances& at) {

@@ -19,6 +19,7 @@ struct TorqueSaturation {
     struct Coefficients {
         R limit;
     };
+    static constexpr Pace pace = Pace::sample;
     static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.limit = p[0]; }
 
     template <class R>

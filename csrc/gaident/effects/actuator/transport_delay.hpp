@@ -20,7 +20,7 @@ struct TransportDelay {
         .meaning = "the {torque} acts later than it was commanded",
         .parameters = parameters,
     };
-    static constexpr Hooks hooks = Hooks::actuator_dynamics | Hooks::possible;
+    static constexpr Hooks hooks = Hooks::actuator_dynamics | Hooks::possible | Hooks::tabulate;
 
     // The mean over substep j: (1 - share) u(n - back) + share u(n - back + 1).
     struct Table {

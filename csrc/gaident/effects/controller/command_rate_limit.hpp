@@ -24,6 +24,7 @@ struct CommandRateLimit {
     struct State {
         R before;  // rad/s
     };
+    static constexpr Pace pace = Pace::sample;
     static void prepare(const double* p, const Timing& time, Coefficients<double>& c) { c.step = p[0] * time.hold; }
     template <class R>
     static void begin(const Coefficients<R>&, State<R>& s, const Beginning<R>& start) {

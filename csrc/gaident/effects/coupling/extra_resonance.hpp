@@ -25,6 +25,7 @@ struct ExtraResonance {
         .identity = [](const double* p) { return p[0] == p[2] && p[1] == p[3]; },
     };
     static constexpr Hooks hooks = Hooks::plant;
+    static constexpr Pace pace = Pace::sample;
 
     static Factors<double> plant(const double* p, Factors<double> g) {
         const double wp = p[0], zp = p[1], wz = p[2], zz = p[3];

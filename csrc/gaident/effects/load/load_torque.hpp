@@ -20,6 +20,7 @@ struct LoadTorque {
     struct Coefficients {
         R load;
     };
+    static constexpr Pace pace = Pace::sample;
     static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.load = p[0]; }
 
     template <class R>

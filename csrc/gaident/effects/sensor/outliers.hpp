@@ -16,6 +16,7 @@ struct Outliers {
         .remark = "found and masked, not simulated",
     };
     static constexpr Hooks hooks = Hooks::none;
+    static constexpr Pace pace = Pace::sample;
 };
 
 }  // namespace gaident

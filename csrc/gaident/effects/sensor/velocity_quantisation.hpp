@@ -19,6 +19,7 @@ struct VelocityQuantisation {
     struct Coefficients {
         R step;
     };
+    static constexpr Pace pace = Pace::sample;
     static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c.step = p[0]; }
 
     template <class R>

@@ -24,6 +24,7 @@ struct VelocityRipple {
     struct Coefficients {
         R amplitude, order, phase;
     };
+    static constexpr Pace pace = Pace::sample;
     static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[0], p[1], p[2]}; }
 
     template <class R>

@@ -26,8 +26,8 @@ template <class L>
 
 template <class Isa>
 struct KernelSource {
-    // Calls call(std::integral_constant<int, n>) for orders up to `most`, so that everything of that order unrolls and stays in registers;
-    // with -1 for larger ones.
+    // Calls call(std::integral_constant<int, n>) for orders up to `most`, so that everything of that order unrolls and stays in
+    // registers; with -1 for larger ones.
     template <int most, int n = 0, class Call>
     static void by_order(int order, Call&& call) {
         if constexpr (n > most) return call(std::integral_constant<int, -1>{});
@@ -100,8 +100,9 @@ struct KernelSource {
         }
     };
 
-    // Squared errors of S registers of candidates of one order side by side, from register `first` of the array of groups on: while one
-    // waits for the sample before, the others compute. `driven` false: without input, outputs being deviations from rest.
+    // Squared errors of S registers of candidates of one order side by side, from register `first` of the array of groups on:
+    // while one waits for the sample before, the others compute.
+    // `driven` false: without input, outputs being deviations from rest.
     template <class T, int W, int N, bool driven>
     struct SideBySide {
         using L = Lanes<T, static_cast<int>(Isa::register_bytes / sizeof(T)), Isa>;

@@ -24,8 +24,10 @@ inline constexpr int float_lanes = 16;
 using DoubleGroup = Group<double, double_lanes>;
 using FloatGroup = Group<float, float_lanes>;
 
-// W plants as factors, lane by lane. Lanes of a smaller structure leave at zero the factors they lack: bilinear, s^2 and s over their
-// powers of (delta + 2) are the identity, so that mixed structures share a group. Behind a hold they are not, and a group has one structure.
+// W plants as factors, lane by lane.
+// Lanes of a smaller structure leave at zero the factors they lack: bilinear, s^2 and s over their powers of (delta + 2) are the
+// identity, so that mixed structures share a group.
+// Behind a hold they are not, and a group has one structure.
 struct FactorGroup {
     static constexpr int width = double_lanes;
     Structure structure;  // of all lanes, behind a hold
@@ -58,7 +60,8 @@ struct SteppedKernelSet : KernelSet<DoubleGroup, double> {
 
 struct Kernels {
     const char* name;
-    // Coefficients of the plants (`closed` false) or of the closed loops into the group's a, b and order; its states are left alone.
+    // Coefficients of the plants (`closed` false) or of the closed loops into the group's a, b and order; its states are left
+    // alone.
     void (*coefficients)(const FactorGroup&, const Loop&, double sample_time, bool closed, DoubleGroup&);
     // Random words: out[i] = mix(base + i * golden_gamma).
     WordStream::Fill words;

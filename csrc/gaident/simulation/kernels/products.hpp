@@ -33,8 +33,8 @@ struct ProductSource {
         }
     }
 
-    // Outputs y of a point (lane 0) and of its neighbours, in place, into the error and its derivatives: row[k][0] = output[k] - y, and
-    // row[k][l] = scale[l] (y - row[k][l]).
+    // Outputs y of a point (lane 0) and of its neighbours, in place, into the error and its derivatives:
+    // row[k][0] = output[k] - y, and row[k][l] = scale[l] (y - row[k][l]).
     static void differences(const double* scale, const double* output, std::size_t n, double* rows) {
         const L s = L::load(scale);
         for (std::size_t k = 0; k < n; ++k) {

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gaident.cli import demonstration
-from gaident.cli.output import csv_text, draw, print_json, save_figure, summary_of, write
+from gaident.cli.output import csv_text, print_json, save_figure, summary_of, write
 from gaident.show.progress_bar import Progress
 
 __all__ = ["demo_command"]
@@ -31,7 +31,7 @@ def demo_command(args: argparse.Namespace) -> None:
         say(f"\nCompared with the truth\n{mechanics_comparison(idn.mechanics, truth)}")
     log, picture = folder / "demo_two_mass.csv", folder / "demo_two_mass.png"
     write(log, csv_text(rec, None, "rotary").encode())
-    draw(idn, [rec], "rotary", picture)
+    save_figure(idn.plot(rec), picture)
     say(f"\nwritten: {picture}, {log}; the same from the log:")
     say(f"  gaident identify {log} --kp {controller.kp} --ki {controller.ki} --loop {controller.loop}")
     report: dict[str, Any] = {
@@ -50,7 +50,7 @@ def demo_command(args: argparse.Namespace) -> None:
             rec, idn = demonstration.identify_emps(path, args.seed, progress, args.workers)
         say(summary_of(idn, "linear"))
         picture = folder / "demo_emps.png"
-        draw(idn, [rec], "linear", picture)
+        save_figure(idn.plot(rec, "linear"), picture)
         say(f"\n{demonstration.EMPS_TRUTH}\nwritten: {picture}")
         report["emps"] = {"identification": idn.to_dict()}
     say(f"\n{'-' * 100}\n{demonstration.FRICTION_STORY}")

@@ -10,11 +10,10 @@ from itertools import starmap
 from pathlib import Path
 
 from gaident.axis import velocity_unit
-from gaident.cli.commands.report import write_report
 from gaident.cli.drive import drive_of, read_all, reading_notes
-from gaident.cli.options import PICTURES
-from gaident.cli.output import apart, naming, print_json, proposal_csv, save_figure, target_of, write
+from gaident.cli.output import print_json, proposal_csv, target_of, write
 from gaident.cli.remedies import in_options
+from gaident.cli.result_files import ResultFiles
 from gaident.diagnosis.diagnose import diagnose
 from gaident.drive.drive_file import Drive, axes_in
 from gaident.errors import GaidentError, SettingsError
@@ -89,11 +88,8 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
     """(the drive, its diagnosis, the files that were written)."""
     drive = drive_of(args)
     sources = [*args.logs, *(args.validation or []), *([] if args.model is None else [args.model])]
-    out = target_of(args.out, sources)
-    plot = target_of(args.plot, sources, PICTURES)
     following = target_of(args.next_command, sources)
-    page = target_of(args.report, sources)
-    apart({"--out": out, "--plot": plot, "--report": page, "--next-command": following})
+    files = ResultFiles.of(args, sources, **{"--next-command": following})
     controller = drive.controller()
     records = read_all(drive, args.logs, controller)
     validation = read_all(drive, args.validation, controller) if args.validation else None
@@ -115,19 +111,10 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
             bootstrap=args.bootstrap,
             seed=args.seed,
             progress=progress,
+            axis=drive.axis,
         )
     dia = replace(dia, notes=(*reading_notes(drive, [*records, *(validation or ())]), *dia.notes))
-    written = []
-    if out is not None:
-        with naming(out):
-            dia.save(out)
-        written.append(out)
-    if plot is not None:
-        save_figure(dia.plot(axis=drive.axis), plot)
-        written.append(plot)
-    if page is not None:
-        write_report(dia, page, records, validation or (), drive.axis)
-        written.append(page)
+    written = files.write(dia, records, validation or (), drive.axis, lambda: dia.plot(axis=drive.axis))
     if following is not None and dia.next_experiment is not None:
         write(following, proposal_csv(dia.next_experiment, drive.axis).encode())
         written.append(following)

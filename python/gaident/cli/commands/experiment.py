@@ -23,7 +23,7 @@ def experiment_command(args: argparse.Namespace) -> None:
     inertia = drive.space_values.get("inertia")
     heaviest = None if inertia is None else inertia[1]  # what its ramps ask for must not exceed the torque
     kp = drive.controller_values.get("kp")
-    proposal = first_experiment(dt, drive.limits(), heaviest, kp)
+    proposal = first_experiment(dt, drive.limits(), heaviest, kp, drive.axis)
     if args.json:
         print_json({"schema": "gaident/experiment", "schema_version": 1, **proposal.to_dict()})
         return

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 from gaident.axis import say
 from gaident.cli.drive import drive_of, read_all, reading_notes
-from gaident.cli.options import PICTURES
-from gaident.cli.output import apart, draw, naming, print_json, summary_of, target_of
+from gaident.cli.output import print_json, summary_of
+from gaident.cli.result_files import ResultFiles
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.controller.replay import Replay, replay
@@ -25,10 +25,7 @@ _REPLAYED = 1 << 18  # samples of a log on which the controller is run again
 
 def identify_command(args: argparse.Namespace) -> None:
     drive = drive_of(args)
-    out = target_of(args.out, args.logs)
-    plot = target_of(args.plot, args.logs, PICTURES)
-    page = target_of(args.report, args.logs)
-    apart({"--out": out, "--plot": plot, "--report": page})
+    files = ResultFiles.of(args, args.logs)
     controller = drive.controller()
     records = read_all(drive, args.logs, controller)
     settings = Settings.paper() if args.paper else Settings()
@@ -50,19 +47,7 @@ def identify_command(args: argparse.Namespace) -> None:
         for name, said in _replayed(records, controller)
     ]
     idn = replace(idn, warnings=(*reading_notes(drive, records), *off, *idn.warnings))
-    written = []
-    if out is not None:
-        with naming(out):
-            idn.save(out)
-        written.append(out)
-    if plot is not None:
-        draw(idn, records, drive.axis, plot)
-        written.append(plot)
-    if page is not None:
-        from gaident.cli.commands.report import write_report
-
-        write_report(idn, page, records, (), drive.axis)
-        written.append(page)
+    written = files.write(idn, records, (), drive.axis, lambda: idn.plot(records, drive.axis))
     if args.json:
         print_json(idn.to_dict())
         return

@@ -3,28 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from pathlib import Path
 
 from gaident.cli.drive import drive_of
-from gaident.cli.output import print_json, target_of, write
-from gaident.data.record import Record
+from gaident.cli.output import print_json, target_of
+from gaident.cli.result_files import write_report
 from gaident.errors import GaidentError
-from gaident.reporting.report import report_page
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.results.store import load
 
-__all__ = ["report_command", "write_report"]
-
-
-def write_report(
-    result: Diagnosis | Identification, target: Path, records: Sequence[Record], validation: Sequence[Record], axis: str
-) -> int:
-    """The page; returns its size [bytes]."""
-    page = report_page(result, records, validation, axis).encode()
-    write(target, page)
-    return len(page)
+__all__ = ["report_command"]
 
 
 def report_command(args: argparse.Namespace) -> None:

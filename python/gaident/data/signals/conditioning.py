@@ -75,7 +75,7 @@ def low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float) -> NDArray[np.
         )
     from scipy.signal import butter, sosfiltfilt
 
-    # The odd extension at the ends must outlast the filter's transient, or a moving start would be bent.
+    # The odd extension at the ends must outlast the filter's transient, or a start in motion would be distorted.
     extension = max(_SHORTEST_EXTENSION, math.ceil(min(2.0 / (cutoff_hz * dt), float(x.size))))
     sections = butter(_ORDER, cutoff_hz * 2.0 * dt, output="sos")
     # The straight line between the ends passes such a filter as it is. Taken off first, it costs no digits

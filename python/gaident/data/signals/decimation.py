@@ -1,4 +1,4 @@
-"""Fewer samples without folding: a linear-phase low-pass whose delay is taken out, sample by sample as a log comes in."""
+"""Fewer samples without aliasing: a linear-phase low-pass whose delay is taken out, sample by sample as a log comes in."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Decimator:
     Up to 80 % of the new Nyquist frequency 1/(2 M dt) a signal passes to within 0.03 %, from that frequency on it is damped by 72
     dB and more. At both ends the signal is continued by its reflection about its end point.
     What comes out does not depend on how the samples are divided between calls of `push`.
-    It is symmetric: an edge shows a little before it comes, by less than 25 new samples.
+    The filter is symmetric: an edge shows up to 25 new samples before it comes.
     """
 
     def __init__(self, factor: int) -> None:

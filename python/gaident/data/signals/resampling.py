@@ -26,7 +26,7 @@ def resampled(
     channels  name -> (time stamps [s], values), shape (n,) each, n may differ; the stamps increase, those without a
               value (NaN) are left out, and no gap between them may be longer than five of their usual steps in the time
               that all cover
-    dt        sample time of the result [s]; at most 1.5 times what the channels have, or high frequencies would fold;
+    dt        sample time of the result [s]; at most 1.5 times what the channels have, or high frequencies would alias;
               at least a hundredth of the finest
 
     Linear interpolation is a low-pass of its own (sinc^2 on average: -1.8 dB at a quarter of the log's sample rate) without
@@ -46,7 +46,7 @@ def resampled(
         if dt > _COARSER * median:
             raise ReadError(
                 f"{path}: {arg('resample', format(dt, 'g'))} s is coarser than the log, whose {name} has steps of {median:g} "
-                "s, and would fold high "
+                "s, and would alias high "
                 f"frequencies down; give {arg('resample', format(median, '.4g'))} and "
                 f"{arg('decimate', repr(max(2, round(dt / median))))}"
             )

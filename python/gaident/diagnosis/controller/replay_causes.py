@@ -91,7 +91,7 @@ def rounded_command(off: Vector, command: Vector, dt: float, controller: PI) -> 
 
         off(n) - off(n-1) = (kp + h) d(n) - (kp - h) d(n-1)
     """
-    h = 0.5 * controller.ki * dt
+    h = 0.5 * controller.ki * dt  # no decision: the trapezoidal rule
     if controller.kp <= h or controller.limited:
         return False
     d = _error_of(off, controller, dt)
@@ -208,7 +208,7 @@ def _rate(case: _Case) -> Iterator[Explanation]:
 
     moves with the slope of the limit where it is not the logged one.
     """
-    h = 0.5 * case.controller.ki * case.dt
+    h = 0.5 * case.controller.ki * case.dt  # no decision: the trapezoidal rule
     if case.controller.kp <= h or case.controller.limited:
         return
     seen = _error_of(case.logged, case.controller, case.dt) + case.velocity
@@ -250,13 +250,13 @@ def _fitted(case: _Case) -> Iterator[Explanation]:
                 continue
             solved = np.linalg.lstsq(table[used] / sizes, case.logged[used], rcond=1e-12)[0] / sizes
             torque = np.clip(table @ solved, -top, top)
-            gains = _Gains(float(solved[0]), float(solved[1]) if case.controller.ki else 0.0)
+            gains = _Gains(kp=float(solved[0]), ki=float(solved[1]) if case.controller.ki else 0.0)
             yield _named(case.controller, gains, case.dt, float(solved[-1]), shift, share, torque)
 
 
 def _named(controller: PI, gains: _Gains, dt: float, start: float, shift: int, share: float, torque: Vector) -> Explanation:
     """Says what of a fitted controller differs from the configured one."""
-    kp, ki = gains
+    kp, ki = gains.kp, gains.ki
     differs: list[str] = []
     cause, value = "", np.nan
     if shift:

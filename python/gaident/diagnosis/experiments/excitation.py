@@ -16,14 +16,17 @@ from numpy.typing import NDArray
 from gaident.axis import TURN, Text, say, turns
 from gaident.control.pi import PI
 from gaident.data.record import Record
+from gaident.data.torque_kind import MEASURED
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.library.triggers import Motion, not_testable, one_sided
 from gaident.errors import RecordError
+from gaident.estimation.regression.sensor_lag import velocity_lag
 from gaident.models.drive_torque import torque_of
 from gaident.models.model import Model
 from gaident.models.starts import noise_std
 from gaident.policy.table import POLICY
 
-__all__ = ["Excitation", "excitation", "position_of"]
+__all__ = ["Excitation", "decided_by_the_angle", "excitation", "position_of"]
 
 Vector = NDArray[np.float64]
 
@@ -88,8 +91,10 @@ class Excitation:
         )
 
 
-def excitation(records: Record | Sequence[Record], controller: PI | None = None, model: Model | None = None) -> Excitation:
-    """Looks at one record or several; with `model`, its structure too decides what can be judged.
+def excitation(
+    records: Record | Sequence[Record], controller: PI | None = None, model: Model | None = None, axis: str = "rotary"
+) -> Excitation:
+    """Looks at one record or several; with `model`, its structure too decides what can be judged. axis: rotary or linear.
 
     Raises RecordError where there is no record, or a record has no torque and nothing to make it from.
     """
@@ -117,7 +122,7 @@ def excitation(records: Record | Sequence[Record], controller: PI | None = None,
         revolutions=max(float(np.ptp(m.position)) for m in motions) / TURN,
         steps=_distinct([s for m in motions for s in m.jumps], POLICY.apart * max(top, TINY)),
         repeated=any(m.repeated for m in motions),
-        not_testable=not_testable(motions, controller, model),
+        not_testable=not_testable(motions, controller, model, axis),
         one_sided=one_sided(motions, controller),
     )
 
@@ -155,10 +160,10 @@ def _smoothed(x: Vector, width: int) -> Vector:
 
 def _held(smooth: Vector, dt: float, floor: float, top: float) -> tuple[list[float], list[float], list[float]]:
     """Speeds held (velocity within 2 % of the highest, for long enough): all, those of the first and of the last third."""
-    band = 2.0 * max(POLICY.still * top, floor)
+    band = 2.0 * max(POLICY.still * top, floor)  # no decision: from one side of a speed to the other
     held, early, late = [], [], []
     n, start = len(smooth), 0
-    third = n / 3
+    third = n / 3  # no decision: the first and the last third, for how even a record is
     low = high = float(smooth[0])
     values = smooth.tolist()
     for i in range(1, n + 1):
@@ -201,3 +206,15 @@ def _changes(x: Vector, floor: float) -> int:
     """Changes of sign between values beyond +-floor."""
     signs = np.sign(x[np.abs(x) > floor])
     return int(np.sum(signs[1:] != signs[:-1]))
+
+
+def decided_by_the_angle(records: Sequence[Record]) -> set[str]:
+    """Effects that a logged angle says are not there: a late velocity, where it is not late behind the angle.
+
+    Beside a measured torque only. With a commanded one, what acts alike at the actuator would then stand alone, on the word of an
+    angle that the drive may have integrated from the same velocity.
+    """
+    lags = [velocity_lag(r) if r.torque_is == MEASURED else None for r in records]
+    if any(lag is None or abs(lag) > POLICY.lag_said for lag in lags):
+        return set()
+    return {t.name for t in LIBRARY.values() if t.late}

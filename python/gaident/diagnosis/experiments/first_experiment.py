@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, joined, say
+from gaident.axis import Text, checked_axis, joined, say
 from gaident.checks import real_number
 from gaident.control.pi import PI
 from gaident.data.record import Record
@@ -27,6 +27,7 @@ from gaident.diagnosis.experiments.commands import largest_jump
 from gaident.diagnosis.experiments.excitation import position_of
 from gaident.diagnosis.experiments.menu import MENU, Bench, Builder, prbs_moving, reversals, slow_stairs, speed_ladder, steps
 from gaident.diagnosis.library.names import SATURATION
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.errors import SettingsError
 from gaident.models.drive_torque import torque_of
 from gaident.results.experiment import Limits, Proposal, swept
@@ -57,7 +58,9 @@ class MenuItem:
         return Proposal(self.command, self.dt, tuple(separates), margin, reason)
 
 
-def first_experiment(dt: float, limits: Limits, inertia: float | None = None, kp: float | None = None) -> Proposal:
+def first_experiment(
+    dt: float, limits: Limits, inertia: float | None = None, kp: float | None = None, axis: str = "rotary"
+) -> Proposal:
     """Propose a command for the first record of a drive: it shows every effect of the library within the limits.
 
     Levels with reversals and dither, slow stairs with rests, reversals with small and large torque, steps of three sizes, and
@@ -74,6 +77,8 @@ def first_experiment(dt: float, limits: Limits, inertia: float | None = None, kp
     kp : float, optional
         Proportional gain of the controller [N m s/rad]: no jump of the command then asks for more torque than there is, and none
         shows torque_saturation. None: jumps are sized by the speed alone, `reason` says what they ask for.
+    axis : {"rotary", "linear"}
+        "linear": positions are lengths, and what returns with every turn is not among what the experiment shows.
 
     Returns
     -------
@@ -83,7 +88,7 @@ def first_experiment(dt: float, limits: Limits, inertia: float | None = None, kp
     Raises
     ------
     SettingsError
-        For a duration of fewer than 400 samples.
+        For a duration of fewer than 400 samples, or another axis.
 
     Examples
     --------
@@ -104,22 +109,24 @@ def first_experiment(dt: float, limits: Limits, inertia: float | None = None, kp
     command = _within(
         np.concatenate([_filled(build, replace(bench, seconds=share * bench.seconds)) for build, share in course]), bench
     )
-    names = dict.fromkeys(effect for item in MENU for effect in item[2])
+    periodic = {name for name, term in LIBRARY.items() if term.harmonic} if checked_axis(axis) == "linear" else set()
+    names = dict.fromkeys(effect for item in MENU for effect in item[2] if effect not in periodic)
     if kp is not None:
         del names[SATURATION]
-    return Proposal(command, dt, tuple(names), math.nan, _first_reason(command, limits, inertia, bench))
+    return Proposal(command, dt, tuple(names), math.nan, _first_reason(command, limits, inertia, bench, axis))
 
 
-def _first_reason(command: Vector, limits: Limits, inertia: float | None, b: Bench) -> Text:
+def _first_reason(command: Vector, limits: Limits, inertia: float | None, b: Bench, axis: str) -> Text:
     """What the first experiment is for, and which of the limits it cannot promise to keep."""
     jump = largest_jump(command, AT_ONCE)
-    parts = [Text("No record yet: this triggers every effect, as far as travel allows.")]
+    every = "every effect that does not depend on the turns of a shaft" if axis == "linear" else "every effect"
+    parts = [Text(f"No record yet: this triggers {every}, as far as travel allows.")]
     if b.kp is not None:
         text = (
-            "No record yet: this triggers every effect but torque saturation, as far as travel allows: its largest jump, of "
+            "No record yet: this triggers {} but torque saturation, as far as travel allows: its largest jump, of "
             "{:.3g} {rad/s}, asks for {:.3g} of {:.3g} {N m}."
         )
-        parts = [say(text, jump, b.kp * jump, limits.torque)]
+        parts = [say(text, every, jump, b.kp * jump, limits.torque)]
     else:
         top = float(np.abs(command).max())
         text = (
@@ -142,7 +149,7 @@ def candidate_commands(dt: float, limits: Limits, inertia: float | None = None, 
     return [MenuItem(name, _within(_filled(build, bench), bench), dt, effects, why) for name, build, effects, why in MENU]
 
 
-def limits_of(records: Record | Sequence[Record], controller: PI | None = None) -> Limits:
+def limits_of(records: Record | Sequence[Record], controller: PI | None = None, axis: str = "rotary") -> Limits:
     """What records show to be allowed, see `Limits.of`."""
     listed = [records] if isinstance(records, Record) else list(records)
     asked = [rec.velocity if rec.command is None else rec.command for rec in listed]
@@ -153,7 +160,7 @@ def limits_of(records: Record | Sequence[Record], controller: PI | None = None) 
     return Limits(
         speed=max((float(np.abs(r).max()) for r in asked), default=0.0) / FREE,
         torque=torque,
-        travel=math.inf if travel >= math.tau else travel / FREE,
+        travel=math.inf if checked_axis(axis) == "rotary" and travel >= math.tau else travel / FREE,
         duration=max((rec.duration for rec in listed), default=0.0),
     )
 

@@ -159,7 +159,7 @@ def menu(data: DataSet, fit: Fit) -> list[MenuItem]:
     """The menu within the limits that the records show, for the mechanism that was found."""
     dt = data.dt
     try:
-        limits = Limits.of(data.records, data.controller)
+        limits = Limits.of(data.records, data.controller, data.axis)
         limits = replace(limits, duration=max(limits.duration, POLICY.proposed_samples * dt))
         assert data.controller is not None
         return candidate_commands(dt, limits, inertia_of(fit), data.controller.kp or None)

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from gaident.axis import Text, say
+from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
 from gaident.diagnosis.library.terms import TWO_LEVELS
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
 from gaident.models.effects import table
+from gaident.results.estimate import Estimate
+from gaident.results.finding import Finding
 
-__all__ = ["basis_of", "evidence_of", "far_off"]
+__all__ = ["basis_of", "evidence_of", "far_off", "noise_findings"]
 
 
 def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None) -> Text:
@@ -54,3 +59,16 @@ def far_off(ratio: float) -> Text:
         "is far too large for noise: a controller or a limit that is not the one given here, or a load that changes in time."
     )
     return say(text, ratio)
+
+
+def noise_findings(spoiled: int, total: int, step: float) -> list[Finding]:
+    """What describes the record: `spoiled` of `total` samples left out, and the lattice of all velocities [rad/s], 0: none."""
+    found = []
+    if spoiled:
+        samples = "{} of {} samples leave the signal and come back; they are left out of every fit."
+        fraction = Estimate(spoiled / total, float(np.sqrt(spoiled) / total), "1")
+        found.append(Finding(OUTLIERS, {"fraction": fraction}, evidence=say(samples, spoiled, total), is_noise=True))
+    if step > 0.0:
+        text = say("All velocities lie on a lattice of {:.4g} {rad/s}: the resolution of the encoder or of the log.", step)
+        found.append(Finding(QUANTISATION, {"step": Estimate(step, 0.0, "rad/s")}, evidence=text, is_noise=True))
+    return found

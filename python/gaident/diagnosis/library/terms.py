@@ -272,7 +272,7 @@ _METADATA: dict[str, dict[str, object]] = {
     "torque_dead_band": {"domains": frozenset({"torque"})},
     "transport_delay": {},
     "torque_lag": {},
-    "velocity_filter": {"seen_angle": _behind_filter},
+    "velocity_filter": {"seen_angle": _behind_filter, "late": True},
     "integrator_clamp": {"replayed": _clamped},
     "command_rate_limit": {"replayed": _rate_limited},
 }

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gaident.axis import TURN, Text, joined, order, say, turns
 from gaident.control.pi import PI
-from gaident.diagnosis.library.terms import HIGHEST_ORDER, friction_family
+from gaident.diagnosis.library.terms import HIGHEST_ORDER, LIBRARY, friction_family
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
@@ -43,10 +43,10 @@ class Motion:
     repeated: bool
 
 
-def not_testable(motions: Sequence[Motion], controller: PI | None, model: Model | None) -> dict[str, Text]:
-    """Effect -> why these records say nothing about it; effects that were triggered are not in it."""
+def not_testable(motions: Sequence[Motion], controller: PI | None, model: Model | None, axis: str = "rotary") -> dict[str, Text]:
+    """Effect -> why these records say nothing about it; effects that were triggered are not in it. axis: rotary or linear."""
     why: dict[str, Text] = {}
-    for part in (_speed(motions), _travel(motions), _torque(motions), _loop(motions, controller), _structure(model)):
+    for part in (_turn(axis), _speed(motions), _travel(motions), _torque(motions), _loop(motions, controller), _structure(model)):
         for effect, reason in part.items():
             why.setdefault(effect, reason)
     return why
@@ -80,6 +80,14 @@ def one_sided(motions: Sequence[Motion], controller: PI | None) -> dict[str, Tex
         if parts and least <= HIGHEST_ORDER:
             notes[effect] = joined("; ", parts)
     return notes
+
+
+def _turn(axis: str) -> dict[str, Text]:
+    """What returns with every turn: the position of a linear axis is a length, which does not say what one turn is."""
+    if axis == "rotary":
+        return {}
+    why = Text("positions are lengths on a linear axis: which length is one turn, they do not say")
+    return {name: why for name, term in LIBRARY.items() if term.harmonic}
 
 
 def _integral(m: Motion, controller: PI) -> float:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from gaident.arguments import NO_CONTROLLER
+from gaident.axis import checked_axis
 from gaident.control.cascade import Cascade
 from gaident.control.pi import PI
 from gaident.data.record import Record
@@ -41,8 +42,10 @@ def checked(
     bootstrap: int,
     seed: int,
     progress: ProgressCallback | None,
+    axis: str,
 ) -> None:
     """Raises RecordError or SettingsError for what cannot be diagnosed."""
+    checked_axis(axis)
     if idn is not None and not isinstance(idn, Identification):
         raise SettingsError(f"identification is {type(idn).__name__}: give what identify() returned, or None")
     for r in (*records, *held):

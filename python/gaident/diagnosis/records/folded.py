@@ -38,6 +38,7 @@ def folded(rec: Record) -> bool:
     if u is None or len(w) < WINDOW or not top > 0.0 or float(w.min()) < -POLICY.still * top:
         return False
     around = np.lib.stride_tricks.sliding_window_view(w, WINDOW)
+    # no decision: slopes over two samples
     before, after = 0.5 * (around[:, 2] - around[:, 0]), 0.5 * (around[:, 4] - around[:, 2])
     steep = max(POLICY.folded_steep * float(np.quantile(np.abs(np.diff(w)), USUAL)), POLICY.above_noise * noise_std(w))
     turning = (before < -steep) & (after > steep) & (around[:, 2] <= np.minimum(around[:, 1], around[:, 3]))

@@ -4,13 +4,21 @@ A finding is withdrawn where a free function of one signal in its place explains
 own domain, is of the finding's size.
 But whitened gains judge by what is fast, and in a record with almost no noise a small misfit of the true cause is as significant
 as the cause itself. So a finding stands where it leaves next to nothing of the free-run error that there is to explain.
-With V the sum of squared plain errors, all linear parts refitted: without the finding, with it, and with any function of the
+With V the sum of squared raw errors, all linear parts refitted: without the finding, with it, and with any function of the
 driver beside it,
 
     share = (V_without - V_with) / (V_without - V_free)
 
 Measured: square-root drag 0.77 to 0.87 by whatever friction comes closest, friction that varies with the angle 0.44 to 0.71; the
 friction of a real ball-screw axis (EMPS) 0.997, beside a remainder that is significant all the same.
+
+That share asks whether the finding is all there is. An axis may hold the cause and something else as large that the library does
+not hold: a joint whose friction has a part that grows with gravity's torque has dry friction, though it explains 0.45 of what a
+function of the position does. So dry friction also stands where the records show it without any model of the rest: the torque
+jumps at the reversals, beside the steepest drag, or the axis rests while its torque changes
+(`estimation/regression/reversal.py`). It is then a cause, and what is left remains named by its driver.
+The same says where there is none: a drag sqrt(w) is explained to 0.95 by dry friction where the motion is fast, but its torque
+does not jump.
 """
 
 from __future__ import annotations
@@ -20,11 +28,17 @@ import numpy as np
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.dependence import Dependence, dependence
 from gaident.diagnosis.selection.moves import Moves
+from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit
+from gaident.estimation.regression.force_error import band_of
+from gaident.estimation.regression.reversal import jump_at_reversal, torque_held_at_rest
+from gaident.models.model import Model
+from gaident.policy.table import POLICY
+from gaident.results.estimate import Estimate
 
-__all__ = ["only_describes", "share", "simplified"]
+__all__ = ["friction_shown", "only_describes", "share", "shown_by_the_records", "simplified"]
 
 
 def only_describes(
@@ -34,12 +48,55 @@ def only_describes(
 
     of_class: the record cannot split it from other effects, whatever its noise, and it is reported with them.
     """
+    shown = shown_by_the_records(space, final, effect)
+    if shown is not None:
+        return not shown
     without = space.without(final, effect)
     instead = dependence(space.objective, without).gains
     doubtful = max(instead.values()) > gain + space.policy.rival_margin
     if not doubtful and driver is not None and left.gains[driver] >= space.policy.of_its_size * gain:
         doubtful = driver in final.parameters.term(effect).domains
     return doubtful and share(space, without, final, left) < (space.policy.class_stands if of_class else space.policy.stands)
+
+
+def shown_by_the_records(space: Moves, final: Fit, effect: str) -> bool | None:
+    """Whether the records show dry friction of the finding's level by themselves; None where they say nothing.
+
+    False where they show that there is none: the torque hardly jumps at the reversals. Of other effects they say nothing that no
+    function of the driver could be.
+    """
+    parameters = final.parameters
+    if not parameters.term(effect).levels or not space.data.torque_logged:
+        return None
+    level = float(final.x[parameters.slot(effect)][0])
+    jump, rest = _friction_in(space.data, parameters.model(final.x))
+    if _sure(jump, rest, POLICY.of_its_level * level):
+        return True
+    refuted = jump is not None and jump.value + POLICY.jump_deviations * jump.std < POLICY.of_its_size * level
+    return False if refuted else None
+
+
+def friction_shown(data: DataSet, model: Model) -> bool:
+    """Whether the records show dry friction without any simulation, at the reversals or at rest."""
+    return data.torque_logged and _sure(*_friction_in(data, model), 0.0)
+
+
+def _friction_in(data: DataSet, model: Model) -> tuple[Estimate | None, Estimate | None]:
+    """(jump of the torque at the reversals, torque held at rest), below what resonates in the model.
+
+    A small torque held at rest is none: a controller at rest also answers to small torques that disturb the axis.
+    """
+    cutoff = band_of(model, data.records, below=POLICY.rigid_band)
+    rest = torque_held_at_rest(data.records, cutoff)
+    if rest is not None and rest.value < POLICY.slow * float(np.abs(data.torque).max()):
+        rest = None
+    return jump_at_reversal(data.records, cutoff), rest
+
+
+def _sure(jump: Estimate | None, rest: Estimate | None, least: float) -> bool:
+    """Whether either is beyond its noise, and at least so large [N m]."""
+    beyond = ((jump, POLICY.jump_deviations), (rest, POLICY.above_noise))
+    return any(e is not None and e.value > max(times * e.std, least) for e, times in beyond)
 
 
 def simplified(space: Moves, final: Fit, left: Dependence) -> Fit:
@@ -60,6 +117,6 @@ def share(space: Moves, without: Fit, final: Fit, left: Dependence) -> float:
     """The part that `final` explains of what it and a free function of the best driver explain together."""
     objective = space.objective
     less = fitted(objective, without.hypothesis, without.x, WHITE, space.policy.usual)
-    before, after = (objective.plain(*objective.sensitivities(f.hypothesis, f.x)) for f in (less, final))
+    before, after = (objective.raw_rest(*objective.sensitivities(f.hypothesis, f.x)) for f in (less, final))
     free = min(left.least.values())
     return float((before - after) / np.maximum(before - free, 1e-300))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from gaident.diagnosis.library.terms import of_inverse_dynamics
+from gaident.diagnosis.selection.attribution import friction_shown
 from gaident.diagnosis.selection.mechanisms import is_mechanism, one_mass, reduced, resonant, rigid, swings
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.score_test import ScoreTest
@@ -28,7 +30,7 @@ from gaident.models.simulate import simulate
 from gaident.policy.table import POLICY
 from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["PlainView", "Task", "linear_bases", "noise_floor", "plain_bases", "plain_view"]
+__all__ = ["ByOutputErrors", "Task", "linear_bases", "noise_floor", "output_error_bases"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,23 +42,29 @@ class Task:
     model: Model
     allowed: tuple[Term, ...]
     note: Callable[[str], None]
+    shown: frozenset[str] = frozenset()
 
     @property
     def data(self) -> DataSet:
         return self.objective.data
 
     def space(self) -> Moves:
-        return Moves(self.objective, self.allowed, self.note)
+        return Moves(self.objective, self.allowed, self.note, shown=self.shown)
 
     def under(self, family: Innovations | OutputErrors) -> Task:
         return replace(self, objective=self.objective.under(family))
+
+    @cached_property
+    def by_output_errors(self) -> ByOutputErrors:
+        """The task under output errors: made when it is first asked for, and once for each grid of time."""
+        return _by_output_errors(self)
 
     def predictor(self) -> Predictor:
         """Of linear models: the closed loop only where no torque is available."""
         return ClosedLoop(self.data) if self.data.loop_only else OpenLoop(self.data)
 
     def start(self, model: Model, iterations: int = POLICY.long) -> Fit:
-        """A mechanism fitted to the records' plain errors."""
+        """A mechanism fitted to the raw errors of the records."""
         parameters = Parameterisation.of(model, self.scales, self.data.moving)
         return ls.fit(self.objective, Hypothesis(parameters, self.predictor()), parameters.start(model), WHITE, iterations)
 
@@ -108,19 +116,19 @@ def linear_bases(task: Task) -> tuple[Task, list[Fit]]:
     return task, [two]
 
 
-def plain_bases(task: Task, bases: Sequence[Fit]) -> list[Fit]:
-    """The best linear fit of one mass and of two to the plain errors: from the bases, and from the identified mechanism.
+def output_error_bases(task: Task, bases: Sequence[Fit]) -> list[Fit]:
+    """The best linear fit of one mass and of two by output errors: from the bases, and from the identified mechanism.
 
     In closed loop where the log shows that the simulated loop is the drive's.
     A replayed torque that ignores a limit of the controller biases these fits, and the model was identified in closed loop.
     """
-    looped = task.data.loopable and task.data.loop_follows
-    view: Predictor = ClosedLoop(task.data) if looped else OpenLoop(task.data)
+    closed = task.data.loopable and task.data.loop_follows
+    predictor: Predictor = ClosedLoop(task.data) if closed else OpenLoop(task.data)
     starts = [(f.parameters, f.x) for f in bases]
     for model in rigid(task.model) + reduced(task.model):
         parameters = Parameterisation.of(model, task.scales, task.data.moving)
         starts.append((parameters, parameters.start(model)))
-    fits = [ls.fit(task.objective, Hypothesis(p, view), x, WHITE, POLICY.usual) for p, x in starts]
+    fits = [ls.fit(task.objective, Hypothesis(p, predictor), x, WHITE, POLICY.usual) for p, x in starts]
     fits.sort(key=lambda f: (not swings(f), f.cost))
     return [next(f for f in fits if f.parameters.masses == m) for m in sorted({f.parameters.masses for f in fits})]
 
@@ -146,7 +154,7 @@ def noise_floor(task: Task, one: Fit) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class PlainView:
+class ByOutputErrors:
     """A selection by output errors: the task, and the rigid axis that was regressed where the records show one.
 
     With it the errors are weighed as torques (`estimation/prefilter.py`).
@@ -159,14 +167,14 @@ class PlainView:
     def objective(self) -> Objective:
         return self.task.objective
 
-    def worth(self, samples: float) -> Task:
+    def informed(self, samples: float) -> Task:
         """The task with so many independent samples."""
         family = self.objective.family
         assert isinstance(family, OutputErrors)
         return self.task.under(replace(family, samples=samples))
 
     def regressed(self, predictor: Predictor) -> Fit | None:
-        """The regressed axis, fitted to the plain errors; None where there is none.
+        """The regressed axis, fitted by output errors; None where there is none.
 
         The regression needs no start: where a simulation has valleys, as with gravity, it says where to begin.
         """
@@ -191,31 +199,32 @@ class PlainView:
         return fit if fit.cost < WORST else None
 
 
-def plain_view(task: Task) -> PlainView:
+def _by_output_errors(task: Task) -> ByOutputErrors:
     """The task under output errors.
 
     Their corner is where the error of the regressed axis has as much power in its slope as in itself: free run and torque then
-    count alike. Of a measured torque an inertia up to two deviations above that of the regression is free.
+    count alike. Of a measured torque an inertia is free up to `heavier` deviations above that of the regression.
     """
-    plain = PlainView(task.under(OutputErrors(1.0)), _axis(task.data))
-    fit = plain.regressed(task.predictor())
-    if plain.axis is None or fit is None:
-        return PlainView(plain.task, None)
-    axis, objective = plain.axis, plain.objective
+    shown = frozenset(t.family for t in task.allowed if t.levels) if friction_shown(task.data, task.model) else frozenset()
+    raw = ByOutputErrors(replace(task.under(OutputErrors(1.0)), shown=shown), _axis(task.data))
+    fit = raw.regressed(task.predictor())
+    if raw.axis is None or fit is None:
+        return ByOutputErrors(raw.task, None)
+    axis, objective = raw.axis, raw.objective
     inertia = axis.parameters["inertia"]
     weight = Prefilter(axis.dt, 0.0, axis.cutoff_hz, axis.order)
     weight = replace(
         weight, corner=max(weight.balance(objective.bridged(objective.error(fit)[None, :])[0], objective.lengths), _corner(axis))
     )
-    heaviest = inertia.value + 2.0 * inertia.std if task.data.torque_measured else None
-    return PlainView(task.under(OutputErrors(1.0, weight, heaviest)), axis)
+    heaviest = inertia.value + POLICY.heavier * inertia.std if task.data.torque_measured else None
+    return ByOutputErrors(raw.task.under(OutputErrors(1.0, weight, heaviest)), axis)
 
 
 def _axis(data: DataSet) -> InverseDynamics | None:
     if not data.torque_logged:
         return None
     try:
-        found = inverse_dynamics(list(data.records))
+        found = inverse_dynamics(list(data.records), axis=data.axis)
     except (RecordError, SettingsError):
         return None
     return found if found.parameters["inertia"].value > 0.0 else None

@@ -28,7 +28,7 @@ class Beam(Generic[State]):
     score: the lower the better. key: the same for the same model, whatever its parameters. grow: models with one effect more,
     best first. worth(fuller, simpler): the decision whether a grown model is worth what it adds. reduce: moves to other models;
     prefers(other, model): whether the other one takes the model's place. search: the same model again, with more effort; asked
-    for once of each model that leads. settled(model): whether a model leaves noise, so that no other way to explain the same is
+    for once of each model that leads. leaves_noise(model): whether a model does, so that no other way to explain the same is
     followed. size: effects in a model; most: at most. width, reach: how many models are carried on, and how far behind the
     best. margin: within which the smaller model is taken.
     """
@@ -40,7 +40,7 @@ class Beam(Generic[State]):
     worth: Callable[[State, State], bool]
     prefers: Callable[[State, State], bool]
     search: Callable[[State], State]
-    settled: Callable[[State], bool]
+    leaves_noise: Callable[[State], bool]
     size: Callable[[State], int]
     most: int
     width: int
@@ -59,7 +59,7 @@ class Beam(Generic[State]):
         while True:
             wanted = [s for s in beam if self.key(s) not in grown and self.size(s) < self.most]
             leads = wanted and wanted[0] is beam[0]
-            if not wanted or not (leads or not self.settled(beam[0])):
+            if not wanted or not (leads or not self.leaves_noise(beam[0])):
                 break
             grown.add(self.key(wanted[0]))
             found = self.children(wanted[0])

@@ -35,9 +35,9 @@ Vector = NDArray[np.float64]
 def decimated(data: DataSet, blocks: int) -> DataSet:
     """The records on the coarser grid, open loop: driven by the torque that the controller issued."""
     records = [decimated_record(r, blocks) for r in data.driven]
-    return replace(
-        DataSet.of(records, None), finest=max(FINEST, 2.0 * data.dt), known_noise=data.noise, torque_measured=data.torque_measured
-    )
+    finest = max(FINEST, 2.0 * data.dt)  # no decision: the step of a simulation
+    found = replace(DataSet.of(records, None), finest=finest, known_noise=data.noise)
+    return replace(found, torque_measured=data.torque_measured, axis=data.axis)
 
 
 def decimated_objective(objective: Objective, blocks: int) -> Objective:

@@ -33,20 +33,21 @@ Matrix = NDArray[np.float64]
 class Dependence:
     """Gains [BIC units] by driver, and the strongest where it counts, from `needed` on.
 
-    least: squared plain errors beside each driver's family.
+    least: squared raw errors beside each driver's family; unwhitened: the same before whitening, by which output errors count.
     """
 
     gains: dict[str, float]
     least: dict[str, float]
+    unwhitened: dict[str, float]
     needed: float
     line: tuple[float, float] | None = None  # (frequency [Hz], torque [N m]) where "time" is one
     whitened: bool = True
 
     @property
     def strongest(self) -> str | None:
-        """The driver that explains most, whether or not it counts: of whitened errors by gain, of plain ones by what is left."""
+        """The driver that explains most, counted or not: of whitened errors by gain, of output errors by what is left."""
         if not self.whitened:
-            return min(self.least, key=lambda d: self.least[d], default=None)
+            return min(self.unwhitened, key=lambda d: self.unwhitened[d], default=None)
         return max(self.gains, key=lambda d: self.gains[d], default=None)
 
     @property
@@ -92,10 +93,12 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
         gain = none - account.bic(pairs) - np.log(objective.information)
         if gain > gains["time"]:
             gains["time"], line = gain, torque_of_line(objective, fit, J, error, pairs)
-    least = {driver: objective.plain(np.vstack([J, rows]), error) for driver, rows in columns.items()}
+    beside = {driver: np.vstack([J, rows]) for driver, rows in columns.items()}
+    least = {driver: objective.raw_rest(rows, error) for driver, rows in beside.items()}
+    unwhitened = {driver: objective.unwhitened_rest(rows, error) for driver, rows in beside.items()}
     whitened = isinstance(objective.family, Innovations)
     needed = POLICY.dependence_gain * (1.0 + (POLICY.short_record / objective.count if whitened else 0.0))
-    return Dependence({driver: float(gain) for driver, gain in gains.items()}, least, needed, line, whitened)
+    return Dependence({driver: float(gain) for driver, gain in gains.items()}, least, unwhitened, needed, line, whitened)
 
 
 def _strongest(rows: Matrix, room: int) -> Matrix:

@@ -17,7 +17,7 @@ Matrix = NDArray[np.float64]
 def torque_of_line(objective: Objective, fit: Fit, jacobian: Matrix, error: Vector, pairs: Matrix) -> tuple[float, float]:
     """(frequency [Hz], amplitude [N m]) of a torque a cos(wt) + b sin(wt), fitted to the error beside the model's parameters.
 
-    jacobian (parameters, N) and error (N,) plain; pairs: rows cos(wt), sin(wt) of each record, 0 outside it, t from its start.
+    jacobian (parameters, N) and error (N,) raw; pairs: rows cos(wt), sin(wt) of each record, 0 outside it, t from its start.
     Of several records the amplitude is the rms of theirs, each by its samples.
     """
     answers = fit.predictor.torque_response(fit.parameters, fit.x, pairs)

@@ -209,7 +209,7 @@ def swings(fit: Fit) -> bool:
     if fit.parameters.masses == 1:
         return True
     _, _, e1, e0, f1, f0 = fit.parameters.base_values(fit.x[None, :])[0]
-    twice = 2.0 * POLICY.swing_damping
+    twice = 2.0 * POLICY.swing_damping  # no decision: the 2 of 2 zeta w
     return bool(e0 > 0.0 and f0 > 0.0 and abs(e1) < twice * np.sqrt(e0) and abs(f1) < twice * np.sqrt(f0))
 
 

@@ -4,7 +4,7 @@ A fuller model is *worth* its effects where its score
 
     BIC + penalty per effect (a generalisation counts as two, a second mass as one)
 
-is lower than the simpler model's, both seen by the same predictors, and where what it explains is material. This is the one
+is lower than the simpler model's, both under the same predictors, and where what it explains is material. This is the one
 decision of the search; its numbers stand in the policy.
 """
 
@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
 from gaident.diagnosis.selection.mechanisms import as_two_masses
 from gaident.estimation import least_squares as ls
+from gaident.estimation.criterion import effective_samples
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
-from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective
+from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
 from gaident.estimation.term import Term
 from gaident.policy.table import POLICY, Policy
@@ -55,6 +56,7 @@ class ModelSpace:
     allowed: tuple[Term, ...]
     note: Callable[[str], None]
     policy: Policy = POLICY
+    shown: frozenset[str] = frozenset()  # families of effects that the records show by themselves
     grown: dict[Hashable, list[Fit]] = field(default_factory=dict)
 
     # What a model is worth.
@@ -83,7 +85,8 @@ class ModelSpace:
 
     def score(self, fit: Fit) -> float:
         """BIC and what the effects cost; the lower the better."""
-        effects = sum(_depth(t) for t in fit.parameters.terms)
+        # The penalty is for the number of candidates tried: what the records show by themselves was not found by trying.
+        effects = sum(_depth(t) - (t.family in self.shown) for t in fit.parameters.terms)
         # An order of the angle that was searched for counts as so many candidates more.
         orders = sum(2.0 * float(np.log(t.orders[1] - t.orders[0] + 1)) for t in fit.parameters.terms)
         more = fit.parameters.masses - 1 + fit.parameters.held  # a second mass, or a spring, counts as an effect
@@ -105,33 +108,33 @@ class ModelSpace:
         """The variance-ratio test: whether a fit leaves noise."""
         return self.ratio(fit) < self.policy.noise_ratio
 
-    def runs_free(self, fit: Fit) -> bool:
-        """Whether the free run, of the loop where there is one, misses the velocity by little more than its noise."""
+    def small_unwhitened(self, fit: Fit) -> bool:
+        """Whether the errors before whitening, in the loop where there is one, are little more than the noise."""
         inside = fit.hypothesis.driven_by(self.closed(fit.predictor)) if self.data.loopable else fit.hypothesis
         cost = float(self.objective.costs(inside, fit.x[None, :], WHITE)[0])
-        return bool(np.sqrt(cost / self.objective.count) < self.policy.loop_ratio * self.data.noise)
+        return bool(np.sqrt(cost / self.objective.count) < self.policy.unwhitened_ratio * self.data.noise)
 
     def worth(self, fuller: Fit, simpler: Fit) -> bool:
         """The decision: whether a fuller model is worth its effects against a simpler one."""
-        simpler = self.in_view_of(simpler, fuller)
+        simpler = self.under_predictor_of(simpler, fuller)
         if not self.score(fuller) < self.score(simpler):
             return False
         more = [t for t in fuller.parameters.terms if t.name not in simpler.effects]
-        if any(set(t.nested) & set(simpler.effects) for t in more) and not self.in_both_views(simpler, fuller):
+        if any(set(t.nested) & set(simpler.effects) for t in more) and not self.in_both_loops(simpler, fuller):
             return False
         return self.material(simpler, fuller)
 
-    def in_view_of(self, fit: Fit, other: Fit) -> Fit:
-        """The fit as the other's predictor sees it, where that is better: models are compared under the same predictors."""
+    def under_predictor_of(self, fit: Fit, other: Fit) -> Fit:
+        """The fit under the other's predictor, where that is better: models are compared under the same predictors."""
         if fit.predictor == other.predictor:
             return fit
-        return min((fit, self.seen(fit, other.predictor)), key=lambda f: f.bic)
+        return min((fit, self.predicted_by(fit, other.predictor)), key=lambda f: f.bic)
 
     def material(self, simpler: Fit, fuller: Fit) -> bool:
         """Whether a model explains a fair part of what a simpler one leaves beyond the noise, or leaves noise.
 
         Significance is not enough where a model is wrong: many effects then reduce the error a little.
-        The part counts whitened, or in the plain error of the free run: a noise filter may take the larger misfit for noise and
+        The part counts whitened, or before whitening: a noise filter may take the larger misfit for noise and
         whiten it.
         Beside impacts the part is larger: one impact more or less leaves an error even with the true parameters, which other
         effects can fit.
@@ -143,27 +146,49 @@ class ModelSpace:
         share = self.policy.material_beside_impacts if impacts else self.policy.material_share
         if simpler.cost - fuller.cost > share * (simpler.cost - noise):
             return True
-        before, after = (self.plain_cost(f) for f in (simpler, fuller))
+        before, after = (self.unwhitened_cost(f) for f in (simpler, fuller))
         return before - after > share * (before - noise)
 
-    def hidden(self, whitened: Fit, plain: Fit) -> bool:
-        """Whether a model of plain errors holds a cause that whitened errors took for noise; of the space of output errors.
+    def hidden(self, whitened: Fit, other: Fit) -> bool:
+        """Whether whitening hides a cause that another model holds: it has passed for noise.
 
-        The two are different models, of which no specification test says anything. Each is fitted to the plain errors, under the
-        same predictor; the score decides, by as much as tells two explanations apart, and the cause has to explain most of what
-        is left without it.
+        The two are different models, of which no specification test says anything. Both are fitted to the errors before
+        whitening, under the same predictor. There the model without the cause leaves more than noise; the other one leaves at
+        most the share `overrules` of that, and is better by as much as tells two explanations apart. What that is worth is
+        counted in independent samples: those of the space of output errors, else those in the errors of the model without the
+        cause.
         """
-        if not set(plain.effects) - set(whitened.effects):
+        if not set(other.effects) - set(whitened.effects):
             return False
-        without = ls.fit(self.objective, whitened.hypothesis.driven_by(plain.predictor), whitened.x, WHITE, self.policy.usual)
-        return plain.cost < self.policy.overrules * without.cost and self.score(plain) < self.score(without) - self.margin
+        space = self.of_output_errors()
+        predictor = space.free_predictor(other)
+        without, beside = (space.unwhitened(f, predictor) for f in (whitened, other))
+        if not beside.cost < self.policy.overrules * without.cost or self.ratio(without) < self.policy.unwhitened_ratio:
+            return False
+        if self.whitens:
+            space = space.of_output_errors(effective_samples(space.objective.unwhitened_errors(without)))
+            without, beside = (space.objective.rescored(f) for f in (without, beside))
+        return space.score(beside) < space.score(without) - space.margin
 
-    def plain_cost(self, fit: Fit) -> float:
-        """Sum of squared plain errors, refitted to these, of the loop where there is one."""
-        view = self.closed(fit.predictor) if self.data.loopable and self.data.loop_follows else fit.predictor
-        return ls.fit(self.objective, fit.hypothesis.driven_by(view), fit.x, WHITE, self.policy.usual).cost
+    def of_output_errors(self, samples: float = np.inf) -> ModelSpace:
+        """The same models under errors that are not whitened, so many of them independent; this space where they are not."""
+        if not self.whitens:
+            return self
+        return replace(self, objective=self.objective.under(OutputErrors(samples)))
 
-    def in_both_views(self, simpler: Fit, fuller: Fit) -> bool:
+    def unwhitened_cost(self, fit: Fit) -> float:
+        """Sum of squared errors before whitening, refitted to these, in the loop where it is the drive's."""
+        return self.unwhitened(fit, self.free_predictor(fit)).cost
+
+    def unwhitened(self, fit: Fit, predictor: Predictor) -> Fit:
+        """A model fitted to the errors before whitening."""
+        return ls.fit(self.objective, fit.hypothesis.driven_by(predictor), fit.x, WHITE, self.policy.usual)
+
+    def free_predictor(self, fit: Fit) -> Predictor:
+        """What leaves a model to itself: the loop where it is the drive's, else the torque that drives the model."""
+        return self.closed(fit.predictor) if self.data.loopable and self.data.loop_follows else fit.predictor
+
+    def in_both_loops(self, simpler: Fit, fuller: Fit) -> bool:
         """Whether a generalisation is worth its cost in closed loop too, and not only because it is simulated with more substeps.
 
         Driven by the torque, a model with dry friction comes to rest a little before or after the drive wherever a disturbance
@@ -174,7 +199,7 @@ class ModelSpace:
             return False
         if fuller.predictor.closed or not self.data.loopable or fuller.noise.size == 0:
             return True
-        inside = [self.seen(f, self.closed(f.predictor)) for f in (simpler, fuller)]
+        inside = [self.predicted_by(f, self.closed(f.predictor)) for f in (simpler, fuller)]
         return self.score(inside[1]) < self.score(inside[0])
 
     def neutral_score(self, simpler: Fit, fuller: Fit) -> float:
@@ -204,14 +229,14 @@ class ModelSpace:
         """The closed loop with the same angle."""
         return ClosedLoop(self.data, predictor.own_angle)
 
-    def seen(self, fit: Fit, predictor: Predictor) -> Fit:
+    def predicted_by(self, fit: Fit, predictor: Predictor) -> Fit:
         """A model fitted under another predictor."""
         if fit.predictor == predictor:
             return fit
         return self.refitted(fit.hypothesis.driven_by(predictor), fit.x)
 
     def refitted(self, hypothesis: Hypothesis, x: Vector, iterations: int = POLICY.usual) -> Fit:
-        """Plain least squares from x, then under a noise model of its own."""
+        """Least squares before whitening from x, then under a noise model of its own."""
         return ls.reestimated(self.objective, ls.fit(self.objective, hypothesis, x, WHITE, iterations))
 
     def continued(self, hypothesis: Hypothesis, fit: Fit, x: Vector, iterations: int = POLICY.usual) -> Fit:
@@ -220,22 +245,22 @@ class ModelSpace:
 
     def finished(self, fit: Fit) -> Fit:
         """A short fit taken to the end, under the predictors that may say more."""
-        return self.seen_best(self.completed(fit))
+        return self.under_best_predictor(self.completed(fit))
 
     def completed(self, fit: Fit) -> Fit:
         """A short fit taken to the end under its own noise model."""
         fit = fit if fit.converged else ls.fit(self.objective, fit.hypothesis, fit.x, fit.noise, self.policy.usual)
         return ls.reestimated(self.objective, fit)
 
-    def seen_best(self, fit: Fit) -> Fit:
+    def under_best_predictor(self, fit: Fit) -> Fit:
         """A fit under the predictor, of those that may say more, that says most."""
-        views: list[Predictor] = []
+        predictors: list[Predictor] = []
         if fit.predictor.closed and self.whitens and not self.data.loop_only:
             # Parameters found in closed loop may be a good start for the open loop, whose errors show more.
-            views.append(OpenLoop(self.data, fit.predictor.own_angle))
+            predictors.append(OpenLoop(self.data, fit.predictor.own_angle))
         if not fit.predictor.own_angle and not self.data.angle_logged and any(t.harmonic for t in fit.parameters.terms):
-            views.append(replace(fit.predictor, own_angle=True))  # type: ignore[type-var]
-        best = min((fit, *(self.seen(fit, v) for v in views)), key=lambda f: f.bic)
+            predictors.append(replace(fit.predictor, own_angle=True))  # type: ignore[type-var]
+        best = min((fit, *(self.predicted_by(fit, p) for p in predictors)), key=lambda f: f.bic)
         return self.canonical(best)
 
     def canonical(self, fit: Fit) -> Fit:

@@ -119,12 +119,12 @@ class Moves(ModelSpace):
         best = sorted(near, key=lambda f: f.bic)[: self.policy.finished]
         best = sorted((self.completed(f) for f in best), key=self.score)
         reach = self.policy.beam_reach * self.penalty
-        fits += [self.seen_best(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
+        fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
         fits += [f for fit in fits for f in self.resettled(fit)]
         return self._best(now, fits)
 
     def _best(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
-        """Those that are mechanisms, best first, seen in the loop where the best one is.
+        """Those that are mechanisms, best first, in the loop where the best one is.
 
         A second mass that an effect has become swings on a shaft: what does not describes some other thing.
         """
@@ -132,7 +132,7 @@ class Moves(ModelSpace):
         found = sorted((f for f in fits if f.cost < WORST and is_mechanism(f.parameters, f.x)), key=self.score)
         if found and found[0].predictor.closed:
             count = self.policy.screened
-            found = [self.in_view_of(f, found[0]) for f in found[:count]] + found[count:]
+            found = [self.under_predictor_of(f, found[0]) for f in found[:count]] + found[count:]
             found = sorted(found, key=self.score)
         return found
 
@@ -252,7 +252,7 @@ class Moves(ModelSpace):
         rests = any(t.levels for t in fit.parameters.terms)
         if not self.whitens or fit.predictor.closed or not self.data.loopable or not rests or self.quiet(fit):
             return []
-        return [self.seen(fit, self.closed(fit.predictor))]
+        return [self.predicted_by(fit, self.closed(fit.predictor))]
 
     def exchange(self, fit: Fit) -> list[Fit]:
         """An effect as one of its equivalence class, where something else turns with an angle that was not logged.
@@ -306,8 +306,8 @@ class Moves(ModelSpace):
 
     def evolved(self, fit: Fit) -> Fit:
         """A global search nearby, in the loop where there is one."""
-        view = self.closed(fit.predictor) if self.data.loopable else fit.predictor
-        start = replace(fit, hypothesis=fit.hypothesis.driven_by(view))
+        predictor = self.closed(fit.predictor) if self.data.loopable else fit.predictor
+        start = replace(fit, hypothesis=fit.hypothesis.driven_by(predictor))
         key = "evolved", start.key, self.policy.evolution
         return self.objective.once(key, lambda: self.finished(ls.evolved(self.objective, start, self.policy.evolution)))
 

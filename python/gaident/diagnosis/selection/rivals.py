@@ -26,7 +26,7 @@ class Rival:
 def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str] = ()) -> tuple[float, list[Rival]]:
     """(gain of `effect` in the final model, other effects in its place that come within reach, or are equivalent here)."""
     less = space.known(space.without(final, effect))
-    gain = space.in_view_of(less, final).bic - final.bic
+    gain = space.under_predictor_of(less, final).bic - final.bic
     term = final.parameters.term(effect)
     found = []
     for f in space.add(less):
@@ -46,7 +46,7 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
             gained = more * np.log(space.objective.information) - behind  # likelihood ratio, 2 ln
             if gained < chi_square_bound(more, space.policy.detail_level):
                 continue
-            if behind < -space.penalty and not space.in_both_views(final, f):
+            if behind < -space.penalty and not space.in_both_loops(final, f):
                 continue
         if behind < space.margin:
             found.append(Rival(other.name, behind, f))

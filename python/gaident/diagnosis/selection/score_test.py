@@ -59,7 +59,7 @@ class _Trial:
     term: Term
     hypothesis: Hypothesis
     rows: Matrix  # start coordinates; for harmonics the orders
-    errors: Matrix  # plain errors; for harmonics the two columns of each order, what the error loses per unit
+    errors: Matrix  # raw errors; for harmonics the two columns of each order, what the error loses per unit
     base: _Base
     onto: tuple[Hypothesis, Vector]  # the model and its x that the coordinates are added to
     columns: bool
@@ -72,7 +72,7 @@ class _Trial:
 
 @dataclass(frozen=True, eq=False)
 class _Base:
-    """The model that candidates are compared with: x, plain error and sensitivities."""
+    """The model that candidates are compared with: x, raw error and sensitivities."""
 
     hypothesis: Hypothesis
     x: Vector
@@ -81,7 +81,7 @@ class _Base:
 
 
 @dataclass(frozen=True, eq=False)
-class _View:
+class _Filtered:
     """A base under one filter: an orthonormal basis of what its parameters can explain, the rest of its error, its BIC."""
 
     noise: NoiseFilter
@@ -98,8 +98,8 @@ class ScoreTest:
         self.trials: list[_Trial] = []
         self._bases: dict[tuple[Hypothesis, bytes], _Base] = {}
         self._beyond: dict[_Base, tuple[int, NoiseFilter]] = {}
-        self._views: dict[tuple[_Base, NoiseFilter, bool], _View] = {}
-        self._screened: dict[tuple[_Trial, _View], Screened] = {}
+        self._filtered_bases: dict[tuple[_Base, NoiseFilter, bool], _Filtered] = {}
+        self._screened: dict[tuple[_Trial, _Filtered], Screened] = {}
 
     def add(self, hypothesis: Hypothesis, x: Vector, terms: Sequence[Term]) -> None:
         """Candidates as extensions of the model x."""
@@ -107,8 +107,8 @@ class ScoreTest:
         if valleys and self.data.loopable and not hypothesis.predictor.closed:
             # A replayed torque that ignores a limit of the controller has biased the mechanism; the closed loop has not.
             inside = hypothesis.driven_by(ClosedLoop(self.data, hypothesis.predictor.own_angle))
-            held = x if self.data.torque_logged else ls.fit(self.objective, inside, x, WHITE, POLICY.usual).x
-            self.add(inside, held, valleys)
+            start = x if self.data.torque_logged else ls.fit(self.objective, inside, x, WHITE, POLICY.usual).x
+            self.add(inside, start, valleys)
             terms = [t for t in terms if not t.in_coupling]
         self._add(hypothesis, x, terms)
         between = [t for t in terms if t.in_coupling]
@@ -153,7 +153,7 @@ class ScoreTest:
             self.trials.append(_Trial(term, longer, rows, self.objective.errors(longer, X), base, onto, False))
 
     def _columns(self, hypothesis: Hypothesis, x: Vector, term: Term, error: Vector) -> tuple[Vector, Matrix]:
-        """(orders, columns): what the plain error loses per unit of the two components, pairs of rows per order."""
+        """(orders, columns): what the raw error loses per unit of the two components, pairs of rows per order."""
         angle = self.data.angle
         first, last = term.orders
         orders = np.arange(float(first), last + 1.0)
@@ -191,23 +191,23 @@ class ScoreTest:
         return self.objective.noise_of(project_out(D, base.error[None, :])[0], base.hypothesis.predictor.closed)
 
     def ranked(self, noise: NoiseFilter | None) -> list[Screened]:
-        """Candidates from the most to the least promising, each in its better view.
+        """Candidates from the most to the least promising, each beside the base where it does better.
 
-        What counts is the fall of a candidate's cost against the model that it extends, in the same view: a model in its loop
-        leaves another error than one that the torque drives. noise: the filter; None: each view's own of what nothing explains.
+        What counts is the fall of a candidate's cost against the base that it extends, under the same filter: a model in its loop
+        leaves another error than one that the torque drives. noise: the filter; None: each base's own of what nothing explains.
         """
         best: dict[Term, Screened] = {}
         for t in self.trials:
-            view = self._view(t.base, noise)
-            key = t, view
+            filtered = self._filtered(t.base, noise)
+            key = t, filtered
             if key not in self._screened:
-                self._screened[key] = self._judged(t, view)
+                self._screened[key] = self._judged(t, filtered)
             found = self._screened[key]
             if t.term not in best or found.fall > best[t.term].fall:
                 best[t.term] = found
         return sorted(best.values(), key=lambda s: -s.fall)
 
-    def _view(self, base: _Base, noise: NoiseFilter | None) -> _View:
+    def _filtered(self, base: _Base, noise: NoiseFilter | None) -> _Filtered:
         own = noise is None
         if noise is None:
             trials = sum(t.base is base for t in self.trials)
@@ -215,21 +215,21 @@ class ScoreTest:
                 self._beyond[base] = trials, self.filter_beyond(base)
             noise = self._beyond[base][1]
         key = base, noise, own
-        if key not in self._views:
+        if key not in self._filtered_bases:
             basis = orthonormal_rows(self.objective.whitened(base.J, noise))
             v = self.objective.whitened(base.error[None, :], noise)[0]
             rest = v - (v @ basis.T) @ basis
-            self._views[key] = _View(noise, basis, rest, self._without(base, None if own else noise))
-        return self._views[key]
+            self._filtered_bases[key] = _Filtered(noise, basis, rest, self._without(base, None if own else noise))
+        return self._filtered_bases[key]
 
-    def _judged(self, t: _Trial, view: _View) -> Screened:
-        n, rest = self.objective.information, view.rest
-        V = self.objective.whitened(t.errors, view.noise)
+    def _judged(self, t: _Trial, filtered: _Filtered) -> Screened:
+        n, rest = self.objective.information, filtered.rest
+        V = self.objective.whitened(t.errors, filtered.noise)
         finite = np.all(np.isfinite(V), axis=1)
         if not t.columns:
             finite &= np.all(np.abs(t.errors) < LOST, axis=1)
         V[~finite] = 0.0
-        V -= (V @ view.basis.T) @ view.basis
+        V -= (V @ filtered.basis.T) @ filtered.basis
         power = float(rest @ rest)
         if t.columns:
             worth = _pair_worth(V, rest)
@@ -243,10 +243,10 @@ class ScoreTest:
             costs = costs[order]
         cost, size = max(float(costs[0]), 1e-300), t.hypothesis.parameters.size - t.base.hypothesis.parameters.size
         if not np.isfinite(cost):  # every start diverges
-            return Screened(t.term, t.hypothesis, starts, view.noise, -np.inf, -np.inf)
+            return Screened(t.term, t.hypothesis, starts, filtered.noise, -np.inf, -np.inf)
         fall = n * np.log(max(power, 1e-300) / cost) - size * np.log(n)
-        bic = self.objective.bic(cost, view.noise, t.hypothesis.parameters.size)
-        return Screened(t.term, t.hypothesis, starts, view.noise, float(fall), float(view.own - bic))
+        bic = self.objective.bic(cost, filtered.noise, t.hypothesis.parameters.size)
+        return Screened(t.term, t.hypothesis, starts, filtered.noise, float(fall), float(filtered.own - bic))
 
     def _without(self, base: _Base, noise: NoiseFilter | None) -> float:
         """BIC of the model that is extended, under a filter or that of its own errors."""

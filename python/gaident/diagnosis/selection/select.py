@@ -4,10 +4,10 @@
     2. Where more than noise is left, or the free run of the loop is missed: the same search under output errors. What it finds
        is fitted under innovations as well, and counts there if it is better.
        Only this search where the torque itself was measured: noise on the input, which no noise model of the output describes.
-    3. Whitened errors decide where they leave noise (variance ratio) and where whitened and plain estimates of the selected
-       model do not contradict each other (specification test). Else its errors are no stationary noise, and the model that
-       output errors select is the result, with the information of its independent samples.
-    4. The same is the result where it holds a cause that the whitened errors hide: two models, compared by their plain errors.
+    3. Whitened errors decide where they leave noise (variance ratio) and where the estimates of whitened and of output errors of
+       the selected model do not contradict each other (specification test). Else its errors are no stationary noise, and the
+       model that output errors select is the result, with the information of its independent samples.
+    4. The same is the result where it holds a cause that the whitened errors hide: two models, compared before whitening.
     5. The rivals of every effect.
 
 Long records are searched on a coarser grid of time first.
@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.library.terms import EVEN_FRICTION
-from gaident.diagnosis.selection.bases import PlainView, Task, linear_bases, noise_floor, plain_bases, plain_view
+from gaident.diagnosis.selection.bases import ByOutputErrors, Task, linear_bases, noise_floor, output_error_bases
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
@@ -33,7 +33,7 @@ from gaident.diagnosis.selection.rivals import Rival, rivals_of
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import Specification, chi_square_bound, effective_samples, specification_statistic
 from gaident.estimation.noise_model import WHITE, ShaftNoise
-from gaident.estimation.objective import Fit, Innovations, Objective, OutputErrors
+from gaident.estimation.objective import Fit, Innovations, Objective
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
@@ -90,72 +90,79 @@ def selected(
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What a search came to."""
+    """What a search came to: its space, the linear part of its model, the model; further as in `Selection`."""
 
     space: Moves
     base: Fit
     final: Fit
-    specification: Specification | None
+    specification: Specification | None = None
     whitened: _Found | None = None
+
+    def of(self, final: Fit) -> _Found:
+        """The same with another model, and its linear part."""
+        base = self.base if self.base.parameters.kind == final.parameters.kind else _bare(self.space, final)
+        return replace(self, base=base, final=final)
 
 
 def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     """Steps 1 to 4; where the linear model leaves a large misfit, step 2 first: step 1 may then be needless."""
     task, bases = linear_bases(task)
     space = task.space()
-    plain = plain_view(task)
     if task.data.torque_measured:
         # Noise on the input makes a whitened inertia too large, whatever the noise model; at the slow end there is little of it.
-        return _Found(*_plainly(plain, bases, note), None)
-    plainly: tuple[Moves, Fit, Fit] | None = None
+        return _by_output_errors(task.by_output_errors, bases, note)
+    by_output: _Found | None = None
     if min(space.ratio(b) for b in bases) > POLICY.misfit_ratio:
-        plainly = _plainly(plain, bases, note)
-        test = specification(space, plain.objective, _as_innovations(space, plainly[2]))
+        by_output = _by_output_errors(task.by_output_errors, bases, note)
+        test = specification(space, task, _as_innovations(space, by_output.final))
         if test.contradicts:
-            return _Found(*plainly, test)
+            return replace(by_output, specification=test)
     base, final = _explored(task, space, bases)
-    test = specification(space, plain.objective, final)
-    if plainly is None and (test.contradicts or not (space.is_noise(final) and space.runs_free(final))):
-        plainly = _plainly(plain, bases, note)
-    if plainly is not None:
-        again = _improved(space, _as_innovations(space, plainly[2]), final)
+    test = specification(space, task, final)
+    if by_output is None and (test.contradicts or not (space.is_noise(final) and space.small_unwhitened(final))):
+        by_output = _by_output_errors(task.by_output_errors, bases, note)
+    if by_output is not None:
+        again = _improved(space, _as_innovations(space, by_output.final), final)
         if again is not final:
             base, final = _bare(space, again), again
-        test = specification(space, plain.objective, final)
-        plainly = _with(plainly, final)
+        test = specification(space, task, final)
+        by_output = _offered(by_output, final)
     whitened = _Found(space, base, final, test)
-    if plainly is not None and (test.contradicts or not space.is_noise(final) or plainly[0].hidden(final, plainly[2])):
-        return _Found(*plainly, test, whitened)
+    if by_output is not None and (
+        test.contradicts or not space.is_noise(final) or by_output.space.hidden(final, by_output.final)
+    ):
+        return replace(by_output, specification=test, whitened=whitened)
     return whitened
 
 
-def _with(plainly: tuple[Moves, Fit, Fit], whitened: Fit) -> tuple[Moves, Fit, Fit]:
+def _offered(by_output: _Found, whitened: Fit) -> _Found:
     """The result of output errors, or the model of whitened errors in its place where it scores better there."""
-    space, base, final = plainly
-    better = _improved(space, ls.fit(space.objective, whitened.hypothesis, whitened.x, WHITE, POLICY.usual), final)
-    if better is final:
-        return plainly
-    return space, base if base.parameters.kind == better.parameters.kind else _bare(space, better), better
+    space = by_output.space
+    better = _improved(space, ls.fit(space.objective, whitened.hypothesis, whitened.x, WHITE, POLICY.usual), by_output.final)
+    return by_output if better is by_output.final else by_output.of(better)
 
 
-def _plainly(plain: PlainView, bases: Sequence[Fit], note: Callable[[str], None]) -> tuple[Moves, Fit, Fit]:
-    """Step 2: (the space of output errors, linear fit, selected model).
+def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callable[[str], None]) -> _Found:
+    """Step 2: the search under output errors.
 
     The information is that of the errors which the best linear model or the regressed axis leaves: those of a better model are
     more.
     """
-    note("looking at the plain errors")
-    starts = plain_bases(plain.task, bases)
+    note("looking at the output errors")
+    starts = output_error_bases(output.task, bases)
     least = min(starts, key=lambda f: f.cost)
-    axis = plain.regressed(least.predictor)
-    samples = [effective_samples(plain.objective.plain_errors(f)) for f in (least, axis) if f is not None]
-    task = plain.worth(max(samples))
+    axis = output.regressed(least.predictor)
+    task = _informed(output, least, axis)
     space = task.space()
     base, final = _explored(task, space, [task.objective.rescored(f) for f in starts])
     if axis is not None:
         final = _improved(space, task.objective.rescored(axis), final)
-        base = base if base.parameters.kind == final.parameters.kind else _bare(space, final)
-    return space, base, final
+    return _Found(space, base, base).of(final)
+
+
+def _informed(output: ByOutputErrors, *fits: Fit | None) -> Task:
+    """The task under output errors, with as many independent samples as the errors of one of these fits hold."""
+    return output.informed(max(effective_samples(output.objective.unwhitened_errors(f)) for f in fits if f is not None))
 
 
 def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]:
@@ -165,10 +172,10 @@ def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]
         end = _searched(space, base)
         # On a coarse grid a resonance beyond what it shows stands for another fast effect: the fit to all samples decides.
         # Two overdamped masses describe some other effect, which one mass leaves in the error.
-        seen = task.scales.blocks == 1 or resonance(end) < POLICY.seen_band * np.pi / task.scales.dt
-        if not ends or (swings(end) and seen):
+        shown = task.scales.blocks == 1 or resonance(end) < POLICY.seen_band * np.pi / task.scales.dt
+        if not ends or (swings(end) and shown):
             ends.append((base, end))
-        if space.quiet(end) and space.runs_free(end):
+        if space.quiet(end) and space.small_unwhitened(end):
             break
     return min(ends, key=lambda e: space.score(e[1]))
 
@@ -193,7 +200,7 @@ def _beam(space: Moves) -> Beam[Fit]:
         reduce=_reductions(space),
         prefers=space.prefers,
         search=space.search,
-        settled=space.is_noise,
+        leaves_noise=space.is_noise,
         size=lambda f: len(f.effects),
         most=policy.most_effects,
         width=policy.beam_width,
@@ -216,50 +223,57 @@ def _improved(space: Moves, other: Fit, best: Fit) -> Fit:
 
 
 def _as_innovations(space: Moves, fit: Fit) -> Fit:
-    """A model selected by output errors under a noise model of its own, in the views that may say more."""
+    """A model selected by output errors under a noise model of its own, under the predictors that may say more."""
     return space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit)))
 
 
-def specification(space: Moves, plainly: Objective, fit: Fit) -> Specification:
-    """The specification test: the plain errors of the whitened and of the plain estimate of one model.
+def specification(space: Moves, task: Task, fit: Fit) -> Specification:
+    """The specification test: the output errors of the whitened and of the output-error estimate of one model.
 
-    plainly: the objective of output errors. What no estimate moves by slope, the order of a harmonic, is the same in both and no
-    degree of freedom. H is 0 where the whitened estimate's errors are no larger than noise, as torques
-    and in the free run.
+    task: the one whose output errors are taken. What no estimate moves by slope, the order of a harmonic, is the same in both and
+    no degree of freedom. H is 0 where the whitened estimate's errors are no larger than noise, as torques and in the free run.
+    Where they are that, and white without a filter, the two estimates are one: no prefilter keeps white noise from being noise.
     """
-    plain = ls.fit(plainly, fit.hypothesis, fit.x, WHITE, space.policy.usual)
-    errors = [plainly.plain_errors(f) for f in (fit, plain)]
-    information = min(effective_samples(errors[1]), plainly.count)
-    whole, least = (float(e @ e) for e in errors)
     freedom = int(np.count_nonzero(fit.parameters.steps()))
     bound = chi_square_bound(freedom, space.policy.noise_level)
-    if whole < plainly.count * (space.policy.noise_ratio * plainly.data.noise) ** 2 and space.runs_free(fit):
+    free = space.small_unwhitened(fit)
+    if free and fit.noise.size == 0 and space.is_noise(fit):
         return Specification(0.0, bound)
-    return Specification(specification_statistic(whole, least, information), bound)
+    output = task.by_output_errors.objective
+    whole = float(np.sum(output.unwhitened_errors(fit) ** 2))
+    if free and whole < output.count * (space.policy.noise_ratio * output.data.noise) ** 2:
+        return Specification(0.0, bound)
+    least = output.unwhitened_errors(ls.fit(output, fit.hypothesis, fit.x, WHITE, space.policy.usual))
+    information = min(effective_samples(least), output.count)
+    return Specification(specification_statistic(whole, float(least @ least), information), bound)
 
 
 def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) -> _Found:
-    """What the coarse grid came to, fitted to all samples, reduced, and grown by what the grid could not show."""
-    data, family = task.data, outline.space.objective.family
+    """What the coarse grid came to, fitted to all samples, reduced, and grown by what the grid could not show.
+
+    Output errors are weighed anew: what the low-pass of the coarse grid's prefilter removes is what that grid could not show.
+    """
+    data, family, found = task.data, task.objective.family, outline.space.objective.family
     if outline.final.parameters.masses == 1:  # no stiff shaft, no fine substeps
-        coarse = 0.5 * data.dt
+        coarse = 0.5 * data.dt  # no decision: the step of a simulation
         data = replace(data, finest=max(data.finest, coarse))
-    if isinstance(family, Innovations) and family.shaft is not None:
+    if isinstance(found, Innovations) and found.shaft is not None:
         shaft = ShaftNoise(outline.base.parameters.linear(outline.base.x), data.dt, data.controller)
-        family = Innovations(shaft, family.floor)
-    if isinstance(family, OutputErrors) and family.prefilter is not None:
-        family = replace(family, prefilter=replace(family.prefilter, dt=data.dt))
-    objective = Objective(data, task.objective.weight, family, task.objective.measured, task.objective.counter)
-    task = replace(task, objective=objective)
-    space = task.space()
+        family = Innovations(shaft, found.floor)
+    task = replace(
+        task, objective=Objective(data, task.objective.weight, family, task.objective.measured, task.objective.counter)
+    )
+    selecting = task
+    if not outline.space.whitens:
+        linear = _moved(task.by_output_errors.task.space(), task.scales, outline.base)
+        selecting = _informed(task.by_output_errors, linear, task.by_output_errors.regressed(linear.predictor))
+    space = selecting.space()
     base, final = (_moved(space, task.scales, f) for f in (outline.base, outline.final))
     final = reduced_by(final, _reductions(space), space.prefers, space.score)
     note(f"looking beyond {words(final.effects) or 'the linear model'}, at all samples")
     final = _beam(space).run([final])
-    if base.parameters.kind != final.parameters.kind:
-        base = _bare(space, final)
-    test = specification(space, plain_view(task).objective, final) if space.whitens else outline.specification
-    return _Found(space, base, final, test)
+    test = specification(space, task, final) if space.whitens else outline.specification
+    return _Found(space, base, base, test).of(final)
 
 
 def _moved(space: Moves, scales: Scales, fit: Fit) -> Fit:
@@ -280,7 +294,7 @@ def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> S
     space, final = found.space, found.final
     for swaps_left in range(POLICY.swaps, -1, -1):
         rivals, better = _rivals(space, final, swaps_left > 0, classes, note)
-        if better is not None and _runs_far_worse(space, better, final):
+        if better is not None and space.hidden(better, final):
             rivals, better = _rivals(space, final, False, classes, note)
         if better is None:
             break
@@ -289,16 +303,8 @@ def _compared(found: _Found, classes: Classes, note: Callable[[str], None]) -> S
     return Selection(space, base, final, rivals, found.specification, found.whitened)
 
 
-def _runs_far_worse(space: Moves, better: Fit, final: Fit) -> bool:
-    """Whether a model of smaller whitened errors misses the free run by far more: whitening has hidden a cause that it lacks."""
-    if not space.whitens:
-        return False
-    other, own = (space.plain_cost(f) for f in (better, final))
-    return own < space.policy.overrules * other and not space.runs_free(better)
-
-
 def by_whitened_errors(selection: Selection, classes: Classes, note: Callable[[str], None]) -> Selection | None:
-    """What whitened errors had selected in the place of a plain result that names nothing; None where there is none."""
+    """What whitened errors had selected, where output errors decided and their model names nothing; None where there is none."""
     return None if selection.whitened is None else _compared(selection.whitened, classes, note)
 
 

@@ -142,10 +142,11 @@ def force_error(
         raise RecordError("records: give one Record or several, each with its torque, which the force error compares")
     if len(firsts) != len(given):
         raise SettingsError(f"first has {len(firsts)} numbers for {len(given)} records; give one number, or one for each record")
+    # no decision: what an argument may be
     if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= 10:
         raise SettingsError(f"order={order!r}: give a whole number from 1 to 10, the filter's order in each direction")
     cutoff = band_of(model, given, int(order)) if cutoff_hz is None else float(cutoff_hz)
-    if not 0.0 < cutoff < 0.5 / given[0].dt:
+    if not 0.0 < cutoff < 0.5 / given[0].dt:  # no decision: the Nyquist frequency
         raise SettingsError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {0.5 / given[0].dt:g} Hz, or None")
     left = whole = floor = 0.0
     count = 0
@@ -249,7 +250,7 @@ def _led(model: Model, rec: Record, motion: Motion, cutoff_hz: float) -> Vector:
     state = np.zeros(mechanism.order + 2 * any(e.row.place == "plant" for e in mechanism.effects) + 1)
     state[0] = motion.velocity[0]
     with np.errstate(all="ignore"):
-        torque = run(mechanism, lead, PI(kp, INTEGRAL * kp / dt), state).torque
+        torque = run(mechanism, lead, PI(kp=kp, ki=INTEGRAL * kp / dt), state).torque
     held = torque.reshape(n, fine)
     return np.asarray(held[:, 0] if rec.torque_is == MEASURED else held.mean(axis=1))
 

@@ -102,9 +102,10 @@ def inverse_dynamics(
     """
     records = _checked(rec, "rec")
     checked_axis(axis)
+    # no decision: what an argument may be
     if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= 10:
         raise SettingsError(f"order={order!r}: give a whole number from 1 to 10, the filter's order in each direction")
-    nyquist = 0.5 / records[0].dt
+    nyquist = 0.5 / records[0].dt  # no decision: the Nyquist frequency
     cutoff = (
         min(cutoff_of(r, order) for r in records) if cutoff_hz is None else _number(cutoff_hz, "cutoff_hz", "the corner in Hz")
     )
@@ -131,6 +132,8 @@ def inverse_dynamics(
                 raise RecordError(f"terms has {name!r}, but {refused[name]}; leave it out, or give a record that shows it")
     possible = [asked] if asked is not None else [c for c in CHOICES if not set(c) & set(refused)]
     n_eff = _effective(rows, possible)
+    if asked is None:
+        possible = [c for c in possible if _exists(rows, c)] or possible
     squares = {choice: _squares(rows, choice) for choice in possible}
     scores = {c: bic(squares[c], count, n_eff, _count(c)) for c in possible}
     chosen = _material(min(possible, key=lambda c: (scores[c], len(c))), squares)
@@ -228,6 +231,12 @@ def _fitted(rows: Sequence[Rows], terms: tuple[str, ...]) -> tuple[Vector, int]:
     return solve(np.vstack([r.of(terms) for r in rows]), np.concatenate([r.torque for r in rows]))
 
 
+def _exists(rows: Sequence[Rows], terms: tuple[str, ...]) -> bool:
+    """Whether an axis can be so: its inertia, and the stiffness of a spring, are positive."""
+    values = dict(zip((p.name for t in terms for p in TERMS[t].parameters), _fitted(rows, terms)[0], strict=True))
+    return all(values.get(name, 1.0) > 0.0 for name in ("inertia", "spring"))
+
+
 def _squares(rows: Sequence[Rows], terms: tuple[str, ...]) -> float:
     theta, _ = _fitted(rows, terms)
     return sum(float(np.sum((r.torque - r.of(terms) @ theta) ** 2)) for r in rows)
@@ -270,7 +279,7 @@ def _effective(rows: Sequence[Rows], possible: Sequence[tuple[str, ...]]) -> flo
     fits = [(c, _fitted(rows, c)[0]) for c in possible]
     lefts = [[r.torque - r.of(c) @ theta for r in rows] for c, theta in fits]
     best = int(np.argmin([sum(float(x @ x) for x in left) for left in lefts]))
-    return max(effective_samples(lefts[best]), 2.0 * len(fits[best][1]))
+    return max(effective_samples(lefts[best]), 2.0 * len(fits[best][1]))  # no decision: no fewer than the fit has numbers twice
 
 
 def _relative(left: Sequence[Vector], rows: Sequence[Rows]) -> float:

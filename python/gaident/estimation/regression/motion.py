@@ -82,6 +82,7 @@ def low_passed(x: Vector, dt: float, cutoff_hz: float, order: int) -> Vector:
     from scipy.signal import butter, sosfiltfilt
 
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
+    # no decision: samples beyond the ends, for a filter to settle
     extension = min(max(15, math.ceil(2.0 / (cutoff_hz * dt))), x.size - 1)
     sections = butter(order, cutoff_hz * 2.0 * dt, output="sos")
     return np.asarray(sosfiltfilt(sections, x - line, padlen=extension) + line)
@@ -123,6 +124,7 @@ def torque_noise(rec: Record, cutoff_hz: float, order: int) -> float:
 
 def _twice(rec: Record, f: Vector, cutoff_hz: float, order: int) -> Vector:
     """Gain of the filter, run forward and backward, at frequencies f [Hz]."""
+    # no decision: next to the Nyquist frequency
     warped = np.tan(np.pi * np.minimum(f, 0.499 / rec.dt) * rec.dt) / math.tan(math.pi * cutoff_hz * rec.dt)
     return np.asarray(1.0 / (1.0 + warped ** (2 * order)))
 
@@ -144,7 +146,7 @@ def _spectrum_of(x: Vector, dt: float) -> tuple[Vector, Vector, float]:
     from scipy.signal import welch
 
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
-    f, power = welch(x - line, 1.0 / dt, nperseg=min(x.size, 2048))
+    f, power = welch(x - line, 1.0 / dt, nperseg=min(x.size, 2048))  # no decision: the resolution of a spectrum
     high = (f >= HIGH[0] / dt) & (f <= HIGH[1] / dt)
     return f, power, float(np.median(power[high])) if np.any(high) else 0.0
 

@@ -53,7 +53,7 @@ def effective_samples(residuals: Sequence[Vector]) -> float:
     pairs = rho[1 : 2 * ((longest - 1) // 2) + 1].reshape(-1, 2).sum(axis=1)
     negative = np.flatnonzero(pairs <= 0.0)
     kept = pairs[: negative[0]] if negative.size else pairs
-    return float(np.clip(n / (1.0 + 2.0 * kept.sum()), 1.0, n))
+    return float(np.clip(n / (1.0 + 2.0 * kept.sum()), 1.0, n))  # no decision: the variance of a mean of correlated samples
 
 
 def bic(squares: float, n: int, n_eff: float, columns: int) -> float:
@@ -87,7 +87,7 @@ def covariance(X: Sequence[Matrix], residuals: Sequence[Vector]) -> Matrix:
     # No smaller than white: both deviations are estimates, and the larger one is the safer.
     ratio = np.sqrt(np.maximum(np.diag(white) / np.maximum(np.diag(robust), 1e-300), 1.0))
     cov = robust * np.outer(ratio, ratio)
-    lost = np.sum(vectors[:, ~known] ** 2, axis=1) > 1e-6
+    lost = np.sum(vectors[:, ~known] ** 2, axis=1) > 1e-6  # no decision: rounding of eigenvectors
     cov[lost, :] = cov[:, lost] = 0.0
     cov[lost, lost] = np.inf
     return np.asarray(cov / np.outer(scale, scale))

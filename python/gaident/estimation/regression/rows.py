@@ -11,7 +11,7 @@ from gaident.data.record import Record
 from gaident.data.signals.decimation import decimated
 from gaident.errors import SettingsError
 from gaident.estimation.regression.motion import motion_of
-from gaident.estimation.regression.torque_terms import TERMS, columns_of
+from gaident.estimation.regression.torque_terms import COLUMNS, columns_of
 
 __all__ = ["Rows", "decimation_of", "rows_of"]
 
@@ -31,8 +31,8 @@ class Rows:
 
     def of(self, terms: tuple[str, ...]) -> Matrix:
         """The columns of some of the terms, in the order of these."""
-        starts = dict(zip(self.terms, np.cumsum([0, *(len(TERMS[t].parameters) for t in self.terms)]), strict=False))
-        index = [starts[t] + i for t in terms for i in range(len(TERMS[t].parameters))]
+        starts = dict(zip(self.terms, np.cumsum([0, *(len(COLUMNS[t].parameters) for t in self.terms)]), strict=False))
+        index = [starts[t] + i for t in terms for i in range(len(COLUMNS[t].parameters))]
         return self.columns[:, index]
 
     def split(self, share: float) -> tuple[Rows, Rows]:
@@ -47,7 +47,8 @@ class Rows:
 def decimation_of(decimation: object, cutoff_hz: float, dt: float) -> int:
     """Samples that become one row: as asked, else 1/(cutoff_hz dt) of them, at least one. Raises SettingsError."""
     if decimation is None:
-        return max(1, int(1.0 / (cutoff_hz * dt) + 1e-6))
+        return max(1, int(1.0 / (cutoff_hz * dt) + 1e-6))  # no decision: rounding
+    # no decision: what an argument may be
     if isinstance(decimation, bool) or not isinstance(decimation, int | np.integer) or not 1 <= decimation <= 100_000:
         raise SettingsError(f"decimation={decimation!r}: give a whole number of samples from 1 to 100000, or None")
     return int(decimation)

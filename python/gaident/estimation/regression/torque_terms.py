@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gaident.estimation.regression.motion import Motion
 from gaident.results.estimate import Estimate
 
-__all__ = ["CHOICES", "TERMS", "Term", "columns_of", "estimates_of"]
+__all__ = ["CHOICES", "COLUMNS", "STEEP_DRAG", "TERMS", "Term", "columns_of", "estimates_of"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -72,6 +72,14 @@ TERMS: dict[str, Term] = {
     "spring": Term(lambda m, _: [m.position], (Parameter("spring", "N m/rad", "N/m"),)),
 }
 
+STEEP_DRAG = "steep_drag"
+"""A drag cbrt(w) that no choice of terms holds: beside it a jump at the reversal is dry friction (`reversal.py`)."""
+
+COLUMNS: dict[str, Term] = TERMS | {
+    STEEP_DRAG: Term(lambda m, _: [np.cbrt(m.velocity)], (Parameter("steep_drag", "N m (s/rad)^(1/3)", "N (s/m)^(1/3)"),))
+}
+"""The terms that a user can ask for, and those of tests."""
+
 FRICTION = ((), ("viscous",), ("coulomb",), ("viscous", "coulomb"))
 BY_DIRECTION = ("viscous_by_direction", "coulomb_by_direction")
 WITH_CONSTANT = (*((*f, "offset") for f in FRICTION), BY_DIRECTION)
@@ -89,7 +97,7 @@ def columns_of(terms: tuple[str, ...], motion: Motion) -> Matrix:
     Below the threshold of standstill the sign runs as a straight line from -1 to 1: such samples are no rows of a regression, and
     a predicted torque shall not jump with the noise."""
     sign = np.clip(motion.velocity / motion.threshold, -1.0, 1.0) if motion.threshold > 0.0 else np.sign(motion.velocity)
-    return np.column_stack([column for name in terms for column in TERMS[name].columns(motion, sign)])
+    return np.column_stack([column for name in terms for column in COLUMNS[name].columns(motion, sign)])
 
 
 def estimates_of(terms: tuple[str, ...], theta: Vector, cov: Matrix, axis: str) -> dict[str, Estimate]:
@@ -97,7 +105,7 @@ def estimates_of(terms: tuple[str, ...], theta: Vector, cov: Matrix, axis: str) 
     found: dict[str, Estimate] = {}
     k = 0
     for name in terms:
-        parameters = TERMS[name].parameters
+        parameters = COLUMNS[name].parameters
         here = slice(k, k + len(parameters))
         values, block = theta[here], cov[here, here]
         k += len(parameters)

@@ -180,7 +180,7 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
         parts.append(tag("h3", head))
         if dia.driver is not None:
             parts.append(
-                box(tag("p", "Bent by what is left: do not trust these beyond what the figures below show."), kind="warn")
+                box(tag("p", "Biased by what is left: do not trust these beyond what the figures below show."), kind="warn")
             )
         if dia.model.effects:
             parts.append(table(("", "value", "unit", "linear fit alone", "moved", ""), [rows]))

@@ -99,7 +99,9 @@ def _parameters(idn: Identification, view: View, drawn: Charts) -> Section:
     else:
         parts.append(tag("h3", "The mechanism"))
         if idn.falsified or idn.adequacy.undecided:
-            doubt = "falsified: these are bent by what the model lacks" if idn.falsified else "undecided: take these with reserve"
+            doubt = (
+                "falsified: these are biased by what the model lacks" if idn.falsified else "undecided: take these with reserve"
+            )
             parts.append(box(tag("p", f"The linear model is {doubt}."), kind="warn"))
         damped = m.with_shaft_damping if isinstance(m, TwoMass) else None
         rows: list[Row] = []

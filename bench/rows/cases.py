@@ -1,0 +1,242 @@
+"""The cases that show a row of the policy: what each kind of them holds, how one is run, and what its result is called.
+
+    drives      simulated drives of the blind bench, of each number five: one that hides nothing, one effect at its typical size,
+                one at 0.1 to 4 times of it, two effects, one that the library does not know
+    short       the same with nothing or one effect hidden, cut to 80, 200 or 400 samples
+    loop        what only the controller shows: saturation, clamp, rate limit, outliers; and two clean records at once
+    shifted     clean drives whose log wrote the torque 0, 1 or 2 samples late, with and without a controller
+    real        measured drives, diagnosed (GAIDENT_DATA)
+    regression  the same records, `ga.inverse_dynamics` alone
+    success     linear plants of bench/success.py, `ga.identify`
+    winding     currents of motors from weak to strong inductance, `ga.estimate_winding`
+
+A result has three parts: an outcome, what is said (verdict and findings; the structure; the terms), and a digest of the rest that
+a user reads: parameters to three digits, notes, comparisons, the next experiment.
+
+    right        the truth and nothing else; of an effect outside the library, that something is unexplained
+    in set       the truth among alternatives that are said not to be told apart; of one outside, a true part of it
+    missed       part of the truth is in no finding
+    wrong        a name that is not there
+    false alarm  something is said of a record that hides nothing
+    refused      an error that says what is missing
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import blind
+import numpy as np
+import success
+
+import gaident as ga
+from blind_judge import judge
+from drive_rig import OUTSIDE
+
+LOOP = ("torque_saturation", "integrator_clamp", "command_rate_limit", "outliers")
+LENGTHS = (80, 200, 400)  # samples of a short record
+STRIDE = 7  # has no divisor in common with the count of effects: neighbours in their list are of one family
+OUTCOMES = ("right", "in set", "missed", "wrong", "false alarm", "refused", "crash")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case, complete: the same case is the same record. `key` names it in the file; `what` is its cell, name or number."""
+
+    kind: str
+    key: str
+    what: Any
+    number: int = 0
+
+
+@dataclass(frozen=True)
+class Result:
+    outcome: str
+    said: str
+    detail: str
+
+
+def cases(kind: str, count: int, seed: int) -> list[Case]:
+    """The cases of a kind, `count` of each combination, balanced also where only the first ones are run."""
+    return [replace(c, key=f"{kind}/{c.key}") for c in KINDS[kind][0](count, seed)]
+
+
+def run(case: Case) -> Result:
+    """The result of one case under the policy of this process."""
+    try:
+        return KINDS[case.kind][1](case)
+    except ga.GaidentError as refusal:
+        return Result("refused", type(refusal).__name__, digest(str(refusal)))
+
+
+def digest(what: Any) -> str:
+    return hashlib.sha1(json.dumps(what, default=str).encode()).hexdigest()[:10]
+
+
+def _cells(groups: tuple[str, ...], count: int, seed: int) -> Iterator[blind.Cell]:
+    for n in range(count):
+        for group in groups:
+            found = [c for c in blind.cells(group, n + 1, seed) if c.seed == seed * 1_000_000 + n]
+            multi = [c for c in found if c.kind == "multi"] if n % 3 < 2 else found  # single steps show little
+            yield multi[(STRIDE * n + zlib.crc32(group.encode())) % len(multi)]
+
+
+def drives(count: int, seed: int) -> list[Case]:
+    groups = ("clean", "effects", "sizes", "pairs", "outside")
+    return [Case("drives", c.key, c) for c in _cells(groups, count, seed)]
+
+
+def short(count: int, seed: int) -> list[Case]:
+    cells = [replace(c, kind="multi") for c in _cells(("clean", "effects"), count, seed)]
+    return [Case("short", f"{c.key}/{n}", c, n) for c in cells for n in LENGTHS]
+
+
+def loop(count: int, seed: int) -> list[Case]:
+    found = [c for c in blind.cells("effects", count, seed) if c.kind == "multi" and c.effects[0] in LOOP]
+    found += [replace(c, kind="multi", torque=True) for c in _cells(("clean",), count, seed)]
+    return [Case("loop", c.key, replace(c, torque=True)) for c in sorted(found, key=lambda c: c.seed)]
+
+
+def shifted(count: int, seed: int) -> list[Case]:
+    cells = [replace(c, kind="multi", torque=True) for c in _cells(("clean",), count, seed)]
+    return [Case("shifted", f"{c.key}/{'PI' if closed else 'open'}/{k}", (c, closed), k)
+            for c in cells for closed in (True, False) for k in (0, 1, 2)]  # fmt: skip
+
+
+def diagnosed(case: Case) -> Result:
+    """A cell of the blind bench, whole or cut; a clean one of `loop` as two records of one drive."""
+    cell: blind.Cell = case.what
+    try:
+        record, validation, controller, truth = blind.case_of(cell)
+    except RuntimeError as none:  # this effect does not act there
+        return Result("refused", "impossible", digest(str(none)))
+    if case.number:
+        record, validation = record[: case.number], None
+    if case.kind == "loop" and not cell.effects and validation is not None:
+        dia = ga.diagnose([record, validation], controller=controller)
+    else:
+        dia = ga.diagnose(record, controller=controller, validation=validation)
+    return Result(outcome(dia, truth.effects), *texts(dia))
+
+
+def outcome(dia: ga.Diagnosis, effects: dict[str, dict[str, float]]) -> str:
+    judged = judge(dia, effects)
+    if not effects:
+        return "right" if dia.verdict == "adequate" and not judged.sets else "false alarm"
+    if judged.wrong:
+        return "wrong"
+    if set(effects) & set(OUTSIDE):
+        known = "wrong" if judged.extra else "in set"  # explained by what is not there, or by a true part of it
+        return {"adequate": "missed", "explained": known}.get(dia.verdict, "right")
+    return "right" if judged.exact else "in set" if judged.in_set else "missed"
+
+
+def texts(dia: ga.Diagnosis) -> tuple[str, str]:
+    """What a diagnosis says, and a digest of the rest."""
+    sets = [" or ".join([f.effect, *f.alternatives]) for f in dia.findings]
+    said = f"{dia.verdict}: {', '.join(sets)}; {dia.driver}"
+    parameters = {f"{f.effect}.{name}": f"{e.value:.3g}" for f in dia.findings for name, e in f.parameters.items()}
+    proposal = dia.next_experiment
+    rest = [parameters, dia.notes, sorted(dia.not_testable), sorted(dia.one_sided), dia.held_out, f"{dia.after.rmse:.3g}"]
+    rest += [[(c.name, c.differs) for c in dia.comparisons], proposal and [proposal.separates, proposal.reason], dia.force_reason]
+    return said, digest(rest)
+
+
+def moved(case: Case) -> Result:
+    (cell, closed), late = case.what, case.number
+    record, _, controller, _ = blind.case_of(cell)
+    record = record.shifted(torque=late) if late else record
+    dia = ga.diagnose(record, controller=controller if closed else None)
+    back = dia.log_shifts.get(record.digest, {})
+    expected = {"torque": -late} if late and closed else {}
+    said, rest = texts(dia)
+    called = "right" if back == expected else "missed" if not back else "wrong" if late else "false alarm"
+    return Result(called, f"{said}; moved {dict(back)}", rest)
+
+
+def real(count: int, seed: int) -> list[Case]:
+    from real_records import DRIVES
+    from real_records import Case as Measured
+
+    return [Case("real", f"{name}/{variation}", Measured(name, variation))
+            for n in range(count) for name, row in DRIVES.items() for variation in row.variations[n : n + 1]]  # fmt: skip
+
+
+def diagnosed_real(case: Case) -> Result:
+    from real_judge import judge as judge_real
+    from real_judge import said
+    from real_records import parts_of
+
+    training = parts_of(case.what).training
+    dia = ga.diagnose(training if len(training) > 1 else training[0], controller=case.what.row.controller)
+    return Result(judge_real(case.what.row, said(dia))["outcome"], *texts(dia))
+
+
+def regressed(case: Case) -> Result:
+    from real_records import FRICTION, GRAVITY, parts_of
+
+    parts, row = parts_of(case.what), case.what.row
+    found = ga.inverse_dynamics(parts.training, validation=parts.held_out, axis=row.axis)
+    terms = {FRICTION: any("coulomb" in t for t in found.terms), GRAVITY: "gravity" in found.terms}
+    called = "right" if all(terms.get(group, True) for group in row.truth or ()) else "missed"
+    values = {name: f"{e.value:.3g}" for name, e in found.parameters.items()}
+    return Result(called, " + ".join(found.terms), digest([values, sorted(found.not_tried), f"{found.force_error_held_out:.3g}"]))
+
+
+def plants(count: int, seed: int) -> list[Case]:
+    return [Case("success", f"{name}/{seed}/{n}", name, n + 1000 * seed) for n in range(count) for name in success.CASES]
+
+
+def identified(case: Case) -> Result:
+    """As bench/success.py judges it: the true structure, and a response that is as good as noise permits."""
+    make, _ = success.CASES[case.what]
+    rng = np.random.default_rng([case.number, len(case.what)])
+    drawn = success.bounded_loop(make, rng)
+    truth = success.noise_free(drawn)
+    rec = ga.Record(dt=success.DT, command=drawn.command, velocity=truth + drawn.noise * rng.standard_normal(len(truth)))
+    idn = ga.identify(rec, drawn.controller, seed=1000 + case.number, workers=1)
+    deviation = float(np.sqrt(np.mean((idn.simulate(rec) - truth) ** 2)) / drawn.noise)
+    good = (idn.p, idn.q) == (drawn.model.p, drawn.model.q) and deviation < drawn.limit
+    rest = [idn.warnings, [(s.p, s.q) for s in idn.structures], [(r.p, r.q) for r in idn.rivals], f"{idn.rmse:.3g}"]
+    return Result("right" if good else "wrong", f"({idn.p}, {idn.q}), falsified {idn.falsified}", digest(rest))
+
+
+def windings(count: int, seed: int) -> list[Case]:
+    return [Case("winding", f"{seed}/{n}/{L:g} H", L, n + 1000 * seed)
+            for n in range(count) for L in (0.0, 3e-5, 1e-4, 3e-4, 1e-3)]  # fmt: skip
+
+
+def wound(case: Case) -> Result:
+    """U = R i + L di/dt + ke w with U held over each sample, 3000 samples of 1 ms; noise of 0.05 A and 0.05 rad/s."""
+    rng, R, L, ke, dt = np.random.default_rng(case.number), 0.8, float(case.what), 0.06, 1e-3
+    U = np.repeat(rng.uniform(-20.0, 20.0, 40), 75)
+    a, w, i = (np.exp(-R * dt / L) if L else 0.0), 0.0, 0.0
+    log = np.empty((2, len(U)))
+    for n, u in enumerate(U):
+        i = i if L else (u - ke * w) / R
+        log[:, n] = i, w
+        i = a * i + (1.0 - a) * (u - ke * w) / R
+        w += dt / 2e-4 * (0.06 * i - 4e-4 * w)
+    current, velocity = log + 0.05 * rng.standard_normal(log.shape)
+    found = ga.estimate_winding(U, current, velocity, dt)
+    shown = found.winding.inductance > 0.0
+    called = "right" if shown == (L > 0.0) else "missed" if L else "false alarm"
+    return Result(called, "inductance" if shown else "none", digest([f"{e.value:.3g}" for e in found.parameters.values()]))
+
+
+KINDS: dict[str, tuple[Callable[[int, int], list[Case]], Callable[[Case], Result]]] = {
+    "drives": (drives, diagnosed),
+    "short": (short, diagnosed),
+    "loop": (loop, diagnosed),
+    "shifted": (shifted, moved),
+    "real": (real, diagnosed_real),
+    "regression": (lambda count, seed: [replace(c, kind="regression") for c in real(count, seed)], regressed),
+    "success": (plants, identified),
+    "winding": (windings, wound),
+}
+"""Kind -> what makes its cases (count, seed), and what runs one."""

@@ -1,0 +1,70 @@
+"""The files of a result: --out, --plot and --report of `identify` and `diagnose`."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gaident.cli.options import PICTURES
+from gaident.cli.output import apart, naming, save_figure, target_of, write
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from gaident.data.record import Record
+    from gaident.results.diagnosis import Diagnosis
+    from gaident.results.identification import Identification
+
+__all__ = ["ResultFiles", "write_report"]
+
+
+@dataclass(frozen=True)
+class ResultFiles:
+    """Where the result, its picture and its page go; None where one is not asked for."""
+
+    result: Path | None
+    picture: Path | None
+    page: Path | None
+
+    @classmethod
+    def of(cls, args: Namespace, sources: Sequence[str], **others: Path | None) -> ResultFiles:
+        """The files that the options name; raises where one is a source, or two, `others` among them, are the same."""
+        files = cls(
+            target_of(args.out, sources),
+            target_of(args.plot, sources, PICTURES),
+            target_of(args.report, sources),
+        )
+        apart({"--out": files.result, "--plot": files.picture, "--report": files.page, **others})
+        return files
+
+    def write(
+        self,
+        result: Diagnosis | Identification,
+        records: Sequence[Record],
+        validation: Sequence[Record],
+        axis: str,
+        figure: Callable[[], Figure],
+    ) -> list[Path]:
+        """Write those that were asked for and return them; figure: draws the picture."""
+        if self.result is not None:
+            with naming(self.result):
+                result.save(self.result)
+        if self.picture is not None:
+            save_figure(figure(), self.picture)
+        if self.page is not None:
+            write_report(result, self.page, records, validation, axis)
+        return [path for path in (self.result, self.picture, self.page) if path is not None]
+
+
+def write_report(
+    result: Diagnosis | Identification, target: Path, records: Sequence[Record], validation: Sequence[Record], axis: str
+) -> int:
+    """The page; returns its size [bytes]."""
+    from gaident.reporting.report import report_page
+
+    page = report_page(result, records, validation, axis).encode()
+    write(target, page)
+    return len(page)
