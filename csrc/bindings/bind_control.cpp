@@ -2,6 +2,8 @@
 // from another by its place.
 #include "bindings.hpp"
 
+#include "gaident/control/servo.hpp"
+
 using namespace gaident;
 
 namespace {
@@ -11,8 +13,24 @@ constexpr double endless = std::numeric_limits<double>::infinity();
 LoopKind loop_named(const std::string& name) {
     if (name == "continuous") return LoopKind::continuous;
     if (name == "sampled") return LoopKind::sampled;
+    if (name == "servo") return LoopKind::servo;
     if (name == "open") return LoopKind::open;
-    throw std::invalid_argument("kind must be 'continuous', 'sampled' or 'open', not '" + name + "'");
+    throw std::invalid_argument("kind must be 'continuous', 'sampled', 'servo' or 'open', not '" + name + "'");
+}
+
+AntiWindup anti_windup_named(const std::string& name) {
+    if (name == "none") return AntiWindup::none;
+    if (name == "hold") return AntiWindup::hold;
+    if (name == "tracking") return AntiWindup::tracking;
+    throw std::invalid_argument("anti_windup must be 'none', 'hold' or 'tracking', not '" + name + "'");
+}
+
+FilterChain chain_of(const std::vector<DigitalFilter>& filters, const char* name) {
+    if (filters.size() > FilterChain::most)
+        throw std::invalid_argument(std::string(name) + ": at most " + std::to_string(FilterChain::most) + " filters");
+    FilterChain chain;
+    for (const DigitalFilter& f : filters) chain.filter[chain.count++] = f;
+    return chain;
 }
 
 Start start_named(const std::string& name) {
@@ -20,6 +38,21 @@ Start start_named(const std::string& name) {
     if (name == "steady") return Start::steady;
     if (name == "free") return Start::free;
     throw std::invalid_argument("start must be 'rest', 'steady' or 'free', not '" + name + "'");
+}
+
+// The torque that a servo makes of measured signals, one after the other at its own clock; from rest.
+RealArray servo_torque(const Clock& clock, const Loop& loop, const RealArray& source, const RealArray& velocity,
+                       const RealArray& position, const RealArray& velocity_feedforward, const RealArray& torque_feedforward) {
+    const py::ssize_t n = source.size();
+    for (const RealArray* signal : {&velocity, &position, &velocity_feedforward, &torque_feedforward})
+        if (signal->size() != n) throw std::invalid_argument("every signal needs as many samples as the source");
+    Servo<double> servo(loop.controller, loop.servo, clock.period);
+    RealArray torque(n);
+    for (py::ssize_t i = 0; i < n; ++i) {
+        const double r = servo.command(static_cast<std::size_t>(i), source.at(i), velocity_feedforward.at(i), position.at(i));
+        torque.mutable_data()[i] = servo.torque(r, velocity.at(i), torque_feedforward.at(i));
+    }
+    return torque;
 }
 
 }  // namespace
@@ -30,16 +63,46 @@ PyRecord::PyRecord(const Clock& clock, RealArray in, RealArray out, const std::s
       record{view(input), view(output), clock.period, start_named(start), velocity0} {}
 
 void bind_control(py::module_& m) {
-    py::class_<Clock>(m, "Clock").def(py::init([](double period) { return Clock{period}; }), py::kw_only(), py::arg("period"));
+    py::class_<Clock>(m, "Clock")
+        .def(py::init([](double period, int log_every) { return Clock{period, log_every}; }), py::kw_only(), py::arg("period"),
+             py::arg("log_every") = 1);
+    py::class_<DigitalFilter>(m, "DigitalFilter")
+        .def_property_readonly("b", [](const DigitalFilter& f) { return std::vector{f.b0, f.b1, f.b2}; })
+        .def_property_readonly("a", [](const DigitalFilter& f) { return std::vector{1.0, f.a1, f.a2}; });
+    m.def("low_pass", &low_pass, py::arg("time_constant"), py::arg("period"));
+    m.def("notch", &notch, py::kw_only(), py::arg("frequency"), py::arg("numerator_damping"), py::arg("denominator_damping"),
+          py::arg("period"));
+    py::class_<ServoSettings>(m, "ServoSettings")
+        .def(py::init([](double newest, double command_weight, const std::string& anti_windup, double tracking_time,
+                         const std::vector<DigitalFilter>& command_filters, const std::vector<DigitalFilter>& velocity_filters,
+                         const std::vector<DigitalFilter>& torque_filters, double position_gain, int position_every) {
+                 if (position_every < 1) throw std::invalid_argument("position_every must be 1 or more");
+                 return ServoSettings{newest,
+                                      command_weight,
+                                      anti_windup_named(anti_windup),
+                                      tracking_time,
+                                      chain_of(command_filters, "command_filters"),
+                                      chain_of(velocity_filters, "velocity_filters"),
+                                      chain_of(torque_filters, "torque_filters"),
+                                      position_gain,
+                                      position_every};
+             }),
+             py::kw_only(), py::arg("newest"), py::arg("command_weight"), py::arg("anti_windup"), py::arg("tracking_time"),
+             py::arg("command_filters"), py::arg("velocity_filters"), py::arg("torque_filters"), py::arg("position_gain"),
+             py::arg("position_every"));
     py::class_<Controller>(m, "Controller")
         .def(py::init([](double kp, double ki, double torque_limit, double integrator_limit) {
                  return Controller{.kp = kp, .ki = ki, .torque_limit = torque_limit, .integrator_limit = integrator_limit};
              }),
              py::kw_only(), py::arg("kp"), py::arg("ki"), py::arg("torque_limit") = endless,
              py::arg("integrator_limit") = endless);
-    py::class_<Loop>(m, "Loop").def(
-        py::init([](const std::string& kind, const Controller& controller) { return Loop{loop_named(kind), controller}; }),
-        py::kw_only(), py::arg("kind"), py::arg("controller") = Controller{});
+    py::class_<Loop>(m, "Loop")
+        .def(py::init([](const std::string& kind, const Controller& controller, const ServoSettings& servo) {
+                 return Loop{loop_named(kind), controller, servo};
+             }),
+             py::kw_only(), py::arg("kind"), py::arg("controller") = Controller{}, py::arg("servo") = ServoSettings{});
+    m.def("servo_torque", &servo_torque, py::kw_only(), py::arg("clock"), py::arg("loop"), py::arg("source"), py::arg("velocity"),
+          py::arg("position"), py::arg("velocity_feedforward"), py::arg("torque_feedforward"));
     py::class_<PyRecord>(m, "Record")
         .def(py::init<const Clock&, RealArray, RealArray, const std::string&, double>(), py::kw_only(), py::arg("clock"),
              py::arg("input"), py::arg("output"), py::arg("start"), py::arg("velocity0"));

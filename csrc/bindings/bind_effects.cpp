@@ -90,21 +90,32 @@ Factors<double> factors_of(const double* x, int real_poles, int pole_pairs, int 
 }
 
 struct PyEffectRecord {
-    RealArray input, position, velocity;
+    RealArray input, position, velocity, velocity_feedforward, torque_feedforward;
     EffectJob job;
 
     PyEffectRecord(const Clock& clock, RealArray in, RealArray measured_position, const RealArray& measured_velocity,
-                   double start_angle, const Loop& loop)
-        : input(std::move(in)), position(std::move(measured_position)), velocity(measured_velocity) {
-        if (position.size() != 0 && position.size() != input.size())
-            throw std::invalid_argument("position: as many samples as the input are needed");
+                   double start_angle, const Loop& loop, RealArray fed_velocity, RealArray fed_torque)
+        : input(std::move(in)),
+          position(std::move(measured_position)),
+          velocity(measured_velocity),
+          velocity_feedforward(std::move(fed_velocity)),
+          torque_feedforward(std::move(fed_torque)) {
+        for (const auto& [signal, name] : {std::pair(&position, "position"), std::pair(&velocity_feedforward, "velocity_feedforward"),
+                                           std::pair(&torque_feedforward, "torque_feedforward")})
+            if (signal->size() != 0 && signal->size() != input.size())
+                throw std::invalid_argument(std::string(name) + ": as many samples as the input are needed");
+        if (clock.log_every < 1 || input.size() % clock.log_every != 0)
+            throw std::invalid_argument("input: log_every samples are needed for each line of the log");
         job.record.input = view(input);
         job.record.position = view(position);
+        job.record.velocity_feedforward = view(velocity_feedforward);
+        job.record.torque_feedforward = view(torque_feedforward);
+        job.record.log_every = clock.log_every;
         job.record.sample_time = clock.period;
         job.record.start_angle = start_angle;
         for (const double w : view(velocity)) job.record.top_speed = std::max(job.record.top_speed, std::abs(w));
         job.loop = loop;
-        if (job.loop.kind == LoopKind::open) return;
+        if (job.loop.kind == LoopKind::open || (job.loop.kind == LoopKind::servo && job.loop.servo.position_gain > 0.0)) return;
         for (const double r : job.record.input) job.record.top_speed = std::max(job.record.top_speed, std::abs(r));
     }
 };
@@ -210,7 +221,7 @@ py::tuple simulate_models(const PyEffectRecord& record, const std::vector<Effect
         job.kernel = effects_named(kernel.c_str());
         if (job.kernel == nullptr) throw std::invalid_argument("kernel: '" + kernel + "' is not available on this machine");
     }
-    const std::size_t count = models.size(), samples = static_cast<std::size_t>(record.input.size());
+    const std::size_t count = models.size(), samples = static_cast<std::size_t>(record.input.size() / job.record.log_every);
     std::vector<const double*> starts;
     if (initial_states.size() != 0) {
         if (initial_states.ndim() != 2 || static_cast<std::size_t>(initial_states.shape(0)) != count)
@@ -282,9 +293,10 @@ void bind_effects(py::module_& m) {
     py::class_<EffectModel>(m, "EffectModel")
         .def(py::init(&make_model), py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("effects"));
     py::class_<PyEffectRecord>(m, "EffectRecord")
-        .def(py::init<const Clock&, RealArray, RealArray, const RealArray&, double, const Loop&>(), py::kw_only(),
-             py::arg("clock"), py::arg("input"), py::arg("position"), py::arg("velocity"), py::arg("start_angle"),
-             py::arg("loop"))
+        .def(py::init<const Clock&, RealArray, RealArray, const RealArray&, double, const Loop&, RealArray, RealArray>(),
+             py::kw_only(), py::arg("clock"), py::arg("input"), py::arg("position"), py::arg("velocity"),
+             py::arg("start_angle"), py::arg("loop"), py::arg("velocity_feedforward") = RealArray(),
+             py::arg("torque_feedforward") = RealArray())
         .def("simulate", &simulate_models, py::arg("models"), py::arg("initial_states"), py::arg("substeps"), py::arg("workers"),
              py::arg("all"), py::arg("kernel") = "", py::arg("lanes") = true, py::arg("own") = OwnList())
         .def("simulate_values", &simulate_values, py::arg("values"), py::arg("structure"), py::arg("effects"),

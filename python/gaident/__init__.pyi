@@ -1,5 +1,5 @@
 from . import errors
-from .control import PI
+from .control import PI, Cascade, LowPass, Notch, P
 from .data import Alignment, Record, Winding, align, columns, differentiate, read, read_axes, read_columns
 from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
@@ -29,6 +29,7 @@ from .show import progress
 __all__ = [
     "PI",
     "Alignment",
+    "Cascade",
     "Diagnosis",
     "Discrete",
     "Effect",
@@ -40,8 +41,11 @@ __all__ = [
     "InverseDynamics",
     "LeastSquares",
     "Limits",
+    "LowPass",
     "Model",
+    "Notch",
     "OneMass",
+    "P",
     "Proposal",
     "Record",
     "Run",

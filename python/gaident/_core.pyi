@@ -85,19 +85,62 @@ class Trial:
     def species(self) -> list[Refined]: ...
 
 class Clock:
-    """When the controller acts: period, its sample time [s], which is the record's."""
+    """When the controller acts: period, its sample time [s], and how many of these one line of the log stands for."""
 
-    def __init__(self, *, period: float) -> None: ...
+    def __init__(self, *, period: float, log_every: int = 1) -> None: ...
 
 class Controller:
     """The PI velocity controller: kp [N m s/rad], ki [N m/rad], limits of |u| and of |I| [N m]."""
 
     def __init__(self, *, kp: float, ki: float, torque_limit: float = ..., integrator_limit: float = ...) -> None: ...
 
-class Loop:
-    """How the loop is closed, "continuous", "sampled" or "open", and over which controller; "open" has none."""
+class DigitalFilter:
+    """y(n) = b0 u(n) + b1 u(n-1) + b2 u(n-2) - a1 y(n-1) - a2 y(n-2)."""
 
-    def __init__(self, *, kind: str, controller: Controller = ...) -> None: ...
+    @property
+    def b(self) -> list[float]: ...
+    @property
+    def a(self) -> list[float]: ...
+
+def low_pass(time_constant: float, period: float) -> DigitalFilter:
+    """Low pass of first order, exact for a held input; times [s]."""
+
+def notch(*, frequency: float, numerator_damping: float, denominator_damping: float, period: float) -> DigitalFilter:
+    """Notch at a frequency [Hz], bilinear with the frequency kept in its place; period [s]."""
+
+class ServoSettings:
+    """What a servo's controller has beyond a bare PI; times [s], position_gain [1/s], 0 without a position loop."""
+
+    def __init__(
+        self,
+        *,
+        newest: float,
+        command_weight: float,
+        anti_windup: str,
+        tracking_time: float,
+        command_filters: Sequence[DigitalFilter],
+        velocity_filters: Sequence[DigitalFilter],
+        torque_filters: Sequence[DigitalFilter],
+        position_gain: float,
+        position_every: int,
+    ) -> None: ...
+
+def servo_torque(
+    *,
+    clock: Clock,
+    loop: Loop,
+    source: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    position: NDArray[np.float64],
+    velocity_feedforward: NDArray[np.float64],
+    torque_feedforward: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Torque [N m] that a servo makes of measured signals at its own clock, from rest."""
+
+class Loop:
+    """How the loop is closed, "continuous", "sampled", "servo" or "open", and over which controller; "open" has none."""
+
+    def __init__(self, *, kind: str, controller: Controller = ..., servo: ServoSettings = ...) -> None: ...
 
 class Record:
     """Input (velocity command [rad/s], torque [N m] in the open loop) and measured velocity [rad/s] of an identification.
@@ -230,6 +273,8 @@ class EffectRecord:
         velocity: NDArray[np.float64],
         start_angle: float,
         loop: Loop,
+        velocity_feedforward: NDArray[np.float64] = ...,
+        torque_feedforward: NDArray[np.float64] = ...,
     ) -> None: ...
     def simulate(
         self,

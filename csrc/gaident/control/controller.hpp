@@ -4,17 +4,19 @@
 //
 // The trapezoidal integral is the bilinear transformation of ki/s, so both loops share this controller; they differ in the plant:
 // bilinear with the algebraic loop solved exactly (continuous), or behind a zero-order hold (sampled).
+// What a servo axis has beyond that PI (servo.hpp) is behind a zero-order hold as well.
 #pragma once
 
 #include "../plant/bilinear.hpp"
 #include "clock.hpp"
+#include "servo_settings.hpp"
 
 #include <cstdint>
 #include <limits>
 
 namespace gaident {
 
-enum class LoopKind : std::uint8_t { continuous, sampled, open };
+enum class LoopKind : std::uint8_t { continuous, sampled, servo, open };
 
 // The controller's settings.
 struct Controller {
@@ -32,6 +34,7 @@ struct Controller {
 struct Loop {
     LoopKind kind = LoopKind::continuous;
     Controller controller;
+    ServoSettings servo = {};  // of LoopKind::servo
 
     bool limited() const { return kind != LoopKind::open && controller.limited(); }
 };

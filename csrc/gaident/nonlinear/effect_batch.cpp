@@ -25,12 +25,12 @@ class Job {
 public:
     Job(const EffectJob& job, std::span<const EffectModel> models, std::span<const double* const> starts,
         const EffectOutputs& out)
-        : job_(job), out_(out), samples_(job.record.input.size()), planned_(models.size()), order_(models.size()) {
+        : job_(job), out_(out), samples_(job.record.input.size() / static_cast<std::size_t>(job.record.log_every)), planned_(models.size()), order_(models.size()) {
         for (std::size_t i = 0; i < models.size(); ++i) {
             Planned& p = planned_[i];
             p.start = starts.empty() ? nullptr : starts[i];
             p.model = reduced(models[i], p.start != nullptr);
-            if (p.model.effects.bits != 0 || job.own != nullptr)
+            if (p.model.effects.bits != 0 || job.own != nullptr || job.loop.kind == LoopKind::servo)
                 p.substeps = job.substeps > 0 ? job.substeps : substeps_for(p.model, job.record, job.loop, job.own != nullptr);
         }
         std::iota(order_.begin(), order_.end(), std::size_t{0});
@@ -158,10 +158,13 @@ private:
         run.effects = set;
         run.loop = job_.loop;
         run.sample_time = job_.record.sample_time;
+        run.log_every = job_.record.log_every;
         run.substeps = first.substeps;
         run.order = first.model.linear.structure.poles();
         run.moving = first.start != nullptr;
         run.input = job_.record.input;
+        run.velocity_feedforward = job_.record.velocity_feedforward;
+        run.torque_feedforward = job_.record.torque_feedforward;
         run.position = job_.record.position;
         run.start_angle = job_.record.start_angle;
         run.tables = tables.data();

@@ -1,7 +1,7 @@
 // One model or many against one record, with effects or without.
 //
-// Without effects all loops are the linear ones of batch.hpp.
-// With effects the sampled and the open loop are effect_loop.hpp; in the continuous loop the answer is
+// Without effects all loops are the linear ones of batch.hpp, but for a servo's.
+// With effects, and under a servo, the sampled and the open loop are effect_loop.hpp; in the continuous loop the answer is
 //
 //     bilinear loop of the linear part + (fine loop with effects - fine loop without),
 //
@@ -15,7 +15,7 @@
 namespace gaident {
 
 struct EffectOutputs {
-    double* velocity = nullptr;  // models x samples, row after row; as the sensor shows it
+    double* velocity = nullptr;  // models x logged samples, row after row; as the sensor shows it
     double* torque = nullptr;    // as the controller issues it; may be null
     double* angle = nullptr;     // the motor's true angle; may be null
 };

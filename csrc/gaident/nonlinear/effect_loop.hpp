@@ -3,124 +3,40 @@
 // be asked with a branch; on numbers there are selections only. The loop names no effect: it runs over the list (effects/list.hpp) at each
 // hook (effects/effect.hpp). The chain, with a user's own effects (own_effects.hpp) at those marked with a star:
 //
-//     command -> PI -> *actuator -> actuator_dynamics -> *torque -> coupling, *friction -> *sensor -> sensor_dynamics -> reading
+//     command -> controller -> *actuator -> actuator_dynamics -> *torque -> coupling, *friction -> *sensor -> sensor_dynamics -> reading
 //
 // One sample is `substeps` steps of h. In the sampled and the open loop the torque is held over the sample; in the continuous one the
 // controller acts every substep on the linearly interpolated command, and its torque is extrapolated to the substep's mean (third order).
 #pragma once
 
+#include "../control/servo.hpp"
+#include "effect_run.hpp"
 #include "mechanism.hpp"
-#include "own_effects.hpp"
 
 #include <span>
 
 namespace gaident {
 
-// What lanes of one run have in common.
-struct EffectRun {
-    EffectSet effects;
-    Loop loop;
-    double sample_time = 0.0;
-    int substeps = 1;
-    int order = 0;                     // of the plant in observer form
-    bool two_masses = false;           // the coupling is not linear
-    bool moving = false;               // the record does not start at rest
-    std::span<const double> input;     // command, or torque in open loop
-    std::span<const double> position;  // measured, or empty
-    double start_angle = 0.0;
-
-    // Written where not null, lanes side by side: input.size() * width numbers.
-    double* velocity = nullptr;
-    double* torque = nullptr;
-    double* angle = nullptr;
-
-    const Effects::Tables* tables = nullptr;  // one per lane
-    double* history = nullptr;                // past torques: (history_mask + 1) * width numbers
-    std::size_t history_mask = 0;
-
-    OwnEffects* own = nullptr;           // asked through these
-    OwnSignals own_signals{};            // width numbers each,
-    const double* own_answer = nullptr;  // and answering there
-};
-
-// The torques issued so far, as an effect of the actuator looks back on them.
-struct PastTorques {
-    const EffectRun& run;
-    std::size_t width, newest;
-    int substep;
-
-    // Number `at`, counted as `newest` is.
-    [[gnu::always_inline]] double torque(std::size_t at, std::size_t lane) const {
-        return run.history[(at & run.history_mask) * width + lane];
-    }
-    template <class E>
-    [[gnu::always_inline]] const typename E::Table& table(std::size_t lane) const {
-        return run.tables[lane].template of<E>();
-    }
-};
-
-// User-defined effects in the loop.
-// Few models have them: what asks them is apart and called with values, so that the loop's own state may stay in registers.
-template <class R>
-class OwnInLoop {
-public:
-    OwnInLoop(const EffectRun& run, R w)
-        : run_(run),
-          torque_(at(OwnPlace::torque)),
-          friction_(at(OwnPlace::friction)),
-          actuator_(at(OwnPlace::actuator)),
-          sensor_(at(OwnPlace::sensor)),
-          shaft_(torque_ || friction_),
-          w_before_(w) {}
-
-    bool there() const { return run_.own != nullptr; }
-    bool shaft() const { return shaft_; }
-    bool friction() const { return friction_; }
-    bool actuator() const { return actuator_; }
-    bool sensor() const { return sensor_; }
-
-    [[gnu::noinline]] static R asked(const EffectRun& run, OwnPlace place, R w, R theta, R u, double t) {
-        Pack<R>::store(w, run.own_signals.velocity);
-        Pack<R>::store(theta, run.own_signals.angle);
-        Pack<R>::store(u, run.own_signals.torque);
-        run.own->ask(place, t);
-        return Pack<R>::load(run.own_answer);
-    }
-
-    // The torque with that of the effects at the shaft, evaluated at the predicted mean velocity.
-    [[gnu::always_inline]] R with_torque(R w, R theta, R T, double t) {
-        const R middle = w + (w - w_before_) * R(0.5);
-        w_before_ = w;
-        if (friction_) level_ = asked(run_, OwnPlace::friction, middle, theta, T, t > 0.0 ? t : 0.0);
-        return torque_ ? T + asked(run_, OwnPlace::torque, middle, theta, T, t > 0.0 ? t : 0.0) : T;
-    }
-    // The friction evaluated with it [N m].
-    R level() const { return level_; }
-
-private:
-    bool at(OwnPlace place) const { return run_.own != nullptr && run_.own->at(place); }
-
-    const EffectRun& run_;
-    bool torque_, friction_, actuator_, sensor_, shaft_;
-    R w_before_, level_ = R(0.0);
-};
-
-template <class R, class Plant>
+// Control: ControllerState, or Servo.
+template <class R, class Plant, class Control>
 class EffectLoop {
+    static constexpr bool is_servo = std::same_as<Control, Servo<R>>;
+
 public:
     [[gnu::always_inline]] EffectLoop(const EffectRun& run, const EffectConstants<R>& constants)
         : run_(run),
           c_(constants),
           plant_(constants, run.order),
-          pi_(run.loop.controller, Clock{run.sample_time}),
+          pi_(controller_of(run)),
           own_(run, plant_.velocity()) {
         const bool continuous = run.loop.kind == LoopKind::continuous;
         h_ = run.sample_time / run.substeps;
-        if (continuous) pi_ = ControllerState<R>(run.loop.controller, Clock{h_});
+        if constexpr (!is_servo)
+            if (continuous) pi_ = ControllerState<R>(run.loop.controller, Clock{h_});
         dry_ = run.effects.meets(effects_with(Hooks::law | Hooks::level | Hooks::friction)) || own_.friction();
         turning_ = run.effects.meets(effects_that_turn()) || own_.there();
         looking_back_ = run.effects.meets(effects_with(Hooks::tabulate));
-        const Beginning<R> start{plant_.velocity(), c_.before, R(run.moving && !run.input.empty() ? run.input[0] : 0.0)};
+        const Beginning<R> start{plant_.velocity(), c_.before, first_command()};
         Effects::each([&]<class E>() __attribute__((always_inline)) {
             if (!run_.effects.has<E>()) return;
             const auto& c = c_.effects.template of<E>();
@@ -128,7 +44,8 @@ public:
             if constexpr (hook::law<E>) E::law(c, law_);
             if constexpr (hook::begin<E>) E::begin(c, states_.template of<E>(), start);
         });
-        pi_.s = c_.stored;
+        if constexpr (!is_servo) pi_.s = c_.stored;
+        else if (run.moving) pi_.rest(start.command, start.velocity, c_.stored);
         angle_ = R(run.start_angle);
         theta_middle_ = angle_ + plant_.velocity() * R(0.5 * h_);
         if (looking_back_)
@@ -146,6 +63,19 @@ public:
 private:
     static constexpr std::size_t width = static_cast<std::size_t>(Pack<R>::width);
 
+    static Control controller_of(const EffectRun& run) {
+        if constexpr (is_servo) return Control(run.loop.controller, run.loop.servo, run.sample_time);
+        else return Control(run.loop.controller, Clock{run.sample_time});
+    }
+
+    // The velocity command where the record begins in motion; under a position controller the velocity, which it keeps.
+    R first_command() const {
+        if (!run_.moving || run_.input.empty()) return R(0.0);
+        if constexpr (is_servo)
+            if (run_.loop.servo.position_gain > 0.0) return plant_.velocity();
+        return R(run_.input[0]);
+    }
+
     [[gnu::always_inline]] void held() {
         const bool open = run_.loop.kind == LoopKind::open;
         const double share = 1.0 / run_.substeps;
@@ -154,8 +84,9 @@ private:
             theta_ = run_.position.empty() ? angle_ : R(here);
             time_ = static_cast<double>(n) * run_.sample_time;
             const R y = sensor();
-            const R u = open ? R(run_.input[n]) : control(R(run_.input[n]), y);
-            write(n, y, u);
+            const R u = open ? R(run_.input[n]) : control_at(n, y);
+            if constexpr (!is_servo) write(n, y, u);
+            else if (n % static_cast<std::size_t>(run_.log_every) == 0) write(n / static_cast<std::size_t>(run_.log_every), y, u);
             act(u);
             for (int j = 0; j < run_.substeps; ++j) {
                 middle(here, next, (j + 0.5) * share);
@@ -262,13 +193,24 @@ private:
         });
     }
 
-    [[gnu::always_inline]] R control(R r, R y) {
-        r = Effects::chain(r, [&]<class E>(R x) __attribute__((always_inline)) {
+    [[gnu::always_inline]] R control_at(std::size_t n, R y) {
+        if constexpr (is_servo) {
+            const auto fed = [&](std::span<const double> signal) { return R(signal.empty() ? 0.0 : signal[n]); };
+            const R r = pi_.command(n, R(run_.input[n]), fed(run_.velocity_feedforward), angle_);
+            return pi_.torque(shaped(r), y, fed(run_.torque_feedforward));
+        } else {
+            return control(R(run_.input[n]), y);
+        }
+    }
+    [[gnu::always_inline]] R control(R r, R y) { return pi_.step(shaped(r) - y); }
+
+    // The velocity command as the effects let it pass.
+    [[gnu::always_inline]] R shaped(R r) {
+        return Effects::chain(r, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::command<E>)
                 if (run_.effects.has<E>()) return E::command(c_.effects.template of<E>(), states_.template of<E>(), x);
             return x;
         });
-        return pi_.step(r - y);
     }
 
     // The torque u is issued, to be held until the next.
@@ -346,7 +288,7 @@ private:
     const EffectRun& run_;
     const EffectConstants<R>& c_;
     Plant plant_;
-    ControllerState<R> pi_;
+    Control pi_;
     double h_;
     bool dry_, turning_, looking_back_;
     double time_ = 0.0;
@@ -369,14 +311,24 @@ template <class Loop>
 // Where it takes several, moving the state took up to 25 % more instructions: behind a call it stays in memory.
 template <class R, class Plant>
 [[gnu::always_inline]] inline void run_effects_on(const EffectRun& run, const EffectConstants<R>& c) {
-    EffectLoop<R, Plant> loop(run, c);
+    EffectLoop<R, Plant, ControllerState<R>> loop(run, c);
     if constexpr (Pack<R>::registers == 1) loop();
     else run_in_memory(loop);
+}
+
+template <class R, class Plant>
+[[gnu::noinline]] void run_servo_on(const EffectRun& run, const EffectConstants<R>& c) {
+    EffectLoop<R, Plant, Servo<R>> loop(run, c);
+    run_in_memory(loop);
 }
 
 // Runs the lanes whose constants are given, with the plant's order known to the compiler where it is a usual one.
 template <class R>
 void run_effects(const EffectRun& run, const EffectConstants<R>& c) {
+    if (run.loop.kind == LoopKind::servo) {
+        if (run.two_masses) return run_servo_on<R, TwoMassPlant<R>>(run, c);
+        return run_servo_on<R, ObserverPlant<R, -1>>(run, c);
+    }
     if (run.two_masses) return run_effects_on<R, TwoMassPlant<R>>(run, c);
     switch (run.order) {
         case 1: return run_effects_on<R, ObserverPlant<R, 1>>(run, c);

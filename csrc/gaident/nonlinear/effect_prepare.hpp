@@ -11,7 +11,9 @@ namespace gaident {
 // What a model is run against. The position is the measured one or empty; the angle then starts at `start_angle`.
 struct EffectRecord {
     std::span<const double> input, position;
-    double sample_time = 0.0;
+    std::span<const double> velocity_feedforward, torque_feedforward;  // [rad/s], [N m] of a servo, or empty
+    double sample_time = 0.0;                                          // of these signals, and of the controller
+    int log_every = 1;                                                 // outputs are those of the first of so many samples
     double start_angle = 0.0;
     double top_speed = 0.0;  // of the measured velocity [rad/s], for the choice of substeps
 };

@@ -6,13 +6,15 @@ controller: None for the open loop, where the torque drives the model.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
-from gaident.control.pi import PI
+from gaident.control.cascade import Cascade, Controller, cascade_of
+from gaident.control.pi import PI, RULES
+from gaident.control.ticks import ticks_of
 
 __all__ = [
     "clock",
@@ -23,8 +25,10 @@ __all__ = [
     "held_torque",
     "loop",
     "loop_name",
+    "one_equation",
     "record",
     "recurrence",
+    "servo_torque",
     "simulate",
 ]
 
@@ -32,9 +36,14 @@ Vector = NDArray[np.float64]
 Roots = NDArray[np.complex128]
 
 
-def loop_name(controller: PI | None) -> str:
+def loop_name(controller: Controller | None) -> str:
     """ "sampled", "continuous" or "open"."""
     return "open" if controller is None else controller.loop
+
+
+def one_equation(controller: Controller | None) -> TypeGuard[PI | None]:
+    """Whether one difference equation holds controller and plant, limits left out: of a bare PI, and in the open loop."""
+    return controller is None or cascade_of(controller) is None
 
 
 def clock(dt: float) -> _core.Clock:
@@ -68,12 +77,73 @@ def discrete(gain: float, poles: Roots, zeros: Roots, dt: float, controller: PI 
 
 
 def effect_record(
-    dt: float, source: Vector, position: Vector, velocity: Vector, start_angle: float, controller: PI | None
+    dt: float, source: Vector, position: Vector | None, velocity: Vector, start_angle: float, controller: Controller | None
 ) -> _core.EffectRecord:
-    """A record and its loop, for models with effects."""
+    """A record and its loop, for models with effects and for every controller.
+
+    source: command [rad/s], in the open loop torque [N m], with a position controller position command [rad].
+    """
+    cascade = None if controller is None else cascade_of(controller)
+    if cascade is not None:
+        return _servo_record(dt, source, position, velocity, start_angle, cascade)
+    assert not isinstance(controller, Cascade)
     return _core.EffectRecord(
-        clock=clock(dt), input=source, position=position, velocity=velocity, start_angle=start_angle, loop=loop(controller)
+        clock=clock(dt),
+        input=source,
+        position=np.zeros(0) if position is None else position,
+        velocity=velocity,
+        start_angle=start_angle,
+        loop=loop(controller),
     )
+
+
+def _servo_record(
+    dt: float, source: Vector, position: Vector | None, velocity: Vector, start_angle: float, cascade: Cascade
+) -> _core.EffectRecord:
+    ticks = ticks_of(cascade, dt, source, position)
+    period = dt / ticks.log_every
+    return _core.EffectRecord(
+        clock=_core.Clock(period=period, log_every=ticks.log_every),
+        input=ticks.source,
+        position=ticks.position,
+        velocity=velocity,
+        start_angle=start_angle,
+        loop=_servo(cascade, period, cascade.position_every(dt)),
+        velocity_feedforward=ticks.velocity_feedforward,
+        torque_feedforward=ticks.torque_feedforward,
+    )
+
+
+def servo_torque(dt: float, source: Vector, velocity: Vector, position: Vector | None, cascade: Cascade) -> Vector:
+    """Torque [N m] (n,) that a cascade makes of measured signals (n,), from rest; the log has a line for each of its samples."""
+    ticks = ticks_of(cascade, dt, source, position)
+    none = np.zeros(len(source))
+    fed, added = ticks.velocity_feedforward, ticks.torque_feedforward
+    return _core.servo_torque(
+        clock=clock(dt),
+        loop=_servo(cascade, dt, cascade.position_every(dt)),
+        source=ticks.source,
+        velocity=velocity,
+        position=none if position is None else position,
+        velocity_feedforward=fed if len(fed) else none,
+        torque_feedforward=added if len(added) else none,
+    )
+
+
+def _servo(cascade: Cascade, period: float, position_every: int) -> _core.Loop:
+    pi = cascade.velocity
+    settings = _core.ServoSettings(
+        newest=RULES[pi.rule],
+        command_weight=pi.command_weight,
+        anti_windup=pi.anti_windup,
+        tracking_time=pi.tracking_time or 0.0,
+        command_filters=[f.digital(period) for f in cascade.command_filters],
+        velocity_filters=[f.digital(period) for f in cascade.velocity_filters],
+        torque_filters=[f.digital(period) for f in cascade.torque_filters],
+        position_gain=0.0 if cascade.position is None else cascade.position.gain,
+        position_every=position_every,
+    )
+    return _core.Loop(kind="servo", controller=core_controller(pi), servo=settings)
 
 
 def record(dt: float, source: Vector, velocity: Vector, start: str, velocity0: float) -> _core.Record:

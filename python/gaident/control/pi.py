@@ -1,4 +1,4 @@
-"""The velocity controller: u = kp e + ki integral of e, e = command - velocity (Fig. 3 of the paper)."""
+"""The velocity controller: u = kp (b r - w) + ki integral of e, e = r - w (for b = 1 Fig. 3 of the paper)."""
 
 from __future__ import annotations
 
@@ -13,6 +13,10 @@ from gaident.errors import ControllerError
 
 PI_OF_GAINS = arg("controller", "PI(kp=..., ki=...)", python="PI(kp=..., ki=...)")
 LOOPS = ("sampled", "continuous")
+RULES = {"trapezoidal": 0.5, "backward": 1.0, "forward": 0.0}
+"""Rule of integration -> share of ki T that the newest error has in a step of the integral."""
+DIGITAL = ("rule", "command_weight", "anti_windup", "tracking_time")
+ANTI_WINDUP = ("none", "hold", "tracking")
 _NOT_GIVEN = float("nan")  # told from a given nan by identity
 
 
@@ -36,11 +40,22 @@ class PI:
         u is clamped to +-torque_limit [N m]; None: no limit.
     integrator_limit : float, optional
         I is clamped to +-integrator_limit [N m] after each update; None: no limit.
+    rule : {"trapezoidal", "backward", "forward"}
+        How I is summed, T the controller's sample time: ki T (e(n) + e(n-1))/2, ki T e(n), or ki T e(n-1).
+    command_weight : float
+        b of the proportional part kp (b r - w), >= 0; 0: an IP controller.
+    anti_windup : {"none", "hold", "tracking"}
+        What keeps I from winding up where u is at `torque_limit`, which it needs.
+        "hold": where e would drive u further, I keeps its last value, and u is formed again.
+        "tracking": I changes by (u_limited - u) T/tracking_time after the clamp.
+    tracking_time : float, optional
+        [s], > 0, of "tracking".
 
     Raises
     ------
     ControllerError
-        For a missing or negative gain, two gains of 0, another loop, and a limit that is not above 0.
+        For a missing or negative gain, two gains of 0, another loop, a limit that is not above 0, an anti-windup without what it
+        needs, and anything of a digital controller in the continuous loop.
 
     Notes
     -----
@@ -59,6 +74,10 @@ class PI:
     loop: str = "sampled"
     torque_limit: float | None = None
     integrator_limit: float | None = None
+    rule: str = "trapezoidal"
+    command_weight: float = 1.0
+    anti_windup: str = "none"
+    tracking_time: float | None = None
 
     def __post_init__(self) -> None:
         missing = [name for name in ("kp", "ki") if getattr(self, name) is _NOT_GIVEN]
@@ -88,6 +107,39 @@ class PI:
             if limit <= 0.0:
                 raise ControllerError(f"{name} is {limit:g}: {remedy}")
             object.__setattr__(self, name, limit)
+        self._check_digital()
+
+    def _check_digital(self) -> None:
+        object.__setattr__(self, "rule", one_of(self.rule, "rule", tuple(RULES), ControllerError))
+        object.__setattr__(self, "anti_windup", one_of(self.anti_windup, "anti_windup", ANTI_WINDUP, ControllerError))
+        weight = real_number(self.command_weight, "command_weight", ControllerError)
+        if weight < 0.0:
+            raise ControllerError(f"command_weight is {weight:g}: give a number >= 0; 1 is a PI, 0 an IP controller")
+        object.__setattr__(self, "command_weight", weight)
+        if self.anti_windup != "none" and self.torque_limit is None:
+            raise ControllerError(
+                f'anti_windup is "{self.anti_windup}" without a torque_limit, at which it would act: give torque_limit='
+            )
+        if (self.anti_windup == "tracking") != (self.tracking_time is not None):
+            raise ControllerError(
+                f'anti_windup is "{self.anti_windup}" and tracking_time is {self.tracking_time}: "tracking" needs a '
+                "tracking_time [s], the others have none"
+            )
+        if self.tracking_time is not None:
+            time = real_number(self.tracking_time, "tracking_time", ControllerError, "give a number > 0")
+            if time <= 0.0:
+                raise ControllerError(f"tracking_time is {time:g}: give a number > 0")
+            object.__setattr__(self, "tracking_time", time)
+        if self.loop == "continuous" and not self.bare:
+            raise ControllerError(
+                'loop is "continuous", but rule, command_weight and anti_windup belong to a digital controller: leave them out, '
+                'or give loop="sampled"'
+            )
+
+    @property
+    def bare(self) -> bool:
+        """True for the trapezoidal rule, a command weight of 1 and no anti-windup: the paper's controller, limits or not."""
+        return self.rule == "trapezoidal" and self.command_weight == 1.0 and self.anti_windup == "none"
 
     @property
     def limited(self) -> bool:
@@ -102,12 +154,13 @@ class PI:
         return torque, integrator
 
     def to_dict(self) -> dict[str, float | str | None]:
-        """Return the fields as a dictionary for JSON or TOML."""
-        return asdict(self)
+        """Return the fields as a dictionary for JSON or TOML, without those of a digital controller that a bare one has not."""
+        data = asdict(self)
+        return {key: data[key] for key in data if key not in DIGITAL} if self.bare else data
 
     @classmethod
     def from_dict(cls, data: Mapping[str, object]) -> PI:
         """Return the controller of what `to_dict` gave; keys with a default may be left out. Raises ControllerError."""
-        allowed = ("kp", "ki", "loop", "torque_limit", "integrator_limit")
+        allowed = ("kp", "ki", "loop", "torque_limit", "integrator_limit", *DIGITAL)
         values: dict[str, Any] = known_keys(data, "the controller", allowed, ("kp", "ki"), ControllerError)
         return cls(**values)

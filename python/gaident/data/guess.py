@@ -16,6 +16,8 @@ from gaident.errors import ReadError
 
 __all__ = ["Guess", "guess_channels", "position_and_velocity", "unit_from_position", "unit_from_velocity"]
 
+COMMANDED_QUANTITY = {"command": "velocity", "position_command": "position"}
+"""Channel that is a command -> the quantity that it commands."""
 _LEAST = 2
 
 
@@ -46,7 +48,7 @@ def guess_channels(listing: Listing) -> Guess:
     channels: dict[str, ColumnInfo] = {}
     reasons: dict[str, str] = {}
     undecided: dict[str, tuple[ColumnInfo, ...]] = {}
-    for channel in ("velocity", "command", "torque", "position"):
+    for channel in ("velocity", "command", "torque", "position", "position_command"):
         free = [row for row in scored[channel] if row[1].name not in {c.name for c in channels.values()}]
         best = max((score for score, _, _ in free), default=0)
         first = [row for row in free if row[0] == best]
@@ -69,7 +71,7 @@ def _time(listing: Listing, longest: int) -> ColumnInfo | None:
 
 def _score(column: ColumnInfo, channel: str) -> tuple[int, str]:
     """How much speaks for it: words of the name, the unit."""
-    quantity = "velocity" if channel == "command" else channel
+    quantity = COMMANDED_QUANTITY.get(channel, channel)
     words = [word for name in (column.name, *column.names) for word in words_of(name)]
     if FOREIGN_WORDS & set(words):
         return 0, ""
@@ -79,14 +81,14 @@ def _score(column: ColumnInfo, channel: str) -> tuple[int, str]:
         return 0, ""
     commanded, measured = bool(COMMAND_WORDS & set(words)), bool(MEASURED_WORDS & set(words))
     score = by_name + (3 if fits else 0)
-    if channel == "command":
+    if channel in COMMANDED_QUANTITY:
         score = score + 3 if commanded else 0
     elif channel in ("velocity", "position"):
         score = 0 if commanded else score + (1 if measured else 0)  # a command is no measurement, whatever its unit
     else:
         score += 1 if commanded else 0  # what the controller issued rather than what was measured
     why = [f"its name says {quantity}" if by_name else "", f"its unit is one of {quantity}" if fits else ""]
-    if channel == "command" and commanded:
+    if channel in COMMANDED_QUANTITY and commanded:
         why.append("its name says that it is a command")
     return score, ", ".join(filter(None, why))
 

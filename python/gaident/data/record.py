@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident.checks import one_of
-from gaident.data.record_checks import equally_long, moved_channels, sample_time, texts, torque_kind
+from gaident.data.record_checks import check_bounds, equally_long, moved_channels, sample_time, texts, torque_kind
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel
 from gaident.data.signals.decimation import decimated, factor_of
 from gaident.data.torque_kind import COMMANDED, MEASURED
@@ -25,7 +25,7 @@ from gaident.version import version
 
 __all__ = ["CHANNELS", "Record"]
 
-CHANNELS = ("command", "velocity", "torque", "position")
+CHANNELS = ("command", "velocity", "torque", "position", "position_command")
 """The channels of a record, in the order of its arguments."""
 
 SCHEMA = "gaident/record"
@@ -57,6 +57,8 @@ class Record:
         Measured motor angle theta [rad].
     name : str
         What reports call the record.
+    position_command : array_like, shape (n,), optional
+        Position command theta* [rad], which drives a loop with a position controller.
     torque_is : {"commanded", "measured"}
         What the torque is.
         "commanded": as the controller issued it, before the actuator's limits, dead band, delay and lag.
@@ -92,6 +94,7 @@ class Record:
     velocity: NDArray[np.float64]
     torque: NDArray[np.float64] | None
     position: NDArray[np.float64] | None
+    position_command: NDArray[np.float64] | None
     name: str
     torque_is: str
     notes: tuple[str, ...]
@@ -105,6 +108,7 @@ class Record:
         position: ArrayLike | None = None,
         name: str = "",
         *,
+        position_command: ArrayLike | None = None,
         torque_is: str = COMMANDED,
         notes: Sequence[str] = (),
     ) -> None:
@@ -117,7 +121,7 @@ class Record:
             raise RecordError("command=None and torque=None, but a record needs what drove the motor; give one of them")
         if not isinstance(name, str):
             raise RecordError(f"name={name!r} is no text; give a str")
-        given = {"command": command, "velocity": velocity, "torque": torque, "position": position}
+        given = {key: value for key, value in zip(CHANNELS, (command, velocity, torque, position, position_command), strict=True)}
         channels = {key: None if values is None else channel(values, key) for key, values in given.items()}
         kind = torque_kind(torque_is, channels["torque"])
         self._fill(sample_time(dt), equally_long(channels), name=str(name), torque_is=kind, notes=texts(notes))
@@ -252,13 +256,7 @@ class Record:
         RecordError
             Where a bound is no number, t0 >= t1, or fewer than 20 samples are left.
         """
-        for key, value in (("t0", t0), ("t1", t1)):
-            if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-                raise RecordError(f"between({t0!r}, {t1!r}): {key} is no number; give seconds")
-            if math.isnan(value):
-                raise RecordError(f"between({t0!r}, {t1!r}): {key} is NaN; give seconds")
-        if not t0 < t1:
-            raise RecordError(f"between({t0!r}, {t1!r}): t0 must be before t1; exchange them")
+        check_bounds(t0, t1)
         start, stop = (self._sample_at(float(value)) for value in (t0, t1))
         return self._cut(start, stop, f"between({t0!r}, {t1!r})")
 
@@ -352,13 +350,13 @@ class Record:
             Where the data are something else or of a newer schema.
         """
         check_schema(data, SCHEMA, SCHEMA_VERSION)
-        missing = [key for key in ("dt", "name", *CHANNELS) if key not in data]
+        missing = [key for key in ("dt", "name", *CHANNELS[:4]) if key not in data]
         if missing:
             raise RecordError(f"the saved record lacks {', '.join(missing)}; save it again")
-        command, velocity, torque, position = (data[key] for key in CHANNELS)
-        # Early files hold neither of these.
+        channels = {key: data.get(key) for key in CHANNELS}
+        # Early files hold neither of these, nor a position command.
         kind, notes = data.get("torque_is", COMMANDED), data.get("notes", ())
-        return cls(data["dt"], command, velocity, torque, position, data["name"], torque_is=kind, notes=notes)
+        return cls(data["dt"], name=data["name"], torque_is=kind, notes=notes, **channels)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the record as JSON, all digits, for `gaident.load`; the file appears whole or not at all."""

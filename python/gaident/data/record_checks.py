@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -13,7 +14,7 @@ from gaident.data.signals.arrays import MINIMUM_SAMPLES, positive_number
 from gaident.data.torque_kind import COMMANDED, TORQUE_KINDS
 from gaident.errors import RecordError
 
-__all__ = ["equally_long", "moved_channels", "sample_time", "texts", "torque_kind"]
+__all__ = ["check_bounds", "equally_long", "moved_channels", "sample_time", "texts", "torque_kind"]
 
 
 def sample_time(dt: object) -> float:
@@ -65,3 +66,14 @@ def moved_channels(channels: Mapping[str, NDArray[np.float64]], samples: Mapping
             "move by fewer samples"
         )
     return {key: values[start - moves[key] : stop - moves[key]] for key, values in channels.items()}
+
+
+def check_bounds(t0: object, t1: object) -> None:
+    """Raises RecordError for bounds that are not two times [s], the earlier first."""
+    for key, value in (("t0", t0), ("t1", t1)):
+        if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+            raise RecordError(f"between({t0!r}, {t1!r}): {key} is no number; give seconds")
+        if math.isnan(value):
+            raise RecordError(f"between({t0!r}, {t1!r}): {key} is NaN; give seconds")
+    if not t0 < t1:  # type: ignore[operator]  # both are numbers
+        raise RecordError(f"between({t0!r}, {t1!r}): t0 must be before t1; exchange them")

@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, called, say
-from gaident.control.pi import PI
+from gaident.control.cascade import Cascade, Controller
 from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
 from gaident.diagnosis.controller.log_shift import aligned
 from gaident.diagnosis.experiments.excitation import decided_by_the_angle, excitation
-from gaident.diagnosis.explain.wording import basis_of, evidence_of, noise_findings
+from gaident.diagnosis.explain.wording import basis_of, evidence_of, far_off, noise_findings
 from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, LOAD, TWO_LEVELS, conditional_classes
 from gaident.diagnosis.mechanics import base_shift, mechanics_of
 from gaident.diagnosis.note import Note
-from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_order, noise_std_of, records_of
+from gaident.diagnosis.records.arguments import ProgressCallback, check_controller, checked, in_order, noise_std_of, records_of
 from gaident.diagnosis.records.folded import ADVICE, FOLDED, folded
 from gaident.diagnosis.records.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.records.sizes import scales_of
@@ -35,6 +35,7 @@ from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.uncertainty import estimates_of
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
+from gaident.models.drive_torque import torque_driven
 from gaident.models.simulate import simulate
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
@@ -50,7 +51,7 @@ DIVERGED = 1e6  # no decision: of the velocity; a simulation that leaves so much
 
 def diagnose(
     rec: Record | Sequence[Record],
-    controller: PI | None = None,
+    controller: Controller | None = None,
     identification: Identification | None = None,
     validation: Record | Sequence[Record] | None = None,
     noise: float | Record | None = None,
@@ -71,8 +72,9 @@ def diagnose(
     ----------
     rec : Record or sequence of Record
         The data.
-    controller : PI, optional
+    controller : PI or Cascade, optional
         The velocity loop; None: open loop, the record's torque drives the model.
+        Under what is no bare PI at the log's rate the torque drives the model too: as logged, or as this controller makes it.
     identification : Identification, optional
         What `identify` found; None: it is run first.
     validation : Record or sequence of Record, optional
@@ -115,8 +117,10 @@ def diagnose(
     """
     began = time.perf_counter()
     note = Note(progress)
-    records = records_of(rec, "rec")
-    held = () if validation is None else records_of(validation, "validation")
+    check_controller(controller)
+    records, loop, under, cascade = torque_driven(records_of(rec, "rec"), controller)
+    held = () if validation is None else torque_driven(records_of(validation, "validation"), controller).records
+    controller = loop
     checked(records, held, controller, identification, bootstrap, seed, progress, axis)
     records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
@@ -130,9 +134,10 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.02, "identifying the linear model")
         idn = identification if identification is not None else identify(list(moved.records), controller, seed=seed)
-        work = _Work(moved.records, moved.held, logged, idn, noise_std, note, axis)
+        work = _Work(moved.records, moved.held, logged, idn, noise_std, note, axis, cascade)
         work.search()
         result = moved.noted(replace(work.report(seed), noise=noise_std, bootstrap=bootstrap))
+        result = replace(result, notes=(*under, *result.notes)) if under else result
         if bootstrap:
             from gaident.diagnosis.selection.bootstrap import with_p_value
 
@@ -153,16 +158,19 @@ class _Work:
     noise: float | None
     note: Note
     axis: str
+    cascade: Cascade | None = None
 
     def __post_init__(self) -> None:
         self.controller = self.logged.controller
-        self.notes: list[Text] = [*self.logged.notes, *open_loop_notes(self.records, self.controller)]
+        self.notes: list[Text] = list(self.logged.notes)
+        if self.cascade is None:
+            self.notes += open_loop_notes(self.records, self.controller)
         hit = [self._spikes(r) for r in self.records]
         clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
         self.clean = tuple(clean)
         self.step = quantisation(self.records)
         read = as_read(self.records, clean, self.controller)
-        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis)
+        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis, self.cascade)
         self.scales = scales_of(data)
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.logged.replays)
         self.notes += notes
@@ -231,12 +239,7 @@ class _Work:
         if driver is None and after.rmse > POLICY.free_run_ratio * after.noise_floor > 0.0:
             # A noise filter removes a slow misfit completely; the free run shows it.
             driver = self.left.strongest or "time"
-            text = (
-                "The free run misses the velocity by {:.0f} times its noise. In these data that passes for a {torque} "
-                "disturbance, but is far too large for noise: a controller or a limit that is not the one given here, or a load "
-                "that changes in time."
-            )
-            self.notes.append(say(text, after.rmse / after.noise_floor))
+            self.notes.append(far_off(after.rmse / after.noise_floor))
         space = self.found.space
         causes = []
         for e in self.final.effects:
@@ -341,7 +344,7 @@ class _Work:
             gains = measured_gains(
                 self.clean,
                 self.held,
-                self.controller,
+                self.cascade or self.controller,
                 self.idn.model,
                 self.final,
                 self.objective,

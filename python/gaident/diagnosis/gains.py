@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.control.pi import PI
+from gaident.control.cascade import Cascade, Controller
 from gaident.data.record import Record
 from gaident.diagnosis.library.terms import RESONANCE
 from gaident.diagnosis.records.hygiene import quantisation
@@ -65,7 +65,7 @@ class Gains:
 def measured_gains(
     records: Sequence[Record],
     held: Sequence[Record],
-    controller: PI | None,
+    controller: Controller | None,
     linear: Model,
     final: Fit,
     objective: Objective,
@@ -137,7 +137,7 @@ def measured_gains(
     )
 
 
-def _turned(rec: Record, controller: PI | None, final: Fit) -> Record:
+def _turned(rec: Record, controller: Controller | None, final: Fit) -> Record:
     """The record with the angle that the model's effects turned with when it was selected.
 
     Where none is logged that is the measured velocity, integrated, or the simulation's own. A pendulum that is simulated with its
@@ -145,7 +145,8 @@ def _turned(rec: Record, controller: PI | None, final: Fit) -> Record:
     """
     if final.predictor.own_angle or rec.position is not None or not any(t.harmonic == "torque" for t in final.parameters.terms):
         return rec
-    (turned,) = DataSet.of([rec], controller).turned
+    # The torque of a cascade is in its record already.
+    (turned,) = DataSet.of([rec], None if isinstance(controller, Cascade) else controller).turned
     return turned
 
 
@@ -194,7 +195,7 @@ def _stages(final: Fit, objective: Objective, part: tuple[int, ...] | None) -> l
     return fits[::-1]
 
 
-def free_run_errors(model: Model, scored: Sequence[tuple[Record, int]], controller: PI | None) -> list[Vector]:
+def free_run_errors(model: Model, scored: Sequence[tuple[Record, int]], controller: Controller | None) -> list[Vector]:
     """Measured minus simulated velocity of each record from a sample on [rad/s]; 1e150 where a simulation diverges."""
     errors = []
     for r, first in scored:
@@ -205,12 +206,14 @@ def free_run_errors(model: Model, scored: Sequence[tuple[Record, int]], controll
     return errors
 
 
-def start_state(model: Model, rec: Record, controller: PI | None) -> Vector | None:
+def start_state(model: Model, rec: Record, controller: Controller | None) -> Vector | None:
     """Initial state of the model at the record's start; None where it starts at rest, or the loop has limits.
 
     A model with effects is not linear in it: two steps of Gauss and Newton over the record's head, from the first velocity.
     """
-    if not starts_moving(rec, controller) or (controller is not None and (controller.limited or model.effects)):
+    if not starts_moving(rec, None if isinstance(controller, Cascade) else controller) or (
+        controller is not None and (controller.limited or model.effects)
+    ):
         return None
     if not model.effects:
         return np.asarray(initial_state(model, rec, controller))

@@ -21,7 +21,7 @@ from gaident.errors import ReadError
 
 __all__ = ["DriveDraft", "draft"]
 
-_SI = {"command": "rad/s", "velocity": "rad/s", "torque": "N m", "position": "rad"}
+_SI = {"command": "rad/s", "velocity": "rad/s", "torque": "N m", "position": "rad", "position_command": "rad"}
 _CONSTANTS = {
     "rated_torque": ("2.4", say("{N m} at 100 %")),
     "torque_constant": ("0.05", say("{N m/A}")),

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.cascade import Cascade, Controller
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
@@ -38,7 +39,8 @@ class DataSet:
     as the controller read them, which may hold samples that the fit leaves out. finest: no substep of a simulation is much
     shorter [s]; resolution: step of the lattice that all velocities lie on [rad/s], 0: none; known_noise: standard deviation
     of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
-    makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear".
+    makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear";
+    cascade: the whole controller where the log has no line for each of its samples; the torque is then known on the lines only.
     """
 
     records: tuple[Record, ...]
@@ -55,6 +57,7 @@ class DataSet:
     loop_follows: bool = True
     torque_measured: bool = False
     axis: str = "rotary"
+    cascade: Cascade | None = None
 
     @classmethod
     def of(
@@ -65,6 +68,7 @@ class DataSet:
         read: Sequence[Record] | None = None,
         resolution: float = 0.0,
         axis: str = "rotary",
+        cascade: Cascade | None = None,
     ) -> DataSet:
         """The records as driven by their torque; spoiled: some velocities are not what the controller read."""
         driven = tuple(_driven(r, torque_of(r, controller)) for r in records)
@@ -74,7 +78,7 @@ class DataSet:
         seen = tuple(records if read is None else read)
         measured = any(r.torque_is == MEASURED for r in records)
         found = cls(tuple(records), controller, driven, turned, free, moving, spoiled, seen, resolution=resolution)
-        return replace(found, torque_measured=measured, axis=axis)
+        return replace(found, torque_measured=measured, axis=axis, cascade=cascade)
 
     @property
     def dt(self) -> float:
@@ -93,13 +97,26 @@ class DataSet:
 
     @property
     def loop_only(self) -> bool:
-        """Whether no torque is available: a replayed one keeps the error that one wrong velocity adds to its integral."""
-        return self.spoiled and not self.torque_logged and self.loopable
+        """Whether no torque drives the motor as it did.
+
+        A replayed one keeps the error that one wrong velocity adds to its integral; one that is logged now and then lacks what it
+        did between the lines.
+        """
+        lost = self.cascade is not None or (self.spoiled and not self.torque_logged)
+        return lost and self.loopable
 
     @cached_property
     def loopable(self) -> bool:
         """Whether command and controller can drive a model too."""
-        return self.controller is not None and self.command is not None and not any(self.moving)
+        if self.loop is None or any(self.moving):
+            return False
+        placed = isinstance(self.loop, Cascade) and self.loop.position is not None
+        return all(r.position_command is not None for r in self.records) if placed else self.command is not None
+
+    @property
+    def loop(self) -> Controller | None:
+        """What a simulated loop is closed over."""
+        return self.controller if self.cascade is None else self.cascade
 
     @cached_property
     def lengths(self) -> tuple[int, ...]:

@@ -20,6 +20,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.cascade import Controller
 from gaident.control.filtering import filtered
 from gaident.control.pi import PI
 from gaident.data.record import Record
@@ -122,18 +123,23 @@ class ClosedLoop:
         data = self.data
         inside = any(t.in_controller for t in parameters.terms)
         if not inside and not self.own_angle and _bends_the_angle(data, parameters):
-            return np.vstack([_of_true_angle(data, parameters, x, data.turned, data.controller) for x in X])
+            return np.vstack([_of_true_angle(data, parameters, x, data.turned, data.loop) for x in X])
         names, values = parameters.values(X)
         steps = substeps(data, parameters.terms)
         records = data.records if self.own_angle else data.turned
-        parts = [simulate_values(parameters.structure, names, values, r, data.controller, substeps=steps) for r in records]
+        parts = [simulate_values(parameters.structure, names, values, r, data.loop, substeps=steps) for r in records]
         return np.concatenate(parts, axis=1)
 
     def torque_response(self, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
-        """See `Predictor`; the controller answers: G d - T (G d), T the closed loop's response to the command."""
+        """See `Predictor`; the controller answers: G d - T (G d), T the closed loop's response to the command.
+
+        Of a cascade that is taken to be its velocity controller alone, at the log's rate.
+        """
         linear = parameters.linear(x)
         open_loop = OpenLoop(self.data).torque_response(parameters, x, torques)
-        d = linear.discrete(parameters.scales.dt, self.data.controller)
+        cascade = self.data.cascade
+        pi = self.data.controller if cascade is None else PI(cascade.velocity.kp, cascade.velocity.ki)
+        d = linear.discrete(parameters.scales.dt, pi)
         return open_loop - filtered(d.alpha, np.append(1.0, -d.beta), open_loop, self.data.lengths)
 
 
@@ -174,7 +180,7 @@ def _of_true_angle(
     parameters: Parameterisation,
     x: Vector,
     records: Sequence[Record],
-    controller: PI | None,
+    controller: Controller | None,
     left_out: Sequence[str] = (),
 ) -> Matrix:
     """One x with the true angle, from which the sensor of this model makes the angle that was seen."""

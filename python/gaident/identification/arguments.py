@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from gaident.arguments import A_CONTROLLER, COMMAND, CONTINUOUS_LOOP, NO_CONTROLLER, TORQUE, arg
+from gaident.control.cascade import Cascade, Controller, cascade_of
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError, SpaceError
@@ -18,13 +19,15 @@ from gaident.results.settings import Settings
 __all__ = ["check_arithmetic", "check_numbers", "checked_records", "checked_space", "distinct"]
 
 
-def checked_records(rec: Record | Sequence[Record], controller: PI | None) -> list[Record]:
+def checked_records(rec: Record | Sequence[Record], controller: Controller | None) -> list[Record]:
     """The records as a list, once each has the input that drives the model. Raises RecordError and SettingsError."""
     records = [rec] if isinstance(rec, Record) else list(rec) if isinstance(rec, Sequence) else None
     if not records or not all(isinstance(r, Record) for r in records):
         raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record or a list of them, at least one")
-    if controller is not None and not isinstance(controller, PI):
-        raise SettingsError(f"controller is {controller!r}: give a gaident.PI, or None for open loop")
+    if controller is not None and not isinstance(controller, PI | Cascade):
+        raise SettingsError(f"controller is {controller!r}: give a gaident.PI or a Cascade, or None for open loop")
+    if controller is not None and cascade_of(controller) is not None:
+        return records
     for i, r in enumerate(records):
         where = f"record {i} ({r.name})" if r.name else f"record {i}"
         if controller is not None and r.command is None:

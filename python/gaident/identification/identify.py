@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gaident import _core
 from gaident.control import core
+from gaident.control.cascade import Controller
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import SettingsError, SpaceError
@@ -25,6 +26,7 @@ from gaident.identification.parts import search_parts
 from gaident.identification.selection import Candidate
 from gaident.identification.space import derive_space
 from gaident.messages import Message
+from gaident.models.drive_torque import torque_driven
 from gaident.models.mechanics import mechanics_from_model
 from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
@@ -49,7 +51,7 @@ REACH = math.log(2.0)  # no decision: effort; units of BIC per sample: twice the
 
 def identify(
     rec: Record | Sequence[Record],
-    controller: PI | None = None,
+    controller: Controller | None = None,
     space: SearchSpace | None = None,
     settings: Settings | None = None,
     trials: int = 1,
@@ -66,8 +68,9 @@ def identify(
     ----------
     rec : Record or sequence of Record
         The data; one model for all, each record with its own initial state.
-    controller : PI, optional
+    controller : PI or Cascade, optional
         The velocity loop, driven by the record's command; None: open loop, the record's torque drives the model.
+        Under what is no bare PI at the log's rate the torque drives the model too: as logged, or as this controller makes it.
     space : SearchSpace, optional
         Search ranges; None: derived from the data, see `Identification.space`.
     settings : Settings, optional
@@ -115,30 +118,32 @@ def identify(
     (1, 0, 0.01, 0.05, False)
     """
     began = time.perf_counter()
-    given = checked_records(rec, controller)
+    driven = torque_driven(checked_records(rec, controller), controller)
+    loop = driven.controller
+    given = [r.with_channels(command=None) for r in driven.records] if driven.cascade is not None else list(driven.records)
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
     check_numbers(trials, seed, workers)
-    check_arithmetic(settings, controller)
+    check_arithmetic(settings, loop)
     threads = _processors() if workers is None else int(workers)
     digests = distinct(given)
     # Sums must not depend on the order given.
     order = sorted(range(len(given)), key=lambda i: (digests[i], given[i].name))
     records, digests = [given[i] for i in order], [digests[i] for i in order]
     derived = space is None
-    space = checked_space(derive_space(records, controller) if space is None else space, controller)
+    space = checked_space(derive_space(records, loop) if space is None else space, loop)
 
-    moving = [
-        settings.initial_state == "free" or (settings.initial_state == "auto" and starts_moving(r, controller)) for r in records
-    ]
-    work = _Work(records, digests, controller, space, settings, moving, threads)
+    moving = [settings.initial_state == "free" or (settings.initial_state == "auto" and starts_moving(r, loop)) for r in records]
+    work = _Work(records, digests, loop, space, settings, moving, threads)
     found = work.search(int(trials), int(seed), progress)
     best, scored = work.select(found)
     result = work.report(best, scored, found, int(seed))
     if derived and not settings.species:
         warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
         object.__setattr__(result, "warnings", (*result.warnings, warning))
+    if driven.notes:
+        object.__setattr__(result, "warnings", (*driven.notes, *result.warnings))
     overflows = sum(t.overflows for t in found)
     if overflows:
         evaluations = sum(t.evaluations for t in found)

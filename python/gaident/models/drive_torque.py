@@ -2,20 +2,107 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import TORQUE
+from gaident.axis import Text, say
+from gaident.control import core
+from gaident.control.cascade import Cascade, Controller, cascade_of
 from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_block
 from gaident.data.record import Record
 from gaident.errors import RecordError
 
-__all__ = ["torque_blocks", "torque_of"]
+__all__ = ["Driven", "driven_by_cascade", "made_by_cascade", "torque_blocks", "torque_driven", "torque_of"]
 
 Vector = NDArray[np.float64]
+
+
+FOLLOWS = 1e-3  # no decision: of the torque's rms, what a log in few digits differs by; more is said
+
+
+class Driven(NamedTuple):
+    """Records and the controller that an estimation closes the loop over; None: their torque drives the model. Notes on that.
+
+    cascade: the whole controller where the log has no line for each of its samples.
+    """
+
+    records: tuple[Record, ...]
+    controller: PI | None
+    notes: tuple[Text, ...]
+    cascade: Cascade | None = None
+
+
+def torque_driven(records: Sequence[Record], controller: Controller | None) -> Driven:
+    """The records as they are under a bare PI or in the open loop; under any other controller as driven by their torque."""
+    cascade = None if controller is None else cascade_of(controller)
+    if cascade is None:
+        assert not isinstance(controller, Cascade)
+        return Driven(tuple(records), controller, ())
+    every = max(cascade.log_every(r.dt) for r in records)
+    if every == 1:
+        notes = [say("The controller is not a bare PI: its {torque} drives the model, and no loop is simulated.")]
+    else:
+        text = (
+            "The log has a line for every {}th sample of the controller. The linear model is identified from a {torque} that "
+            "goes straight from line to line; what the controller answered to noise between them is lost."
+        )
+        notes = [say(text, every)]
+    for rec in records:
+        if every > 1 or rec.torque is None or not _replayable(rec, cascade):
+            continue
+        off = float(np.sqrt(np.mean((rec.torque - made_by_cascade(rec.with_channels(torque=None), cascade)) ** 2)))
+        size = float(np.sqrt(np.mean(rec.torque**2)))
+        if off > FOLLOWS * size:
+            text = (
+                "{}The logged {torque} does not follow from command and velocity through this controller: by {:.2g} {N m} rms, "
+                "of {:.2g} {N m} rms. Is this the controller, and are these the signals it saw?"
+            )
+            notes.append(say(text, f"{rec.name}: " if len(records) > 1 and rec.name else "", off, size))
+    return Driven(tuple(driven_by_cascade(r, cascade) for r in records), None, tuple(notes), cascade if every > 1 else None)
+
+
+def _replayable(rec: Record, cascade: Cascade) -> bool:
+    if cascade.position is None:
+        return rec.command is not None
+    return rec.position_command is not None and rec.position is not None
+
+
+def driven_by_cascade(rec: Record, cascade: Cascade) -> Record:
+    """The record with the torque that drove the motor, held over each line of the log [N m], and no more than drives it.
+
+    Where the log has a line for each of the controller's samples, that is the logged torque, or the one that the controller
+    makes of the measured signals. Of a torque logged every r-th sample, which goes on between the lines, it is the mean over the
+    r samples of a straight line to the next one:
+
+        u(k) + (u(k+1) - u(k)) (r - 1)/(2 r)
+
+    Raises RecordError where a torque is neither logged nor can be made.
+    """
+    every = cascade.log_every(rec.dt)
+    torque = made_by_cascade(rec, cascade) if rec.torque is None else rec.torque
+    if every == 1:
+        return rec.with_channels(torque=torque, command=None, position_command=None)
+    return rec.with_channels(torque=torque + np.append(np.diff(torque), 0.0) * ((every - 1) / (2 * every)))
+
+
+def made_by_cascade(rec: Record, cascade: Cascade) -> Vector:
+    """The torque [N m] (n,) that the controller makes of command and measured signals; RecordError where it cannot be made."""
+    every = cascade.log_every(rec.dt)
+    if every > 1:
+        raise RecordError(
+            f"the record has no torque, and a line for every {every}th sample of the controller only: what it made between "
+            f"the lines of the velocity is lost; give {TORQUE}"
+        )
+    source = rec.command if cascade.position is None else rec.position_command
+    if source is None or (cascade.position is not None and rec.position is None):
+        needed = "a command" if cascade.position is None else "a position_command and a position"
+        raise RecordError(f"the record has no torque and nothing to make it from: give {TORQUE}, or {needed}")
+    return core.servo_torque(rec.dt, source, rec.velocity, rec.position, cascade)
 
 
 def torque_of(rec: Record, controller: PI | None) -> Vector:

@@ -15,6 +15,7 @@ from gaident import _core
 from gaident.arguments import CONTINUOUS_LOOP
 from gaident.checks import known_keys, real_number
 from gaident.control import core
+from gaident.control.cascade import Controller
 from gaident.control.pi import PI
 from gaident.errors import ModelError
 from gaident.models.discrete import Discrete
@@ -389,7 +390,7 @@ class Model:
         return made
 
 
-def require_strictly_proper(p: int, controller: PI | None) -> None:
+def require_strictly_proper(p: int, controller: Controller | None) -> None:
     """Raises ModelError for p = 0 outside the continuous loop."""
     if p == 0 and (controller is None or controller.loop != "continuous"):
         where = "the sampled loop" if controller is not None else "an open loop"

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident.checks import one_of
 from gaident.control import core
+from gaident.control.cascade import Controller
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import ModelError
@@ -46,7 +47,7 @@ class Run:
 def simulate(
     model: AnyModel,
     rec: Record,
-    controller: PI | None = None,
+    controller: Controller | None = None,
     initial_state: ArrayLike | None = None,
     *,
     arithmetic: str = "double",
@@ -60,7 +61,7 @@ def simulate(
         The drive.
     rec : Record
         With a controller its command drives the loop, without one its torque drives the model.
-    controller : PI, optional
+    controller : PI or Cascade, optional
         The velocity loop; None: open loop.
     initial_state : array_like, optional
         See `run`; None: at rest.
@@ -92,7 +93,7 @@ def simulate(
 def run(
     model: AnyModel,
     rec: Record,
-    controller: PI | None = None,
+    controller: Controller | None = None,
     initial_state: ArrayLike | None = None,
     *,
     arithmetic: str = "double",
@@ -108,7 +109,7 @@ def run(
         The drive.
     rec : Record
         With a controller its command drives the loop, without one its torque drives the model.
-    controller : PI, optional
+    controller : PI or Cascade, optional
         The velocity loop; None: open loop.
     initial_state : array_like, optional
         None: at rest.
@@ -151,7 +152,7 @@ def run(
     return Run(velocity, torque, position)
 
 
-def initial_state(model: AnyModel, rec: Record, controller: PI | None = None) -> Signal:
+def initial_state(model: AnyModel, rec: Record, controller: Controller | None = None) -> Signal:
     """Return the initial state with which the model follows the record's velocity best (linear least squares).
 
     The response is the one from rest plus the state's own, which is linear in it.
@@ -164,7 +165,7 @@ def initial_state(model: AnyModel, rec: Record, controller: PI | None = None) ->
         The drive.
     rec : Record
         The record that starts in motion.
-    controller : PI, optional
+    controller : PI or Cascade, optional
         The velocity loop; None: open loop.
 
     Returns
@@ -195,6 +196,11 @@ def initial_state(model: AnyModel, rec: Record, controller: PI | None = None) ->
             "start at rest"
         )
     source, _ = input_of(plant, rec, controller)
+    if not core.one_equation(controller):
+        raise ModelError(
+            f"controller is {controller!r}: the start of a loop is found under a bare PI only; use controller=None where the "
+            "torque is logged, or start at rest"
+        )
     size = plant.order + (controller is not None)
     if size == 0:
         return np.zeros(0)
@@ -214,7 +220,7 @@ def initial_state(model: AnyModel, rec: Record, controller: PI | None = None) ->
 
 
 def _simulated(
-    model: AnyModel, rec: Record, controller: PI | None, state: ArrayLike | None, arithmetic: str, substeps: int | None
+    model: AnyModel, rec: Record, controller: Controller | None, state: ArrayLike | None, arithmetic: str, substeps: int | None
 ) -> tuple[Signal, Signal, Signal | None]:
     """(velocity, torque, angle); a model without effects has no angle of its own."""
     plant = as_model(model)
@@ -226,17 +232,20 @@ def _simulated(
     steps = checked_substeps(substeps)
     if arithmetic not in ("double", "float") and not plant.effects:
         _check_drive(controller, state, arithmetic)
-    if not plant.effects:
+    if not plant.effects and core.one_equation(controller):
         return *_core_simulate(plant, rec.dt, source, controller, start, arithmetic), None
     if arithmetic != "double":
-        raise ModelError(f'arithmetic is {arithmetic!r}: a model with effects is simulated in "double" only')
+        raise ModelError(
+            f"arithmetic is {arithmetic!r}: a model with effects, or under another controller than a bare PI, is "
+            'simulated in "double" only'
+        )
     starts = start.reshape(1, -1) if state is not None else np.zeros((0, 0))
     found = simulated_with_effects(core_record(rec, source, controller), [plant], starts, steps, 1, True)
     velocity, torque, angle = (signal[0] for signal in found)
     return velocity, torque, angle
 
 
-def _check_drive(controller: PI | None, state: ArrayLike | None, arithmetic: str) -> None:
+def _check_drive(controller: Controller | None, state: ArrayLike | None, arithmetic: str) -> None:
     limits = (0.0,) if controller is None else controller.limits
     if controller is None or controller.loop != "continuous" or any(map(math.isfinite, limits)):
         raise ModelError(f'arithmetic is {arithmetic!r}: it is that of the continuous loop without limits; use "double" here')

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gaident import _core
-from gaident.control.pi import PI
+from gaident.control.cascade import Controller
 from gaident.data.record import Record
 from gaident.errors import GaidentError, ModelError
 from gaident.models.effects import table as effect_table
@@ -33,7 +33,7 @@ OwnList = list[tuple[str, Callable[..., Any], Signal]]
 def simulate_many(
     models: Sequence[AnyModel],
     rec: Record,
-    controller: PI | None = None,
+    controller: Controller | None = None,
     *,
     initial_states: ArrayLike | None = None,
     substeps: int | None = None,
@@ -49,7 +49,7 @@ def simulate_many(
         The drives.
     rec : Record
         With a controller its command drives the loop, without one its torque drives the models.
-    controller : PI, optional
+    controller : PI or Cascade, optional
         The velocity loop; None: open loop.
     initial_states : array_like, shape (len(models), states), optional
         See `run`; then all models have the same number of states. None: at rest.
@@ -97,7 +97,7 @@ def simulate_values(
     effects: Sequence[str],
     values: ArrayLike,
     rec: Record,
-    controller: PI | None = None,
+    controller: Controller | None = None,
     *,
     initial_states: ArrayLike | None = None,
     substeps: int | None = None,

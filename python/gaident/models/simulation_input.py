@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from gaident import _core
 from gaident.arguments import A_CONTROLLER, COMMAND, NO_CONTROLLER, TORQUE
 from gaident.control import core
-from gaident.control.pi import PI
+from gaident.control.cascade import Cascade, Controller
 from gaident.data.record import Record
 from gaident.errors import ModelError, RecordError
 from gaident.models.mechanics import OneMass, TwoMass
@@ -27,15 +27,22 @@ def as_model(model: AnyModel) -> Model:
     return model
 
 
-def input_of(plant: Model, rec: Record, controller: PI | None) -> tuple[Signal, str]:
+def input_of(plant: Model, rec: Record, controller: Controller | None) -> tuple[Signal, str]:
     """What drives the simulation, and its name; raises where record, model and loop do not fit together."""
     return input_for(plant.p, rec, controller)
 
 
-def input_for(p: int, rec: Record, controller: PI | None) -> tuple[Signal, str]:
+def input_for(p: int, rec: Record, controller: Controller | None) -> tuple[Signal, str]:
     if not isinstance(rec, Record):
         raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record")
     require_strictly_proper(p, controller)
+    if isinstance(controller, Cascade) and controller.position is not None:
+        if rec.position_command is None:
+            raise RecordError(
+                "the record has no position_command, which drives the loop with a position controller: give position_command=, "
+                "or leave position= out of the cascade to drive its velocity controller with the command"
+            )
+        return np.ascontiguousarray(rec.position_command, dtype=np.float64), "position_command"
     if controller is not None:
         if rec.command is None:
             raise RecordError(
@@ -51,7 +58,7 @@ def input_for(p: int, rec: Record, controller: PI | None) -> tuple[Signal, str]:
     return np.ascontiguousarray(rec.torque, dtype=np.float64), "torque"
 
 
-def check_start(plant: Model, controller: PI | None, start: Signal, what: str) -> None:
+def check_start(plant: Model, controller: Controller | None, start: Signal, what: str) -> None:
     extra = 2 * any(effect.name == "extra_resonance" for effect in plant.effects)
     size = plant.order + extra + (controller is not None)
     if start.shape != (size,):
@@ -72,7 +79,6 @@ def checked_substeps(substeps: int | None) -> int:
     return substeps
 
 
-def core_record(rec: Record, source: Signal, controller: PI | None) -> _core.EffectRecord:
-    position = np.zeros(0) if rec.position is None else rec.position
+def core_record(rec: Record, source: Signal, controller: Controller | None) -> _core.EffectRecord:
     start = 0.0 if rec.position is None else float(rec.position[0])
-    return core.effect_record(rec.dt, source, position, rec.velocity, start, controller)
+    return core.effect_record(rec.dt, source, rec.position, rec.velocity, start, controller)

@@ -14,7 +14,7 @@ __all__ = ["record_html", "sparkline"]
 
 _WIDTH, _HEIGHT = 240, 28
 _CELL = 'style="text-align:right"'
-_UNITS = {"command": "rad/s", "velocity": "rad/s", "torque": "N m", "position": "rad"}
+_UNITS = {"command": "rad/s", "velocity": "rad/s", "torque": "N m", "position": "rad", "position_command": "rad"}
 
 
 def record_html(rec: Record) -> str:

@@ -97,6 +97,7 @@ _TABLES = {
     "velocity": _VELOCITY,
     "torque": _TORQUE,
     "position": _POSITION,
+    "position_command": _POSITION,
     "voltage": _VOLTAGE,
     "current": _CURRENT,
     "time": _TIME,
@@ -158,7 +159,7 @@ def is_any_unit(text: str) -> bool:
 def factor(quantity: str, unit: str | float, constants: Constants | None = None) -> float:
     """What a value in `unit` is multiplied by to get SI (rad, rad/s, N m, s; linear m, m/s, N).
 
-    quantity   "command", "velocity", "torque", "position", "voltage", "current" or "time"
+    quantity   "command", "velocity", "torque", "position", "position_command", "voltage", "current" or "time"
     unit       a spelling from the table, or the factor itself as a number (finite, not 0; negative turns the
                sign)
     constants  of the drive, for counts, A, V and %

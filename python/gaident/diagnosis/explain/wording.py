@@ -15,7 +15,7 @@ from gaident.models.effects import table
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
-__all__ = ["basis_of", "evidence_of", "noise_findings"]
+__all__ = ["basis_of", "evidence_of", "far_off", "noise_findings"]
 
 
 def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None) -> Text:
@@ -50,6 +50,15 @@ def basis_of(found: Selection) -> list[Text]:
     if before is not None and not before.space.is_noise(before.final):
         return [Text("What the model leaves is more than noise: the parameters are those of least output error.")]
     return [Text("A noise model would take a cause for noise here: the parameters are those of least output error.")]
+
+
+def far_off(ratio: float) -> Text:
+    """What a free run says that misses the velocity by `ratio` times its noise."""
+    text = (
+        "The free run misses the velocity by {:.0f} times its noise. In these data that passes for a {torque} disturbance, but "
+        "is far too large for noise: a controller or a limit that is not the one given here, or a load that changes in time."
+    )
+    return say(text, ratio)
 
 
 def noise_findings(spoiled: int, total: int, step: float) -> list[Finding]:

@@ -145,7 +145,7 @@ def noise_floor(task: Task, one: Fit) -> float:
     if not np.isfinite(floor):
         return 0.0
     if floor > 0.0 and data.loopable:  # what the loop suppresses is no noise either: without it a load is integrated
-        inside = np.concatenate([r.velocity - simulate(task.model, r, data.controller) for r in data.records])
+        inside = np.concatenate([r.velocity - simulate(task.model, r, data.loop) for r in data.records])
         floor = min(floor, beyond(float(np.mean(inside[used] ** 2))))
     if floor > 0.0:  # a shaft that resonates is no misfit
         fits = [f for part in task.two_masses(one) for f in part if swings(f)]

@@ -1,0 +1,102 @@
+// One run of the loop with effects: what its lanes have in common, the torques that it looks back on, and a user's own effects in it.
+#pragma once
+
+#include "coefficients.hpp"
+#include "own_effects.hpp"
+
+#include <span>
+
+namespace gaident {
+
+// What lanes of one run have in common.
+struct EffectRun {
+    EffectSet effects;
+    Loop loop;
+    double sample_time = 0.0;  // of the controller
+    int log_every = 1;         // outputs are written for the first of so many samples
+    int substeps = 1;
+    int order = 0;                     // of the plant in observer form
+    bool two_masses = false;           // the coupling is not linear
+    bool moving = false;               // the record does not start at rest
+    std::span<const double> input;     // command, or torque in open loop
+    std::span<const double> velocity_feedforward, torque_feedforward;  // of a servo, or empty
+    std::span<const double> position;                                  // measured, or empty
+    double start_angle = 0.0;
+
+    // Written where not null, lanes side by side: input.size() / log_every * width numbers.
+    double* velocity = nullptr;
+    double* torque = nullptr;
+    double* angle = nullptr;
+
+    const Effects::Tables* tables = nullptr;  // one per lane
+    double* history = nullptr;                // past torques: (history_mask + 1) * width numbers
+    std::size_t history_mask = 0;
+
+    OwnEffects* own = nullptr;           // asked through these
+    OwnSignals own_signals{};            // width numbers each,
+    const double* own_answer = nullptr;  // and answering there
+};
+
+// The torques issued so far, as an effect of the actuator looks back on them.
+struct PastTorques {
+    const EffectRun& run;
+    std::size_t width, newest;
+    int substep;
+
+    // Number `at`, counted as `newest` is.
+    [[gnu::always_inline]] double torque(std::size_t at, std::size_t lane) const {
+        return run.history[(at & run.history_mask) * width + lane];
+    }
+    template <class E>
+    [[gnu::always_inline]] const typename E::Table& table(std::size_t lane) const {
+        return run.tables[lane].template of<E>();
+    }
+};
+
+// User-defined effects in the loop.
+// Few models have them: what asks them is apart and called with values, so that the loop's own state may stay in registers.
+template <class R>
+class OwnInLoop {
+public:
+    OwnInLoop(const EffectRun& run, R w)
+        : run_(run),
+          torque_(at(OwnPlace::torque)),
+          friction_(at(OwnPlace::friction)),
+          actuator_(at(OwnPlace::actuator)),
+          sensor_(at(OwnPlace::sensor)),
+          shaft_(torque_ || friction_),
+          w_before_(w) {}
+
+    bool there() const { return run_.own != nullptr; }
+    bool shaft() const { return shaft_; }
+    bool friction() const { return friction_; }
+    bool actuator() const { return actuator_; }
+    bool sensor() const { return sensor_; }
+
+    [[gnu::noinline]] static R asked(const EffectRun& run, OwnPlace place, R w, R theta, R u, double t) {
+        Pack<R>::store(w, run.own_signals.velocity);
+        Pack<R>::store(theta, run.own_signals.angle);
+        Pack<R>::store(u, run.own_signals.torque);
+        run.own->ask(place, t);
+        return Pack<R>::load(run.own_answer);
+    }
+
+    // The torque with that of the effects at the shaft, evaluated at the predicted mean velocity.
+    [[gnu::always_inline]] R with_torque(R w, R theta, R T, double t) {
+        const R middle = w + (w - w_before_) * R(0.5);
+        w_before_ = w;
+        if (friction_) level_ = asked(run_, OwnPlace::friction, middle, theta, T, t > 0.0 ? t : 0.0);
+        return torque_ ? T + asked(run_, OwnPlace::torque, middle, theta, T, t > 0.0 ? t : 0.0) : T;
+    }
+    // The friction evaluated with it [N m].
+    R level() const { return level_; }
+
+private:
+    bool at(OwnPlace place) const { return run_.own != nullptr && run_.own->at(place); }
+
+    const EffectRun& run_;
+    bool torque_, friction_, actuator_, sensor_, shaft_;
+    R w_before_, level_ = R(0.0);
+};
+
+}  // namespace gaident

@@ -1,0 +1,209 @@
+"""The controller of a servo axis: velocity controller, filters, position controller and feedforward, at its own clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from gaident.checks import known_keys, real_number
+from gaident.control.filters import LowPass, Notch, filter_of
+from gaident.control.pi import PI
+from gaident.errors import ControllerError
+
+__all__ = ["Cascade", "Controller", "Filter", "P", "cascade_of"]
+
+Filter: TypeAlias = LowPass | Notch
+
+WHOLE = 1e-6  # no decision: rounding of two decimal numbers that divide; more is no whole multiple
+FEEDFORWARDS = ("velocity_feedforward", "acceleration_feedforward", "friction_feedforward")
+FILTERS = ("torque_filters", "velocity_filters", "command_filters")
+MOST_FILTERS = 8
+
+
+@dataclass(frozen=True)
+class P:
+    """Proportional position controller: velocity command = gain (position command - position).
+
+    Parameters
+    ----------
+    gain : float
+        Kv [1/s], > 0.
+
+    Raises
+    ------
+    ControllerError
+        For a gain that is not above 0.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> ga.P(40.0)
+    P(gain=40.0)
+    """
+
+    gain: float
+
+    def __post_init__(self) -> None:
+        gain = real_number(self.gain, "gain", ControllerError)
+        if gain <= 0.0:
+            raise ControllerError(f"gain is {gain:g}: give a number > 0 [1/s]")
+        object.__setattr__(self, "gain", gain)
+
+
+@dataclass(frozen=True)
+class Cascade:
+    """The controller of a servo axis at its own clock T.
+
+        r(n) = gain (q*(n) - q(n)) + velocity_feedforward v*(n)        every position_period, held between; without `position`
+                                                                       r is the record's velocity command
+        r -> command_filters -> r',   measured velocity -> velocity_filters -> w,   e = r' - w
+        u(n) = kp (b r' - w) + I(n) + acceleration_feedforward a*(n) + friction_feedforward sign(v*(n))
+        u, limited as `velocity` says -> torque_filters -> the torque that is logged and held for T
+
+    q* is the position command; v* is its slope over the coming position period, or the velocity command; a* the slope of v*.
+
+    Parameters
+    ----------
+    velocity : PI
+        The velocity controller, with loop="sampled".
+    period : float, optional
+        T [s]; None: the log's sample time. The log's is a whole multiple of T.
+    position : P, optional
+        The position controller. The record's position_command drives it.
+    position_period : float, optional
+        Its sample time [s], a whole multiple of T; None: T.
+    velocity_feedforward : float
+        Share of v* that is added to the velocity command of the position controller.
+    acceleration_feedforward : float
+        [N m s^2/rad], an inertia.
+    friction_feedforward : float
+        [N m].
+    torque_filters, velocity_filters, command_filters : sequence of LowPass and Notch
+        At most eight each; they act in their order.
+
+    Raises
+    ------
+    ControllerError
+        For a velocity controller of another kind, times that are not above 0 or no whole multiples, and a feedforward of the
+        position loop without one.
+
+    Examples
+    --------
+    >>> import gaident as ga
+    >>> drive = ga.Cascade(
+    ...     velocity=ga.PI(0.02, 1.4, rule="backward"), period=125e-6, torque_filters=(ga.LowPass(time_constant=0.4e-3),)
+    ... )
+    >>> drive.log_every(dt=1e-3)
+    8
+    """
+
+    velocity: PI
+    period: float | None = None
+    position: P | None = None
+    position_period: float | None = None
+    velocity_feedforward: float = 0.0
+    acceleration_feedforward: float = 0.0
+    friction_feedforward: float = 0.0
+    torque_filters: Sequence[Filter] = ()
+    velocity_filters: Sequence[Filter] = ()
+    command_filters: Sequence[Filter] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.velocity, PI) or self.velocity.loop != "sampled":
+            raise ControllerError(f'velocity is {self.velocity!r}: give a PI with loop="sampled", the digital controller')
+        if self.position is not None and not isinstance(self.position, P):
+            raise ControllerError(f"position is {self.position!r}: give P(gain), or None without a position controller")
+        for name in ("period", "position_period"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            time = real_number(value, name, ControllerError, "give seconds")
+            if time <= 0.0:
+                raise ControllerError(f"{name} is {time:g}: give seconds, > 0")
+            object.__setattr__(self, name, time)
+        for name in FEEDFORWARDS:
+            object.__setattr__(self, name, real_number(getattr(self, name), name, ControllerError))
+        if self.position is None and (self.velocity_feedforward != 0.0 or self.position_period is not None):
+            given = "velocity_feedforward" if self.velocity_feedforward != 0.0 else "position_period"
+            raise ControllerError(
+                f"{given} belongs to a position controller, and there is none: give position=P(gain) or leave it out"
+            )
+        if self.period is not None and self.position_period is not None:
+            _multiple(self.position_period, self.period, "position_period", "period")
+        for name in FILTERS:
+            object.__setattr__(self, name, _filters(getattr(self, name), name))
+
+    @property
+    def loop(self) -> str:
+        """ "sampled": a cascade is a digital controller."""
+        return "sampled"
+
+    @property
+    def limited(self) -> bool:
+        """True if torque or integrator have a limit."""
+        return self.velocity.limited
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """(Torque limit, integrator limit) [N m], infinity for none."""
+        return self.velocity.limits
+
+    def log_every(self, dt: float) -> int:
+        """Controller samples for each line of a log with the sample time dt [s]; ControllerError where it is no whole number."""
+        return 1 if self.period is None else _multiple(dt, self.period, "the record's dt", "period")
+
+    def position_every(self, dt: float) -> int:
+        """Velocity controller's samples for each of the position controller's, in a log with the sample time dt [s]."""
+        if self.position_period is None:
+            return 1
+        return _multiple(self.position_period, dt if self.period is None else self.period, "position_period", "period")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON or TOML."""
+        filters = {name: [f.to_dict() for f in getattr(self, name)] for name in FILTERS}
+        numbers = {name: getattr(self, name) for name in ("period", "position_period", *FEEDFORWARDS)}
+        position = None if self.position is None else self.position.gain
+        return {"velocity": self.velocity.to_dict(), "position_gain": position, **numbers, **filters}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Cascade:
+        """Return the controller of what `to_dict` gave; raises ControllerError."""
+        allowed = ("velocity", "position_gain", "period", "position_period", *FEEDFORWARDS, *FILTERS)
+        values: dict[str, Any] = known_keys(data, "the cascade", allowed, ("velocity",), ControllerError)
+        gain = values.pop("position_gain", None)
+        values["velocity"] = PI.from_dict(values["velocity"])
+        for name in FILTERS:
+            values[name] = tuple(filter_of(one) for one in values.get(name, ()))
+        return cls(position=None if gain is None else P(gain), **values)
+
+
+Controller: TypeAlias = PI | Cascade
+
+
+def cascade_of(controller: Controller) -> Cascade | None:
+    """The cascade that a controller is; None for a bare PI, which the faster recurrences simulate."""
+    if isinstance(controller, Cascade):
+        return controller
+    return None if controller.bare else Cascade(controller)
+
+
+def _filters(given: object, name: str) -> tuple[Filter, ...]:
+    if isinstance(given, LowPass | Notch):
+        given = (given,)
+    if not isinstance(given, Sequence) or not all(isinstance(f, LowPass | Notch) for f in given):
+        raise ControllerError(f"{name} is {given!r}: give a sequence of LowPass and Notch")
+    if len(given) > MOST_FILTERS:
+        raise ControllerError(f"{name} has {len(given)} filters: give at most {MOST_FILTERS}")
+    return tuple(given)
+
+
+def _multiple(long: float, short: float, name: str, of: str) -> int:
+    ratio = long / short
+    whole = max(round(ratio), 1)
+    if abs(ratio - whole) > WHOLE * ratio:
+        raise ControllerError(
+            f"{name} is {long:g} s and {of} {short:g} s, {ratio:.4g} times as long: it must be a whole multiple, such as "
+            f"{whole * short:g} s; or give the {of} {long / whole:g} s"
+        )
+    return whole
