@@ -154,7 +154,7 @@ def test_an_answer_that_is_worse_than_the_table_is_told(bench: SimpleNamespace) 
 
     assert told("right") == [] and told("in set") == ["joint 1/whole: in set (nothing), was right"]
     assert told("missed") == ["joint 1/whole: missed (nothing), was right"]
-    missed, in_set = (bench.records.Case(drive, "whole") for drive in ("joint 2", "hsm150 measured"))
+    missed, in_set = (bench.records.Case(drive, "whole") for drive in ("epos 1", "hsm150 commanded"))
     assert told("missed", missed) == told("right", missed) == told("in set", in_set) == [] != told("missed", in_set)
     for one in (case, missed):
         assert told("wrong", one) == [f"{one.key}: named [['torque_dead_band']], which is false"]

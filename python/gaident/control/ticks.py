@@ -8,13 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.cascade import Cascade
+from gaident.policy.table import POLICY
 
 __all__ = ["Ticks", "at_the_clock", "between_lines", "ticks_of"]
 
 Vector = NDArray[np.float64]
-
-# no decision: a slope that goes on is at most so many times that of the interval before or after, or the value has jumped
-GOES_ON = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +69,7 @@ def between_lines(line: Vector, every: int) -> Vector:
     steps = np.diff(line)
     size = np.abs(steps)
     near = np.maximum(np.append(0.0, size[:-1]), np.append(size[1:], 0.0))
-    steps = np.append(np.where(size <= GOES_ON * near, steps, 0.0), 0.0)
+    steps = np.append(np.where(size <= POLICY.ramp * near, steps, 0.0), 0.0)
     return (line[:, None] + steps[:, None] * (np.arange(every) / every)).ravel()
 
 

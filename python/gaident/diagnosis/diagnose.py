@@ -356,7 +356,8 @@ class _Work:
             effect = gains.harmful[-1]
             text = "{} would come closer to these records, but makes the held-out data worse: it is not accepted."
             self.notes.append(say(text, effect.replace("_", " ").capitalize()))
-            self._settle(self.found.space.without(self.final, effect))
+            shorter = self.found.space.without(self.final, effect)
+            self.take(compared(self.found, shorter, self._equivalent_here, self._say))
 
     def _alternatives(self, effect: str, rivals: Sequence[Rival], even: bool) -> tuple[str, ...]:
         """Statistical rivals and equivalent effects, no untestable ones; even: friction of two levels is a load as well."""

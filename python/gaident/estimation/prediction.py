@@ -138,7 +138,7 @@ class ClosedLoop:
         linear = parameters.linear(x)
         open_loop = OpenLoop(self.data).torque_response(parameters, x, torques)
         cascade = self.data.cascade
-        pi = self.data.controller if cascade is None else PI(cascade.velocity.kp, cascade.velocity.ki)
+        pi = self.data.controller if cascade is None else PI(kp=cascade.velocity.kp, ki=cascade.velocity.ki)
         d = linear.discrete(parameters.scales.dt, pi)
         return open_loop - filtered(d.alpha, np.append(1.0, -d.beta), open_loop, self.data.lengths)
 

@@ -16,13 +16,11 @@ from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_block
 from gaident.data.record import Record
 from gaident.errors import RecordError
+from gaident.policy.table import POLICY
 
 __all__ = ["Driven", "driven_by_cascade", "made_by_cascade", "torque_blocks", "torque_driven", "torque_of"]
 
 Vector = NDArray[np.float64]
-
-
-FOLLOWS = 1e-3  # no decision: of the torque's rms, what a log in few digits differs by; more is said
 
 
 class Driven(NamedTuple):
@@ -57,7 +55,7 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
             continue
         off = float(np.sqrt(np.mean((rec.torque - made_by_cascade(rec.with_channels(torque=None), cascade)) ** 2)))
         size = float(np.sqrt(np.mean(rec.torque**2)))
-        if off > FOLLOWS * size:
+        if off > POLICY.negligible * size:
             text = (
                 "{}The logged {torque} does not follow from command and velocity through this controller: by {:.2g} {N m} rms, "
                 "of {:.2g} {N m} rms. Is this the controller, and are these the signals it saw?"

@@ -52,7 +52,7 @@ def _row(group: str, value: float, unit: str, source: str, cases: str = "", comm
 def calibrated(group: str, name: str, unit: str, source: str) -> Any:
     """A row with the value that the blind bench wrote."""
     measured = CALIBRATED["numbers"][name]
-    source = f"{source}; calibrated at `noise_level`, the largest of {measured['records']} is {measured['largest']:.3g}"
+    source = f"{source}; extrapolated to `noise_level`, the largest of {measured['records']} is {measured['largest']:.3g}"
     return _row(group, measured["value"], unit, source, DRIVES, CALIBRATED["command"])
 
 
@@ -113,6 +113,7 @@ class Policy:
         DRIVES,
     )
     swap: float = gain(2.0, "BIC units", "by which a rival has to be better to take a place", DRIVES)
+    most_effects: int = gain(4, "1", "effects in one model at most", DRIVES)
     harm: float = gain(0.02, "1", "of the held-out error that an effect may add before it is refused", REAL)
     fitted_share: float = gain(0.7, "1", "of a record that parameters are fitted to where the rest is held out", REAL)
     least_held: int = gain(600, "samples", "of a record from which a part is held out", REAL)
@@ -138,6 +139,15 @@ class Policy:
         DRIVES,
     )
     dependence_gain: float = calibrated(NOISE, "dependence_gain", "BIC units", "of a free function of one signal")
+    effort_ratio: float = noise(
+        1.1,
+        "1",
+        "rms of whitened errors over the noise: below, nothing more is looked for, and what explains so much is enough",
+        DRIVES,
+    )
+    misfit_ratio: float = noise(
+        2.0, "1", "rms of the whitened errors of the linear model over the noise: above, output errors are searched first", REAL
+    )
     immaterial: float = noise(
         0.02, "1", "of the linear mechanism's rms error: counts as noise, however little noise there is", DRIVES
     )
@@ -168,6 +178,12 @@ class Policy:
         REAL,
     )
     rigid_band: float = check(0.25, "1", "of the antiresonance: below, a load is rigid within 1/16 (1/(1 - 1/16))", DRIVES)
+    rigid_left: float = check(
+        0.05,
+        "1",
+        "of the squared torque, that the regression of a rigid axis leaves at most: far below its cutoff no shaft swings",
+        REAL,
+    )
     loses: float = check(2.0, "1", "force error of the diagnosed model over that of the regression: above, it is a note", REAL)
 
     # Does the logged torque follow from command and velocity through the controller?
@@ -187,6 +203,9 @@ class Policy:
         50.0, "BIC units", "by which the law holds better before a channel is moved by samples: odds of e^25", SHIFTED
     )
     lag_seen: float = loop(0.5, "samples", "between motion and torque, from which a lag is seen", SHIFTED)
+    ramp: float = loop(
+        2.0, "1", "times the change over the interval before or after: a command changes faster where it jumps", SHIFTED
+    )
     lag_said: float = loop(
         0.75, "samples", "from which a lag of an open loop's log is said; a sampled torque stands at 0.5", SHIFTED
     )
@@ -254,11 +273,6 @@ class Policy:
     )
 
     # Effort: budgets.
-    effort_ratio: float = effort(1.1, "1", "rms of whitened errors over the noise: below, no more effort is spent")
-    misfit_ratio: float = effort(
-        2.0, "1", "rms of the whitened errors of the linear model over the noise: above, output errors first"
-    )
-    most_effects: int = effort(4, "1", "effects in one model")
     beam_width: int = effort(3, "1", "models that are carried on side by side")
     beam_reach: float = effort(4.0, "penalties", "how far behind the best a model is carried on")
     hope: float = effort(0.5, "1", "of what is asked for, that a linearised gain has to promise to be worth a fit")

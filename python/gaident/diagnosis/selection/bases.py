@@ -35,7 +35,11 @@ __all__ = ["ByOutputErrors", "Task", "linear_bases", "noise_floor", "output_erro
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """One selection on its grid of time."""
+    """One selection on its grid of time.
+
+    shown: families of effects that the records show by themselves; rigid_below: the records show one rigid body there [rad/s],
+    and two masses that swing more slowly are none.
+    """
 
     objective: Objective
     scales: Scales
@@ -43,13 +47,14 @@ class Task:
     allowed: tuple[Term, ...]
     note: Callable[[str], None]
     shown: frozenset[str] = frozenset()
+    rigid_below: float = 0.0
 
     @property
     def data(self) -> DataSet:
         return self.objective.data
 
     def space(self) -> Moves:
-        return Moves(self.objective, self.allowed, self.note, shown=self.shown)
+        return Moves(self.objective, self.allowed, self.note, shown=self.shown, rigid_below=self.rigid_below)
 
     def under(self, family: Innovations | OutputErrors) -> Task:
         return replace(self, objective=self.objective.under(family))
@@ -217,7 +222,9 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
         weight, corner=max(weight.balance(objective.bridged(objective.error(fit)[None, :])[0], objective.lengths), _corner(axis))
     )
     heaviest = inertia.value + POLICY.heavier * inertia.std if task.data.torque_measured else None
-    return ByOutputErrors(raw.task.under(OutputErrors(1.0, weight, heaviest)), axis)
+    rigid = axis.force_error**2 < POLICY.rigid_left
+    below = 2.0 * np.pi * POLICY.rigid_band * axis.cutoff_hz if rigid else 0.0  # no decision: rad/s of Hz
+    return ByOutputErrors(replace(raw.task, rigid_below=below).under(OutputErrors(1.0, weight, heaviest)), axis)
 
 
 def _axis(data: DataSet) -> InverseDynamics | None:

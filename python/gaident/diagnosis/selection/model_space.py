@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
-from gaident.diagnosis.selection.mechanisms import as_two_masses
+from gaident.diagnosis.selection.mechanisms import as_two_masses, resonance, swings
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import effective_samples
 from gaident.estimation.dataset import DataSet
@@ -57,6 +57,7 @@ class ModelSpace:
     note: Callable[[str], None]
     policy: Policy = POLICY
     shown: frozenset[str] = frozenset()  # families of effects that the records show by themselves
+    rigid_below: float = 0.0  # rad/s, below which the records show one rigid body
     grown: dict[Hashable, list[Fit]] = field(default_factory=dict)
 
     # What a model is worth.
@@ -82,6 +83,10 @@ class ModelSpace:
         """BIC units within which two explanations are not told apart."""
         short = self.policy.rival_short / self.objective.count if self.whitens else 0.0
         return self.policy.rival_margin * (1.0 + short)
+
+    def swings(self, fit: Fit) -> bool:
+        """Whether two masses may be a shaft: damped as one, and not where the records show one rigid body; one mass may be."""
+        return swings(fit) and (fit.parameters.masses == 1 or resonance(fit) >= self.rigid_below)
 
     def score(self, fit: Fit) -> float:
         """BIC and what the effects cost; the lower the better."""

@@ -31,7 +31,6 @@ from gaident.diagnosis.selection.mechanisms import (
     is_mechanism,
     moved_to,
     released,
-    swings,
 )
 from gaident.diagnosis.selection.model_space import ModelSpace, words
 from gaident.diagnosis.selection.score_test import ScoreTest
@@ -128,7 +127,7 @@ class Moves(ModelSpace):
 
         A second mass that an effect has become swings on a shaft: what does not describes some other thing.
         """
-        fits = [f for f in fits if f.parameters.masses == now.parameters.masses or swings(f)]
+        fits = [f for f in fits if f.parameters.masses == now.parameters.masses or self.swings(f)]
         found = sorted((f for f in fits if f.cost < WORST and is_mechanism(f.parameters, f.x)), key=self.score)
         if found and found[0].predictor.closed:
             count = self.policy.screened

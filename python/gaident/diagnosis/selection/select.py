@@ -26,7 +26,7 @@ from gaident.diagnosis.selection.bases import ByOutputErrors, Task, linear_bases
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
-from gaident.diagnosis.selection.mechanisms import resonance, swings
+from gaident.diagnosis.selection.mechanisms import resonance
 from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.rivals import Rival, rivals_of
@@ -173,7 +173,7 @@ def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]
         # On a coarse grid a resonance beyond what it shows stands for another fast effect: the fit to all samples decides.
         # Two overdamped masses describe some other effect, which one mass leaves in the error.
         shown = task.scales.blocks == 1 or resonance(end) < POLICY.seen_band * np.pi / task.scales.dt
-        if not ends or (swings(end) and shown):
+        if not ends or (space.swings(end) and shown):
             ends.append((base, end))
         if space.quiet(end) and space.small_unwhitened(end):
             break

@@ -1,0 +1,47 @@
+"""An effect that makes held-out data worse is refused, and what is said of the others is then said of the model without it."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gaident as ga
+
+module = importlib.import_module("gaident.diagnosis.diagnose")  # the package's attribute of this name is the function
+
+
+def record(seed: int) -> ga.Record:
+    """One mass with dry friction and a load, levels with reversals, torque logged."""
+    drive = (
+        ga.OneMass(J=2e-4, D=3e-3).model().with_effect("coulomb_friction", torque=0.02).with_effect("load_torque", torque=0.03)
+    )
+    noise = 0.05 * np.random.default_rng(seed).standard_normal(2000)
+    levels = np.array([0, 20, -5, 60, -40, 3, -80, 10, 1, -20, 40, -60, 5, 80, -3, -10, -30, 30, -1, 0.0])
+    r = np.repeat(levels, 100)
+    controller = ga.PI(kp=0.02, ki=0.5)
+    run = ga.run(drive, ga.Record(1e-3, command=r - noise, velocity=noise), controller)
+    return ga.Record(1e-3, command=r, velocity=run.velocity + noise, torque=run.torque)
+
+
+def test_what_is_said_is_said_of_the_model_without_the_refused_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    measured, calls = module.measured_gains, []
+
+    def refusing(*given: Any) -> Any:
+        gains = measured(*given)
+        calls.append(given[4].effects)
+        return replace(gains, harmful=("load_torque",)) if len(calls) == 1 else gains
+
+    whole = ga.diagnose(record(1), ga.PI(kp=0.02, ki=0.5))
+    both = {f.effect: f.delta_bic for f in whole.causes}
+    assert both.keys() == {"coulomb_friction", "load_torque"}
+    monkeypatch.setattr(module, "measured_gains", refusing)
+    without = ga.diagnose(record(1), ga.PI(kp=0.02, ki=0.5))
+    assert len(calls) == 2
+    assert "load_torque" not in calls[1]
+    assert any("Load torque would come closer" in note for note in without.notes)
+    # The friction is now worth what it is worth without the load.
+    assert all(f.delta_bic != pytest.approx(both["coulomb_friction"], rel=1e-3) for f in without.causes)
