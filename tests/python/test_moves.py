@@ -456,6 +456,22 @@ def test_demote_keeps_what_needs_two_masses() -> None:
     assert bench.space.demote(bench.fit(A, masses=1)) == []
 
 
+def test_hold_fixes_one_mass_by_a_spring_where_the_error_follows_the_angle(monkeypatch: pytest.MonkeyPatch) -> None:
+    def answered(toy: Toy, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
+        """A torque -theta answers as the third base parameter does, which is the spring's; a constant does not."""
+        return np.vstack([BASE[2], np.zeros(N)]) if len(torques) == 2 else np.zeros_like(torques)
+
+    monkeypatch.setattr(Toy, "torque_response", answered)
+    bench = Bench({"a": (1.0,)}, extra=0.7 * BASE[2])
+    free = bench.fit(A)
+    (held,) = bench.space.hold(free)
+    assert held.parameters.held and not free.parameters.held and held.effects == ("a",)
+    left = [float(np.std(bench.task.objective.error(f))) for f in (held, free)]
+    assert left[0] < 1.05 * NOISE and left[1] > 3.0 * NOISE
+    assert bench.space.worth(free, held)
+    assert Bench({"a": (1.0,)}).space.hold(Bench({"a": (1.0,)}).fit(A)) == []
+
+
 def test_close_shows_friction_in_its_loop_where_the_open_one_drifts_away() -> None:
     bench = Bench({"level": (0.4,)}, extra=DRIFT, loop=True)
     fit = ls.fit(bench.space.objective, bench.hypothesis(LEVEL), bench.start(bench.hypothesis(LEVEL)), WHITE, 10)
