@@ -9,10 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import chdtrc
 
 import gaident as ga
 from clock import fastest
 from gaident.errors import RecordError, SpaceError
+from gaident.identification.noise import chi2_tail
 
 DT = 0.444e-3
 ONE_MASS = ga.OneMass(J=2e-4, D=3e-3).model()
@@ -218,3 +220,10 @@ def test_a_damped_shaft_is_named_as_the_better_mechanics() -> None:
     undamped = ga.TwoMass(JM=4e-4, DM=5e-4, JL=9e-4, DL=1e-4, KG=1.2)
     plain = ga.identify(closed(undamped.model(), ctl, stairs(2000), 0.02), ctl, workers=1)
     assert not any("with_shaft_damping" in w for w in plain.warnings)
+
+
+def test_the_tail_of_chi_square_is_scipys() -> None:
+    for dof in (1, 2, 3, 8, 25, 80):
+        for x in (0.01, 1.0, 7.3, 40.0, 300.0):
+            assert chi2_tail(x, dof) == pytest.approx(float(chdtrc(dof, x)), rel=1e-12)
+    assert chi2_tail(0.0, 3) == 1.0

@@ -468,7 +468,7 @@ def test_hold_fixes_one_mass_by_a_spring_where_the_error_follows_the_angle(monke
     assert held.parameters.held and not free.parameters.held and held.effects == ("a",)
     left = [float(np.std(bench.task.objective.error(f))) for f in (held, free)]
     assert left[0] < 1.05 * NOISE and left[1] > 3.0 * NOISE
-    assert bench.space.worth(free, held)
+    assert bench.space.score(held) < bench.space.score(free)
     assert Bench({"a": (1.0,)}).space.hold(Bench({"a": (1.0,)}).fit(A)) == []
 
 

@@ -12,7 +12,7 @@ A model is a mechanism (one mass or two) with effects. The moves are
     close       the open loop to the closed one
     search      the same model again, from all starts and globally, beside stops and impacts
 
-Whether a move is taken is one decision, `ModelSpace.worth`.
+Whether an effect is added is one decision, `ModelSpace.worth`; a search of the same model goes by its BIC alone.
 """
 
 from __future__ import annotations
