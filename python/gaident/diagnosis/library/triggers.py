@@ -167,7 +167,7 @@ def _torque(motions: Sequence[Motion]) -> dict[str, Text]:
 def _loop(motions: Sequence[Motion], controller: PI | None) -> dict[str, Text]:
     if controller is None or all(m.command is None for m in motions):
         return dict.fromkeys(
-            ("integrator_clamp", "command_rate_limit"), Text("no controller and no command are known: open loop")
+            ("integrator_clamp", "command_rate_limit"), Text("the torque drives the model: no controller is simulated from a command")
         )
     why = {}
     if controller.ki == 0.0:
