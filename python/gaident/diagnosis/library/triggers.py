@@ -166,15 +166,14 @@ def _torque(motions: Sequence[Motion]) -> dict[str, Text]:
 
 def _loop(motions: Sequence[Motion], controller: PI | None) -> dict[str, Text]:
     if controller is None or all(m.command is None for m in motions):
-        return dict.fromkeys(
-            ("integrator_clamp", "command_rate_limit"), Text("the torque drives the model: no controller is simulated from a command")
-        )
-    why = {}
+        why = Text("the torque drives the model: no controller is simulated from a command")
+        return dict.fromkeys(("integrator_clamp", "command_rate_limit"), why)
+    reasons = {}
     if controller.ki == 0.0:
-        why["integrator_clamp"] = Text("the controller has no integral part")
+        reasons["integrator_clamp"] = Text("the controller has no integral part")
     if not any(m.jumps or (m.command is not None and np.any(np.diff(m.command) != 0.0)) for m in motions):
-        why["command_rate_limit"] = Text("the command never changes")
-    return why
+        reasons["command_rate_limit"] = Text("the command never changes")
+    return reasons
 
 
 def _structure(model: Model | None) -> dict[str, Text]:
