@@ -1,4 +1,4 @@
-"""An effect that makes held-out data worse is refused, and what is said of the others is then said of the model without it."""
+"""What a diagnosis refuses: an effect that makes held-out data worse, and a mechanism that no axis is."""
 
 from __future__ import annotations
 
@@ -45,3 +45,20 @@ def test_what_is_said_is_said_of_the_model_without_the_refused_effect(monkeypatc
     assert any("Load torque would come closer" in note for note in without.notes)
     # The friction is now worth what it is worth without the load.
     assert all(f.delta_bic != pytest.approx(both["coulomb_friction"], rel=1e-3) for f in without.causes)
+
+
+def test_a_model_with_a_negative_damping_is_not_adequate(monkeypatch: pytest.MonkeyPatch) -> None:
+    rec, controller = record(2), ga.PI(kp=0.02, ki=0.5)
+    whole = ga.diagnose(rec, controller)
+    assert (whole.verdict, whole.driver) == ("explained", None)
+    true = module.mechanics_of
+
+    def driven(*given: Any) -> dict[str, ga.Estimate]:
+        return true(*given) | {"viscous_friction": ga.Estimate(-0.01, 0.003, "N m s/rad")}
+
+    monkeypatch.setattr(module, "mechanics_of", driven)
+    found = ga.diagnose(rec, controller)
+    assert (found.verdict, found.driver) == ("partly explained", "velocity")
+    assert any(note.startswith("The viscous friction comes out negative (-0.01 N m s/rad)") for note in found.notes)
+    monkeypatch.setattr(module, "mechanics_of", lambda *given: true(*given) | {"viscous_friction": ga.Estimate(-0.01, 0.004, "")})
+    assert ga.diagnose(rec, controller).verdict == "explained"

@@ -16,10 +16,10 @@ from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
 from gaident.diagnosis.controller.log_shift import aligned
 from gaident.diagnosis.experiments.excitation import decided_by_the_angle, excitation
-from gaident.diagnosis.explain.wording import basis_of, evidence_of, far_off, noise_findings
+from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off, noise_findings
 from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, LOAD, TWO_LEVELS, conditional_classes
-from gaident.diagnosis.mechanics import base_shift, mechanics_of
+from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.arguments import ProgressCallback, check_controller, checked, in_order, noise_std_of, records_of
 from gaident.diagnosis.records.folded import ADVICE, FOLDED, folded
@@ -271,6 +271,9 @@ class _Work:
                 )
             )
         mechanics = mechanics_of(self.objective, self.final)
+        if driver is None and (damping := negative_damping(mechanics)) is not None:
+            driver = "velocity"
+            self.notes.append(drives_itself(damping))
         model = self.final.parameters.model(self.final.x)
         for name, values in self.at_controller.effects.items():
             model = model.with_effect(name, **values)

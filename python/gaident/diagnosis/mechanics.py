@@ -10,15 +10,18 @@ are six equations for six numbers, which `gaident.models.two_mass` solves. The w
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.uncertainty import covariance_of
 from gaident.models.two_mass import mechanics_with_shaft_damping
+from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["MECHANICS", "base_shift", "mechanics_of", "moved"]
+__all__ = ["MECHANICS", "base_shift", "mechanics_of", "moved", "negative_damping"]
 
 Vector = NDArray[np.float64]
 
@@ -61,6 +64,12 @@ def mechanics_of(objective: Objective, fit: Fit) -> dict[str, Estimate]:
         for name, value, s in zip(MECHANICS, found, std, strict=False)
         if np.isfinite(value)
     }
+
+
+def negative_damping(mechanics: Mapping[str, Estimate]) -> Estimate | None:
+    """The viscous friction where it is below 0 beyond its deviation; None where it may be that of an axis."""
+    found = mechanics.get("viscous_friction")
+    return found if found is not None and found.value < -POLICY.contradiction * found.std else None
 
 
 def moved(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:

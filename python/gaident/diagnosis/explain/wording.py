@@ -15,7 +15,7 @@ from gaident.models.effects import table
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
-__all__ = ["basis_of", "evidence_of", "far_off", "noise_findings"]
+__all__ = ["basis_of", "drives_itself", "evidence_of", "far_off", "noise_findings"]
 
 
 def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None) -> Text:
@@ -59,6 +59,15 @@ def far_off(ratio: float) -> Text:
         "is far too large for noise: a controller or a limit that is not the one given here, or a load that changes in time."
     )
     return say(text, ratio)
+
+
+def drives_itself(damping: Estimate) -> Text:
+    """What a negative viscous friction says."""
+    text = (
+        "The viscous friction comes out negative ({:.2g} {N m s/rad}), which no axis has: friction that falls with the speed or "
+        "does not depend on it, or a lag, is in its place. Inertia and friction are not to be trusted."
+    )
+    return say(text, damping.value)
 
 
 def noise_findings(spoiled: int, total: int, step: float) -> list[Finding]:
