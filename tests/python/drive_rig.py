@@ -333,7 +333,7 @@ def rig(
     full = np.concatenate([np.zeros(settle), np.asarray(command, dtype=np.float64)])
     sensor = {"encoder": noise.encoder, "differenced": noise.differenced}
     every = plant.log_every
-    ticks = between_lines(full, every, held=not plant.placed)
+    ticks = between_lines(plant, full)
     whole = run_drive(plant, ticks, effects, substeps=substeps, **sensor, **disturbances(noise, len(ticks), rng))
     log = Log(*(getattr(whole, each.name)[::every] for each in dataclass_fields(Log)))
     velocity = log.velocity.copy()
@@ -352,9 +352,10 @@ def rig(
     )
 
 
-def between_lines(line: Array, every: int, held: bool) -> Array:
-    """A command at the controller's clock: held until the log's next line, or straight to it and after the last line on."""
-    if held or every == 1:
+def between_lines(plant: Plant, line: Array) -> Array:
+    """A command at the controller's clock: a velocity is held until the log's next line, a position goes straight there."""
+    every = plant.log_every
+    if not plant.placed or every == 1:
         return np.repeat(line, every)
     ahead = np.append(line, 2 * line[-1] - line[-2])
     return np.interp(np.arange(len(line) * every) / every, np.arange(len(ahead)), ahead)

@@ -66,7 +66,7 @@ def test_a_slower_log_is_every_so_manyth_sample(placed: bool) -> None:
     line = path(2400)[::4] if placed else command(2400)[::4]
     slow = replace(plant, dt=4 * T, cascade=cascade)
     rec = rig(slow, line, noise="none", position_logged=True)
-    ticks = between_lines(line, 4, held=not placed)
+    ticks = between_lines(slow, line)
     log = run_drive(replace(plant, cascade=cascade), ticks, substeps=10)  # as many as the slower log gives one of its samples
     assert rec.dt == 4 * T
     assert rec.velocity.tobytes() == log.velocity[::4].tobytes()
