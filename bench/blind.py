@@ -137,6 +137,7 @@ def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade
     """Record, validation record, controller and truth of a cell. Raises RuntimeError where its effect does not act there."""
     rng = np.random.default_rng(cell.seed)
     if cell.loop:
+        rng = np.random.default_rng([cell.seed, zlib.crc32(" ".join((cell.loop, str(cell.every), *cell.effects)).encode())])
         two = True if {*cell.effects} & {*COUPLING, "extra_resonance"} else None
         plant, noise = loop_plant(cell.loop, cell.every, rng, two), loop_noise(cell.noise, cell.seed)
         return random_case(cell.seed, cell.effects, cell.kind, noise, cell.torque, cell.factor, plant, plant.placed)

@@ -148,15 +148,18 @@ def level_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> 
     samples = samples_of("multi", plant)
     edges = np.linspace(0, samples, len(levels) + 1).astype(int)
     command = np.empty(samples)
-    # A log that is slower than the controller shows a held command as such only where it stays for two lines.
-    shortest = 1 if plant.log_every == 1 else 2
+    # A log that is slower than the controller shows a held command as such only where it stays for two lines: no shorter chip.
+    slower = plant.log_every > 1
+    shortest = 2 if slower else 1
     for i, level in enumerate(levels):
         length = edges[i + 1] - edges[i]
         command[edges[i] : edges[i + 1]] = level
         if i % 2 == 1:
             clock = max(shortest, round((4e-3 if i % 4 == 1 else 1e-3) / plant.dt))
             chips = rng.choice([-1.0, 1.0], length // clock + 1)
-            command[edges[i] : edges[i + 1]] += 0.05 / plant.kp * np.repeat(chips, clock)[:length]
+            chip = np.arange(length) // clock
+            chip = np.minimum(chip, length // clock - 1) if slower else chip
+            command[edges[i] : edges[i + 1]] += 0.05 / plant.kp * chips[chip]
     return command
 
 

@@ -53,7 +53,7 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
     for rec in records:
         if every > 1 or rec.torque is None or not _replayable(rec, cascade):
             continue
-        off = float(np.sqrt(np.mean((rec.torque - made_by_cascade(rec.with_channels(torque=None), cascade)) ** 2)))
+        off = float(np.sqrt(np.mean((rec.torque - made_by_cascade(rec, cascade)) ** 2)))
         size = float(np.sqrt(np.mean(rec.torque**2)))
         if off > POLICY.negligible * size:
             text = (
