@@ -14,14 +14,17 @@ import gaident as ga
 from blind_judge import Judgement, judge
 from drive_cases import random_case
 from drive_rig import skip_without_library
-from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_plant
+from gaident.models.drive_torque import torque_driven
+from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_noise, loop_plant
 
 skip_without_library()
 
 
-def diagnosed(loop: str, every: int, effects: tuple[str, ...], seed: int) -> Judgement:
+def diagnosed(loop: str, every: int, effects: tuple[str, ...], seed: int, noise: str = "white") -> Judgement:
     plant = loop_plant(loop, every, np.random.default_rng(seed))
-    record, validation, controller, truth = random_case(seed, effects, loop_kind(loop), plant=plant, position_logged=plant.placed)
+    record, validation, controller, truth = random_case(
+        seed, effects, loop_kind(loop), loop_noise(noise, seed), plant=plant, position_logged=plant.placed
+    )
     assert isinstance(controller, ga.Cascade) and controller.log_every(record.dt) == every
     return judge(ga.diagnose(record, controller=controller, validation=validation), truth.effects)
 
@@ -29,6 +32,21 @@ def diagnosed(loop: str, every: int, effects: tuple[str, ...], seed: int) -> Jud
 def test_a_clean_drive_with_every_fourth_sample_is_adequate() -> None:
     judged = diagnosed("torque low pass", 4, (), 1)
     assert judged.verdict == "adequate" and not judged.sets, judged
+
+
+def test_a_clean_drive_is_judged_by_the_mechanism_in_its_loop() -> None:
+    """The model of the identification, from a torque that misses what came between the lines, is ten times as far off."""
+    judged = diagnosed("notch", 4, (), 1, noise="encoder")
+    assert judged.verdict == "adequate" and not judged.sets, judged
+
+
+def test_the_torque_of_a_position_loop_follows_from_its_log() -> None:
+    """From position command, position and velocity, without a velocity command."""
+    plant = loop_plant("position", 1, np.random.default_rng(3))
+    record, _, controller, _ = random_case(3, (), "move", "encoder", plant=plant, position_logged=True)
+    driven = torque_driven([record], controller)
+    assert record.command is None
+    assert not any("does not follow" in note for note in driven.notes)
 
 
 def test_friction_is_named_from_every_fourth_sample() -> None:
