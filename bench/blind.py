@@ -14,6 +14,8 @@ Every finished case is a line of the file: stop at will, start again and it goes
     outside  effects that the library does not know, multi-level
     encoder  an encoder that is really differenced: half a sample of delay is there, and nothing else
     settled  a load that the integrator carries before the record starts, torque logged
+    loops    loops of servo drives, wholly known, at 125 us with the log every 1, 2, 4, 8 samples: clean, and the effects in turn
+             (--loops, --every: only these; --effects none: only clean ones)
 """
 
 from __future__ import annotations
@@ -46,9 +48,10 @@ import gaident as ga
 from blind_judge import describes_noise, judge
 from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS, PAIRS, Truth, nominal_plants, random_case, random_plant, tuned
 from drive_rig import COUPLING, OUTSIDE
+from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_noise, loop_plant
 
 NOISE_KINDS = ("white", "encoder", "coloured")
-GROUPS = ("clean", "effects", "sizes", "pairs", "outside", "encoder", "settled")
+GROUPS = ("clean", "effects", "sizes", "pairs", "outside", "encoder", "settled", "loops")
 
 
 @dataclass(frozen=True)
@@ -64,11 +67,15 @@ class Cell:
     factor: float | None = None
     settle: int = 0
     plant: str | None = None
+    loop: str = ""  # of LOOPS; "": a bare PI at the log's clock
+    every: int = 1  # controller samples to a line of the log
 
     @property
     def key(self) -> str:
         factor = "" if self.factor is None else f"{self.factor:.4g}"
-        return "/".join([self.group, "+".join(self.effects), self.kind, self.noise, f"u{self.torque:d}", factor, str(self.seed)])
+        loop = [self.loop, str(self.every)] if self.loop else []
+        parts = [self.group, *loop, "+".join(self.effects), self.kind, self.noise, f"u{self.torque:d}", factor, str(self.seed)]
+        return "/".join(parts)
 
 
 def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float] | None = None) -> Iterator[Cell]:
@@ -111,11 +118,29 @@ def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float
             yield Cell(group, (), "multi", "differenced", bool(number % 2), number)
         elif group == "settled":
             yield Cell(group, ("load_torque",), "multi", NOISE_KINDS[number % 3], True, number, settle=1500)
+        elif group == "loops":
+            yield from loop_cells(number)
 
 
-def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI, Truth]:
+def loop_cells(number: int) -> Iterator[Cell]:
+    """Each loop at each clock of the log: once clean, once with an effect, which the numbers take in turn."""
+    for loop in LOOPS:
+        for every in EVERY:
+            turn = number + zlib.crc32(f"{loop} {every}".encode())
+            possible = loop_effects(loop)
+            for effects in ((), (possible[turn % len(possible)],)):
+                noise = "white" if turn % 2 or "velocity_quantisation" in effects else "encoder"
+                yield Cell("loops", effects, loop_kind(loop), noise, True, number, loop=loop, every=every)
+
+
+def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade, Truth]:
     """Record, validation record, controller and truth of a cell. Raises RuntimeError where its effect does not act there."""
     rng = np.random.default_rng(cell.seed)
+    if cell.loop:
+        rng = np.random.default_rng([cell.seed, zlib.crc32(" ".join((cell.loop, str(cell.every), *cell.effects)).encode())])
+        two = True if {*cell.effects} & {*COUPLING, "extra_resonance"} else None
+        plant, noise = loop_plant(cell.loop, cell.every, rng, two), loop_noise(cell.noise, cell.seed)
+        return random_case(cell.seed, cell.effects, cell.kind, noise, cell.torque, cell.factor, plant, plant.placed)
     plant = next(p for p in iter(lambda: random_plant(rng), None) if p.name == cell.plant) if cell.plant else None
     return random_case(cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, plant, settle=cell.settle)
 
@@ -136,7 +161,7 @@ def run(cell: Cell, with_oracle: bool) -> dict[str, Any]:
     line |= {"seconds": time.perf_counter() - started, "judged": judge(dia, truth.effects).as_dict()}
     line |= {"before": dia.before.rmse, "after": dia.after.rmse}
     inside = cell.effects and not set(cell.effects) & set(OUTSIDE) and not describes_noise(cell.effects)
-    if with_oracle and validation is not None and inside and not cell.settle:
+    if with_oracle and validation is not None and inside and not cell.settle and not cell.loop:
         line["oracle"] = blind_refit.oracle(truth, record.velocity, validation.velocity)
     return line
 
@@ -188,8 +213,12 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", nargs="+", choices=GROUPS, default=list(GROUPS))
-    parser.add_argument("--effects", nargs="+", default=None, help="of the groups, only cases that hide one of these")
+    parser.add_argument(
+        "--effects", nargs="+", default=None, help="of the groups, only cases that hide one of these; none: clean"
+    )
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
+    parser.add_argument("--loops", nargs="+", choices=list(LOOPS), default=["", *LOOPS], help="of the group loops")
+    parser.add_argument("--every", nargs="+", type=int, choices=EVERY, default=list(EVERY), help="of the group loops")
     names = [plant.name for plant in nominal_plants()]
     parser.add_argument("--plants", nargs="+", choices=names, default=names, help="of --limits")
     parser.add_argument("--limit-with", default="blind_refit:limit", metavar="MODULE:FUNCTION")
@@ -215,7 +244,8 @@ def main() -> None:
         limits = limits_of(list(there.values()))
         chosen = [cell for group in options.only for cell in cells(group, options.cases, options.seed, limits)]
         chosen = [c for c in chosen if c.kind in options.kinds and c.key not in there]
-        chosen = [c for c in chosen if not options.effects or set(c.effects) & set(options.effects)]
+        chosen = [c for c in chosen if not options.effects or set(c.effects or ["none"]) & set(options.effects)]
+        chosen = [c for c in chosen if c.loop in options.loops and c.every in options.every]
         jobs = [(run, cell, not options.no_oracle) for cell in chosen]
     work(options.out, jobs, options.workers)
     print(report(list(read(options.out).values())))

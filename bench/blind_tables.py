@@ -215,6 +215,39 @@ def encoder_table(lines: list[Line]) -> str:
     return f"- half a sample of delay found as delay, lag or filter: {rate(found, n)}\n- anything else named: {rate(other, n)}"
 
 
+def loop_table(lines: list[Line]) -> str:
+    """One row per kind of loop and clock of the log, and the totals."""
+    rows = []
+    names = list(dict.fromkeys(x["cell"]["loop"] for x in lines))
+    for loop in (*names, "all"):
+        of_loop = [x for x in lines if loop in (x["cell"]["loop"], "all")]
+        for every in sorted({x["cell"]["every"] for x in of_loop}):
+            some = [x for x in of_loop if x["cell"]["every"] == every]
+            clean = [x for x in some if not x["cell"]["effects"]]
+            hidden = [x for x in some if x["cell"]["effects"]]
+            found = Counter(each[0] for x in clean for each in x["judged"]["sets"])
+            false = Counter(name for x in hidden for name in x["judged"]["wrong"])
+            rows.append([loop, every, len(clean), share(right(x, "sets") for x in clean),
+                         share(x["judged"]["verdict"] == "adequate" for x in clean), len(hidden),
+                         *(share(right(x, key) for x in hidden) for key in ("exact", "in_set", "wrong")),
+                         share(x["judged"]["verdict"] == "explained" for x in hidden),
+                         median(x["seconds"] for x in some), f"clean: {listing(found)}; hidden: {listing(false)}"])  # fmt: skip
+    clean = [x for x in lines if not x["cell"]["effects"]]
+    hidden = [x for x in lines if x["cell"]["effects"]]
+    drive = [x for x in hidden if x["cell"]["effects"][0] not in NOISE_EFFECTS]
+    apart = [x for x in drive if x["cell"]["effects"][0] not in CLASSES]
+    total = [
+        f"clean, anything reported: {rate(sum(right(x, 'sets') for x in clean), len(clean))}",
+        f"exact name outside structural classes: {rate(sum(right(x, 'exact') for x in apart), len(apart))}",
+        f"truth in the reported set: {rate(sum(right(x, 'in_set') for x in drive), len(drive))}",
+        f"a wrong name: {rate(sum(right(x, 'wrong') for x in hidden), len(hidden))}",
+        f'verdict "explained": {rate(sum(x["judged"]["verdict"] == "explained" for x in drive), len(drive))}',
+    ]
+    head = ["loop", "log every", "clean", "reported", "adequate", "hidden", "exact", "in set", "wrong", "explained",
+            "median [s]", "false names"]  # fmt: skip
+    return table(head, rows) + "\n\n" + "\n".join(f"- {each}" for each in total)
+
+
 def seconds_table(lines: list[Line]) -> str:
     rows = []
     for kind in KINDS:
@@ -247,6 +280,7 @@ def report(lines: list[Line]) -> str:
     add("Effects outside the library", groups.get("outside", []), outside_table)
     add("An encoder that is really differenced", groups.get("encoder", []), encoder_table)
     add("A load settled before the record", groups.get("settled", []), effect_table)
+    add("Loops of servo drives, wholly known", groups.get("loops", []), loop_table)
     add("Time of a diagnosis", done, seconds_table)
     crashed = [x for x in lines if "crash" in x]
     add("Crashes", crashed, lambda some: "\n".join(f"- {x['key']}: {x['crash']}" for x in some))

@@ -8,9 +8,11 @@
 // Every sample is cut at the instant where the delayed torque changes and into substeps of a Runge-Kutta step of fourth order.
 // Dry friction has three regimes (sliding +, sliding -, at rest); the instant of a zero crossing is found by a secant iteration,
 // and at rest w is exactly 0 until the torque that holds the shaft exceeds the friction's level.
-// The controller is digital, as a drive has it.
+// The controller is digital, as a drive has it: drive_rig_controller.hpp.
 //
 // Compiled and called by tests/python/drive_rig.py, which reads the list of fields below.
+#include "drive_rig_controller.hpp"
+
 #include <array>
 #include <cmath>
 #include <limits>
@@ -28,9 +30,6 @@ struct Drive {  // SI units, rad; neutral values
     double D2 = 0;
     double K = 0;  // N m/rad
     double DG = 0;
-    double kp = 0;  // N m s/rad
-    double ki = 0;  // N m/rad
-    double torque_limit = inf;
     double integrator_limit = inf;  // known setting or hidden effect
     double command_rate = inf;      // rad/s2
     double saturation = inf;
@@ -81,7 +80,7 @@ struct Drive {  // SI units, rad; neutral values
     double uneven_depth = 0;
     double uneven_order = 1;
     double uneven_phase = 0;
-    double loaded = 0;  // dry friction as a share of the torque that gravity and the load put on the axis
+    double loaded = 0;      // dry friction as a share of the torque that gravity and the load put on the axis
     double root = 0;        // drag root sqrt|w| sign(w),
     double hysteretic = 0;  // share of a Bouc-Wen spring in K,
     double yield = 1;       // and its yield twist, rad
@@ -274,24 +273,27 @@ private:
     }
 };
 
-double clamp(double value, double limit) { return value > limit ? limit : value < -limit ? -limit : value; }
+using rig_controller::clamp;
 
 }  // namespace
 
-// One run of n samples. `command` drives the loop; where it is null, `given` is the torque command of an open loop. `measured`,
-// where given, is what the controller reads instead of the velocity (a replay). Returns 0, or 1 where the drive ran away.
-extern "C" int drive_rig_run(const Drive* drive, int n, double dt, int substeps, const double* command, const double* given,
+// One run of n samples of the controller. `command` drives the loop; where it is null, `given` is the torque command of an open
+// loop. `measured`, where given, is what the controller reads instead of the velocity (a replay). Returns 0, or 1 where the drive
+// ran away.
+extern "C" int drive_rig_run(const Drive* drive, const rig_controller::Settings* settings, const double* filters,
+                             int filter_count, int n, double dt, int substeps, const double* command, const double* given,
                              const double* measured, const double* velocity_noise, const double* torque_noise, double* velocity,
                              double* torque, double* position, double* truth) {
     const Drive& d = *drive;
     Rig rig(d);
+    rig_controller::Controller controller(*settings, filters, filter_count, command, n, dt, d.integrator_limit, d.command_rate);
     std::vector<double> acted(static_cast<std::size_t>(n));
     const auto at = [&](int i) { return i < 0 ? 0.0 : acted[static_cast<std::size_t>(i)]; };
     const int whole = static_cast<int>(d.delay / dt + 1e-12);
     const double part = d.delay - whole * dt > 1e-9 * dt ? d.delay - whole * dt : 0;
     const int before = static_cast<int>(std::ceil(substeps * part / dt)),
               after = static_cast<int>(std::ceil(substeps * (1 - part / dt)));
-    double integral = 0, last_error = 0, reference = 0, encoded = 0, last_line = 0;
+    double encoded = 0, last_line = 0;
     for (int i = 0; i < n; ++i) {
         double w = d.filter > 0 ? rig.s[filtered] : rig.rippled();
         truth[i] = rig.s[w1];
@@ -308,16 +310,7 @@ extern "C" int drive_rig_run(const Drive* drive, int n, double dt, int substeps,
             last_line = line;
         }
         velocity[i] = w;
-        double u = 0;
-        if (command) {
-            reference += clamp(command[i] - reference, d.command_rate * dt);
-            const double error = reference - (measured ? measured[i] : w);
-            integral = clamp(integral + d.ki * dt / 2 * (error + last_error), d.integrator_limit);
-            u = clamp(d.kp * error + integral, d.torque_limit);
-            last_error = error;
-        } else {
-            u = given[i];
-        }
+        double u = command ? controller.step(i, measured ? measured[i] : w, rig.s[angle]) : given[i];
         torque[i] = u;
         u = clamp(u, d.saturation);
         acted[static_cast<std::size_t>(i)] = std::abs(u) <= d.dead_band ? 0 : u - d.dead_band * sign(u);

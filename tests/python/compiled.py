@@ -28,13 +28,14 @@ def fields(source: Path) -> dict[str, float]:
 
 @lru_cache
 def library(source: Path) -> ctypes.CDLL:
-    """Compile it, once for each text of the source, into build/rig; else, where that is not writable, for this run."""
+    """Compile it, once for each text of source and headers, into build/rig; else, where that is not writable, for this run."""
     command = shlex.split(os.environ.get("CXX", "")) or ["g++"]
     if shutil.which(command[0]) is None:
         command = ["c++"]
     if shutil.which(command[0]) is None:
         raise RuntimeError("the simulated drive needs a C++ compiler: install g++ or name one in CXX")
-    key = hashlib.sha256(source.read_bytes() + " ".join(MATH).encode()).hexdigest()[:16]
+    text = b"".join(file.read_bytes() for file in [source, *_included(source)])
+    key = hashlib.sha256(text + " ".join(MATH).encode()).hexdigest()[:16]
     folder = ROOT / "build" / "rig"
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
@@ -50,3 +51,8 @@ def library(source: Path) -> ctypes.CDLL:
                 raise RuntimeError(f"{source.name} does not compile: {done.stderr}")
             os.replace(made, target)
     return ctypes.CDLL(str(target))
+
+
+def _included(source: Path) -> list[Path]:
+    """The headers beside the source that it names."""
+    return [source.with_name(name) for name in re.findall(r'^#include "([^"]+)"', source.read_text(), re.MULTILINE)]

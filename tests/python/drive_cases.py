@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import gaident as ga
-from drive_rig import COUPLING, NOISES, Array, Noise, Plant, RanAwayError, rig, run_drive
+from drive_rig import COUPLING, NOISES, Array, Noise, Plant, RanAwayError, between_lines, rig, run_drive
 
 __all__ = ["EFFECTS", "KINDS", "NOISE_EFFECTS", "PAIRS", "Truth", "command_for", "draw_effect", "random_case", "random_plant"]
 
@@ -61,6 +61,7 @@ PAIRS = tuple(
 KINDS = ("multi", "step", "move")
 
 STEP_SAMPLES, LONG_SAMPLES = 250, 3500
+LONG_TIME = 1.75  # s, the least of a long record under a cascade, whose log may have many lines a second
 SPEEDS = (1, 3, 5, 10, 20, 30, 40, 60, 80)  # rad/s
 
 
@@ -114,8 +115,19 @@ def tuned(plant: Plant, rng: np.random.Generator) -> Plant:
 
 
 def command_for(kind: str, plant: Plant, rng: np.random.Generator, other_order: bool = False) -> Array:
-    """A velocity command [rad/s]: one step, levels with reversals and dither, or point-to-point moves."""
-    return {"step": step_command, "multi": level_command, "move": move_command}[kind](plant, rng, other_order)
+    """A velocity command [rad/s]: one step, levels with reversals and dither, or point-to-point moves.
+
+    Its sum, a position command [rad], for a drive with a position controller.
+    """
+    command = {"step": step_command, "multi": level_command, "move": move_command}[kind](plant, rng, other_order)
+    return np.cumsum(command) * plant.dt if plant.placed else command
+
+
+def samples_of(kind: str, plant: Plant) -> int:
+    """Lines of a record."""
+    if kind == "step":
+        return STEP_SAMPLES
+    return LONG_SAMPLES if plant.cascade is None else max(LONG_SAMPLES, round(LONG_TIME / plant.dt))
 
 
 def step_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> Array:
@@ -133,22 +145,29 @@ def level_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> 
             first = rng.choice([-1, 1])
             levels += [first * speed, -first * speed]
     levels.append(0.0)
-    edges = np.linspace(0, LONG_SAMPLES, len(levels) + 1).astype(int)
-    command = np.empty(LONG_SAMPLES)
+    samples = samples_of("multi", plant)
+    edges = np.linspace(0, samples, len(levels) + 1).astype(int)
+    command = np.empty(samples)
+    # A log that is slower than the controller shows a held command as such only where it stays for two lines: no shorter chip.
+    slower = plant.log_every > 1
+    shortest = 2 if slower else 1
     for i, level in enumerate(levels):
         length = edges[i + 1] - edges[i]
         command[edges[i] : edges[i + 1]] = level
         if i % 2 == 1:
-            clock = max(1, round((4e-3 if i % 4 == 1 else 1e-3) / plant.dt))
+            clock = max(shortest, round((4e-3 if i % 4 == 1 else 1e-3) / plant.dt))
             chips = rng.choice([-1.0, 1.0], length // clock + 1)
-            command[edges[i] : edges[i + 1]] += 0.05 / plant.kp * np.repeat(chips, clock)[:length]
+            chip = np.arange(length) // clock
+            chip = np.minimum(chip, length // clock - 1) if slower else chip
+            command[edges[i] : edges[i + 1]] += 0.05 / plant.kp * chips[chip]
     return command
 
 
 def move_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> Array:
     """Moves back and forth with limited acceleration and jerk, and dwells; the other order is another job."""
     command = np.zeros(0)
-    while len(command) < LONG_SAMPLES:
+    samples = samples_of("move", plant)
+    while len(command) < samples:
         speed, acceleration = rng.uniform(20, 90), 10 ** rng.uniform(3, 3.6)
         ramp = max(2, round(speed / acceleration / plant.dt))
         hold = round(rng.uniform(0.03, 0.15) / plant.dt)
@@ -157,7 +176,7 @@ def move_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> A
         dwell = np.zeros(round(rng.uniform(0.05, 0.12) / plant.dt))
         move = speed * np.convolve(np.concatenate([profile, np.zeros(len(smooth))]), smooth)
         command = np.concatenate([command, dwell, move, dwell, -move])
-    return command[:LONG_SAMPLES]
+    return command[:samples]
 
 
 def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.random.Generator) -> dict[str, float]:
@@ -221,12 +240,14 @@ def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.ra
 
 
 def stable(plant: Plant, effects: dict[str, dict[str, float]]) -> bool:
-    """Whether the loop with its linear effects comes to rest at a level."""
+    """Whether the loop with its linear effects comes to rest at a level; a bare PI without such an effect does."""
     linear = {name: values for name, values in effects.items() if name in LINEAR}
-    if not linear:
+    if not linear and plant.cascade is None:
         return True
+    every = plant.log_every
     try:
-        end = run_drive(plant, np.full(round(0.9 / plant.dt), 50.0), linear).truth[-round(0.15 / plant.dt) :]
+        level = np.full(round(0.9 / plant.dt) * every, 1.0 if plant.placed else 50.0)
+        end = run_drive(plant, level, linear).truth[-round(0.15 / plant.dt) * every :]
     except RanAwayError:
         return False
     return bool(np.ptp(end) < 0.5)
@@ -237,10 +258,11 @@ def acts(truth: Truth) -> bool:
     if not truth.effects:
         return True
     try:
-        whole = run_drive(truth.plant, truth.command, truth.effects).velocity
+        command = between_lines(truth.plant, truth.command)
+        whole = run_drive(truth.plant, command, truth.effects).velocity
         for name in set(truth.effects) - {"outliers"}:
             rest = {key: value for key, value in truth.effects.items() if key != name}
-            if np.sqrt(np.mean((run_drive(truth.plant, truth.command, rest).velocity - whole) ** 2)) < 1e-6:
+            if np.sqrt(np.mean((run_drive(truth.plant, command, rest).velocity - whole) ** 2)) < 1e-6:
                 return False
     except RanAwayError:
         return False
@@ -257,7 +279,7 @@ def random_case(
     plant: Plant | None = None,
     position_logged: bool = False,
     settle: int = 0,
-) -> tuple[ga.Record, ga.Record | None, ga.PI, Truth]:
+) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade, Truth]:
     """Draw record, validation record (None for a single step), controller and truth; arguments as in `random_truth`."""
     truth = random_truth(seed, effect, kind, noise, factor, plant, settle)
     return *records(truth, torque_logged, position_logged), truth.plant.controller, truth
@@ -282,11 +304,11 @@ def random_truth(
     encoder = float(np.exp(rng.uniform(np.log(1e-4), np.log(6.3e-4))))
     noise_now = replace(NOISES[noise], encoder=encoder) if noise in ("encoder", "differenced") else noise
     noise_now = NOISES[noise_now] if isinstance(noise_now, str) else noise_now
-    samples = STEP_SAMPLES if kind == "step" else LONG_SAMPLES
     for _ in range(200 if plant is None else 10):
         factors = [float(np.exp(rng.uniform(np.log(0.5), np.log(2)))) for _ in effects]
         # One mass with an extra resonance is a drive of two masses, which identify() finds: nothing would be hidden.
         now = plant or random_plant(rng, True if set(effects) & {*COUPLING, "extra_resonance"} else None)
+        samples = samples_of(kind, now)
         hidden = {
             name: draw_effect(name, factors[i] if factor is None else factor, now, samples, rng) for i, name in enumerate(effects)
         }

@@ -1,11 +1,13 @@
 """A simulated drive to hide effects in, independent of the library: `rig(plant, command, effects)` returns its log as a Record.
 
 The drive itself is tests/cpp/drive_rig.cpp: continuous time, fourth-order Runge-Kutta steps cut at every event, at least
-40 to a sample, dry friction with exact rest, a digital PI controller, noise inside the loop (what is logged as torque
+40 to a line of the log, dry friction with exact rest, a digital controller, noise inside the loop (what is logged as torque
 follows from what is logged as velocity). It is compiled here when it is first needed. Names and signs of effects are those
 of the library's table; OUTSIDE lists what the library does not know.
 
     rec = rig(Plant(J=3e-4, D=2e-3, kp=0.03, ki=1.9, dt=1e-3), command, {"coulomb_friction": {"torque": 0.05}}, seed=1)
+
+The controller is a bare PI at the log's clock, or that of `Plant.cascade`: only its numbers are read from it.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Mapping
 from dataclasses import dataclass
+from dataclasses import fields as dataclass_fields
 from functools import lru_cache
 from pathlib import Path
 
@@ -27,7 +30,11 @@ Array = NDArray[np.float64]
 Effects = Mapping[str, Mapping[str, float]]
 
 SOURCE = Path(__file__).resolve().parents[2] / "tests" / "cpp" / "drive_rig.cpp"
+CONTROLLER = SOURCE.with_name("drive_rig_controller.hpp")
 SUBSTEPS, MOST_SUBSTEPS = 40, 400
+LEAST_SUBSTEPS = 8  # of a sample of a controller that is faster than the log
+NEWEST = {"trapezoidal": 0.5, "backward": 1.0, "forward": 0.0}  # share of e(n) in a step of the integral
+PLACES = ("command_filters", "velocity_filters", "torque_filters")  # as the simulated drive numbers them
 
 
 @dataclass(frozen=True)
@@ -35,6 +42,8 @@ class Plant:
     """A drive without effects. One mass J [kg m2], D [N m s/rad]; with JL also a load JL, DL on a shaft KG [N m/rad], DG.
 
     ground, rest: a spring between motor and ground [N m/rad], and the angle at which it rests [rad].
+    dt: of the log [s]. cascade: the controller where it is more than the PI of kp and ki at the log's clock; its gains are
+    then those that act.
     """
 
     J: float
@@ -49,10 +58,21 @@ class Plant:
     ground: float = 0.0
     rest: float = 0.0
     name: str = "drive"
+    cascade: ga.Cascade | None = None
 
     @property
-    def controller(self) -> ga.PI:
-        return ga.PI(self.kp, self.ki)
+    def controller(self) -> ga.PI | ga.Cascade:
+        return self.cascade or ga.PI(self.kp, self.ki)
+
+    @property
+    def log_every(self) -> int:
+        """Controller samples to a line of the log."""
+        return 1 if self.cascade is None or self.cascade.period is None else round(self.dt / self.cascade.period)
+
+    @property
+    def placed(self) -> bool:
+        """Whether a position command drives it [rad], not a velocity command [rad/s]."""
+        return self.cascade is not None and self.cascade.position is not None
 
     @property
     def two_masses(self) -> bool:
@@ -149,7 +169,8 @@ def library() -> ctypes.CDLL:
     """The drive's functions. Raises RuntimeError without a compiler."""
     loaded = compiled.library(SOURCE)
     pointer = ctypes.POINTER(ctypes.c_double)
-    loaded.drive_rig_run.argtypes = [pointer, ctypes.c_int, ctypes.c_double, ctypes.c_int, *[pointer] * 9]
+    integer = ctypes.c_int
+    loaded.drive_rig_run.argtypes = [*[pointer] * 3, integer, integer, ctypes.c_double, integer, *[pointer] * 9]
     return loaded
 
 
@@ -166,8 +187,10 @@ def skip_without_library() -> None:
 def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:
     """The fields of the simulated drive that has these effects."""
     values = dict(fields())
-    values.update(J1=plant.J, D1=plant.D, J2=plant.JL, D2=plant.DL, K=plant.KG, DG=plant.DG, kp=plant.kp, ki=plant.ki)
+    values.update(J1=plant.J, D1=plant.D, J2=plant.JL, D2=plant.DL, K=plant.KG, DG=plant.DG)
     values.update(ground=plant.ground, rest=plant.rest)
+    if plant.cascade is not None and plant.cascade.velocity.integrator_limit is not None:
+        values["integrator_limit"] = plant.cascade.velocity.integrator_limit
     for effect, parameters in effects.items():
         if effect == "outliers":
             continue  # they spoil the log, not the drive
@@ -188,6 +211,32 @@ def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:
         elif effect in FIELDS:
             values.update({known[name]: value for name, value in parameters.items()})
     return values
+
+
+def controller_values(plant: Plant) -> tuple[dict[str, float], Array]:
+    """The fields of the simulated controller, and its filters as rows (place, kind, three numbers)."""
+    values = dict(compiled.fields(CONTROLLER))
+    values.update(kp=plant.kp, ki=plant.ki)
+    rows: list[list[float]] = []
+    c = plant.cascade
+    if c is None:
+        return values, np.zeros((0, 5))
+    pi = c.velocity
+    values.update(kp=pi.kp, ki=pi.ki, newest=NEWEST[pi.rule], weight=pi.command_weight, hold=float(pi.anti_windup == "hold"))
+    values.update(kff=c.velocity_feedforward, aff=c.acceleration_feedforward, fff=c.friction_feedforward)
+    values["tracking_time"] = pi.tracking_time or 0.0
+    if pi.torque_limit is not None:
+        values["torque_limit"] = pi.torque_limit
+    if c.position is not None:
+        period = plant.dt / plant.log_every
+        values.update(position_gain=c.position.gain, position_every=round((c.position_period or period) / period))
+    for place, name in enumerate(PLACES):
+        for f in getattr(c, name):
+            if isinstance(f, ga.LowPass):
+                rows.append([place, 0, f.time_constant, 0, 0])
+            else:
+                rows.append([place, 1, f.frequency, f.numerator_damping, f.denominator_damping])
+    return values, np.array(rows, dtype=np.float64).reshape(-1, 5)
 
 
 def substeps_for(values: Mapping[str, float], dt: float, least: int) -> int:
@@ -215,7 +264,10 @@ def run_drive(
     differenced: bool = False,
     substeps: int = SUBSTEPS,
 ) -> Log:
-    """Simulate from rest. `torque` without a command: open loop; `measured`: the controller reads this (a replay)."""
+    """Simulate from rest, at the controller's clock: every array has `plant.log_every` values to a line of the log.
+
+    `torque` without a command: open loop; `measured`: the controller reads this (a replay).
+    """
     values = drive_values(plant, effects or {})
     values.update(encoder=encoder, differenced=float(differenced))
     driving = command if command is not None else torque
@@ -228,19 +280,29 @@ def run_drive(
             return None
         if array.shape != (n,) or array.dtype != np.float64 or not array.flags.c_contiguous:
             raise ValueError(f"every array is float64, contiguous and {n} long")
+        return address(array)
+
+    def address(array: Array) -> ctypes.Array[ctypes.c_double]:
         return array.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
 
-    drive = np.array(list(values.values()))
+    settings, filters = controller_values(plant)
+    every = plant.log_every
+    period = plant.dt / every
+    least = substeps if every == 1 else max(LEAST_SUBSTEPS, -(-substeps // every))
+    drive, control = (np.array(list(v.values()), dtype=np.float64) for v in (values, settings))
     out = [np.empty(n) for _ in range(4)]
     given = [
         None if a is None else np.ascontiguousarray(a, dtype=np.float64)
         for a in (command, torque if command is None else None, measured, velocity_noise, torque_noise)
     ]
     failed = library().drive_rig_run(
-        drive.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
+        address(drive),
+        address(control),
+        address(filters),
+        len(filters),
         n,
-        plant.dt,
-        substeps_for(values, plant.dt, substeps),
+        period,
+        substeps_for(values, period, least),
         *map(pointer, given),
         *map(pointer, out),
     )
@@ -261,13 +323,19 @@ def rig(
     substeps: int = SUBSTEPS,
     name: str = "",
 ) -> ga.Record:
-    """The log of one run. Starts from rest with an empty integrator; `settle` samples at command 0 before it are not logged."""
+    """The log of one run: `command` as its lines have it, a position command [rad] where the drive is `placed`.
+
+    Starts from rest with an empty integrator; `settle` lines at command 0 before it are not logged.
+    """
     noise = NOISES[noise] if isinstance(noise, str) else noise
     effects = effects or {}
     rng = np.random.default_rng(seed)
     full = np.concatenate([np.zeros(settle), np.asarray(command, dtype=np.float64)])
     sensor = {"encoder": noise.encoder, "differenced": noise.differenced}
-    log = run_drive(plant, full, effects, substeps=substeps, **sensor, **disturbances(noise, len(full), rng))
+    every = plant.log_every
+    ticks = between_lines(plant, full)
+    whole = run_drive(plant, ticks, effects, substeps=substeps, **sensor, **disturbances(noise, len(ticks), rng))
+    log = Log(*(getattr(whole, each.name)[::every] for each in dataclass_fields(Log)))
     velocity = log.velocity.copy()
     if "outliers" in effects:
         count = round(effects["outliers"]["fraction"] * len(command))
@@ -275,12 +343,22 @@ def rig(
         velocity[hit] += rng.choice([-1, 1], count) * rng.uniform(10, 60, count)
     return ga.Record(
         dt=plant.dt,
-        command=full[settle:],
+        command=None if plant.placed else full[settle:],
+        position_command=full[settle:] if plant.placed else None,
         velocity=velocity[settle:],
         torque=log.torque[settle:] if torque_logged else None,
         position=log.position[settle:] - log.position[settle] if position_logged else None,
         name=name or plant.name,
     )
+
+
+def between_lines(plant: Plant, line: Array) -> Array:
+    """A command at the controller's clock: a velocity is held until the log's next line, a position goes straight there."""
+    every = plant.log_every
+    if not plant.placed or every == 1:
+        return np.repeat(line, every)
+    ahead = np.append(line, 2 * line[-1] - line[-2])
+    return np.interp(np.arange(len(line) * every) / every, np.arange(len(ahead)), ahead)
 
 
 def disturbances(noise: Noise, n: int, rng: np.random.Generator) -> dict[str, Array | None]:

@@ -85,9 +85,10 @@ def measured_gains(
         scored, words, part = [(r, 0) for r in records], IN_SAMPLE, None
     scored = [(_turned(r, controller, final), first) for r, first in scored]
     stages = _stages(final, objective, part)
-    chain = [linear]
     named = list(at_controller.items())
     bare = stages[0].parameters.model(stages[0].x)
+    # What the torque did between the lines of a slower log is lost to the identification, not to a fit of the whole loop.
+    chain = [linear if objective.data.cascade is None else bare]
     chain += [_with(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
     chain += [_with(f.parameters.model(f.x), at_controller) for f in stages[1:]]
     errors = [free_run_errors(m, scored, controller) for m in chain]

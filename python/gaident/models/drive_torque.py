@@ -53,7 +53,7 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
     for rec in records:
         if every > 1 or rec.torque is None or not _replayable(rec, cascade):
             continue
-        off = float(np.sqrt(np.mean((rec.torque - made_by_cascade(rec.with_channels(torque=None), cascade)) ** 2)))
+        off = float(np.sqrt(np.mean((rec.torque - made_by_cascade(rec, cascade))[: -_ahead(rec, cascade)] ** 2)))
         size = float(np.sqrt(np.mean(rec.torque**2)))
         if off > POLICY.negligible * size:
             text = (
@@ -62,6 +62,11 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
             )
             notes.append(say(text, f"{rec.name}: " if len(records) > 1 and rec.name else "", off, size))
     return Driven(tuple(driven_by_cascade(r, cascade) for r in records), None, tuple(notes), cascade if every > 1 else None)
+
+
+def _ahead(rec: Record, cascade: Cascade) -> int:
+    """Samples at the end of a record whose feedforward takes the command from behind it."""
+    return 1 if cascade.position is None else 2 * cascade.position_every(rec.dt)
 
 
 def _replayable(rec: Record, cascade: Cascade) -> bool:

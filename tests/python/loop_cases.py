@@ -1,0 +1,115 @@
+"""Kinds of loop that servo drives have, drawn for the blind tests: `loop_plant("notch", 4, rng)` is a drive in such a loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+import gaident as ga
+from drive_cases import EFFECTS, command_for, random_plant, stable
+from drive_rig import Noise, Plant, RanAwayError, between_lines, run_drive
+
+__all__ = ["EVERY", "LOOPS", "loop_effects", "loop_kind", "loop_noise", "loop_plant"]
+
+PERIOD = 125e-6  # s, of the velocity controller
+EVERY = (1, 2, 4, 8)  # its samples to a line of the log
+ENCODER_BITS = (17, 21)  # lines of a turn: 2^17 to 2^20
+LIMITS = ("torque_saturation", "integrator_clamp", "command_rate_limit")
+
+
+def pi(plant: Plant, **more: object) -> ga.PI:
+    return ga.PI(plant.kp, plant.ki, **more)  # type: ignore[arg-type]
+
+
+def low_pass(rng: np.random.Generator, low: float, high: float) -> ga.LowPass:
+    """Its time constant between these [s]."""
+    return ga.LowPass(time_constant=float(rng.uniform(low, high)))
+
+
+def notch(plant: Plant, rng: np.random.Generator) -> ga.Notch:
+    """On the drive's resonance, 10 % beside it at most; of one mass anywhere from 150 to 500 Hz."""
+    hertz = float(rng.uniform(150, 500))
+    if plant.two_masses:
+        hertz = float(np.sqrt(plant.KG * (1 / plant.J + 1 / plant.JL)) / (2 * np.pi) * rng.uniform(0.9, 1.1))
+    return ga.Notch(frequency=hertz, numerator_damping=float(rng.uniform(0.05, 0.2)), denominator_damping=0.7)
+
+
+def limit_for(plant: Plant, rng: np.random.Generator) -> float:
+    """A torque limit [N m] of 0.4 to 0.7 of the greatest torque that the drive would ask for."""
+    line = command_for("multi", plant, np.random.default_rng(int(rng.integers(1 << 31))))
+    free = replace(plant, cascade=ga.Cascade(pi(plant), period=PERIOD))
+    return float(np.abs(run_drive(free, between_lines(free, line)).torque).max() * rng.uniform(0.4, 0.7))
+
+
+def hold(plant: Plant, rng: np.random.Generator) -> ga.Cascade:
+    return ga.Cascade(pi(plant, torque_limit=limit_for(plant, rng), anti_windup="hold"), PERIOD)
+
+
+def tracking(plant: Plant, rng: np.random.Generator) -> ga.Cascade:
+    time = float(rng.uniform(1e-3, 10e-3))
+    return ga.Cascade(pi(plant, torque_limit=limit_for(plant, rng), anti_windup="tracking", tracking_time=time), PERIOD)
+
+
+def position(plant: Plant, rng: np.random.Generator) -> ga.Cascade:
+    return ga.Cascade(
+        pi(plant), PERIOD, position=ga.P(float(rng.uniform(10, 30))), position_period=8 * PERIOD,
+        velocity_feedforward=1.0, acceleration_feedforward=float((plant.J + plant.JL) * rng.uniform(0.8, 1.1)),
+    )  # fmt: skip
+
+
+def together(plant: Plant, rng: np.random.Generator) -> ga.Cascade:
+    velocity = pi(plant, rule="backward", command_weight=float(rng.uniform(0.3, 0.8)), torque_limit=limit_for(plant, rng),
+                  anti_windup="hold")  # fmt: skip
+    return ga.Cascade(
+        velocity, PERIOD, torque_filters=(low_pass(rng, 0.2e-3, 0.5e-3), notch(plant, rng)),
+        velocity_filters=(low_pass(rng, 0.2e-3, 0.4e-3),), command_filters=(low_pass(rng, 1e-3, 3e-3),),
+    )  # fmt: skip
+
+
+LOOPS: dict[str, Callable[[Plant, np.random.Generator], ga.Cascade]] = {
+    "bare": lambda plant, rng: ga.Cascade(pi(plant), PERIOD),
+    "backward": lambda plant, rng: ga.Cascade(pi(plant, rule="backward"), PERIOD),
+    "ip": lambda plant, rng: ga.Cascade(pi(plant, command_weight=0.0), PERIOD),
+    "torque low pass": lambda plant, rng: ga.Cascade(pi(plant), PERIOD, torque_filters=(low_pass(rng, 0.2e-3, 0.8e-3),)),
+    "notch": lambda plant, rng: ga.Cascade(pi(plant), PERIOD, torque_filters=(notch(plant, rng),)),
+    "hold": hold,
+    "tracking": tracking,
+    "command filter": lambda plant, rng: ga.Cascade(pi(plant), PERIOD, command_filters=(low_pass(rng, 1e-3, 5e-3),)),
+    "velocity filter": lambda plant, rng: ga.Cascade(pi(plant), PERIOD, velocity_filters=(low_pass(rng, 0.3e-3, 1e-3),)),
+    "position": position,
+    "together": together,
+}
+LIMITED = ("hold", "tracking", "together")
+
+
+def loop_kind(loop: str) -> str:
+    """The kind of command that drives it: a position command is a move."""
+    return "move" if loop == "position" else "multi"
+
+
+def loop_effects(loop: str) -> tuple[str, ...]:
+    """What can hide in such a loop: no second limit where one acts, no rate limit behind a position controller."""
+    without = LIMITS if loop in LIMITED else ("command_rate_limit",) if loop == "position" else ()
+    return tuple(effect for effect in EFFECTS if effect not in without)
+
+
+def loop_noise(name: str, seed: int) -> Noise | str:
+    """The noise of that name; an encoder is one of a drive, 2^17 to 2^20 lines a turn."""
+    if name != "encoder":
+        return name
+    return Noise(white=0.0, encoder=2 * np.pi / 2.0 ** int(np.random.default_rng(seed).integers(*ENCODER_BITS)))
+
+
+def loop_plant(loop: str, every: int, rng: np.random.Generator, two_masses: bool | None = None) -> Plant:
+    """A random drive in such a loop, its log at every `every`-th controller sample. Raises RuntimeError where none is stable."""
+    for _ in range(50):
+        plant = replace(random_plant(rng, two_masses), dt=PERIOD * every)
+        try:
+            plant = replace(plant, cascade=LOOPS[loop](plant, rng))
+        except RanAwayError:
+            continue
+        if stable(plant, {}):
+            return plant
+    raise RuntimeError(f"no stable drive found in the loop {loop!r}")
