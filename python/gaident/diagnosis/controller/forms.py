@@ -6,8 +6,8 @@ feedforwards, filters. All forms are compared by one criterion, with n samples, 
     n ln(max(rss/n, floor^2)) + k ln n + 2 m ln 3
 
 floor: the root mean square of what the log's rounding makes of a replay, below which nothing is seen.
-The least counts, and only if the torque
-follows from it: `gaident.models.drive_torque.made_by_cascade` runs the whole controller on all measured signals.
+The least counts, and only if the torque follows from it: `gaident.models.drive_torque.made_by_cascade` runs the whole controller on
+all measured signals.
 """
 
 from __future__ import annotations
