@@ -142,5 +142,6 @@ def test_a_diagnosis_names_the_controller_and_no_mechanics() -> None:
     rec = ga.Record(T, command=r, velocity=w + noise, torque=u)
     dia = ga.diagnose(rec, GIVEN)
     assert {f.effect for f in dia.causes} == {"command_weight", "torque_filter"}
-    assert dia.verdict == "explained"
-    assert "does not follow from command and velocity through the given PI" in dia.summary()
+    assert dia.verdict == "explained" and dia.controller is None
+    assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.01)
+    assert "The controller is not the given PI" in dia.summary()

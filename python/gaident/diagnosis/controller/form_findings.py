@@ -61,16 +61,17 @@ def driver_of(records: Sequence[Record], held: Sequence[Record], given: Controll
 
 
 def _findings(shown: Shown) -> tuple[Finding, ...]:
-    evidence = say(
-        "The logged {torque} does not follow from command and velocity through the given PI (rms {:.2g} {N m}); through a "
-        "controller with {} it does, to {:.1g} {N m} rms. No model of the plant is involved.",
-        shown.before,
-        _words(shown),
-        shown.rms,
-    )
     return tuple(
-        Finding(name, _estimates(numbers), (), 0.0, shown.gains[name], None, evidence) for name, numbers in shown.numbers.items()
+        Finding(name, _estimates(numbers), (), 0.0, shown.gains[name], None, _evidence(shown, name))
+        for name, numbers in shown.numbers.items()
     )
+
+
+def _evidence(shown: Shown, name: str) -> Text:
+    text = (
+        "The logged {torque} shows {}: every controller without it is {:.0f} BIC units worse. No model of the plant is involved."
+    )
+    return say(text, _part(shown, name), shown.gains[name])
 
 
 def _estimates(numbers: Mapping[str, tuple[float, float]]) -> dict[str, Estimate]:
@@ -79,16 +80,16 @@ def _estimates(numbers: Mapping[str, tuple[float, float]]) -> dict[str, Estimate
 
 def _words(shown: Shown) -> Text:
     """What differs from the bare PI."""
-    parts: list[Text] = []
-    for name, numbers in shown.numbers.items():
-        if name == "integration_rule":
-            parts.append(Text(RULES[shown.controller.velocity.rule]))
-            continue
-        values = joined(
-            ", ", (say("{} {:.4g}{}", key.replace("_", " "), value, _unit(key)) for key, (value, _) in numbers.items())
-        )
-        parts.append(say("{} ({})", "other gains" if name == "other_gains" else "a " + name.replace("_", " "), values))
-    return joined(" and ", parts)
+    return joined(", ", (_part(shown, name) for name in shown.numbers))
+
+
+def _part(shown: Shown, name: str) -> Text:
+    if name == "integration_rule":
+        return Text(RULES[shown.controller.velocity.rule])
+    numbers = ((key.replace("_", " "), value, _unit(key)) for key, (value, _) in shown.numbers[name].items())
+    values = joined(", ", (say("{} {:.4g}{}", *number) for number in numbers))
+    article = {"other_gains": "", "acceleration_feedforward": "an "}.get(name, "a ")
+    return say("{}{} ({})", article, name.replace("_", " "), values)
 
 
 def _unit(parameter: str) -> Text:
@@ -98,9 +99,11 @@ def _unit(parameter: str) -> Text:
 def _notes(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
     notes = [
         say(
-            "The controller is not the given PI: the logged {torque} shows a controller with {}. Its {torque} drives the model, "
-            "and no loop is simulated.",
+            "The controller is not the given PI, which does not make the logged {torque} (rms {:.2g} {N m}). One with {} does, "
+            "to {:.1g} {N m} rms: its {torque} drives the model, and no loop is simulated.",
+            shown.before,
             _words(shown),
+            shown.rms,
         )
     ]
     if shown.rivals:

@@ -6,8 +6,8 @@ feedforwards, filters. All forms are compared by one criterion, with n samples, 
     n ln(max(rss/n, floor^2)) + k ln n + 2 m ln 3
 
 floor: the root mean square of what the log's rounding makes of a replay, below which nothing is seen.
-The least counts, and only if the torque follows from it: `gaident.models.drive_torque.made_by_cascade` runs the whole controller on
-all measured signals.
+The least counts, and only if the torque follows from it: `gaident.models.drive_torque.made_by_cascade` runs the controller on all
+measured signals.
 """
 
 from __future__ import annotations
@@ -315,7 +315,8 @@ def _named(
     kp, kp_b = float(numbers[KP_W]), float(numbers[KP_R])
     named: dict[str, dict[str, tuple[float, float]]] = {name: {} for name in best.names}
     if "other_gains" in named:
-        named["other_gains"] = {"kp": (kp, float(std[KP_W])), "ki": (float(numbers[KI]), float(std[KI]))}
+        gains = {"kp": (kp, float(std[KP_W])), "ki": (float(numbers[KI]), float(std[KI]))}
+        named["other_gains"] = {name: gains[name] for name in best.form.free}
     if "command_weight" in named and kp > 0.0:
         slope = np.array([-kp_b / kp**2, 1.0 / kp])
         named["command_weight"] = {"weight": (kp_b / kp, float(np.sqrt(max(slope @ cov[:2, :2] @ slope, 0.0))))}
