@@ -14,6 +14,7 @@ from gaident.control.cascade import Cascade, Controller
 from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
+from gaident.diagnosis.controller.form_findings import driver_of
 from gaident.diagnosis.controller.log_shift import aligned
 from gaident.diagnosis.experiments.excitation import decided_by_the_angle, excitation
 from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off, noise_findings
@@ -124,17 +125,24 @@ def diagnose(
     checked(records, held, controller, identification, bootstrap, seed, progress, axis)
     records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
-    moved = aligned(records, held, controller)
-    logged = as_logged(moved.records, controller)
-    controller = logged.controller
     import scipy.linalg  # noqa: F401  brings a BLAS of its own, to be limited too
     from threadpoolctl import threadpool_limits
 
     # A sum that several threads share is rounded otherwise with each number of them, and a search follows the last digit.
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
+        note(0.01, "replaying the controller")
+        moved = aligned(records, held, controller)
+        driver = None if moved.shifts else driver_of(records, held, controller)
+        if driver is not None:
+            controller, under = None, (*under, *driver.notes)
+            moved = aligned(driver.records, driver.held, controller)
+        logged = as_logged(moved.records, controller)
+        controller = logged.controller
         note(0.02, "identifying the linear model")
         idn = identification if identification is not None else identify(list(moved.records), controller, seed=seed)
-        work = _Work(moved.records, moved.held, logged, idn, noise_std, note, axis, cascade)
+        work = _Work(
+            moved.records, moved.held, logged, idn, noise_std, note, axis, cascade, () if driver is None else driver.findings
+        )
         work.search()
         result = moved.noted(replace(work.report(seed), noise=noise_std, bootstrap=bootstrap))
         result = replace(result, notes=(*under, *result.notes)) if under else result
@@ -159,6 +167,7 @@ class _Work:
     note: Note
     axis: str
     cascade: Cascade | None = None
+    form: tuple[Finding, ...] = ()  # of the controller
 
     def __post_init__(self) -> None:
         self.controller = self.logged.controller
@@ -174,6 +183,7 @@ class _Work:
         self.scales = scales_of(data)
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.logged.replays)
         self.notes += notes
+        self.controller_steps += self.form
         # Limits that the log shows act in every loop that is closed for a fit.
         known = {t: np.array(list(self.at_controller.effects[t.name].values())) for t in IN_CONTROLLER if self._shown(t.name)}
         shown = self.at_controller.controller or self.controller

@@ -21,7 +21,7 @@ from gaident.diagnosis.records.lattice import lattice_step, rounding_step
 from gaident.errors import RecordError
 from gaident.policy.table import POLICY
 
-__all__ = ["Replay", "replay"]
+__all__ = ["Replay", "replay", "rounding_of", "tolerance_of"]
 
 Vector = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ def _unchecked(torque: Vector, replayed: Vector | None, sentence: Text) -> Repla
 
 def _compared(rec: Record, command: Vector, controller: PI, logged: Vector, replayed: Vector) -> Replay:
     resolution = lattice_step(logged)
-    tolerance = _tolerance(rec, command, controller, logged)
+    tolerance = tolerance_of(rec, command, controller, logged)
     off = logged - replayed
     rms, maximum = float(np.sqrt(np.mean(off**2))), float(np.abs(off).max())
     figures = (logged, replayed, rms, maximum, resolution)
@@ -126,7 +126,7 @@ def _compared(rec: Record, command: Vector, controller: PI, logged: Vector, repl
     return Replay(*figures, False, "", np.nan, departs, text)
 
 
-def _tolerance(rec: Record, command: Vector, controller: PI, logged: Vector) -> float:
+def tolerance_of(rec: Record, command: Vector, controller: PI, logged: Vector) -> float:
     """Steps of the torque's rounding, and what rounded decimals of velocity and command do to P part and integral [N m].
 
     A coarse lattice of the velocity is the encoder's, and the controller read the same numbers; a fine one is the text log's,
@@ -135,10 +135,29 @@ def _tolerance(rec: Record, command: Vector, controller: PI, logged: Vector) -> 
 
         sum of the squares = ki^2 dt^2 (N q_w^2 + sum L_i^2 q_r^2)/12        L_i: samples for which a command is held
     """
+    own = POLICY.replay_steps * rounding_step(logged) + ROUNDING * float(np.abs(logged).max())
+    at_once, drift = _of_signals(rec, command, controller)
+    return own + at_once + DEVIATIONS * drift
+
+
+def _of_signals(rec: Record, command: Vector, controller: PI) -> tuple[float, float]:
+    """What rounded decimals make of P part, at most, and integral, as deviation [N m]."""
     q = rounding_step(rec.velocity)
     q_w = q if q < POLICY.negligible * float(np.ptp(rec.velocity)) else 0.0
     q_r = min(q_w, rounding_step(command))
     held = np.diff(np.flatnonzero(np.concatenate([[True], np.diff(command) != 0.0, [True]])))
     drift = controller.ki * rec.dt * np.sqrt((len(rec) * q_w**2 + float(held @ held) * q_r**2) / 12.0)
-    own = POLICY.replay_steps * rounding_step(logged) + ROUNDING * float(np.abs(logged).max())
-    return float(own + controller.kp * (q_w + q_r) + DEVIATIONS * drift)
+    return controller.kp * (q_w + q_r), float(drift)
+
+
+def rounding_of(rec: Record, command: Vector, controller: PI, logged: Vector) -> float:
+    """Root mean square of what rounding makes of a replay [N m]: a torque of d digits is off by its own last one."""
+    step = rounding_step(logged)
+    steps = np.full(len(logged), step)
+    if step > 0.0 and lattice_step(logged) == 0.0:
+        size = np.abs(logged)
+        highest = np.floor(np.log10(size.max()))
+        steps *= 10.0 ** (np.floor(np.log10(np.where(size > 0.0, size, size.max()))) - highest)
+    at_once, drift = _of_signals(rec, command, controller)
+    own = float(np.mean(steps**2)) / 12.0 + ROUNDING**2 * float(np.mean(logged**2))
+    return float(np.sqrt(own + at_once**2 / 12.0 + drift**2))

@@ -1,0 +1,115 @@
+"""The form of a controller that the logged torques show: as findings, and the records as that controller drives them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gaident.axis import Text, joined, say, unit_text
+from gaident.control.cascade import Cascade, Controller
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.diagnosis.controller.forms import Shown, form_shown
+from gaident.diagnosis.controller.replay import replay
+from gaident.models.drive_torque import driven_by_cascade
+from gaident.policy.table import POLICY
+from gaident.results.estimate import Estimate
+from gaident.results.finding import Finding
+
+__all__ = ["Driver", "driver_of"]
+
+UNITS = {
+    "kp": "N m s/rad",
+    "ki": "N m/rad",
+    "inertia": "kg m^2",
+    "torque": "N m",
+    "time_constant": "s",
+    "frequency": "Hz",
+}
+"""Of the findings' parameters; the others are numbers."""
+RULES = {
+    "backward": "a rectangular integral (backward)",
+    "forward": "a rectangular integral that lacks the newest error (forward)",
+}
+
+
+@dataclass(frozen=True)
+class Driver:
+    """Records whose torque drives the model, because the logged torques show this controller; findings and notes on it."""
+
+    records: tuple[Record, ...]
+    held: tuple[Record, ...]
+    controller: Cascade
+    findings: tuple[Finding, ...]
+    notes: tuple[Text, ...]
+
+
+def driver_of(records: Sequence[Record], held: Sequence[Record], given: Controller | None) -> Driver | None:
+    """The controller that the logged torques show where a PI does not make them and nothing simple explains that; else None."""
+    if not isinstance(given, PI) or given.loop != "sampled" or any(r.torque is None or r.command is None for r in records):
+        return None
+    replays = [replay(r, given) for r in records]
+    if all(r.follows for r in replays) or any(r.cause not in ("", "initial_integral") for r in replays):
+        return None
+    shown = form_shown(records, given)
+    if shown is None:
+        return None
+    driven, held = (tuple(driven_by_cascade(r, shown.controller) for r in part) for part in (records, held))
+    return Driver(driven, held, shown.controller, _findings(shown), _notes(shown, records))
+
+
+def _findings(shown: Shown) -> tuple[Finding, ...]:
+    return tuple(
+        Finding(name, _estimates(numbers), (), 0.0, shown.gains[name], None, _evidence(shown, name))
+        for name, numbers in shown.numbers.items()
+    )
+
+
+def _evidence(shown: Shown, name: str) -> Text:
+    text = (
+        "The logged {torque} shows {}: every controller without it is {:.0f} BIC units worse. No model of the plant is involved."
+    )
+    return say(text, _part(shown, name), shown.gains[name])
+
+
+def _estimates(numbers: Mapping[str, tuple[float, float]]) -> dict[str, Estimate]:
+    return {name: Estimate(value, std, UNITS.get(name, "1")) for name, (value, std) in numbers.items()}
+
+
+def _words(shown: Shown) -> Text:
+    """What differs from the bare PI."""
+    return joined(", ", (_part(shown, name) for name in shown.numbers))
+
+
+def _part(shown: Shown, name: str) -> Text:
+    if name == "integration_rule":
+        return Text(RULES[shown.controller.velocity.rule])
+    numbers = ((key.replace("_", " "), value, _unit(key)) for key, (value, _) in shown.numbers[name].items())
+    values = joined(", ", (say("{} {:.4g}{}", *number) for number in numbers))
+    article = {"other_gains": "", "acceleration_feedforward": "an "}.get(name, "a ")
+    return say("{}{} ({})", article, name.replace("_", " "), values)
+
+
+def _unit(parameter: str) -> Text:
+    return joined("", (" ", unit_text(UNITS[parameter]))) if parameter in UNITS else Text("")
+
+
+def _notes(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
+    notes = [
+        say(
+            "The controller is not the given PI, which does not make the logged {torque} (rms {:.2g} {N m}). One with {} does, "
+            "to {:.1g} {N m} rms: its {torque} drives the model, and no loop is simulated.",
+            shown.before,
+            _words(shown),
+            shown.rms,
+        )
+    ]
+    if shown.rivals:
+        others = "; ".join(" and ".join(name.replace("_", " ") for name in names) for names in shown.rivals)
+        notes.append(Text(f"The log does not tell this from a controller with, instead: {others}."))
+    highest = max(float(np.abs(r.torque).max()) for r in records if r.torque is not None)
+    if shown.starts > POLICY.negligible * highest:
+        notes.append(say("A record begins under load, with up to {:.4g} {N m} in the integrator.", shown.starts))
+    return tuple(notes)

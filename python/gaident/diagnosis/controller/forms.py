@@ -1,0 +1,341 @@
+"""Which form of controller the logged torques show, where a bare PI with the given gains does not make them.
+
+A form is the regression of form_regression.py under constraints: gains as given or free, a rule of integration, a command weight,
+feedforwards, filters. All forms are compared by one criterion, with n samples, k free numbers and m settings chosen of three,
+
+    n ln(max(rss/n, floor^2)) + k ln n + 2 m ln 3
+
+floor: the root mean square of what the log's rounding makes of a replay, below which nothing is seen.
+The least counts, and only if the torque follows from it: `gaident.models.drive_torque.made_by_cascade` runs the controller on all
+measured signals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.cascade import Cascade
+from gaident.control.filters import LowPass
+from gaident.control.pi import PI, RULES
+from gaident.data.record import Record
+from gaident.diagnosis.controller.form_regression import FILTER_SETS, Law, Shape, at_places, bounds_of, fitted_shape, law_of
+from gaident.diagnosis.controller.replay import rounding_of, tolerance_of
+from gaident.diagnosis.controller.replay_causes import white_noise
+from gaident.models.drive_torque import made_by_cascade
+from gaident.policy.table import POLICY
+
+__all__ = ["Form", "Shown", "form_shown"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+FARTHEST = 0.3  # no decision: how far a filter's number moves along its slope
+CHOICE = 2.0 * np.log(3.0)  # no decision: what the choice of one of three settings costs
+NEAR = 1.1  # no decision: of the floor, an estimate of it
+INSIDE = 1e-9  # no decision: of a bound, where a search starts
+STEP = 1e-5  # no decision: of a filter's number, for a slope
+ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
+WEIGHTS = ("one", "none", "free")
+FEEDS = ("acceleration_feedforward", "friction_feedforward")
+FILTER_NAMES = {
+    "torque_filters": "torque_filter",
+    "velocity_filters": "velocity_feedback_filter",
+    "command_filters": "command_filter",
+}
+"""Argument of `Cascade` -> name of the finding."""
+KP_W, KP_R, KI, FIRST_FEED = 0, 1, 2, 3  # places in (kp, kp b, ki, a_ff, f_ff, starts)
+
+
+@dataclass(frozen=True)
+class Form:
+    """Constraints on the regression's numbers. free: of the gains; feeds: feedforwards; starts: an integral before the record."""
+
+    rule: str = "trapezoidal"
+    free: tuple[str, ...] = ()
+    weight: str = "one"
+    feeds: tuple[str, ...] = ()
+    starts: bool = False
+
+    @property
+    def chosen(self) -> int:
+        """Settings that differ without a number of their own."""
+        return int(self.rule != "trapezoidal") + int(self.weight == "none")
+
+    def names(self, shape: Shape) -> tuple[str, ...]:
+        """What differs from the bare PI with the given gains, in words of the findings."""
+        names = ["integration_rule"] * (self.rule != "trapezoidal") + ["other_gains"] * bool(self.free)
+        names += ["command_weight"] * (self.weight != "one")
+        return (*names, *self.feeds, *dict.fromkeys(FILTER_NAMES[place] for place, _ in shape.places))
+
+    def constraints(self, given: PI, records: int) -> tuple[Vector, Matrix]:
+        """(P0, D) of the numbers P = P0 + D z in (kp, kp b, ki, a_ff, f_ff, starts)."""
+        fixed = np.zeros(FIRST_FEED + len(FEEDS) + records)
+        unit = np.eye(len(fixed))
+        moved: list[Vector] = []
+        if "kp" in self.free:
+            moved.append(unit[KP_W] + (unit[KP_R] if self.weight == "one" else 0.0))
+        else:
+            fixed[KP_W] = given.kp
+            fixed[KP_R] = given.kp if self.weight == "one" else 0.0
+        if self.weight == "free":
+            moved.append(unit[KP_R])
+        if "ki" in self.free:
+            moved.append(unit[KI])
+        else:
+            fixed[KI] = given.ki
+        moved += [unit[FIRST_FEED + FEEDS.index(name)] for name in self.feeds]
+        if self.starts:
+            moved += list(unit[FIRST_FEED + len(FEEDS) :])
+        return fixed, np.array(moved).reshape(len(moved), len(fixed)).T
+
+    def of_columns(self, size: int, period: float) -> Matrix:
+        """B of the columns' coefficients c = B P: a rectangular integral is the trapezoidal one and +-ki T/2 of the error."""
+        B = np.eye(size)
+        B[[KP_W, KP_R], KI] = (RULES[self.rule] - RULES["trapezoidal"]) * period
+        return B
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A controller that the logged torques show.
+
+    controller  the whole of it
+    numbers     name of what differs -> parameter -> (value, standard deviation), in the units of `Cascade`
+    gains       name -> by how much the criterion of the best form without it is worse
+    rivals      what differs in forms with no more free numbers that the logs do not tell from it
+    before, rms of logged minus replayed torque, bare PI and this one [N m]
+    starts      the highest integral before a record's begin [N m]; 0: none
+    """
+
+    controller: Cascade
+    numbers: dict[str, dict[str, tuple[float, float]]]
+    gains: dict[str, float]
+    rivals: tuple[tuple[str, ...], ...]
+    before: float
+    rms: float
+    starts: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    form: Form
+    shape: Shape
+    free: Vector  # z, then by how much the filters' numbers move
+    count: int
+    criterion: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.form.names(self.shape)
+
+
+def form_shown(records: Sequence[Record], given: PI) -> Shown | None:
+    """The simplest controller that makes the logged torques; None where none does, or the bare PI needs none."""
+    law = law_of(records, given.limits[0])
+    if law is None or given.loop != "sampled" or any(r.dt != records[0].dt for r in records):
+        return None
+    floor = max(rounding_of(r, r.command, given, r.torque) for r in records if r.command is not None and r.torque is not None)
+    candidates: list[_Candidate] = []
+    followed: int | None = None
+    for places in FILTER_SETS:
+        if followed is not None and len(places) > followed:
+            break  # what leaves no more than rounding or white noise is not improved by another filter
+        shape = fitted_shape(law, places, floor)
+        if shape.rms <= NEAR * floor or white_noise(shape.left, law.logged):
+            followed = len(places)
+        candidates += _candidates(law, shape, given, floor)
+    candidates.sort(key=lambda c: c.criterion)
+    if not candidates or not candidates[0].names:
+        return None
+    return _shown(records, law, given, candidates)
+
+
+def _allowed(rec: Record, controller: PI) -> float:
+    assert rec.command is not None and rec.torque is not None
+    return tolerance_of(rec, rec.command, controller, rec.torque)
+
+
+def _forms(given: PI) -> Iterator[Form]:
+    """Every form; but a rule that other free gains make up for, which no log shows."""
+    gains: tuple[tuple[str, ...], ...] = ((), ("kp",), ("ki",), ("kp", "ki")) if given.ki else ((), ("kp",))
+    feeds = ((), FEEDS[:1], FEEDS[1:], FEEDS)
+    for rule, free, weight, feed, starts in product(RULES, gains, WEIGHTS, feeds, (False, True)):
+        if rule != "trapezoidal" and (not given.ki or ("kp" in free and weight != "none")):
+            continue
+        yield Form(rule, free, weight, feed, starts)
+
+
+def _candidates(law: Law, shape: Shape, given: PI, floor: float) -> Iterator[_Candidate]:
+    """Every form with these filters: one small least squares each, linear in the filters' numbers around those of `shape`."""
+    table = law.columns(shape.places, shape.numbers)
+    around = np.column_stack([table, _slopes(law, shape), law.logged])
+    R: Matrix = np.linalg.qr(around)[1]
+    p, n = table.shape[1], len(law.logged)
+    linear, slopes, logged = R[:, :p], R[:, p:-1], R[:, -1]
+    for form in _forms(given):
+        fixed, moved = form.constraints(given, len(law.lengths))
+        B = form.of_columns(p, law.period)
+        M = np.column_stack([linear @ B @ moved, slopes])
+        wanted = logged - linear @ B @ fixed
+        free, left = _least(M, wanted)
+        if np.any(np.abs(free[moved.shape[1] :]) > FARTHEST):  # the slope holds no longer
+            free, left = _least(M[:, : moved.shape[1]], wanted)
+        numbers = fixed + moved @ free[: moved.shape[1]]
+        if min(numbers[KP_W], numbers[KP_R], numbers[KI]) < -POLICY.negligible * float(np.abs(numbers[:FIRST_FEED]).max()):
+            continue
+        k = M.shape[1]
+        criterion = n * np.log(max(left / n, floor**2)) + k * np.log(n) + CHOICE * form.chosen
+        yield _Candidate(form, shape, free, k, float(criterion))
+
+
+def _least(M: Matrix, wanted: Vector) -> tuple[Vector, float]:
+    """(solution, sum of squares left)."""
+    if M.shape[1] == 0:
+        return np.zeros(0), float(wanted @ wanted)
+    sizes = np.linalg.norm(M, axis=0)
+    sizes[sizes == 0.0] = 1.0
+    solved = np.linalg.lstsq(M / sizes, wanted, rcond=1e-12)[0] / sizes
+    left = wanted - M @ solved
+    return solved, float(left @ left)
+
+
+def _slopes(law: Law, shape: Shape) -> Matrix:
+    """(n, filters' numbers) of the torque over each number."""
+    slopes = [
+        _slope(lambda x: law.columns(shape.places, x) @ shape.coefficients, shape.numbers, k) for k in range(len(shape.numbers))
+    ]
+    return np.array(slopes).reshape(len(slopes), len(law.logged)).T
+
+
+def _slope(f: Callable[[Vector], Vector], x: Vector, k: int) -> Vector:
+    step = STEP * max(abs(float(x[k])), 1.0)
+    moved = step * np.eye(len(x))[k]
+    return (f(x + moved) - f(x - moved)) / (2.0 * step)
+
+
+def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[_Candidate]) -> Shown | None:
+    """The best candidate fitted and run as a whole on every sample; None where the torque does not follow from it."""
+    best = candidates[0]
+    numbers, filters, cov = _fitted(law, best, given)
+    controller = _controller(best, numbers, filters, given, law.period)
+    starts = numbers[FIRST_FEED + len(FEEDS) :]
+    off = []
+    for rec, start in zip(records, starts, strict=True):
+        assert rec.torque is not None
+        left = rec.torque - made_by_cascade(rec.with_channels(torque=None), controller) - start
+        if float(np.abs(left).max()) > _allowed(rec, controller.velocity) and not white_noise(left, rec.torque):
+            return None
+        off.append(left)
+    before = [r.torque - made_by_cascade(r.with_channels(torque=None), Cascade(given)) for r in records if r.torque is not None]
+    without = {name: [c.criterion for c in candidates if name not in c.names] for name in best.names}
+    close = [c for c in candidates if c.criterion - best.criterion < POLICY.rival_margin and c.count <= best.count]
+    return Shown(
+        controller=controller,
+        numbers=_named(best, numbers, filters, cov, law.period),
+        gains={name: min(others) - best.criterion if others else np.inf for name, others in without.items()},
+        rivals=tuple(dict.fromkeys(c.names for c in close if c.names and set(c.names) != set(best.names))),
+        before=_rms(before),
+        rms=_rms(off),
+        starts=float(np.abs(starts).max()),
+    )
+
+
+def _rms(parts: Sequence[Vector]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+
+
+def _fitted(law: Law, best: _Candidate, given: PI) -> tuple[Vector, Vector, Matrix]:
+    """(P, filters' numbers, covariance of both) of a form, by least squares on the replay itself."""
+    from scipy.optimize import least_squares
+
+    form, shape = best.form, best.shape
+    fixed, moved = form.constraints(given, len(law.lengths))
+    B = form.of_columns(len(fixed), law.period)
+    m = moved.shape[1]
+    size = float(np.sqrt(np.mean(law.logged**2)))
+
+    def off(x: Vector) -> Vector:
+        return (law.columns(shape.places, x[m:]) @ (B @ (fixed + moved @ x[:m])) - law.logged) / size
+
+    start = np.concatenate([best.free[:m], shape.numbers])
+    x = start
+    if len(shape.numbers):
+        low, high = (
+            np.concatenate([np.full(m, end), b]) for end, b in zip((-np.inf, np.inf), bounds_of(shape.places), strict=True)
+        )
+        start = np.clip(start, low + INSIDE, high - INSIDE)
+        x = start
+        found = least_squares(off, start, bounds=(low, high), x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-15, max_nfev=60)
+        x = found.x if np.sum(found.fun**2) <= np.sum(off(start) ** 2) else start
+    # A weight of exactly 0 was chosen; how well the log shows it is the deviation of a free one.
+    wide = (
+        form.constraints(given, len(law.lengths))[1]
+        if form.weight != "none"
+        else np.column_stack([moved, np.eye(len(fixed))[KP_R]])
+    )
+    table = law.columns(shape.places, x[m:])
+    coefficients = B @ (fixed + moved @ x[:m])
+    slopes = _slopes(law, Shape(shape.places, x[m:], coefficients, shape.left))
+    J = np.column_stack([table @ B @ wide, slopes])
+    sizes = np.linalg.norm(J, axis=0)
+    sizes[sizes == 0.0] = 1.0
+    variance = max(float(np.mean((size * off(x)) ** 2)), (ROUNDING * float(np.abs(law.logged).max())) ** 2)
+    spread = variance * np.linalg.pinv((J / sizes).T @ (J / sizes), rcond=1e-12) / np.outer(sizes, sizes)
+    k = wide.shape[1]
+    outward = np.zeros((len(fixed) + len(shape.numbers), J.shape[1]))
+    outward[: len(fixed), :k] = wide
+    outward[len(fixed) :, k:] = np.eye(len(shape.numbers))
+    return fixed + moved @ x[:m], x[m:], outward @ spread @ outward.T
+
+
+def _controller(best: _Candidate, numbers: Vector, filters: Vector, given: PI, period: float) -> Cascade:
+    kp, kp_b, ki = (max(float(x), 0.0) for x in numbers[:FIRST_FEED])
+    pi = PI(
+        kp,
+        ki,
+        torque_limit=given.torque_limit,
+        integrator_limit=given.integrator_limit,
+        rule=best.form.rule,
+        command_weight=kp_b / kp if kp else 1.0,
+    )
+    feeds = {name: float(numbers[FIRST_FEED + FEEDS.index(name)]) for name in best.form.feeds}
+    return Cascade(pi, **feeds, **at_places(best.shape.places, filters, period))  # type: ignore[arg-type]
+
+
+def _named(
+    best: _Candidate, numbers: Vector, filters: Vector, cov: Matrix, period: float
+) -> dict[str, dict[str, tuple[float, float]]]:
+    """Name -> parameter -> (value, deviation)."""
+    std = np.sqrt(np.maximum(np.diag(cov), 0.0))
+    kp, kp_b = float(numbers[KP_W]), float(numbers[KP_R])
+    named: dict[str, dict[str, tuple[float, float]]] = {name: {} for name in best.names}
+    if "other_gains" in named:
+        gains = {"kp": (kp, float(std[KP_W])), "ki": (float(numbers[KI]), float(std[KI]))}
+        named["other_gains"] = {name: gains[name] for name in best.form.free}
+    if "command_weight" in named and kp > 0.0:
+        slope = np.array([-kp_b / kp**2, 1.0 / kp])
+        named["command_weight"] = {"weight": (kp_b / kp, float(np.sqrt(max(slope @ cov[:2, :2] @ slope, 0.0))))}
+    for name in best.form.feeds:
+        at = FIRST_FEED + FEEDS.index(name)
+        named[name] = {"inertia" if name == FEEDS[0] else "torque": (float(numbers[at]), float(std[at]))}
+    at = 0
+    for place, kind in best.shape.places:
+        into, known = named[FILTER_NAMES[place]], std[len(numbers) + at :]
+        if kind is LowPass:
+            into["time_constant"] = _of_logarithm(filters[at], known[0], period)
+        else:
+            into["frequency"] = _of_logarithm(filters[at], known[0], 1.0 / period)
+            into["numerator_damping"] = (float(filters[at + 1]), float(known[1]))
+            into["denominator_damping"] = _of_logarithm(filters[at + 2], known[2], 1.0)
+        at += 1 if kind is LowPass else 3
+    return named
+
+
+def _of_logarithm(logarithm: float, std: float, unit: float) -> tuple[float, float]:
+    value = float(np.exp(logarithm)) * unit
+    return value, value * float(std)

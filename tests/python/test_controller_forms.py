@@ -1,0 +1,147 @@
+"""Which form a controller has, from logs of the referee (servo_referee.py) with a bare PI given."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_limits
+
+import gaident as ga
+import servo_referee as referee
+from gaident.diagnosis.controller.form_findings import driver_of
+from gaident.diagnosis.controller.forms import Shown, form_shown
+
+T = 250e-6
+KP, KI = 0.05, 2.0
+GIVEN = ga.PI(KP, KI)
+AXIS = referee.Axis(4e-4, 0.004, 9e-4, 0.006, 60.0, 0.02)
+NOTCH = {"frequency": 80.0, "numerator_damping": 0.1, "denominator_damping": 0.7}
+
+
+def command(samples: int = 2400, seed: int = 0) -> np.ndarray:
+    """Steps and ramps between random speeds of both signs [rad/s]."""
+    n = np.arange(samples)
+    held = np.repeat(np.random.default_rng(seed).uniform(-30.0, 30.0, samples // 300 + 1), 300)[:samples]
+    return np.where((n // 600) % 2 == 0, held, np.interp(n, n[::300], held[::300]))
+
+
+def low(tau: float) -> referee.Filter:
+    return referee.low_pass(tau, T)
+
+
+def dip() -> referee.Filter:
+    return referee.notch(*NOTCH.values(), T)
+
+
+def log(seed: int = 0, digits: int = 0, noise: float = 0.0, **c: Any) -> ga.Record:
+    """What the referee logs; digits of the torque, 0: all; noise: of a measured torque, share of its deviation."""
+    r = command(seed=seed)
+    w, u, _ = referee.simulate(AXIS, r, T, **{"kp": KP, "ki": KI, **c})
+    u = u + noise * np.std(u) * np.random.default_rng(seed).standard_normal(len(u))
+    if digits:
+        u = np.array([float(f"{x:.{digits}g}") for x in u])
+    return ga.Record(T, command=r, velocity=w, torque=u)
+
+
+def shown_by(*records: ga.Record, given: ga.PI = GIVEN) -> Shown | None:
+    with threadpool_limits(1, user_api="blas"):
+        return form_shown(records, given)
+
+
+CASES: dict[str, tuple[Any, dict[str, dict[str, float]]]] = {
+    # name: what the referee is given, and what must be named with which numbers
+    "backward": (lambda: {"rule": "backward"}, {"integration_rule": {}}),
+    "forward": (lambda: {"rule": "forward"}, {"integration_rule": {}}),
+    "IP": (lambda: {"weight": 0.0}, {"command_weight": {"weight": 0.0}}),
+    "half": (lambda: {"weight": 0.5}, {"command_weight": {"weight": 0.5}}),
+    "IP, backward": (lambda: {"weight": 0.0, "rule": "backward"}, {"integration_rule": {}, "command_weight": {"weight": 0.0}}),
+    "low pass": (lambda: {"torque_filters": [low(4e-4)]}, {"torque_filter": {"time_constant": 4e-4}}),
+    "notch": (lambda: {"torque_filters": [dip()]}, {"torque_filter": NOTCH}),
+    "velocity filter": (
+        lambda: {"velocity_filters": [low(1e-3)]},
+        {"velocity_feedback_filter": {"time_constant": 1e-3}},
+    ),
+    "command filter": (lambda: {"command_filters": [low(2e-3)]}, {"command_filter": {"time_constant": 2e-3}}),
+    "acceleration": (lambda: {"aff": 9e-4}, {"acceleration_feedforward": {"inertia": 9e-4}}),
+    "friction": (lambda: {"fff": 0.02}, {"friction_feedforward": {"torque": 0.02}}),
+    "both feedforwards": (
+        lambda: {"aff": 9e-4, "fff": 0.02},
+        {"acceleration_feedforward": {"inertia": 9e-4}, "friction_feedforward": {"torque": 0.02}},
+    ),
+    "IP with a notch": (
+        lambda: {"weight": 0.0, "torque_filters": [dip()]},
+        {"command_weight": {"weight": 0.0}, "torque_filter": NOTCH},
+    ),
+    "gains off with a low pass": (
+        lambda: {"kp": 0.9 * KP, "ki": 1.1 * KI, "torque_filters": [low(6e-4)]},
+        {"other_gains": {"kp": 0.9 * KP, "ki": 1.1 * KI}, "torque_filter": {"time_constant": 6e-4}},
+    ),
+    "backward with a feedforward": (
+        lambda: {"rule": "backward", "aff": 9e-4},
+        {"integration_rule": {}, "acceleration_feedforward": {"inertia": 9e-4}},
+    ),
+    "two filters": (
+        lambda: {"torque_filters": [low(4e-4), dip()]},
+        {"torque_filter": {"time_constant": 4e-4, **NOTCH}},
+    ),
+}
+
+
+def hold(shown: Shown | None, named: dict[str, dict[str, float]]) -> None:
+    """Names, and numbers within 1 % or four deviations."""
+    assert shown is not None and set(shown.numbers) == set(named)
+    for name, numbers in named.items():
+        assert set(shown.numbers[name]) == set(numbers)
+        for key, true in numbers.items():
+            value, std = shown.numbers[name][key]
+            assert abs(value - true) < max(0.01 * abs(true), 4.0 * std), (name, key, value, std)
+
+
+@pytest.mark.parametrize("digits", [0, 4])
+@pytest.mark.parametrize("name", CASES)
+def test_each_form_is_named_with_its_numbers(name: str, digits: int) -> None:
+    given, named = CASES[name]
+    shown = shown_by(log(digits=digits, **given()))
+    hold(shown, named)
+    assert shown is not None and (digits or named == {"integration_rule": {}} or shown.rms < 1e-9 * shown.before)
+
+
+@pytest.mark.parametrize("name", ["IP", "low pass", "notch", "gains off with a low pass"])
+def test_noise_on_a_measured_torque_does_not_break_it(name: str) -> None:
+    given, named = CASES[name]
+    hold(shown_by(log(noise=0.005, **given())), named)
+
+
+def test_the_right_gains_need_nothing() -> None:
+    assert shown_by(log()) is None
+    assert shown_by(log(digits=4)) is None
+    assert driver_of([log()], [], GIVEN) is None
+
+
+def test_several_records_are_one_regression() -> None:
+    hold(shown_by(log(0, weight=0.0), log(1, weight=0.0)), CASES["IP"][1])
+
+
+def test_a_torque_that_no_form_makes_is_none() -> None:
+    rec = log()
+    assert rec.torque is not None
+    n = np.arange(len(rec))
+    assert shown_by(rec.with_channels(torque=rec.torque + 0.05 * np.sin(n / 30.0))) is None
+    assert shown_by(rec.with_channels(torque=rec.torque * (1.0 + 0.2 * np.sign(rec.torque)))) is None
+
+
+def test_a_diagnosis_names_the_controller_and_no_mechanics() -> None:
+    r = command()
+    noise = 0.02 * np.random.default_rng(3).standard_normal(len(r))
+    sensor = iter(noise)
+    reads = [lambda w: w + next(sensor)]  # what the controller reads, and the log shows
+    axis = referee.Axis(1e-3, 0.01)
+    w, u, _ = referee.simulate(axis, r, T, kp=KP, ki=KI, weight=0.0, torque_filters=[dip()], velocity_filters=reads)
+    rec = ga.Record(T, command=r, velocity=w + noise, torque=u)
+    dia = ga.diagnose(rec, GIVEN)
+    assert {f.effect for f in dia.causes} == {"command_weight", "torque_filter"}
+    assert dia.verdict == "explained" and dia.controller is None
+    assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.01)
+    assert "The controller is not the given PI" in dia.summary()
