@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from gaident.checks import known_keys, real_number
+from gaident.control.drive_parameters import position_gain
 from gaident.control.filters import LowPass, Notch, filter_of
 from gaident.control.pi import PI
 from gaident.errors import ControllerError
@@ -49,6 +50,35 @@ class P:
         if gain <= 0.0:
             raise ControllerError(f"gain is {gain:g}: give a number > 0 [1/s]")
         object.__setattr__(self, "gain", gain)
+
+    @classmethod
+    def from_drive(cls, drive: str, **parameters: float) -> P:
+        """Return the position controller of a gain as a drive shows it.
+
+        Parameters
+        ----------
+        drive : str
+            "el72xx", "ax5000", "ax8000", "odrive" or "simplefoc".
+        **parameters : float
+            The drive's parameter in the drive's unit; see the guide "Where to find it in your drive".
+
+        Returns
+        -------
+        P
+            With the gain Kv [1/s].
+
+        Raises
+        ------
+        ControllerError
+            For a drive whose position gain is not known, and a parameter that is missing, of another drive or not above 0.
+
+        Examples
+        --------
+        >>> import gaident as ga
+        >>> ga.P.from_drive("ax5000", s_0_0104=1.5)
+        P(gain=25.0)
+        """
+        return cls(position_gain(drive, parameters))
 
 
 @dataclass(frozen=True)
