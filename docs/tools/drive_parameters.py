@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gaident.control.drive_parameters import CONSTANTS, DRIVES, DriveRow, Parameter
 
-PAGE = Path(__file__).resolve().parents[1] / "how-to" / "drive-parameters.md"
+PAGE = Path(__file__).resolve().parents[1] / "how-to/drive-parameters.md"
 
 HEAD = """\
 # Where to find it in your drive

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from gaident.checks import known_keys, one_of, real_number
 from gaident.errors import ControllerError
 
-__all__ = ["CONSTANTS", "DRIVES", "DriveRow", "Parameter", "kp_and_ki", "position_gain", "velocity_names"]
+__all__ = ["CONSTANTS", "DRIVES", "DriveRow", "Parameter", "drive_row", "kp_and_ki", "position_gain"]
 
 Values = Mapping[str, float]
 
@@ -242,14 +242,9 @@ def _torque_per_erpm(v: Values) -> float:
     return v["l_current_max"] * v["torque_constant"] * v["pole_pairs"] * 60 / _PER_TURN
 
 
-def velocity_names(drive: str) -> tuple[str, ...]:
-    """The parameters that `PI.from_drive` takes for a drive; ControllerError for one that is not in the table."""
-    return tuple(p.name for p in _row(drive).velocity)
-
-
 def kp_and_ki(drive: str, parameters: Mapping[str, object]) -> tuple[float, float]:
     """(kp [N m s/rad], ki [N m/rad]) of a drive's parameters; raises ControllerError."""
-    row = _row(drive)
+    row = drive_row(drive)
     values = _values(drive, row.velocity, parameters, may_be_zero=(row.none_at_zero, *_GAINS))
     if row.none_at_zero and values[row.none_at_zero] == 0.0:
         return row.kp.of(values), 0.0
@@ -258,7 +253,7 @@ def kp_and_ki(drive: str, parameters: Mapping[str, object]) -> tuple[float, floa
 
 def position_gain(drive: str, parameters: Mapping[str, object]) -> float:
     """Kv [1/s] of a drive's position controller; raises ControllerError."""
-    row = _row(drive)
+    row = drive_row(drive)
     if row.position_gain is None:
         known = ", ".join(name for name, other in DRIVES.items() if other.position_gain is not None)
         raise ControllerError(
@@ -271,7 +266,8 @@ def position_gain(drive: str, parameters: Mapping[str, object]) -> float:
 _GAINS = ("speed_regulator_i_gain", "vel_integrator_gain", "pid_velocity_i", "s_pid_ki", "pn103")
 
 
-def _row(drive: str) -> DriveRow:
+def drive_row(drive: str) -> DriveRow:
+    """The row of a drive; ControllerError for one that is not in the table."""
     return DRIVES[one_of(drive, "drive", DRIVES, ControllerError)]
 
 
