@@ -51,6 +51,7 @@ CASES: dict[str, tuple[str, ga.PI | ga.Cascade]] = {
         '[controller]\ndrive = "ax5000"\ns_0_0100 = 0.02\ns_0_0101 = 10\ns_0_0104 = 1.5\n',
         ga.Cascade(SINAMICS, position=ga.P(25.0)),
     ),
+    "delay": ("[controller]\nkp = 0.02\nki = 2\ndelay = 60e-6\n", ga.Cascade(SINAMICS, delay=60e-6)),
 }
 
 
@@ -78,6 +79,7 @@ WRONG = {
     "two positions": ('drive = "odrive"\nvel_gain = 1\nvel_integrator_gain = 1\npos_gain = 1\nposition_gain = 1', "the one or"),
     "filter": ('kp = 1\nki = 1\ntorque_filters = [{ kind = "low pas" }]', 'is a "low pass" or a "notch"'),
     "no list": ("kp = 1\nki = 1\ntorque_filters = 3", "give a list of filters"),
+    "delay": ("kp = 1\nki = 1\ndelay = -1", "delay is -1: give seconds, from 0 to 1"),
     "rule": ('kp = 1\nki = 1\nrule = "backwards"', "did you mean 'backward'"),
 }
 

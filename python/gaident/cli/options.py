@@ -55,7 +55,7 @@ drive.toml, every part optional:
   kp = 0.0232                     # N m s/rad
   ki = 1.367                      # N m/rad; also loop, torque_limit, integrator_limit, and of other loops: drive with
                                   # the gains as it shows them, rule, command_weight, anti_windup, tracking_time,
-                                  # period, torque_filters, velocity_filters, command_filters, position_gain, ...
+                                  # period, delay, torque_filters, velocity_filters, command_filters, position_gain, ...
   [space]
   inertia = [1e-4, 5e-3]          # kg m^2; also resonance_hz, damping, or gain, real, imaginary, p, q, bits
   [limits]

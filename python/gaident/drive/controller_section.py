@@ -36,7 +36,7 @@ PI_KEYS: dict[str, Check] = {
     **{key: text if key in ("rule", "anti_windup") else number for key in DIGITAL},
 }
 AROUND: dict[str, Check] = {
-    **dict.fromkeys(("period", "position_gain", "position_period", *FEEDFORWARDS), number),
+    **dict.fromkeys(("period", "position_gain", "position_period", *FEEDFORWARDS, "delay"), number),
     **dict.fromkeys(FILTERS, _filters),
 }
 # What the motor has stands above the first section, where the units of the log need it too.
