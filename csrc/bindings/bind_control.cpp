@@ -75,7 +75,9 @@ void bind_control(py::module_& m) {
     py::class_<ServoSettings>(m, "ServoSettings")
         .def(py::init([](double newest, double command_weight, const std::string& anti_windup, double tracking_time,
                          const std::vector<DigitalFilter>& command_filters, const std::vector<DigitalFilter>& velocity_filters,
-                         const std::vector<DigitalFilter>& torque_filters, double position_gain, int position_every) {
+                         const std::vector<DigitalFilter>& torque_filters, double position_gain, int position_every,
+                         double delay) {
+                 if (!(delay >= 0.0)) throw std::invalid_argument("delay must be 0 or more");
                  if (position_every < 1) throw std::invalid_argument("position_every must be 1 or more");
                  return ServoSettings{newest,
                                       command_weight,
@@ -85,22 +87,23 @@ void bind_control(py::module_& m) {
                                       chain_of(velocity_filters, "velocity_filters"),
                                       chain_of(torque_filters, "torque_filters"),
                                       position_gain,
-                                      position_every};
+                                      position_every,
+                                      delay};
              }),
              py::kw_only(), py::arg("newest"), py::arg("command_weight"), py::arg("anti_windup"), py::arg("tracking_time"),
              py::arg("command_filters"), py::arg("velocity_filters"), py::arg("torque_filters"), py::arg("position_gain"),
-             py::arg("position_every"));
+             py::arg("position_every"), py::arg("delay") = 0.0);
     py::class_<Controller>(m, "Controller")
         .def(py::init([](double kp, double ki, double torque_limit, double integrator_limit) {
                  return Controller{.kp = kp, .ki = ki, .torque_limit = torque_limit, .integrator_limit = integrator_limit};
              }),
              py::kw_only(), py::arg("kp"), py::arg("ki"), py::arg("torque_limit") = endless,
              py::arg("integrator_limit") = endless);
-    py::class_<Loop>(m, "Loop")
-        .def(py::init([](const std::string& kind, const Controller& controller, const ServoSettings& servo) {
-                 return Loop{loop_named(kind), controller, servo};
-             }),
-             py::kw_only(), py::arg("kind"), py::arg("controller") = Controller{}, py::arg("servo") = ServoSettings{});
+    py::class_<Loop>(m, "Loop").def(
+        py::init([](const std::string& kind, const Controller& controller, const ServoSettings& servo) {
+            return Loop{loop_named(kind), controller, servo};
+        }),
+        py::kw_only(), py::arg("kind"), py::arg("controller") = Controller{}, py::arg("servo") = ServoSettings{});
     m.def("servo_torque", &servo_torque, py::kw_only(), py::arg("clock"), py::arg("loop"), py::arg("source"), py::arg("velocity"),
           py::arg("position"), py::arg("velocity_feedforward"), py::arg("torque_feedforward"));
     py::class_<PyRecord>(m, "Record")

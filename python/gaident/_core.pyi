@@ -123,6 +123,7 @@ class ServoSettings:
         torque_filters: Sequence[DigitalFilter],
         position_gain: float,
         position_every: int,
+        delay: float = ...,
     ) -> None: ...
 
 def servo_torque(

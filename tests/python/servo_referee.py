@@ -67,7 +67,8 @@ def simulate(axis: Axis, source: np.ndarray, T: float, every: int = 1, **c: Any)
     """(velocity, torque, position) at every `every`-th controller sample; source: command at the controller's samples.
 
     c: kp, ki, rule, weight, windup, tracking, torque_limit, integrator_limit, position_gain, position_every, kff, aff, fff,
-    filters as lists of Filter (torque_filters, velocity_filters, command_filters).
+    filters as lists of Filter (torque_filters, velocity_filters, command_filters), delay in tenths of T: a line of past torques,
+    one each fine step, from whose end the motor takes its own.
     """
     A, B = axis.state_space()
     F, G, *_ = signal.cont2discrete((A, B, np.eye(len(A)), np.zeros((len(A), 1))), T / FINE, "zoh")
@@ -76,6 +77,7 @@ def simulate(axis: Axis, source: np.ndarray, T: float, every: int = 1, **c: Any)
     limit, clamp = c.get("torque_limit", np.inf), c.get("integrator_limit", np.inf)
     every_q, N = c.get("position_every", 1), len(source)
     rows = []
+    on_the_way = [0.0] * int(c.get("delay", 0))
     for n in range(N):
         w, q = x[1], x[0]
         placed = c.get("position_gain", 0.0) > 0.0
@@ -115,6 +117,7 @@ def simulate(axis: Axis, source: np.ndarray, T: float, every: int = 1, **c: Any)
         if n % every == 0:
             rows.append((x[1], u, x[0]))
         for _ in range(FINE):
-            x = F @ x + G[:, 0] * u
+            on_the_way.append(u)
+            x = F @ x + G[:, 0] * on_the_way.pop(0)
     velocity, torque, position = np.array(rows).T
     return velocity, torque, position

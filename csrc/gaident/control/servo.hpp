@@ -4,7 +4,7 @@
 //     measured velocity -> velocity filters -> w,   e = r - w
 //     I(n) = clamp(I(n-1) + ki T (newest e(n) + (1 - newest) e(n-1)), +-integrator_limit),   e(-1) = 0
 //     v(n) = kp (weight r - w) + I(n) + feedforward torque,   u(n) = clamp(v(n), +-torque_limit)
-//     u(n) -> torque filters -> the torque that is logged and held for T
+//     u(n) -> torque filters -> the torque that is logged, and held for T from `delay` after its sample on
 //
 // Where |v| is above the limit: hold: if e drives v further, I(n) = I(n-1), and v and u are formed again; tracking: I(n) += (u - v) T/Tt.
 // A bare PI, weight 1 and the trapezoidal rule, is ControllerState (controller.hpp).

@@ -18,6 +18,7 @@ struct ServoSettings {
     FilterChain command_filters, velocity_filters, torque_filters;
     double position_gain = 0.0;  // [1/s] kv; 0: no position loop
     int position_every = 1;      // velocity controller's samples from one position controller's to the next
+    double delay = 0.0;          // [s] from a sample to its torque at the motor
 };
 
 }  // namespace gaident

@@ -31,6 +31,7 @@
 //   - begin(c, s, Beginning)   its state where the record begins in motion
 //   - possible(p)              false where there is no such drive
 //   - tabulate(p, Timing, t)   makes a `Table` t for what is not a number per lane; reach(t, steps): how many torques back it looks
+//   - later(p, delay)          its parameters with the controller's delay [s] added: so it acts where it is not in the model, too
 //
 // The compiler compares `hooks` with the functions that are there (registry.hpp).
 // One that is misspelt, or takes other arguments, is an error, and so is an effect that has no function that acts at its place,
@@ -70,6 +71,7 @@ enum class Hooks : std::uint32_t {
     substeps = 1U << 15,
     possible = 1U << 16,
     tabulate = 1U << 17,
+    later = 1U << 18,
 };
 constexpr Hooks operator|(Hooks a, Hooks b) {
     return static_cast<Hooks>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));

@@ -125,6 +125,7 @@ struct EffectModel {
         for (int i = 0; i < info_of(e).count(); ++i)
             parameter[Effects::first_parameter[static_cast<std::size_t>(e)] + i] = values[i];
     }
+    double* of(Effect e) { return parameter + Effects::first_parameter[static_cast<std::size_t>(e)]; }
 };
 
 }  // namespace gaident

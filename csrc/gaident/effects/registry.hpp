@@ -132,6 +132,8 @@ concept tabulate = HasTable<E> && requires(const double* p, const Timing& time, 
     E::tabulate(p, time, table);
     E::reach(table, time.steps);
 };
+template <class E>
+concept later = requires(double* p, double delay) { E::later(p, delay); };
 
 // What every effect has, not listed in `hooks`.
 template <class E>
@@ -151,7 +153,7 @@ constexpr Hooks all_of() {
            if_there(coupling<E>, Hooks::coupling) | if_there(sensor<E>, Hooks::sensor) |
            if_there(sensor_dynamics<E>, Hooks::sensor_dynamics) | if_there(reading<E>, Hooks::reading) |
            if_there(plant<E>, Hooks::plant) | if_there(begin<E>, Hooks::begin) | if_there(substeps<E>, Hooks::substeps) |
-           if_there(possible<E>, Hooks::possible) | if_there(tabulate<E>, Hooks::tabulate);
+           if_there(possible<E>, Hooks::possible) | if_there(tabulate<E>, Hooks::tabulate) | if_there(later<E>, Hooks::later);
 }
 
 // Those of which an effect at this place has to have one.

@@ -25,11 +25,16 @@ class Job {
 public:
     Job(const EffectJob& job, std::span<const EffectModel> models, std::span<const double* const> starts,
         const EffectOutputs& out)
-        : job_(job), out_(out), samples_(job.record.input.size() / static_cast<std::size_t>(job.record.log_every)), planned_(models.size()), order_(models.size()) {
+        : job_(job),
+          out_(out),
+          samples_(job.record.input.size() / static_cast<std::size_t>(job.record.log_every)),
+          planned_(models.size()),
+          order_(models.size()) {
         for (std::size_t i = 0; i < models.size(); ++i) {
             Planned& p = planned_[i];
             p.start = starts.empty() ? nullptr : starts[i];
             p.model = reduced(models[i], p.start != nullptr);
+            if (job.loop.kind == LoopKind::servo && job.loop.servo.delay > 0.0) delay_torque(p.model, job.loop.servo.delay);
             if (p.model.effects.bits != 0 || job.own != nullptr || job.loop.kind == LoopKind::servo)
                 p.substeps = job.substeps > 0 ? job.substeps : substeps_for(p.model, job.record, job.loop, job.own != nullptr);
         }

@@ -129,6 +129,18 @@ EffectModel reduced(const EffectModel& model, bool moving) {
     return r;
 }
 
+void delay_torque(EffectModel& model, double delay) {
+    Effects::each([&]<class E>() {
+        if constexpr (hook::later<E>) {
+            double* const p = model.of(effect<E>);
+            if (!model.effects.has<E>())
+                for (int i = 0; i < E::info.count(); ++i) p[i] = E::info.parameters[static_cast<std::size_t>(i)].neutral;
+            E::later(p, delay);
+            model.effects.add(effect<E>);
+        }
+    });
+}
+
 int substeps_for(const EffectModel& model, const EffectRecord& record, const Loop& loop, bool own) {
     const Factors<double>& g = model.linear;
     const double Ts = record.sample_time;

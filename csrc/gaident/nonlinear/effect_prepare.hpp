@@ -22,6 +22,9 @@ struct EffectRecord {
 // its factors: these also where they are neutral and the record begins in motion, as their states are among those given.
 EffectModel reduced(const EffectModel& model, bool moving);
 
+// The reduced model behind a controller whose torque acts `delay` [s] after its sample.
+void delay_torque(EffectModel& model, double delay);
+
 // Steps per sample that the reduced model needs: a power of two, so that neighbouring models have the same.
 // `own`: effects that the core does not know act as well.
 int substeps_for(const EffectModel& model, const EffectRecord& record, const Loop& loop, bool own = false);

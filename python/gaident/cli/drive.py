@@ -9,7 +9,8 @@ from typing import Any
 
 from gaident.axis import Text, say
 from gaident.checks import one_of
-from gaident.control.pi import LOOPS, PI
+from gaident.control.cascade import Cascade, Controller
+from gaident.control.pi import LOOPS
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.drive.drive_file import COLUMNS, KEYS, Drive, read_drive_file, unfilled_of
@@ -30,6 +31,8 @@ def drive_of(args: argparse.Namespace) -> Drive:
             sections[name].update(_assignments(getattr(args, name, None) or [], f"--{name}"))
             continue
         for key in keys:
+            if (name, key) == ("controller", "drive"):  # --drive names the file
+                continue
             value = getattr(args, key, None)
             if value is not None:
                 sections[name][key] = value
@@ -57,11 +60,17 @@ def _selected(args: argparse.Namespace) -> str | None:
     return names[0] if names else None
 
 
-def read_all(drive: Drive, logs: Sequence[str], controller: PI | None, measured: bool = True) -> list[Record]:
+def read_all(drive: Drive, logs: Sequence[str], controller: Controller | None, measured: bool = True) -> list[Record]:
     """The logs, each with what drives its simulation; raises SettingsError where that is missing."""
     records = [drive.read(log, measured) for log in logs]
     for log, rec in zip(logs, records, strict=True):
-        if controller is not None and rec.command is None:
+        if isinstance(controller, Cascade) and controller.position is not None:
+            if rec.position_command is None:
+                raise SettingsError(
+                    f"{log}: there is no position_command, which drives the loop with a position controller: name its column "
+                    "(--columns position_command=...), or leave the position controller out"
+                )
+        elif controller is not None and rec.command is None:
             raise SettingsError(
                 f"{log}: there is no command, which drives the loop with a controller: name its column "
                 "(--columns command=...), or use --loop open to work from torque to velocity"

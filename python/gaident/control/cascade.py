@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from gaident.checks import known_keys, real_number
+from gaident.control.drive_parameters import position_gain
 from gaident.control.filters import LowPass, Notch, filter_of
 from gaident.control.pi import PI
 from gaident.errors import ControllerError
@@ -19,6 +20,7 @@ WHOLE = 1e-6  # no decision: rounding of two decimal numbers that divide; more i
 FEEDFORWARDS = ("velocity_feedforward", "acceleration_feedforward", "friction_feedforward")
 FILTERS = ("torque_filters", "velocity_filters", "command_filters")
 MOST_FILTERS = 8
+LONGEST_DELAY = 1.0  # s, as of the effect transport_delay
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,35 @@ class P:
             raise ControllerError(f"gain is {gain:g}: give a number > 0 [1/s]")
         object.__setattr__(self, "gain", gain)
 
+    @classmethod
+    def from_drive(cls, drive: str, **parameters: float) -> P:
+        """Return the position controller of a gain as a drive shows it.
+
+        Parameters
+        ----------
+        drive : str
+            "el72xx", "ax5000", "ax8000", "odrive" or "simplefoc".
+        **parameters : float
+            The drive's parameter in the drive's unit; see the guide "Where to find it in your drive".
+
+        Returns
+        -------
+        P
+            With the gain Kv [1/s].
+
+        Raises
+        ------
+        ControllerError
+            For a drive whose position gain is not known, and a parameter that is missing, of another drive or not above 0.
+
+        Examples
+        --------
+        >>> import gaident as ga
+        >>> ga.P.from_drive("ax5000", s_0_0104=1.5)
+        P(gain=25.0)
+        """
+        return cls(position_gain(drive, parameters))
+
 
 @dataclass(frozen=True)
 class Cascade:
@@ -59,7 +90,7 @@ class Cascade:
                                                                        r is the record's velocity command
         r -> command_filters -> r',   measured velocity -> velocity_filters -> w,   e = r' - w
         u(n) = kp (b r' - w) + I(n) + acceleration_feedforward a*(n) + friction_feedforward sign(v*(n))
-        u, limited as `velocity` says -> torque_filters -> the torque that is logged and held for T
+        u, limited as `velocity` says -> torque_filters -> the torque that is logged, and after `delay` held for T
 
     q* is the position command; v* is its slope over the coming position period, or the velocity command; a* the slope of v*.
 
@@ -81,12 +112,15 @@ class Cascade:
         [N m].
     torque_filters, velocity_filters, command_filters : sequence of LowPass and Notch
         At most eight each; they act in their order.
+    delay : float
+        [s], from 0 to 1: the torque acts at the motor so long after its sample, and is held for T then. Any part of T.
+        The logged torque is the one before it.
 
     Raises
     ------
     ControllerError
-        For a velocity controller of another kind, times that are not above 0 or no whole multiples, and a feedforward of the
-        position loop without one.
+        For a velocity controller of another kind, times that are not above 0 or no whole multiples, a delay beyond its range, and
+        a feedforward of the position loop without one.
 
     Examples
     --------
@@ -108,6 +142,7 @@ class Cascade:
     torque_filters: Sequence[Filter] = ()
     velocity_filters: Sequence[Filter] = ()
     command_filters: Sequence[Filter] = ()
+    delay: float = 0.0
 
     def __post_init__(self) -> None:
         if not isinstance(self.velocity, PI) or self.velocity.loop != "sampled":
@@ -124,6 +159,10 @@ class Cascade:
             object.__setattr__(self, name, time)
         for name in FEEDFORWARDS:
             object.__setattr__(self, name, real_number(getattr(self, name), name, ControllerError))
+        delay = real_number(self.delay, "delay", ControllerError, "give seconds")
+        if not 0.0 <= delay <= LONGEST_DELAY:
+            raise ControllerError(f"delay is {delay:g}: give seconds, from 0 to {LONGEST_DELAY:g}")
+        object.__setattr__(self, "delay", delay)
         if self.position is None and (self.velocity_feedforward != 0.0 or self.position_period is not None):
             given = "velocity_feedforward" if self.velocity_feedforward != 0.0 else "position_period"
             raise ControllerError(
@@ -162,14 +201,14 @@ class Cascade:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON or TOML."""
         filters = {name: [f.to_dict() for f in getattr(self, name)] for name in FILTERS}
-        numbers = {name: getattr(self, name) for name in ("period", "position_period", *FEEDFORWARDS)}
+        numbers = {name: getattr(self, name) for name in ("period", "position_period", *FEEDFORWARDS, "delay")}
         position = None if self.position is None else self.position.gain
         return {"velocity": self.velocity.to_dict(), "position_gain": position, **numbers, **filters}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Cascade:
         """Return the controller of what `to_dict` gave; raises ControllerError."""
-        allowed = ("velocity", "position_gain", "period", "position_period", *FEEDFORWARDS, *FILTERS)
+        allowed = ("velocity", "position_gain", "period", "position_period", *FEEDFORWARDS, *FILTERS, "delay")
         values: dict[str, Any] = known_keys(data, "the cascade", allowed, ("velocity",), ControllerError)
         gain = values.pop("position_gain", None)
         values["velocity"] = PI.from_dict(values["velocity"])

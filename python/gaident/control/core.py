@@ -142,6 +142,7 @@ def _servo(cascade: Cascade, period: float, position_every: int) -> _core.Loop:
         torque_filters=[f.digital(period) for f in cascade.torque_filters],
         position_gain=0.0 if cascade.position is None else cascade.position.gain,
         position_every=position_every,
+        delay=cascade.delay,
     )
     return _core.Loop(kind="servo", controller=core_controller(pi), servo=settings)
 

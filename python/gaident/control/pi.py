@@ -9,6 +9,7 @@ from typing import Any
 
 from gaident.arguments import NO_CONTROLLER, arg
 from gaident.checks import known_keys, one_of, real_number
+from gaident.control.drive_parameters import kp_and_ki
 from gaident.errors import ControllerError
 
 PI_OF_GAINS = arg("controller", "PI(kp=..., ki=...)", python="PI(kp=..., ki=...)")
@@ -152,6 +153,38 @@ class PI:
         torque = math.inf if self.torque_limit is None else self.torque_limit
         integrator = math.inf if self.integrator_limit is None else self.integrator_limit
         return torque, integrator
+
+    @classmethod
+    def from_drive(cls, drive: str, **parameters: Any) -> PI:
+        """Return the controller of gains as a drive shows them.
+
+        Parameters
+        ----------
+        drive : str
+            "sinamics", "el72xx", "ax5000", "ax8000", "sigma", "epos2", "odrive", "simplefoc" or "vesc".
+        **parameters : float
+            The drive's parameters in the drive's units, and what else `PI` takes but gains: torque_limit, rule, ...
+            Names, units and formulas stand in the guide "Where to find it in your drive".
+
+        Returns
+        -------
+        PI
+            With kp [N m s/rad] and ki [N m/rad], where the drive has an integral time Tn, ki = kp/Tn.
+
+        Raises
+        ------
+        ControllerError
+            For a drive that is not known, a parameter that is missing, of another drive or not above 0.
+
+        Examples
+        --------
+        >>> import gaident as ga
+        >>> ga.PI.from_drive("sinamics", p1460=0.02, p1462=10.0, torque_limit=2.4).ki
+        2.0
+        """
+        own = {name: parameters.pop(name) for name in cls.__dataclass_fields__ if name in parameters and name not in ("kp", "ki")}
+        kp, ki = kp_and_ki(drive, parameters)
+        return cls(kp, ki, **own)
 
     def to_dict(self) -> dict[str, float | str | None]:
         """Return the fields as a dictionary for JSON or TOML, without those of a digital controller that a bare one has not."""

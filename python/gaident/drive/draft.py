@@ -250,6 +250,8 @@ class _Draft:
             mark("# ki = 1.367", "controller.ki", f"{unit('N m/rad', self.axis)}; integral gain"),
             _line('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model'),
             _line("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
+            _line('# drive = "sinamics"', "with p1460 and p1462 in place of kp and ki: gains as the drive shows them"),
+            _line("# period = 125e-6", "s, of a controller that is faster than the log; also rule, delay, torque_filters, ..."),
         ]
 
     def _space(self) -> list[str]:

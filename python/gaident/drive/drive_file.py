@@ -6,19 +6,20 @@ import dataclasses
 import math
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gaident.axis import AXES
-from gaident.checks import known_keys, one_of, real_number
-from gaident.control.pi import PI
+from gaident.checks import known_keys, one_of
+from gaident.control.cascade import Controller
 from gaident.data.readers import read
 from gaident.data.record import CHANNELS, Record
-from gaident.data.torque_kind import TORQUE_KINDS
-from gaident.errors import ControllerError, ReadError, SettingsError, SpaceError
+from gaident.drive import kinds
+from gaident.drive.controller_section import CONTROLLER_KEYS, controller_of, proportional_gain_of
+from gaident.errors import ReadError, SettingsError, SpaceError
 from gaident.identification.space import derive_space
+from gaident.models.drive_torque import torque_driven
 from gaident.models.search_space import SearchSpace
 from gaident.results.experiment import Limits
 
@@ -32,107 +33,34 @@ CONSTANTS = (
 )
 RANGES = ("inertia", "resonance_hz", "damping", "gain", "real", "imaginary", "p", "q")
 
-Check = Callable[[object, str], object]
-
-
-def _number(value: object, name: str) -> float:
-    if isinstance(value, bool):
-        raise ReadError(f"{name} is {value!r}: give one number")
-    return real_number(value, name, ReadError, "give one number, without quotes")
-
-
-def _whole(value: object, name: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise ReadError(f"{name} is {value!r}: give a whole number")
-    return value
-
-
-def _text(value: object, name: str) -> str:
-    if not isinstance(value, str):
-        raise ReadError(f'{name} is {value!r}: give text in quotes, {name} = "..."')
-    return value
-
-
-def _column(value: object, name: str) -> str | int:
-    return value if isinstance(value, int) and not isinstance(value, bool) else _text(value, name)
-
-
-def _unit(value: object, name: str) -> str | float:
-    return value if isinstance(value, str) else _number(value, name)
-
-
-def _pair(value: object, name: str) -> tuple[float, float]:
-    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
-        hint = ", with decimal points" if isinstance(value, list) and len(value) in (3, 4) else ""
-        raise ReadError(f"{name} is {value!r}: give a pair{hint}, {name} = [lowest, highest]")
-    low, high = (_number(v, name) for v in value)
-    return low, high
-
-
-def _pair_or_one(value: object, name: str) -> tuple[int, int]:
-    if isinstance(value, int) and not isinstance(value, bool):
-        return value, value
-    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
-        raise ReadError(f"{name} is {value!r}: give one whole number or a pair, {name} = [lowest, highest]")
-    return _whole(value[0], name), _whole(value[1], name)
-
-
-def _channels(value: object, name: str) -> tuple[str, ...]:
-    listed = [value] if isinstance(value, str) else value
-    if not isinstance(listed, Sequence) or not listed:
-        raise ReadError(f'{name} is {value!r}: give a list of channels, {name} = ["position"]')
-    return tuple(one_of(_text(entry, name), name, CHANNELS, ReadError) for entry in listed)
-
-
-def _positive(value: object, name: str) -> float:
-    number = _number(value, name)
-    if not number > 0.0:
-        raise ReadError(f"{name} is {value!r}: give a number > 0")
-    return number
-
-
-def _axis(value: object, name: str) -> str:
-    return one_of(value, name, AXES, ReadError)
-
-
-def _torque_is(value: object, name: str) -> str:
-    return one_of(value, name, TORQUE_KINDS, ReadError)
-
-
 # Sections of drive.toml ("" is its top), their keys and what a value must be.
-KEYS: dict[str, dict[str, Check]] = {
+KEYS: dict[str, dict[str, kinds.Check]] = {
     "": {
-        "axis": _axis,
-        "dt": _number,
-        "velocity_cutoff_hz": _number,
-        **dict.fromkeys(CONSTANTS, _number),
-        "gear_ratio": _positive,
-        "load_side": _channels,
-        "torque_is": _torque_is,
-        "decimate": _whole,
-        "resample": _positive,
-        "delimiter": _text,
-        "decimal": _text,
-        "skip": _whole,
-        "encoding": _text,
+        "axis": kinds.axis,
+        "dt": kinds.number,
+        "velocity_cutoff_hz": kinds.number,
+        **dict.fromkeys(CONSTANTS, kinds.number),
+        "gear_ratio": kinds.positive,
+        "load_side": kinds.channels,
+        "torque_is": kinds.torque_is,
+        "decimate": kinds.whole,
+        "resample": kinds.positive,
+        "delimiter": kinds.text,
+        "decimal": kinds.text,
+        "skip": kinds.whole,
+        "encoding": kinds.text,
     },
-    "columns": dict.fromkeys(COLUMNS, _column),
-    "units": dict.fromkeys(COLUMNS, _unit),
-    "shift": dict.fromkeys(CHANNELS, _whole),
-    "controller": {
-        "kp": _number,
-        "ki": _number,
-        "loop": _text,
-        "torque_limit": _number,
-        "integrator_limit": _number,
-    },
+    "columns": dict.fromkeys(COLUMNS, kinds.column),
+    "units": dict.fromkeys(COLUMNS, kinds.unit),
+    "shift": dict.fromkeys(CHANNELS, kinds.whole),
+    "controller": CONTROLLER_KEYS,
     "space": {
-        **dict.fromkeys(RANGES, _pair),
-        "p": _pair_or_one,
-        "q": _pair_or_one,
-        "bits": _whole,
+        **dict.fromkeys(RANGES, kinds.pair),
+        "p": kinds.pair_or_one,
+        "q": kinds.pair_or_one,
+        "bits": kinds.whole,
     },
-    "limits": dict.fromkeys(("speed", "torque", "travel", "duration"), _positive),
+    "limits": dict.fromkeys(("speed", "torque", "travel", "duration"), kinds.positive),
 }
 
 
@@ -170,23 +98,19 @@ class Drive:
         shift = {k: v for k, v in self.shift.items() if k not in left_out}
         return read(path, columns or None, units or None, self.general.get("dt"), measured=measured, shift=shift, **more)
 
-    def controller(self) -> PI | None:
-        """The PI controller; None: open loop. Raises ControllerError where half of it is missing."""
+    def controller(self) -> Controller | None:
+        """The controller; None: open loop. Raises ControllerError where half of it is missing."""
         values = self.controller_values
         if values.get("loop") == "open":
             return None
-        if self.columns.get("command") != "":
+        if self.columns.get("command") != "" and "drive" not in values:
             remedy = "or give --kp and --ki, or --loop open to work from torque to velocity"
             self._refuse_unfilled("controller", ("kp", "ki"), remedy)
-        if not values:
-            return None
-        missing = [name for name in ("kp", "ki") if name not in values]
-        if missing:
-            raise ControllerError(
-                f"the controller lacks {' and '.join(missing)}: give --kp and --ki (or [controller] in "
-                "the drive file), or --loop open to work from torque to velocity"
-            )
-        return PI(**values)
+        return controller_of(values, self.general) if values else None
+
+    def proportional_gain(self) -> float | None:
+        """kp [N m s/rad], where it is given; raises ControllerError."""
+        return proportional_gain_of(self.controller_values, self.general)
 
     def _refuse_unfilled(self, section: str, keys: Sequence[str], remedy: str) -> None:
         """Raises SettingsError where the file marks keys of a section FILL IN that neither it nor an option gives."""
@@ -209,7 +133,7 @@ class Drive:
             )
         return Limits(**self.limit_values)
 
-    def space(self, records: Sequence[Record], controller: PI | None) -> SearchSpace | None:
+    def space(self, records: Sequence[Record], controller: Controller | None) -> SearchSpace | None:
         """The search space: what is given, the rest derived from the data; None where nothing is given."""
         given = dict(self.space_values)
         if not given:
@@ -220,7 +144,8 @@ class Drive:
                 raise SpaceError(f"{name} and {other} both say where to look for the same thing: leave one out")
         if "damping" in given and "inertia" not in given:
             raise SpaceError("damping is given without inertia: give both, their ratio bounds the real parts")
-        derived = derive_space(records, controller)
+        driven = torque_driven(records, controller)
+        derived = derive_space(driven.records, driven.controller)
         mechanics = {k: given.pop(k) for k in ("inertia", "resonance_hz", "damping") if k in given}
         if mechanics:
             # What is not given stands in with any value; the ranges that come from it are not used.

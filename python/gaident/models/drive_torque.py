@@ -16,9 +16,10 @@ from gaident.control.pi import PI
 from gaident.control.pi_torque import pi_block
 from gaident.data.record import Record
 from gaident.errors import RecordError
+from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
 
-__all__ = ["Driven", "driven_by_cascade", "made_by_cascade", "torque_blocks", "torque_driven", "torque_of"]
+__all__ = ["Driven", "driven_by_cascade", "late", "made_by_cascade", "torque_blocks", "torque_driven", "torque_of"]
 
 Vector = NDArray[np.float64]
 
@@ -84,13 +85,26 @@ def driven_by_cascade(rec: Record, cascade: Cascade) -> Record:
 
         u(k) + (u(k+1) - u(k)) (r - 1)/(2 r)
 
-    Raises RecordError where a torque is neither logged nor can be made.
+    A known delay of the controller is part of it: `late`. Raises RecordError where a torque is neither logged nor can be made.
     """
     every = cascade.log_every(rec.dt)
     torque = made_by_cascade(rec, cascade) if rec.torque is None else rec.torque
+    before = torque[0] if starts_moving(rec.with_channels(torque=torque), None) else 0.0
     if every == 1:
-        return rec.with_channels(torque=torque, command=None, position_command=None)
-    return rec.with_channels(torque=torque + np.append(np.diff(torque), 0.0) * ((every - 1) / (2 * every)))
+        return rec.with_channels(torque=late(torque, cascade.delay / rec.dt, before), command=None, position_command=None)
+    mean = torque + np.append(np.diff(torque), 0.0) * ((every - 1) / (2 * every))
+    return rec.with_channels(torque=late(mean, cascade.delay / rec.dt, before))
+
+
+def late(torque: Vector, delay: float, before: float) -> Vector:
+    """The mean over each line of a torque (n,) that is held over each line and acts `delay` lines later; `before` the record.
+
+    With delay = m + f, m whole: f u(n - m - 1) + (1 - f) u(n - m), exact in its mean and, for f = 0, everywhere.
+    """
+    m = int(delay)
+    f = delay - m
+    padded = np.concatenate([np.full(m + 1, before), torque])
+    return f * padded[: len(torque)] + (1.0 - f) * padded[1 : 1 + len(torque)] if delay > 0.0 else torque
 
 
 def made_by_cascade(rec: Record, cascade: Cascade) -> Vector:

@@ -20,7 +20,7 @@ struct TransportDelay {
         .meaning = "the {torque} acts later than it was commanded",
         .parameters = parameters,
     };
-    static constexpr Hooks hooks = Hooks::actuator_dynamics | Hooks::possible | Hooks::tabulate;
+    static constexpr Hooks hooks = Hooks::actuator_dynamics | Hooks::possible | Hooks::tabulate | Hooks::later;
 
     // The mean over substep j: (1 - share) u(n - back) + share u(n - back + 1).
     struct Table {
@@ -29,6 +29,8 @@ struct TransportDelay {
     };
     static constexpr Pace pace = Pace::fine;
     static bool possible(const double* p) { return p[0] >= 0.0 && p[0] <= longest_delay; }
+    // A static change of the torque, as saturation and dead band are, commutes with a delay: the controller's delay adds to this one.
+    static void later(double* p, double delay) { p[0] += delay; }
     static void tabulate(const double* p, const Timing& time, Table& table) {
         const double delay = possible(p) ? p[0] : 0.0;
         for (int j = 0; j < time.steps; ++j) mean(delay, time.hold, j, time.steps, table.back[j], table.share[j]);

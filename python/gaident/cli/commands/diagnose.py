@@ -18,6 +18,7 @@ from gaident.diagnosis.diagnose import diagnose
 from gaident.drive.drive_file import Drive, axes_in
 from gaident.errors import GaidentError, SettingsError
 from gaident.identification.space import derive_space
+from gaident.models.drive_torque import torque_driven
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.results.store import load
@@ -100,7 +101,8 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
             raise SettingsError(f"--model {args.model} holds no identification: give what gaident identify --out saved")
         idn = loaded
     if idn is None:
-        derive_space(records, controller)  # wrong signs and units are found before anything is searched for
+        driven = torque_driven(records, controller)
+        derive_space(driven.records, driven.controller)  # wrong signs and units are found before anything is searched for
     with Progress(None if args.quiet else sys.stderr) as progress:
         dia = diagnose(
             records,

@@ -22,7 +22,7 @@ def experiment_command(args: argparse.Namespace) -> None:
         raise SettingsError("dt is missing: give --dt (or dt in the drive file), the sample time of the command in seconds")
     inertia = drive.space_values.get("inertia")
     heaviest = None if inertia is None else inertia[1]  # what its ramps ask for must not exceed the torque
-    kp = drive.controller_values.get("kp")
+    kp = drive.proportional_gain()
     proposal = first_experiment(dt, drive.limits(), heaviest, kp, drive.axis)
     if args.json:
         print_json({"schema": "gaident/experiment", "schema_version": 1, **proposal.to_dict()})

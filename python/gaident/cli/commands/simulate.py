@@ -13,7 +13,7 @@ import numpy as np
 from gaident.axis import velocity_unit
 from gaident.cli.drive import drive_of, read_all
 from gaident.cli.output import csv_targets, csv_text, print_json, write
-from gaident.control.pi import PI
+from gaident.control.cascade import Cascade, Controller
 from gaident.data.record import Record
 from gaident.errors import GaidentError, SettingsError
 from gaident.models.mechanics import mechanics_from_dict
@@ -41,7 +41,7 @@ def simulate_command(args: argparse.Namespace) -> None:
     for rec in records:
         state: Any = states.get(rec.digest) if args.initial_state == "auto" else None
         limited = controller is not None and controller.limited
-        moving = bool(np.any(rec.velocity)) and starts_moving(rec, controller)
+        moving = bool(np.any(rec.velocity)) and starts_moving(rec, None if isinstance(controller, Cascade) else controller)
         if state is None and args.initial_state == "auto" and not limited and moving:
             state = initial_state(model, rec, controller)
         results.append(run(model, rec, controller, state))
@@ -65,7 +65,7 @@ def simulate_command(args: argparse.Namespace) -> None:
             print(f"{rec.name}: {against}; written: {target}")
 
 
-def _load_model(path: str) -> tuple[AnyModel, PI | None, dict[str, tuple[float, ...]]]:
+def _load_model(path: str) -> tuple[AnyModel, Controller | None, dict[str, tuple[float, ...]]]:
     """(model, controller, start state of each record known by its digest)."""
     try:
         data = json.loads(Path(path).read_text(encoding="utf-8"))

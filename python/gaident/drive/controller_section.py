@@ -1,0 +1,97 @@
+"""[controller] of a drive file: gains in SI or as a drive shows them, and what stands around the velocity controller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from gaident.control.cascade import FEEDFORWARDS, FILTERS, Cascade, Controller, P
+from gaident.control.drive_parameters import CONSTANTS, DRIVES, drive_row
+from gaident.control.filters import LowPass, Notch, filter_of
+from gaident.control.pi import DIGITAL, PI
+from gaident.drive.kinds import Check, number, text
+from gaident.errors import ControllerError, ReadError
+
+__all__ = ["CONTROLLER_KEYS", "controller_of", "proportional_gain_of"]
+
+Values = Mapping[str, Any]
+
+
+def _filters(value: object, name: str) -> tuple[LowPass | Notch, ...]:
+    if not isinstance(value, Sequence) or not all(isinstance(one, Mapping) for one in value):
+        example = '[{ kind = "low pass", time_constant = 0.4e-3 }]'
+        raise ReadError(f"{name} is {value!r}: give a list of filters, {name} = {example}")
+    try:
+        return tuple(filter_of(one) for one in value)
+    except ControllerError as error:
+        raise ReadError(f"{name}: {error}") from None
+
+
+PI_KEYS: dict[str, Check] = {
+    "kp": number,
+    "ki": number,
+    "loop": text,
+    "torque_limit": number,
+    "integrator_limit": number,
+    **{key: text if key in ("rule", "anti_windup") else number for key in DIGITAL},
+}
+AROUND: dict[str, Check] = {
+    **dict.fromkeys(("period", "position_gain", "position_period", *FEEDFORWARDS, "delay"), number),
+    **dict.fromkeys(FILTERS, _filters),
+}
+# What the motor has stands above the first section, where the units of the log need it too.
+OF_DRIVES = tuple(
+    dict.fromkeys(p.name for row in DRIVES.values() for p in (*row.velocity, *row.position) if p.name not in CONSTANTS)
+)
+CONTROLLER_KEYS: dict[str, Check] = {**PI_KEYS, "drive": text, **AROUND, **dict.fromkeys(OF_DRIVES, number)}
+
+
+def controller_of(values: Values, general: Values) -> Controller:
+    """The controller of a section's values; general: the keys above the first section. Raises ControllerError."""
+    velocity = _velocity(values, general)
+    position = _position(values)
+    around = {key: values[key] for key in AROUND if key in values and key != "position_gain"}
+    if position is None and not around:
+        return velocity
+    return Cascade(velocity, position=position, **around)
+
+
+def proportional_gain_of(values: Values, general: Values) -> float | None:
+    """kp [N m s/rad] of a section's values, None where they say nothing of it; raises ControllerError."""
+    return _velocity(values, general).kp if "drive" in values else values.get("kp")
+
+
+def _velocity(values: Values, general: Values) -> PI:
+    pi = {key: values[key] for key in PI_KEYS if key in values}
+    if "drive" not in values:
+        foreign = [key for key in OF_DRIVES if key in values]
+        if foreign:
+            raise ControllerError(f'the controller has {foreign[0]}, which is a drive\'s: say which, drive = "..."')
+        missing = [name for name in ("kp", "ki") if name not in values]
+        if missing:
+            raise ControllerError(
+                f"the controller lacks {' and '.join(missing)}: give --kp and --ki (or [controller] in "
+                "the drive file), or --loop open to work from torque to velocity"
+            )
+        return PI(**pi)
+    twice = [name for name in ("kp", "ki") if name in pi]
+    if twice:
+        raise ControllerError(
+            f"the controller has {twice[0]} and the gains of a drive, {values['drive']!r}: give the ones or the others"
+        )
+    row = drive_row(values["drive"])
+    used = {p.name: general[p.name] for p in row.velocity if p.name in CONSTANTS and p.name in general}
+    own = {key: values[key] for key in OF_DRIVES if key in values and key not in {p.name for p in row.position}}
+    return PI.from_drive(values["drive"], **own, **used, **pi)
+
+
+def _position(values: Values) -> P | None:
+    """The position controller, of its gain or of the drive's parameter."""
+    own = {}
+    if "drive" in values:
+        own = {p.name: values[p.name] for p in drive_row(values["drive"]).position if p.name in values}
+    if own and "position_gain" in values:
+        raise ControllerError(f"the controller has position_gain and {next(iter(own))}: give the one or the other")
+    if own:
+        return P.from_drive(values["drive"], **own)
+    return P(values["position_gain"]) if "position_gain" in values else None
