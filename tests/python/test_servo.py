@@ -124,6 +124,15 @@ def test_a_delay_of_the_controller_adds_to_that_of_the_drive() -> None:
     assert np.abs(ga.run(ONE[1], rec, ga.Cascade(ga.PI(KP, KI))).velocity - one.velocity).max() > 0.1
 
 
+def test_a_known_delay_under_a_slower_log_is_no_finding() -> None:
+    r = np.repeat(np.random.default_rng(3).uniform(-60.0, 60.0, 20), 400)
+    w, u, _ = referee.simulate(ONE[0], r, T, 4, kp=KP, ki=KI, delay=15)
+    w = w + 0.005 * np.random.default_rng(4).standard_normal(len(w))
+    dia = ga.diagnose(ga.Record(4 * T, command=r[::4], velocity=w, torque=u), ga.Cascade(ga.PI(KP, KI), period=T, delay=1.5 * T))
+    assert (dia.verdict, dia.findings) == ("adequate", ())
+    assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=1e-4)
+
+
 def test_a_known_delay_is_no_finding_and_an_unknown_one_is() -> None:
     samples = 2000
     r = np.repeat(np.random.default_rng(3).uniform(-60.0, 60.0, 20), samples // 20)
