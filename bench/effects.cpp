@@ -63,7 +63,9 @@ void effect_rows(bool quick) {
     for (std::size_t k = 0; k < samples; ++k)
         input[k] = (k / 175 % 2 == 0 ? 1.0 : -1.0) * static_cast<double>((k / 350 * 7) % 30 + 1);
     EffectJob job;
-    job.record = {input, {}, 0.444e-3, 0.0, 30.0};
+    job.record.input = input;
+    job.record.sample_time = 0.444e-3;
+    job.record.top_speed = 30.0;
     job.loop.kind = LoopKind::sampled;
     job.loop.controller.kp = 0.08;
     job.loop.controller.ki = 1.5;
