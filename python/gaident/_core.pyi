@@ -123,7 +123,7 @@ class ServoSettings:
         torque_filters: Sequence[DigitalFilter],
         position_gain: float,
         position_every: int,
-        delay: float = ...,
+        delay: float = 0.0,
     ) -> None: ...
 
 def servo_torque(

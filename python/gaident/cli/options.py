@@ -53,9 +53,9 @@ drive.toml, every part optional:
   torque = -1                     # samples, for a channel that the log wrote on another line than the rest
   [controller]
   kp = 0.0232                     # N m s/rad
-  ki = 1.367                      # N m/rad; also loop, torque_limit, integrator_limit, and of other loops: drive with
-                                  # the gains as it shows them, rule, command_weight, anti_windup, tracking_time,
-                                  # period, delay, torque_filters, velocity_filters, command_filters, position_gain, ...
+  ki = 1.367                      # N m/rad; also loop, torque_limit, integrator_limit; of other loops: drive
+                                  # with its own gains, rule, command_weight, anti_windup, tracking_time,
+                                  # period, delay, torque_filters, velocity_filters, command_filters, ...
   [space]
   inertia = [1e-4, 5e-3]          # kg m^2; also resonance_hz, damping, or gain, real, imaginary, p, q, bits
   [limits]

@@ -40,8 +40,8 @@ PLACES: tuple[Place, ...] = (
 FILTER_SETS: tuple[tuple[Place, ...], ...] = tuple(s for k in range(3) for s in combinations(PLACES, k))
 """None, one, and two filters, the fewer first."""
 
-# no decision: starts of the search; a low pass in samples, a notch as share of the sampling frequency, and its dampings
-TAUS = np.geomspace(0.3, 100.0, 8)
+# Starts of the search: a low pass in samples, a notch as share of the sampling frequency, and its dampings.
+TAUS = np.geomspace(0.3, 100.0, 8)  # no decision: starts of a search
 NOTCHES = tuple(product(np.geomspace(2e-3, 0.4, 14), ((0.1, 0.7), (0.3, 1.5))))
 BOUNDS = {
     LowPass: ((np.log(0.05),), (np.log(1e5),)),

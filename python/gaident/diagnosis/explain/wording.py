@@ -65,7 +65,7 @@ def drives_itself(damping: Estimate) -> Text:
     """What a negative viscous friction says."""
     text = (
         "The viscous friction comes out negative ({:.2g} {N m s/rad}), which no axis has: friction that falls with the speed or "
-        "does not depend on it, or a lag, is in its place. Inertia and friction are not to be trusted."
+        "does not depend on it, or a lag, is in its place. {Inertia} and friction are not to be trusted."
     )
     return say(text, damping.value)
 

@@ -166,7 +166,7 @@ def _torque(motions: Sequence[Motion]) -> dict[str, Text]:
 
 def _loop(motions: Sequence[Motion], controller: PI | None) -> dict[str, Text]:
     if controller is None or all(m.command is None for m in motions):
-        why = Text("the torque drives the model: no controller is simulated from a command")
+        why = say("the {torque} drives the model: no controller is simulated from a command")
         return dict.fromkeys(("integrator_clamp", "command_rate_limit"), why)
     reasons = {}
     if controller.ki == 0.0:
