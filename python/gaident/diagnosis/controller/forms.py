@@ -296,8 +296,8 @@ def _fitted(law: Law, best: _Candidate, given: PI) -> tuple[Vector, Vector, Matr
 def _controller(best: _Candidate, numbers: Vector, filters: Vector, given: PI, period: float) -> Cascade:
     kp, kp_b, ki = (max(float(x), 0.0) for x in numbers[:FIRST_FEED])
     pi = PI(
-        kp,
-        ki,
+        kp=kp,
+        ki=ki,
         torque_limit=given.torque_limit,
         integrator_limit=given.integrator_limit,
         rule=best.form.rule,
