@@ -10,8 +10,11 @@ independently, in state space. What the peers are given stands in peer_problem.p
 from __future__ import annotations
 
 import os
+import sys
+from pathlib import Path
 
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+sys.path.insert(0, str(Path(__file__).resolve().parent / "packages"))
 
 import argparse
 import importlib.metadata

@@ -34,7 +34,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 # ruff: noqa: E402
 BENCH = Path(__file__).resolve().parent
-sys.path[:0] = [str(BENCH), str(BENCH.parent / "tests" / "python")]
+sys.path[:0] = [str(BENCH), str(BENCH / "measured"), str(BENCH.parent / "tests" / "python" / "support")]
 
 # Nothing here imports a module that decides: a process has to put its policy in place before.
 from dataclasses import replace

@@ -24,7 +24,8 @@ from typing import Any
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 # ruff: noqa: E402
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "python"))
+BENCH = Path(__file__).resolve().parent
+sys.path[:0] = [str(BENCH / "measured"), str(BENCH.parent / "tests" / "python" / "support")]
 
 import numpy as np
 import real_fits as fits

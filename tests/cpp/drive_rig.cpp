@@ -10,7 +10,7 @@
 // and at rest w is exactly 0 until the torque that holds the shaft exceeds the friction's level.
 // The controller is digital, as a drive has it: drive_rig_controller.hpp.
 //
-// Compiled and called by tests/python/drive_rig.py, which reads the list of fields below.
+// Compiled and called by tests/python/support/drive_rig.py, which reads the list of fields below.
 #include "drive_rig_controller.hpp"
 
 #include <array>

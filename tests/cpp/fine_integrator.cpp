@@ -5,7 +5,7 @@
 // rule, the bristle by Heun, an analog controller's torque extrapolated by half a step. The equations are those of the public
 // table of effects.
 //
-// Compiled and called by tests/python/fine_integrator.py, which reads the list of fields below.
+// Compiled and called by tests/python/support/fine_integrator.py, which reads the list of fields below.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>

@@ -1,8 +1,8 @@
 """The policy: every number by which gaident decides about a model, with unit, source, and the command that measures it.
 
-A decision is never made by a number that stands elsewhere: `tests/python/test_policy.py` looks for such numbers. What other
-modules keep are numbers that decide nothing (the step of a difference, the tolerance of a solver, the start of a fit): a name in
-capitals, marked by a comment `# no decision: why`.
+A decision is never made by a number that stands elsewhere: `tests/python/project/test_policy.py` looks for such numbers.
+What other modules keep are numbers that decide nothing (the step of a difference, the tolerance of a solver, the start of a fit):
+a name in capitals, marked by a comment `# no decision: why`.
 
 Numbers that follow from records without effects are calibrated: `python bench/blind.py --calibrate` writes them into
 `calibrated.json`, which is read here. The others are set by hand, for the reason that their row gives.

@@ -1,0 +1,122 @@
+"""The judge and the tables of the blind tests, on made-up diagnoses."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blind_judge import Judgement, judge
+from places import BENCH
+
+sys.path.insert(0, str(BENCH))
+import blind
+import blind_tables
+
+Hidden = dict[str, dict[str, float]]
+COULOMB = {"coulomb_friction": {"torque": 0.05}}
+LAG = {"torque_lag": {"time_constant": 1e-3}}
+
+
+def finding(effect: str, *alternatives: str, is_noise: bool = False, **values: float) -> Any:
+    parameters = {name: SimpleNamespace(value=value) for name, value in values.items()}
+    return SimpleNamespace(effect=effect, alternatives=alternatives, is_noise=is_noise, parameters=parameters)
+
+
+def said(
+    effects: dict[str, dict[str, float]], *findings: Any, verdict: str = "explained", driver: str | None = None
+) -> Judgement:
+    return judge(SimpleNamespace(findings=list(findings), verdict=verdict, driver=driver), effects)
+
+
+def test_a_right_name() -> None:
+    judged = said(COULOMB, finding("coulomb_friction", torque=0.052), finding("outliers", is_noise=True))
+    assert judged.exact and judged.in_set and not judged.wrong and judged.column == "coulomb_friction"
+    assert judged.parameter_errors == {"coulomb_friction.torque": pytest.approx(0.04)}
+
+
+def test_abstaining_with_and_without_the_truth() -> None:
+    within = said(COULOMB, finding("stribeck_friction", "coulomb_friction"))
+    assert within.in_set and not within.exact and not within.wrong and within.column == "abstained" and within.extra == 0
+    without = said(COULOMB, finding("stribeck_friction", "presliding_friction"))
+    assert not without.in_set and not without.wrong and without.column == "abstained without it" and without.extra == 1
+
+
+def test_wrong_names_count_even_beside_the_right_one() -> None:
+    judged = said(COULOMB, finding("coulomb_friction"), finding("quadratic_drag"))
+    assert judged.in_set and not judged.exact and judged.wrong == ["quadratic_drag"] and judged.column == "quadratic_drag"
+    assert said({}, finding("cogging")).wrong == ["cogging"]
+    assert said({}, finding("velocity_quantisation", is_noise=True)).sets == []
+
+
+def test_noise_effects_count_where_they_were_hidden() -> None:
+    judged = said({"outliers": {"fraction": 0.002}}, finding("outliers", is_noise=True, fraction=0.003))
+    assert judged.exact and judged.parameter_errors["outliers.fraction"] == pytest.approx(0.5)
+
+
+def test_equivalents_must_stand_together() -> None:
+    assert said(LAG, finding("velocity_filter", "torque_lag")).equivalents_together
+    assert said(LAG, finding("torque_lag")).equivalents_together is False
+    assert said(COULOMB, finding("coulomb_friction")).equivalents_together is None
+
+
+def test_true_parts_of_the_unknown_are_no_wrong_names() -> None:
+    uneven = {"uneven_friction": {"torque": 0.05, "depth": 0.8}}
+    judged = said(uneven, finding("coulomb_friction"), verdict="partly explained", driver="position")
+    assert judged.parts == ["coulomb_friction"] and not judged.wrong and not judged.extra
+    assert said({"root_drag": {"coefficient": 1.0}}, finding("coulomb_friction")).wrong == ["coulomb_friction"]
+
+
+def test_declining() -> None:
+    assert said(COULOMB, verdict="unexplained").column == "unexplained"
+    assert said({}, verdict="adequate").column == "none"
+
+
+def line(effect: str, factor: float, *findings: Any, group: str = "effects", **more: Any) -> dict[str, Any]:
+    effects: dict[str, dict[str, float]] = {effect: {"torque": 0.05}} if effect else {}
+    cell = {"group": group, "effects": list(effects), "kind": "multi", "noise": "white"}
+    return {"key": f"{group}/{effect}", "cell": cell, "judged": said(effects, *findings).as_dict(), "seconds": 1.0,
+            "plant": "one mass", "factor": factor, **more}  # fmt: skip
+
+
+def test_rates_and_their_intervals() -> None:
+    assert blind_tables.interval(0, 299)[1] == pytest.approx(0.01226, abs=1e-4)  # 1 - 0.025^(1/299)
+    low, high = blind_tables.interval(5, 10)
+    assert (low, high) == (pytest.approx(0.1871, abs=1e-4), pytest.approx(0.8129, abs=1e-4))
+    assert blind_tables.rate(1, 2).startswith("1/2 = 50.0 %")
+
+
+def test_tables_count_what_happened() -> None:
+    good = line("coulomb_friction", 1.0, finding("coulomb_friction", torque=0.051), before=0.3, after=0.12, oracle=0.1)
+    bad = line("coulomb_friction", 1.0, finding("cogging"), before=0.3, after=0.3, oracle=0.1)
+    text = blind_tables.effect_table([good, bad, good])
+    assert "| coulomb_friction | 3 | 67 % | 67 % | 1 |" in text
+    assert blind_tables.gain_ratio(good) == pytest.approx(0.9)
+    matrix = blind_tables.confusion([good, bad, line("", 0.0)])
+    assert "| nothing |  |  | 1 |" in matrix and "| coulomb_friction | 1 | 1 |" in matrix
+    limit = {"size": 0.5, "factor": 1.0, "nearest": 100.0, "rival": "none"}
+    limits = [{"key": "limit/", "effect": "coulomb_friction", "plant": "one mass", "limit": limit}]
+    curve = blind_tables.curve_table([good | {"factor": 1.2}, line("coulomb_friction", 0.1, finding("cogging"))], limits)
+    assert "above twice the limit, exact outside classes: 1/1" in curve
+    assert "below the limit, a wrong name: 1/1" in curve and "100 %, 100 %, 0 % of 1" in curve
+    assert "no results" in blind_tables.report([])
+    assert "### Crashes" in blind_tables.report([{"key": "x", "crash": "ValueError: no"}])
+
+
+def test_cells_repeat_themselves_and_have_their_own_keys() -> None:
+    for group in blind.GROUPS:
+        cells = list(blind.cells(group, 3, 1))
+        assert cells == list(blind.cells(group, 3, 1))
+        assert len({c.key for c in cells}) == len(cells) > 0
+        assert not {c.key for c in cells} & {c.key for c in blind.cells(group, 3, 2)}
+    assert np.prod([len(list(blind.cells("clean", 17, 1)))]) >= 300
+
+
+def test_an_interrupted_file_goes_on(tmp_path: Path) -> None:
+    path = tmp_path / "results.jsonl"
+    path.write_text('{"key": "a", "x": 1}\n{"key": "b", "x"')
+    assert list(blind.read(path)) == ["a"]

@@ -1,0 +1,82 @@
+"""The quick set of the group `loops` of bench/blind.py: drives in the loops that servo drives have, wholly known."""
+
+from __future__ import annotations
+
+import importlib
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from blind_judge import Judgement, judge
+from drive_cases import random_case
+from drive_rig import skip_without_library
+from gaident.models.drive_torque import torque_driven
+from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_noise, loop_plant
+from places import BENCH
+
+skip_without_library()
+
+
+def diagnosed(loop: str, every: int, effects: tuple[str, ...], seed: int, noise: str = "white") -> Judgement:
+    plant = loop_plant(loop, every, np.random.default_rng(seed))
+    record, validation, controller, truth = random_case(
+        seed, effects, loop_kind(loop), loop_noise(noise, seed), plant=plant, position_logged=plant.placed
+    )
+    assert isinstance(controller, ga.Cascade) and controller.log_every(record.dt) == every
+    return judge(ga.diagnose(record, controller=controller, validation=validation), truth.effects)
+
+
+def test_a_clean_drive_with_every_fourth_sample_is_adequate() -> None:
+    judged = diagnosed("torque low pass", 4, (), 1)
+    assert judged.verdict == "adequate" and not judged.sets, judged
+
+
+def test_a_clean_drive_is_judged_by_the_mechanism_in_its_loop() -> None:
+    """The model of the identification, from a torque that misses what came between the lines, is ten times as far off."""
+    judged = diagnosed("notch", 4, (), 1, noise="encoder")
+    assert judged.verdict == "adequate" and not judged.sets, judged
+
+
+def test_the_torque_of_a_position_loop_follows_from_its_log() -> None:
+    """From position command, position and velocity, without a velocity command."""
+    plant = loop_plant("position", 1, np.random.default_rng(3))
+    record, _, controller, _ = random_case(3, (), "move", "encoder", plant=plant, position_logged=True)
+    driven = torque_driven([record], controller)
+    assert record.command is None
+    assert not any("does not follow" in note for note in driven.notes)
+
+
+def test_friction_is_named_from_every_fourth_sample() -> None:
+    judged = diagnosed("notch", 4, ("coulomb_friction",), 1)
+    assert judged.exact and judged.verdict == "explained", judged
+    assert judged.parameter_errors["coulomb_friction.torque"] < 0.02
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_every_kind_of_loop_has_a_stable_drive_and_a_record(loop: str) -> None:
+    plant = loop_plant(loop, 8, np.random.default_rng(2))
+    record, validation, controller, _ = random_case(2, (), loop_kind(loop), plant=plant)
+    assert record.dt == pytest.approx(1e-3) and record.torque is not None and validation is not None
+    assert (record.position_command is not None) is (loop == "position")
+    assert isinstance(controller, ga.Cascade)
+    if controller.velocity.torque_limit is not None and not controller.torque_filters:
+        limit = controller.velocity.torque_limit
+        assert np.abs(record.torque).max() == limit  # drawn so that it is reached
+
+
+@pytest.fixture
+def blind(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.syspath_prepend(str(BENCH))
+    return importlib.import_module("blind")
+
+
+def test_the_cells_take_every_loop_clean_and_the_effects_in_turn(blind: Any) -> None:
+    cells = list(blind.cells("loops", len(loop_effects("bare")), 1))
+    assert len({cell.key for cell in cells}) == len(cells)
+    clean = Counter((cell.loop, cell.every) for cell in cells if not cell.effects)
+    assert set(clean) == {(loop, every) for loop in LOOPS for every in EVERY} and len(set(clean.values())) == 1
+    hidden = {(cell.loop, cell.every, *cell.effects) for cell in cells if cell.effects}
+    assert hidden == {(loop, every, effect) for loop in LOOPS for every in EVERY for effect in loop_effects(loop)}

@@ -1,0 +1,209 @@
+"""What the logged torque tells a diagnosis before any plant: gains, limits, anti-windup; and which samples are outliers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from friction_drive import CONTROLLER, DRIVE, DT, drive_record
+from gaident.control.pi_torque import held_torque
+from gaident.diagnosis.controller.replay import Replay, replay
+from gaident.diagnosis.records.hygiene import outliers
+
+J, D = 5e-4, 2e-3
+LEVELS = np.repeat((60.0, -60.0, 20.0, -40.0, 60.0, -20.0), 120)
+
+
+def limited_drive(limit: float, hold: str = "", hum: float = 0.0, step: float = 0.0, seed: int = 0) -> ga.Record:
+    """One mass behind a torque limit, noise inside the loop; hold: how the integrator is kept from winding up (text of HOLDS).
+
+    hum: a torque of 37 Hz at the shaft [N m]; step: resolution of the velocity [rad/s]. The controller's
+    equations once more, sample by sample, with the exact step of the mass.
+    """
+    rng = np.random.default_rng(seed)
+    decay = math.exp(-D / J * DT)
+    w = integral = last = 0.0
+    seen, torques = [], []
+    for n, command in enumerate(LEVELS):
+        y = w + 0.02 * rng.standard_normal()
+        y = round(y / step) * step if step else y
+        e = command - y
+        new = integral + 0.5 * CONTROLLER.ki * DT * (e + last)
+        v = CONTROLLER.kp * e + new
+        u = min(max(v, -limit), limit)
+        if not hold or u == v or (hold == "held_back" and e * v <= 0.0):
+            integral = new
+        elif hold == "tracked":
+            integral = u - CONTROLLER.kp * e
+        last = e
+        seen.append(y)
+        torques.append(u)
+        w = decay * w + (1.0 - decay) * (u + hum * math.sin(math.tau * 37.0 * n * DT)) / D
+    return ga.Record(DT, command=LEVELS, velocity=np.array(seen), torque=np.array(torques))
+
+
+def test_corners_impacts_tops_and_delays_are_no_outliers() -> None:
+    rng = np.random.default_rng(0)
+    n = np.arange(400)
+    rough = 0.02 * rng.standard_normal(400)
+    corner = np.where(n < 200, 20.0, 20.0 - 4.0 * (n - 200))
+    impact = np.where(n < 200, 0.0, 5.0 * np.exp(-(n - 200) / 3.0))
+    top = -0.4 * np.abs(n - 200.0) ** 1.5
+    flat_then_error = np.where(n == 200, 1.2, 0.0)  # what a model makes of a delay that it does not know
+    for signal in (corner, impact, top):
+        assert len(outliers(signal + rough)) == 0
+        assert len(outliers(signal + rough, rough + flat_then_error)) == 0
+
+
+def test_outliers_are_found_on_slopes_and_side_by_side_and_only_where_the_model_does_not_follow() -> None:
+    rng = np.random.default_rng(1)
+    n = np.arange(600)
+    noise = 0.02 * rng.standard_normal(600)
+    signal = 20.0 * np.sin(n / 15.0)
+    at = np.array([50, 120, 121, 300, 455])
+    spikes = np.zeros(600)
+    spikes[at] = (3.0, 8.0, 5.0, -4.0, -9.0)
+    np.testing.assert_array_equal(outliers(signal + noise + spikes, noise + spikes), at)
+    assert len(outliers(signal + noise + spikes, noise)) == 0  # the model does the same
+
+
+def test_a_log_that_follows_from_the_recorded_velocity_is_not_held_against_the_cleaned_one() -> None:
+    """Glitches of the sensor that the controller read are left out of the fit, not out of the replay."""
+    asked = drive_record().command
+    assert asked is not None
+    glitch = np.zeros(len(asked))
+    glitch[[150, 700, 1333]] = (9.0, -12.0, 10.0)
+    noise = 0.05 * np.random.default_rng(3).standard_normal(len(asked)) + glitch
+    done = ga.run(DRIVE, ga.Record(DT, command=asked - noise, velocity=np.zeros(len(asked))), CONTROLLER)
+    seen = ga.Record(DT, command=asked, velocity=done.velocity + noise, torque=done.torque)
+    found = ga.diagnose(seen, CONTROLLER)
+    assert [f.effect for f in found.findings] == ["outliers", "coulomb_friction"], found.summary()
+    assert not any("does not follow" in note for note in found.notes)
+    # Spoiled behind the controller, in the log alone, the cleaned velocity is what it read.
+    good = drive_record()
+    spoiled = ga.Record(DT, command=good.command, velocity=good.velocity + glitch, torque=good.torque)
+    found = ga.diagnose(spoiled, CONTROLLER)
+    assert found.findings[0].parameters["fraction"].value == 3 / len(asked)
+    assert [f.effect for f in found.causes] == ["coulomb_friction"], found.summary()
+
+
+def test_gains_that_the_log_shows_take_the_place_of_the_given_ones() -> None:
+    wrong = ga.PI(kp=1.3 * CONTROLLER.kp, ki=CONTROLLER.ki)
+    found = ga.diagnose(drive_record(), wrong, validation=drive_record(1))
+    assert found.controller is not None and found.controller.kp == pytest.approx(CONTROLLER.kp, rel=1e-4)
+    assert any(
+        "All simulations use these (kp = 0.05 N m s/rad, ki = 1.5 N m/rad, trapezoidal integral)" in note for note in found.notes
+    )
+    assert [f.effect for f in found.causes] == ["coulomb_friction"]
+    assert found.after.rmse < 1.1 * found.after.noise_floor < found.before.rmse
+
+
+@pytest.mark.parametrize("hold", ["held", "held_back", "tracked"])
+def test_an_anti_windup_is_named(hold: str) -> None:
+    rec = limited_drive(0.5, hold)
+    assert rec.command is not None and rec.torque is not None
+    known = ga.PI(CONTROLLER.kp, CONTROLLER.ki, torque_limit=0.5)
+    np.testing.assert_allclose(held_torque(rec.command, rec.velocity, DT, known, hold), rec.torque, atol=1e-12)
+    for controller in (CONTROLLER, known):
+        found = replay(rec, controller)
+        assert found.cause == "anti_windup" and "(anti-windup)" in found.sentence, found.sentence
+        assert found.value == 0.5 and found.controller == known
+    # A measured torque has a noisy plateau.
+    measured = rec.torque + 0.005 * np.random.default_rng(4).standard_normal(len(rec))
+    found = replay(ga.Record(DT, command=rec.command, velocity=rec.velocity, torque=measured), CONTROLLER)
+    assert found.cause == "anti_windup" and found.value == pytest.approx(0.5, rel=0.005), found.sentence
+
+
+def issued(e: np.ndarray, limit: float, share: float, hold: str) -> np.ndarray:
+    """The PI's torque sample by sample; share, hold: as `held_torque` has them, hold "": the integrator winds up."""
+    kp, step, integral, last, torque = CONTROLLER.kp, CONTROLLER.ki * DT, 0.0, 0.0, []
+    for now in e:
+        after = integral + step * ((0.5 + share) * now + (0.5 - share) * last)
+        wanted = kp * now + after
+        torque.append(min(max(wanted, -limit), limit))
+        if torque[-1] == wanted or hold == "" or (hold == "held_back" and now * wanted <= 0.0):
+            integral = after
+        elif hold == "tracked":
+            integral = torque[-1] - kp * now
+        last = now
+    return np.array(torque)
+
+
+@pytest.mark.parametrize("hold", ["", "held", "held_back", "tracked"])
+@pytest.mark.parametrize("share", [0.0, 0.5, -0.5])
+def test_limits_and_rules_of_integration_are_found_in_a_text_log(share: float, hold: str) -> None:
+    rec = limited_drive(0.5)
+    assert rec.command is not None
+    log = [rec.command, rec.velocity, issued(rec.command - rec.velocity, 0.5, share, hold)]
+    for digits in (7, 5) if hold == "" else (7,):  # one digit more or less decides when an integrator is held
+        r, w, u = ([float(f"{x:.{digits}g}") for x in column] for column in log)
+        found = replay(ga.Record(DT, command=r, velocity=w, torque=u), CONTROLLER)
+        assert found.cause == ("anti_windup" if hold else "torque_limit"), found.sentence
+        assert found.value == 0.5 and ("rectangular" in found.sentence) == (share != 0.0)
+        assert ("lacks the newest error" in found.sentence) == (share < 0.0)
+        same = ga.PI(CONTROLLER.kp + share * CONTROLLER.ki * DT, CONTROLLER.ki, torque_limit=0.5)
+        assert found.controller is not None and found.controller.kp == pytest.approx(same.kp, rel=1e-12)
+        assert found.controller.limits == same.limits
+
+
+def test_a_torque_channel_of_zeros_is_no_controller() -> None:
+    rec = limited_drive(0.5)
+    found = replay(ga.Record(DT, command=rec.command, velocity=rec.velocity, torque=np.zeros(len(rec))), CONTROLLER)
+    assert found.follows is False and found.controller is None
+
+
+def test_a_limit_that_the_log_shows_is_a_finding_and_part_of_the_model() -> None:
+    found = ga.diagnose(limited_drive(0.5), CONTROLLER, validation=limited_drive(0.5, seed=1))
+    assert found.verdict == "explained" and [f.effect for f in found.findings] == ["torque_saturation"], found.summary()
+    (limit,) = found.findings
+    assert limit.parameters["limit"].value == 0.5 and "which acts at" in limit.evidence
+    assert [e.name for e in found.model.effects] == ["torque_saturation"]
+    assert found.after.rmse < 1.2 * found.after.noise_floor < 0.1 * found.before.rmse
+
+
+def test_an_anti_windup_is_said_and_its_free_run_not_trusted() -> None:
+    found = ga.diagnose(limited_drive(0.5, "held"), CONTROLLER)
+    assert [f.effect for f in found.findings] == ["torque_saturation"]
+    assert "the integrator held while the torque is limited" in found.findings[0].evidence
+    assert any("does not hold its integrator" in note for note in found.notes)
+    configured = ga.diagnose(limited_drive(0.5, "held"), ga.PI(CONTROLLER.kp, CONTROLLER.ki, torque_limit=0.5))
+    assert configured.findings == () and any("(anti-windup)" in note for note in configured.notes)
+
+
+def test_a_hum_gets_its_frequency_and_size_and_a_lattice_its_noise() -> None:
+    found = ga.diagnose(limited_drive(math.inf, hum=0.03, step=0.1), CONTROLLER)
+    assert found.verdict == "unexplained" and found.driver == "time" and found.line is not None, found.summary()
+    frequency, torque = found.line
+    assert frequency == pytest.approx(37.0, abs=0.3) and torque == pytest.approx(0.03, rel=0.1)
+    assert "like a torque of 37 Hz and 0.03" in " ".join(found.summary().split())
+    assert found.before.noise_floor >= 0.1 / math.sqrt(12.0)
+
+
+def test_a_hum_in_two_records_is_one_frequency_with_a_phase_of_each() -> None:
+    whole = limited_drive(math.inf, hum=0.03)
+    found = ga.diagnose([whole[: len(whole) // 2], limited_drive(math.inf, seed=1, hum=0.03)[len(whole) // 3 :]], CONTROLLER)
+    assert found.driver == "time" and found.line is not None, found.summary()
+    assert found.line == (pytest.approx(37.0, abs=0.3), pytest.approx(0.03, rel=0.1))
+
+
+def test_a_record_is_replayed_once_with_the_same_controller(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its replay is passed on; only other gains, or a record cleaned of outliers, ask for another."""
+    from gaident.diagnosis.controller import controller_place
+
+    done = []
+
+    def counted(rec: ga.Record, controller: ga.PI | None) -> Replay:
+        done.append((rec.digest, controller))
+        return replay(rec, controller)
+
+    monkeypatch.setattr(controller_place, "replay", counted)
+    first, second = limited_drive(1.0), limited_drive(1.0, seed=1)
+    assert "torque_saturation" in {f.effect for f in ga.diagnose([second, first], CONTROLLER).causes}
+    assert sorted(digest for digest, _ in done) == sorted([first.digest, second.digest])
+    done.clear()
+    used = ga.diagnose(drive_record(), ga.PI(kp=0.06, ki=1.5)).controller
+    assert used is not None and used.kp == pytest.approx(CONTROLLER.kp, rel=1e-3)
+    assert done == [(drive_record().digest, ga.PI(kp=0.06, ki=1.5)), (drive_record().digest, used)]

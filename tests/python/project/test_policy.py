@@ -1,0 +1,313 @@
+"""The policy: every number that decides has its unit, its source and the command that measures it, and none stands elsewhere."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import importlib.util
+import re
+from collections.abc import Iterator
+from dataclasses import FrozenInstanceError, fields
+
+import pytest
+
+from gaident.policy.table import EFFORT, POLICY, SHOWN_BY, Policy, rows
+from places import PACKAGE, ROOT
+
+# Rooms that decide about a model. A number there is a row of the policy, or says on its line (or on a line of its own above) why
+# it decides nothing: `# no decision: a start of a fit`. `data` decides how a file is read, `show` how a result is drawn.
+DECIDE = ("diagnosis", "estimation", "identification", "models", "results")
+MARK = "# no decision: "
+# Numbers with a name in capitals are found wherever a module or class has them. Others stand in no comparison and bound nothing,
+# count no iterations, cut no list, are no default, and no factor of a standard deviation; nor does a local name stand there for
+# them. Free are these, what only guards a division or stands for no limit, and 2 pi; a 2 is a count, a 2.0 is a factor.
+FREE = (-1, 0, 1, 2)
+BOUNDS = {"max", "min", "maximum", "minimum", "clip"}
+FITS = {"fit", "fitted", "refitted", "continued", "reestimated", "evolved", "start"}
+TABLES = {
+    "diagnosis/library/terms": "bounds, steps and starts of the parameters of each effect",
+    "diagnosis/library/coordinates": "the same",
+    "diagnosis/experiments/menu": "shapes of the commands that are proposed",
+    "diagnosis/experiments/commands": "the same",
+    "diagnosis/experiments/first_experiment": "the same",
+}
+
+
+def deciding() -> list[str]:
+    """Names of the policy's numbers that decide: all but those of effort."""
+    return [r.name for r in rows() if r.group != EFFORT]
+
+
+def numeric(node: ast.expr) -> bool:
+    """Whether an expression is made of numbers: literals, pi, arithmetic, tuples and NumPy's grids of them."""
+    match node:
+        case ast.Constant(value=value):
+            return isinstance(value, (int, float)) and not isinstance(value, bool)
+        case ast.UnaryOp(operand=inner):
+            return numeric(inner)
+        case ast.BinOp(left=left, right=right):
+            return numeric(left) and numeric(right)
+        case ast.Tuple(elts=parts) | ast.List(elts=parts):
+            return bool(parts) and all(map(numeric, parts))
+        case ast.Attribute(value=ast.Name(id=module), attr=attribute):
+            return module in {"np", "math"} and attribute in {"pi", "e", "tau"}
+        case ast.Call(func=ast.Attribute(value=ast.Name(id=module)), args=arguments):
+            return module in {"np", "math"} and all(map(numeric, arguments))
+    return False
+
+
+def numbers_named(text: str) -> list[str]:
+    """Names in capitals that a module or a class gives to numbers, where nothing on their lines says that they decide nothing."""
+    found, lines = [], text.splitlines()
+    for node in ast.walk(ast.parse(text)):
+        for inner in node.body if isinstance(node, (ast.Module, ast.ClassDef)) else []:
+            if isinstance(inner, ast.Assign):
+                targets, value = inner.targets, inner.value
+            elif isinstance(inner, ast.AnnAssign) and inner.value is not None:
+                targets, value = [inner.target], inner.value
+            else:
+                continue
+            names = [n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)]
+            reasons = [line.partition(MARK)[2] for line in lines[inner.lineno - 1 : inner.end_lineno]]
+            if numeric(value) and not any(r.strip() for r in reasons):
+                found += [n for n in names if re.fullmatch(r"_?[A-Z][A-Z0-9_]*", n)]
+    return found
+
+
+def numbers_inside(text: str) -> list[str]:
+    """Numbers without a name in capitals that may decide: "line: number", but for lines that say that they decide nothing.
+
+    They stand in comparisons, bounds, iterations, defaults and ends of lists, or have a local name that stands there.
+    """
+    found: list[ast.Constant] = []
+    for node in ast.walk(ast.parse(text)):
+        parts: list[ast.expr] = []
+        if isinstance(node, ast.Compare):
+            parts = [node]
+        elif isinstance(node, ast.Slice) and isinstance(node.upper, ast.Constant) and node.lower is None:
+            parts = [node.upper]
+        elif isinstance(node, ast.BinOp):
+            parts = of_a_deviation(node)
+        elif isinstance(node, ast.Call):
+            name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            parts = bounded(node) or [a for a in node.args if isinstance(a, ast.Constant) and name in FITS]
+        elif isinstance(node, (ast.FunctionDef, ast.Lambda)):
+            parts = [*node.args.defaults, *(d for d in node.args.kw_defaults if d is not None)]
+            found += local_numbers(node) if isinstance(node, ast.FunctionDef) else []
+        found += [n for part in parts for n in literals(part)]
+    kept = {n for n in found if not excused(text.splitlines(), n.lineno)}
+    return [f"{line}: {value}" for line, value in sorted({(n.lineno, n.value) for n in kept})]
+
+
+def excused(lines: list[str], number: int) -> bool:
+    """Whether a line, or a comment that stands alone above it, says why it decides nothing."""
+    above = lines[number - 2].strip() if number > 1 else ""
+    return bool(lines[number - 1].partition(MARK)[2].strip() or (above.startswith(MARK) and above[len(MARK) :].strip()))
+
+
+def local_numbers(function: ast.FunctionDef) -> list[ast.Constant]:
+    """Numbers of a function that have a local name, or are a factor of what has one, where that name is compared or bounds."""
+    decides = {
+        name.id
+        for node in ast.walk(function)
+        for part in ([node.left, *node.comparators] if isinstance(node, ast.Compare) else bounded(node))
+        for name in made_of(part, (ast.Add, ast.Sub, ast.Mult, ast.Div))
+        if isinstance(name, ast.Name)
+    }
+    found: list[ast.expr] = []
+    for node in ast.walk(function):
+        pairs: list[tuple[ast.expr, ast.expr]] = []
+        if isinstance(node, ast.Assign):
+            for target in node.targets:
+                both = isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple)
+                pairs += zip(target.elts, node.value.elts, strict=False) if both else [(target, node.value)]  # type: ignore[attr-defined]
+        elif isinstance(node, (ast.AnnAssign, ast.NamedExpr)) and node.value is not None:
+            pairs = [(node.target, node.value)]
+        for target, value in pairs:
+            if isinstance(target, ast.Name) and target.id in decides:
+                found += made_of(value, (ast.Mult, ast.Div))  # a sum of several terms is a formula
+    return [n for part in found for n in literals(part) if n is part]
+
+
+def bounded(node: ast.AST) -> list[ast.expr]:
+    """Arguments of a call that bounds."""
+    if not isinstance(node, ast.Call):
+        return []
+    return node.args if getattr(node.func, "attr", getattr(node.func, "id", "")) in BOUNDS else []
+
+
+def made_of(node: ast.expr, operators: tuple[type[ast.operator], ...]) -> Iterator[ast.expr]:
+    """Names and numbers that a value is made of by some operators, but nothing inside of calls and indices."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, operators) and not of_a_turn(node):
+        yield from made_of(node.left, operators)
+        yield from made_of(node.right, operators)
+    elif isinstance(node, ast.UnaryOp):
+        yield from made_of(node.operand, operators)
+    elif isinstance(node, ast.IfExp):
+        yield from made_of(node.body, operators)
+        yield from made_of(node.orelse, operators)
+    else:
+        yield node
+
+
+def of_a_turn(node: ast.expr) -> bool:
+    """Whether an expression is a number of turns: 2 pi."""
+    return numeric(node) and any(isinstance(n, ast.Attribute) and n.attr == "pi" for n in ast.walk(node))
+
+
+def of_a_deviation(node: ast.AST) -> list[ast.expr]:
+    """The factors of so many standard deviations, 2.0 * inertia.std; 100 * std is a percentage."""
+    if not (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult)):
+        return []
+    names = [getattr(side, "attr", getattr(side, "id", "")) for side in (node.left, node.right)]
+    factors = [n for n in (node.left, node.right) if isinstance(n, ast.Constant) and isinstance(n.value, float)]
+    return list(factors) if any(re.fullmatch(r"std|sigma|.*_std|deviation", name) for name in names) else []
+
+
+def literals(node: ast.expr) -> Iterator[ast.Constant]:
+    """Numbers in an expression that may decide; indices and powers are none, nor what is next to nothing or to infinity.
+
+    A 2 is a count, a 2.0 is a factor, but for that of 2 pi.
+    """
+    number = isinstance(node, ast.Constant) and isinstance(node.value, (int, float)) and not isinstance(node.value, bool)
+    if number:
+        free = FREE if isinstance(node.value, int) else FREE[:-1]
+        if abs(node.value) not in free and 1e-8 < abs(node.value) < 1e100:
+            yield node
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+        yield from literals(node.left)
+        return
+    if (
+        isinstance(node, ast.BinOp)
+        and numeric(node)
+        and any(isinstance(n, ast.Attribute) and n.attr == "pi" for n in ast.walk(node))
+    ):
+        return
+    for inner in ast.iter_child_nodes(node):
+        if isinstance(inner, ast.expr) and not (isinstance(node, ast.Subscript) and inner is node.slice):
+            yield from literals(inner)
+
+
+def modules(*rooms: str) -> dict[str, str]:
+    """Name -> text of the modules in some rooms."""
+    files = sorted(f for room in rooms for f in (PACKAGE / room).rglob("*.py"))
+    return {f.relative_to(PACKAGE).with_suffix("").as_posix(): f.read_text() for f in files}
+
+
+def test_every_row_has_a_unit_and_a_source() -> None:
+    assert {r.name for r in rows()} == {f.name for f in fields(Policy)}
+    for row in rows():
+        assert row.value == getattr(POLICY, row.name) and row.value > 0, row.name
+        assert row.unit.strip() and row.group and len(row.source) > 10, row.name
+
+
+def test_every_number_that_decides_has_the_command_that_measures_it() -> None:
+    without = [r.name for r in rows() if r.name in deciding() and not r.command]
+    assert not without
+    assert len(deciding()) > 15 and len(rows()) - len(deciding()) > 5
+    beside = [r.name for r in rows() if r.name not in deciding() and r.command]
+    assert not beside, "a number with a command decides: it is no effort"
+
+
+def test_the_commands_can_be_called(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The script is there, and takes what a command names; that of a row measures this row."""
+    monkeypatch.syspath_prepend(str(ROOT / "bench"))
+    for row in rows():
+        if not row.command:
+            continue
+        program, script, *arguments = row.command.split()
+        assert program == "python" and (ROOT / script).is_file(), row
+        if script == "bench/policy.py":
+            assert arguments == [row.name], row
+        else:
+            assert all(a.isdigit() or f'"{a}"' in (ROOT / script).read_text() for a in arguments), row
+        assert [r.name for r in importlib.import_module("policy").options_of([row.name]).rows] == [row.name]
+
+
+def test_a_row_that_decides_says_which_cases_show_it() -> None:
+    assert {r.cases for r in rows() if r.command} == set(SHOWN_BY)
+    assert not [r.name for r in rows() if bool(r.cases) != bool(r.command)]
+
+
+def test_the_page_of_the_policy_is_what_the_policy_says() -> None:
+    spec = importlib.util.spec_from_file_location("policy_page", ROOT / "docs" / "tools" / "policy.py")
+    assert spec is not None and spec.loader is not None
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    assert tool.PAGE.read_text(encoding="utf-8") == tool.page(), "write it again: python docs/tools/policy.py"
+    text = tool.page()
+    assert all(f"| `{row.name}` | {row.value:g} |" in text for row in rows())
+
+
+def test_the_policy_cannot_be_changed() -> None:
+    with pytest.raises(FrozenInstanceError):
+        POLICY.effect_penalty = 0.0  # type: ignore[misc]
+    with pytest.raises((FrozenInstanceError, AttributeError, TypeError)):
+        POLICY.another = 1.0  # type: ignore[attr-defined]
+    assert Policy() == POLICY
+
+
+def test_every_number_of_the_policy_is_used() -> None:
+    text = "".join(f.read_text() for f in PACKAGE.rglob("*.py") if f.parent.name != "policy")
+    used = set(re.findall(r"\b(?:policy|POLICY)\.(\w+)", text)) - {"table"}
+    assert used == {r.name for r in rows()}
+
+
+def test_a_number_with_a_name_is_in_the_policy_or_says_why_not() -> None:
+    found = [f"{module}.{name}" for module, text in modules(*DECIDE).items() for name in numbers_named(text)]
+    assert not found, f"a number that decides is a row of policy/table.py, others say '{MARK}why': {', '.join(found)}"
+
+
+def test_no_number_without_a_name_decides() -> None:
+    texts = modules(*DECIDE)
+    assert set(TABLES) <= set(texts)
+    found = [f"{module}:{number}" for module, text in texts.items() if module not in TABLES for number in numbers_inside(text)]
+    assert not found, f"a number that decides is a row of policy/table.py, others have a name and '{MARK}why': {', '.join(found)}"
+
+
+def test_what_counts_as_a_number_of_its_own() -> None:
+    text = (
+        "import numpy as np\nLIMIT = 0.3\nA, B = -1, 2.0 * np.pi\n_GRID = 2.0 ** np.arange(3)\nLEVEL: float = 1e-3\n"
+        "LEVELS = (1.0, 2.0)\nNAME = 'x'\nFLAG = True\nlimit = 0.3\nTABLE = {'a': 1.0}\ndef f():\n    LOCAL = 1.0\n"
+        "class C:\n    INNER = 3\nSTART = 0.3  # no decision: a start\nBARE = 0.3  # no decision: \n"
+    )
+    assert numbers_named(text) == ["LIMIT", "A", "B", "_GRID", "LEVEL", "LEVELS", "BARE", "INNER"]
+
+
+@pytest.mark.parametrize(
+    ("line", "numbers"),
+    [
+        ("x < 0.3", ["0.3"]),
+        ("x < 3.0 * floor", ["3.0"]),
+        ("max(6.0 * noise, 1e-300)", ["6.0"]),
+        ("np.clip(x, -0.5, 0.7)", ["0.5", "0.7"]),
+        ("costs[:3]", ["3"]),
+        ("ls.fit(objective, x, 8)", ["8"]),
+        ("lambda x, most=7: x", ["7"]),
+        ("def f(x, *, most=7): ...", ["7"]),
+        ("x < 2.0 * floor", ["2.0"]),
+        ("x > y + 2.0", ["2.0"]),
+        ("bound = x.value + 2.5 * x.std", ["2.5"]),
+        ("bound = 2.0 * noise_std", ["2.0"]),
+        ("def f(x):\n limit = 3.0\n return x < limit", ["3.0"]),
+        ("def f(x):\n limit: float = 3.0\n return max(x, limit)", ["3.0"]),
+        ("def f(x, y):\n near, far = 3.0 * y, 5.0\n return near < x", ["3.0"]),
+        ("def f(x, y):\n limit = 3.0 if y else 4.0\n return 1.0 - limit < x", ["3.0", "4.0"]),
+        ("def f(x):\n if x < (limit := 3.0):\n  return limit", ["3.0"]),
+        ("def f(x, limit=3.0): ...", ["3.0"]),
+        ("x < 0.3  # no decision: a start", []),
+        ("# no decision: a start\nx < 0.3", []),
+        ("x < 0.3  # no decision: ", ["0.3"]),
+        ("def f(x):\n scale = 3.0\n return scale * x", []),
+        ("def f(a, b):\n root = b * b - 4.0 * a\n return root < 0", []),
+        ("f'{100 * std:.2g} %'", []),
+        ("x < 2.0 * np.pi and y < z**3", []),
+        ("0.0 < x <= 1 and abs(y) < 2 * z and len(u) > 1", []),
+        ("x[:, 3] > x[:, 4]", []),
+        ("max(x, 1e-300)", []),
+        ("0.25 * x + 3.0", []),
+        ("ls.fit(objective, POLICY.usual)", []),
+    ],
+)
+def test_what_counts_as_a_number_that_decides(line: str, numbers: list[str]) -> None:
+    assert [found.split(": ")[1] for found in numbers_inside(line)] == numbers
