@@ -8,6 +8,7 @@ import pkgutil
 import re
 
 import pytest
+from test_codebase import imports, modules, sources
 
 import gaident
 from gaident.diagnosis import library
@@ -17,11 +18,11 @@ from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.library.equivalences import EQUIVALENT
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.models.effects_linear import LINEAR
-from test_codebase import PACKAGE, ROOT, imports, modules, sources
+from places import CORE, PACKAGE, ROOT
 
 EFFECTS = {row.name for row in gaident.effects.table() if not row.own}
 CATALOGUE = ROOT / "docs/catalogue.md"
-IN_CORE = ROOT / "csrc" / "gaident" / "effects"
+IN_CORE = CORE / "effects"
 OF_THE_RECORD = {"outliers", "velocity_quantisation"}  # no fit moves them
 # Python that may name an effect: the library of the diagnosis, and the transfer functions of those that are linear; and the
 # demonstration, which hides one in a drive as a user would.
