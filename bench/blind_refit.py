@@ -46,7 +46,7 @@ class Fit:
     chi2: float
 
 
-class Structure:
+class Refitted:
     """Which parameters are free, and the vector they are packed into."""
 
     def __init__(self, plant: Plant, effects: dict[str, Values]) -> None:
@@ -127,7 +127,7 @@ def autoregression(rest: Array, order: int) -> tuple[Array, float]:
     return np.concatenate([[1.0], -a]), float(np.sqrt(lags[0] - a @ lags[1:]))
 
 
-def refit(structure: Structure, truth: Truth, velocity: Array, white: tuple[Array, float] | None, evaluations: int = 25) -> Fit:
+def refit(structure: Refitted, truth: Truth, velocity: Array, white: tuple[Array, float] | None, evaluations: int = 25) -> Fit:
     """Least squares over all free parameters, from the structure's own values; on the replay where `white` is given."""
     measured = None if white is None else velocity
     taps, scale = white or (np.ones(1), SIGMA)
@@ -147,7 +147,7 @@ def refit(structure: Structure, truth: Truth, velocity: Array, white: tuple[Arra
 
 def oracle(truth: Truth, velocity: Array, validation: Array) -> float:
     """Free-run rmse [rad/s] on the validation record of the true structure, refitted to the record."""
-    structure = Structure(truth.plant, {k: v for k, v in truth.effects.items() if k not in ("outliers", "velocity_quantisation")})
+    structure = Refitted(truth.plant, {k: v for k, v in truth.effects.items() if k not in ("outliers", "velocity_quantisation")})
     fit = refit(structure, truth, velocity, whitener(truth))
     assert truth.validation_command is not None
     free = run_drive(fit.plant, truth.validation_command, fit.effects, substeps=SUBSTEPS).velocity
@@ -242,7 +242,7 @@ def separability(truth: Truth, only: Sequence[str] | None = None, evaluations: i
     for rival, structures in rivals(truth, log.torque).items():
         if not structures or (only and rival not in only and rival != "none"):
             continue
-        fits = (refit(Structure(truth.plant, start), truth, log.velocity, None, evaluations) for start in structures)
+        fits = (refit(Refitted(truth.plant, start), truth, log.velocity, None, evaluations) for start in structures)
         left[rival] = min(fit.chi2 for fit in fits)
     return left
 

@@ -24,7 +24,7 @@ import numpy as np
 from compare_tasks import Task, Vector, all_tasks
 
 import gaident as ga
-from gaident.models.factors import Structure
+from gaident.models.factors import FactorCounts
 
 MLP_WIDTHS = (8, 16)
 MLP_SEEDS = 3
@@ -54,12 +54,12 @@ Predict = Callable[[ga.Record], Vector]
 
 def linear(task: Task) -> tuple[Predict, int, str]:
     idn = ga.identify(task.train, task.controller, workers=1)
-    return _simulator(task, idn.model), Structure.of(idn.model).size, f"(p,q) = ({idn.p},{idn.q})"
+    return _simulator(task, idn.model), FactorCounts.of(idn.model).size, f"(p,q) = ({idn.p},{idn.q})"
 
 
 def extended(task: Task) -> tuple[Predict, int, str]:
     dia = ga.diagnose(task.train, task.controller)
-    count = Structure.of(dia.model.linear).size + sum(len(e.values) for e in dia.model.effects)
+    count = FactorCounts.of(dia.model.linear).size + sum(len(e.values) for e in dia.model.effects)
     certain = {f.effect for f in dia.causes if f.named}
     names = ", ".join(e.name.replace("_", " ") + ("" if e.name in certain else "?") for e in dia.model.effects)
     return _simulator(task, dia.model), count, f"{dia.verdict}: {names or 'nothing'}"

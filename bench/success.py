@@ -117,9 +117,9 @@ def local_fit_from_truth(case: Case, rec: ga.Record) -> float:
     from scipy.optimize import least_squares
 
     _, values, _ = ga.factor_parameters(case.model)
-    from gaident.models import Structure
+    from gaident.models import FactorCounts
 
-    structure = Structure.of(case.model)
+    structure = FactorCounts.of(case.model)
 
     def residual(scaled: np.ndarray) -> np.ndarray:
         return rec.velocity - ga.simulate(ga.model_from_factor_parameters(scaled * values, structure), rec, case.controller)

@@ -25,7 +25,7 @@ py::list table() {
         for (const EffectParameter& p : info.parameters)
             parameters.append(py::make_tuple(p.name, p.unit, p.neutral, p.lowest, p.highest, p.above_lowest));
         rows.append(py::make_tuple(info.name, name_of(info.place), info.meaning, py::tuple(parameters), info.simulated,
-                                   info.needs_two_masses, info.relation, info.remark));
+                                   info.needs_two_masses, info.relation, info.remark, info.turns));
     }
     return rows;
 }

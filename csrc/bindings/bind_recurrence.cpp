@@ -20,7 +20,7 @@ py::list numbers_of(Value... value) {
     return all;
 }
 
-// Name -> coefficients of each effect there, in the order of its header; of one with a table, its numbers row after row.
+// Name -> coefficients of each effect there, in the order of its header.
 py::dict effect_numbers(const PreparedEffects& made, EffectSet effects) {
     py::dict d;
     Effects::each([&]<class E>() {
@@ -29,6 +29,24 @@ py::dict effect_numbers(const PreparedEffects& made, EffectSet effects) {
         double flat[sizeof c / sizeof(double) + 1];
         std::memcpy(flat, &c, HasCoefficients<E> ? sizeof c : 0);
         d[E::info.name] = numbers(flat, HasCoefficients<E> ? static_cast<int>(sizeof c / sizeof(double)) : 0);
+    });
+    return d;
+}
+
+// Name -> (torques back, share) of each effect with a table, for every substep.
+py::dict effect_tables(const PreparedEffects& made, EffectSet effects, int substeps) {
+    py::dict d;
+    Effects::each([&]<class E>() {
+        if constexpr (HasTable<E>) {
+            if (!effects.has<E>()) return;
+            const TableOf<E>& table = made.tables.of<E>();
+            py::list back, share;
+            for (int j = 0; j < substeps; ++j) {
+                back.append(table.back[j]);
+                share.append(table.share[j]);
+            }
+            d[E::info.name] = py::make_tuple(back, share);
+        }
     });
     return d;
 }
@@ -66,15 +84,7 @@ py::dict recurrence(const EffectModel& model, const Clock& clock, const Loop& lo
         d["a"] = numbers(c.a, n);
         d["b"] = numbers(c.b, n + 1);
     }
-    if (left.effects.has<TransportDelay>()) {
-        const TransportDelay::Table& table = made.tables.of<TransportDelay>();
-        py::list back, share;
-        for (int j = 0; j < m; ++j) {
-            back.append(table.back[j]);
-            share.append(table.share[j]);
-        }
-        d["delay"] = py::make_tuple(back, share);
-    }
+    d["tables"] = effect_tables(made, left.effects, m);
     return d;
 }
 

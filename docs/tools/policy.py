@@ -25,7 +25,7 @@ What each one is for, the pages [estimation](estimation.md), [search](search.md)
 
 Other numbers decide nothing: the tolerance of a solver, the step of a difference, the start of a fit.
 They stand where they are used, with a name and the remark `no decision`, which says why.
-The bounds and starts of each effect's parameters stand in the effect's row of `diagnosis/library/terms.py`.
+The bounds and starts of each effect's parameters stand in the effect's row of `diagnosis/library/`.
 
 "Measured by" names the command that measures this one number: a calibration, or the same cases with the number at its value, at
 half of it and at twice.

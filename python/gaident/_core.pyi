@@ -245,8 +245,10 @@ def discrete(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(alpha, beta) of equation (7), powers of z^-1."""
 
-def effect_table() -> list[tuple[str, str, str, tuple[tuple[str, str, float, float, float, bool], ...], bool, bool, str, str]]:
-    """(name, place, meaning, parameters, simulated, needs two masses, relation) of every effect."""
+def effect_table() -> list[
+    tuple[str, str, str, tuple[tuple[str, str, float, float, float, bool], ...], bool, bool, str, str, bool]
+]:
+    """(name, place, meaning, parameters, simulated, needs two masses, relation, remark, turns) of every effect."""
 
 def broken_relation(name: str, values: Sequence[float]) -> str:
     """The relation between an effect's parameters that these values break, or ""."""
@@ -347,5 +349,6 @@ def recurrence(
     """The numbers of the recurrence that simulates a model, for writing it in another language.
 
     "substeps" 0 where no effect acts, "a" and "b" then in delta = z - 1 at dt; else "effects", "a" and "b" (or "phi", "motor",
-    "coupling", "shaft" of two masses) at the substep, and "delay" where there is one.
+    "coupling", "shaft" of two masses) at the substep, and "tables", of effects that look back: (torques back, share) of each
+    substep.
     """

@@ -152,10 +152,10 @@ def _of_diagnosis(mechanics: Mapping[str, Estimate], effects: Effects) -> dict[s
     found |= {name.replace("_", " "): e for name, e in mechanics.items() if name.replace("_", " ") in NONE}
     for effect, parameters in effects.items():
         term = LIBRARY[effect]
-        if term.levels and "rate" not in parameters:
+        if term.levels and not term.time_varying:
             found["dry friction"] = _level(parameters)
         elif term.levels:
-            del found["dry friction"]  # it drifts: a mean over the record is no parameter
+            del found["dry friction"]
         elif _is_gravity(term):
             found["gravity"] = parameters["amplitude"]
     return found

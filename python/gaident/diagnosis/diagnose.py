@@ -17,9 +17,11 @@ from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, a
 from gaident.diagnosis.controller.form_findings import driver_of
 from gaident.diagnosis.controller.log_shift import aligned
 from gaident.diagnosis.experiments.excitation import decided_by_the_angle, excitation
-from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off, noise_findings
+from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off
 from gaident.diagnosis.gains import Gains, measured_gains
-from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, LOAD, TWO_LEVELS, conditional_classes
+from gaident.diagnosis.library.equivalences import equivalents
+from gaident.diagnosis.library.record import findings_of_the_record
+from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, in_controller
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.arguments import ProgressCallback, check_controller, checked, in_order, noise_std_of, records_of
@@ -28,11 +30,12 @@ from gaident.diagnosis.records.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection.attribution import only_describes, simplified
 from gaident.diagnosis.selection.dependence import dependence
-from gaident.diagnosis.selection.offset import offset_of
-from gaident.diagnosis.selection.rivals import Rival
+from gaident.diagnosis.selection.offset import Offset, offset_of
+from gaident.diagnosis.selection.rivals import Replacement
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.objective import Fit, Objective
+from gaident.estimation.term import Term
 from gaident.estimation.uncertainty import estimates_of
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
@@ -185,7 +188,10 @@ class _Work:
         self.notes += notes
         self.controller_steps += self.form
         # Limits that the log shows act in every loop that is closed for a fit.
-        known = {t: np.array(list(self.at_controller.effects[t.name].values())) for t in IN_CONTROLLER if self._shown(t.name)}
+        limits = self.at_controller.effects
+        known: dict[Term, NDArray[np.float64]] = {
+            t: np.array(list(limits[t.name].values())) for t in in_controller() if t.name in limits
+        }
         shown = self.at_controller.controller or self.controller
         data = replace(data, controller=shown, loop_follows=self.at_controller.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
@@ -193,9 +199,6 @@ class _Work:
         self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
         self.spoiled = int(sum(len(h) for h in hit))
         self.excited = excitation(self.clean, shown, axis=self.axis)
-
-    def _shown(self, effect: str) -> bool:
-        return effect in self.at_controller.effects
 
     def _spikes(self, rec: Record) -> NDArray[np.intp]:
         """Samples that stand out of the velocity, or out of the linear model's error: a slope of the velocity may hide them."""
@@ -265,11 +268,11 @@ class _Work:
                 self.notes = said
                 self.take(instead)
                 return self.report(seed)
-        findings = noise_findings(self.spoiled, sum(len(r) for r in self.records), self.step)
+        findings = findings_of_the_record(self.spoiled, sum(len(r) for r in self.records), self.step)
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         for effect in causes:
             gain, rivals = self.rivals[effect]
-            alternatives = self._alternatives(effect, rivals, offset is None)
+            alternatives = self._alternatives(effect, rivals, offset)
             findings.append(
                 Finding(
                     effect=effect,
@@ -300,7 +303,7 @@ class _Work:
                 self.notes.append(say(text, " and ".join(dropped), of_driver))
         check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None, self.axis)
         self.notes += check.notes
-        if self.final.parameters.held and LOAD.name in self.final.effects:
+        if self.final.parameters.held and any(LIBRARY[e].constant for e in self.final.effects):
             self.notes.append(
                 Text("The axis is held by a spring: its tension where the record starts is part of the constant load.")
             )
@@ -372,13 +375,12 @@ class _Work:
             shorter = self.found.space.without(self.final, effect)
             self.take(compared(self.found, shorter, self._equivalent_here, self._say))
 
-    def _alternatives(self, effect: str, rivals: Sequence[Rival], even: bool) -> tuple[str, ...]:
-        """Statistical rivals and equivalent effects, no untestable ones; even: friction of two levels is a load as well."""
+    def _alternatives(self, effect: str, rivals: Sequence[Replacement], offset: Offset | None) -> tuple[str, ...]:
+        """Statistical rivals and equivalent effects, no untestable ones; offset: what an effect is not the same as."""
         names = [r.effect for r in rivals]
         names += sorted(self._equivalent_here(effect))
-        for names_of_class in EQUIVALENT:
-            if effect in names_of_class and (even or effect != TWO_LEVELS.name):
-                names += [t for t in sorted(names_of_class) if t != effect]
+        if offset is None or effect != offset.effect:
+            names += equivalents(effect)
         return tuple(name for name in dict.fromkeys(names) if name not in self.not_testable)
 
     def _equivalent_here(self, effect: str) -> set[str]:

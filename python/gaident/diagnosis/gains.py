@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from gaident.control.cascade import Cascade, Controller
 from gaident.data.record import Record
-from gaident.diagnosis.library.terms import RESONANCE
 from gaident.diagnosis.records.hygiene import quantisation
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit
@@ -219,7 +218,7 @@ def start_state(model: Model, rec: Record, controller: Controller | None) -> Vec
     if not model.effects:
         return np.asarray(initial_state(model, rec, controller))
     head = rec[: min(len(rec), POLICY.head)]
-    state = np.zeros(model.order + 2 * any(effect.name == RESONANCE.name for effect in model.effects))
+    state = np.zeros(model.linear.order)
     state[0] = rec.velocity[0]
     step = 1e-3 * float(np.abs(head.velocity).max())
     for _ in range(2):

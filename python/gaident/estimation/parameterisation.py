@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from gaident.estimation.term import Scales, Term
 from gaident.models.effects import place_of, table
-from gaident.models.factors import Structure
+from gaident.models.factors import FactorCounts
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
 
@@ -126,12 +126,12 @@ class Parameterisation:
         return next(t for t in self.terms if t.name == effect)
 
     @property
-    def structure(self) -> Structure:
+    def structure(self) -> FactorCounts:
         """The linear part as the core takes it: one real pole, and a pair of poles and of zeros for two masses; a spring makes
         it a pair of poles, and a zero at 0."""
         if self.held:
-            return Structure(0, 1, 1, 0)
-        return Structure(1, 0, 0, 0) if self.masses == 1 else Structure(1, 1, 0, 1)
+            return FactorCounts(0, 1, 1, 0)
+        return FactorCounts(1, 0, 0, 0) if self.masses == 1 else FactorCounts(1, 1, 0, 1)
 
     @property
     def base(self) -> int:

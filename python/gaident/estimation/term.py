@@ -77,6 +77,7 @@ class Term:
     multimodal: bool = False  # a stop or an impact more or less makes valleys: fitted in the loop first, searched globally
     domains: frozenset[str] = frozenset()  # signals whose free function imitates it
     levels: bool = False  # its first coordinate is the level of dry friction
+    time_varying: bool = False  # its size changes in the course of a record: a mean over the record is none of its parameters
     late: bool = False  # it makes the measured velocity late, which a logged angle shows
     resonates: bool = False  # a pair of poles and zeros in series with the mechanism: a second mass in disguise
     poles: Callable[[Vector], tuple[complex, ...]] | None = None  # poles in series [rad/s] of natural parameters
@@ -88,6 +89,20 @@ class Term:
     def size(self) -> int:
         """Number of coordinates."""
         return len(self.limits(_UNIT))
+
+    @property
+    def simplest(self) -> bool:
+        """Whether all others of its family contain it."""
+        return bool(self.family) and not self.nested
+
+    @property
+    def search_cost(self) -> float:
+        """2 ln m, what it costs in BIC units to have chosen the best one of m orders of the angle; 0 without a choice.
+
+        The extended BIC of Chen and Chen (2008, Biometrika 95, 759) with gamma = 1, m the number of models of this size that were
+        tried: chance alone makes the best of m candidates better by x with at most m times the probability of one.
+        """
+        return 2.0 * float(np.log(self.orders[1] - self.orders[0] + 1))
 
     @property
     def in_controller(self) -> bool:

@@ -31,7 +31,6 @@ from gaident.version import version
 
 __all__ = ["c_source", "write_c"]
 
-TURNING = ("unbalance", "cogging", "velocity_ripple")
 FINEST = 16  # substeps that the core takes at most by itself
 
 
@@ -58,7 +57,7 @@ def c_source(model: Model, dt: float, controller: PI | None, name: str, substeps
     """The text of the file; `name` begins every name that it declares. Raises ModelError where it cannot be written."""
     _checked(model, dt, controller, name, substeps)
     checked_axis(axis)
-    steps = substeps or (FINEST if any(e.name in TURNING for e in model.effects) else 0)
+    steps = substeps or (FINEST if any(e.row.turns for e in model.effects) else 0)
     try:
         found: dict[str, Any] = core.recurrence(model.core(), dt, controller, steps, 0.0)
     except ValueError as reason:
@@ -118,12 +117,12 @@ def _table(dt: float, controller: PI | None, name: str, found: dict[str, Any]) -
         rows += [("substeps", str(found["substeps"])), ("h", _number(dt / found["substeps"]))]
         rows.append(("effects", " | ".join(f"GAIDENT_{effect.upper()}" for effect in effects) or "0"))
     for effect, values in effects.items():
-        if effect == "transport_delay":
-            back, share = found["delay"]
-            length = max(back) + 1
+        if effect in found["tables"]:
+            back, share = found["tables"][effect]
+            length = max(length, max(back) + 1)
             before.append(f"static const int {name}_back[] = {{{', '.join(str(b) for b in back)}}};")
             before.append(f"static const double {name}_share[] = {_array(share)};")
-            rows.append((effect, f"{{{length}, {name}_back, {name}_share}}"))
+            rows.append((effect, f"{{{max(back) + 1}, {name}_back, {name}_share}}"))
         else:
             rows.append((effect, _array(values)))
     table = [f"static const gaident_drive {name}_drive = {{", *(f"    .{key} = {value}," for key, value in rows), "};"]

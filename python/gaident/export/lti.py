@@ -14,7 +14,6 @@ Sampled, with the torque held between the samples, it is exact, of any delay d d
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,27 +21,15 @@ from numpy.typing import NDArray
 
 from gaident.checks import real_number
 from gaident.errors import ModelError
+from gaident.models.effects_linear import LINEAR, Transfer
 from gaident.models.model import Model
 from gaident.models.roots import canonical_roots
 
-__all__ = ["LINEAR", "to_control", "to_scipy"]
+__all__ = ["to_control", "to_scipy"]
 
 Matrix = NDArray[np.float64]
 
-LINEAR = ("extra_resonance", "transport_delay", "torque_lag", "velocity_filter")
-"""The effects that a linear system can hold."""
-
 HIGHEST_PADE = 10  # beyond, the approximation's own poles are lost in rounding
-
-
-@dataclass(frozen=True)
-class Chain:
-    """gain prod(s - zeros) / prod(s - poles) exp(-s delay)."""
-
-    gain: float
-    poles: tuple[complex, ...]
-    zeros: tuple[complex, ...]
-    delay: float  # s
 
 
 def to_scipy(model: Model, dt: float | None, pade: int | None) -> Any:
@@ -53,7 +40,7 @@ def to_scipy(model: Model, dt: float | None, pade: int | None) -> Any:
     if dt is not None:
         step = _checked_step(model, dt, pade)
         return signal.StateSpace(*_sampled(chain, step), dt=step)
-    chain = _rational(chain, pade)
+    chain = _rational(model, chain, pade)
     return signal.ZerosPolesGain(list(chain.zeros), list(chain.poles), chain.gain)
 
 
@@ -67,26 +54,26 @@ def to_control(model: Model, dt: float | None, pade: int | None) -> Any:
         raise ImportError('to_control needs python-control: pip install "gaident[control]"') from reason
     if step is not None:
         return control.ss(*_sampled(chain, step), step)
-    chain = _rational(chain, pade)
+    chain = _rational(model, chain, pade)
     return control.zpk(list(chain.zeros), list(chain.poles), chain.gain)
 
 
-def _chain(model: Model) -> Chain:
+def _chain(model: Model) -> Transfer:
     others = [effect.name for effect in model.effects if effect.name not in LINEAR]
     if others:
         raise ModelError(
             f"the model has {', '.join(others)}, which no linear system can hold: take it out with without_effect, use "
             f"model.linear, or write the whole with to_c (of the effects a linear system holds {', '.join(LINEAR)})"
         )
-    linear = model.linear
-    values = {effect.name: effect.values for effect in model.effects}
-    gain, poles = linear.gain, list(linear.poles)
-    for name in ("torque_lag", "velocity_filter"):
-        tau = values.get(name, (0.0,))[0]
-        if tau > 0.0:
-            gain /= tau
-            poles.append(complex(-1.0 / tau))
-    return Chain(gain, tuple(poles), linear.zeros, values.get("transport_delay", (0.0,))[0])
+    mechanism = model.linear
+    chain = Transfer(mechanism.gain, mechanism.poles, mechanism.zeros)
+    for effect in model.effects:
+        if effect.row.place != "plant":  # else it is part of the mechanism
+            more = LINEAR[effect.name](effect.values)
+            chain = Transfer(
+                chain.gain * more.gain, (*chain.poles, *more.poles), (*chain.zeros, *more.zeros), chain.delay + more.delay
+            )
+    return chain
 
 
 def _checked_step(model: Model, dt: float, pade: int | None) -> float:
@@ -101,15 +88,16 @@ def _checked_step(model: Model, dt: float, pade: int | None) -> float:
     return step
 
 
-def _rational(chain: Chain, pade: int | None) -> Chain:
+def _rational(model: Model, chain: Transfer, pade: int | None) -> Transfer:
     """The chain with the delay as poles and zeros."""
     if pade is not None and (isinstance(pade, bool) or not isinstance(pade, int) or not 1 <= pade <= HIGHEST_PADE):
         raise ModelError(f"pade is {pade!r}: give the order of the approximation, a whole number from 1 to {HIGHEST_PADE}")
     if chain.delay == 0.0:
         return chain
     if pade is None:
+        late = " and ".join(e.name for e in model.effects if LINEAR[e.name](e.values).delay)
         raise ModelError(
-            f"the model has a transport_delay of {chain.delay:g} s, which is no ratio of polynomials: give pade=3 for an "
+            f"the model has a {late} of {chain.delay:g} s, which is no ratio of polynomials: give pade=3 for an "
             "approximation, or dt= for a sampled system, in which it is exact"
         )
     n = pade
@@ -117,10 +105,10 @@ def _rational(chain: Chain, pade: int | None) -> Chain:
     roots = np.roots(np.array(N, dtype=np.float64) / N[0]) / chain.delay
     # n is the same above and below: the leading coefficients are 1 and (-1)^n.
     zeros = (*chain.zeros, *(complex(-r) for r in roots))
-    return Chain(chain.gain * (-1.0) ** n, (*chain.poles, *(complex(r) for r in roots)), zeros, 0.0)
+    return Transfer(chain.gain * (-1.0) ** n, (*chain.poles, *(complex(r) for r in roots)), zeros, 0.0)
 
 
-def _sampled(chain: Chain, dt: float) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+def _sampled(chain: Transfer, dt: float) -> tuple[Matrix, Matrix, Matrix, Matrix]:
     """(A, B, C, D) at the sample time: the plant's states, then the torques u(k-1), u(k-2), ... on their way."""
     from scipy.linalg import expm
 
@@ -157,7 +145,7 @@ def _sampled(chain: Chain, dt: float) -> tuple[Matrix, Matrix, Matrix, Matrix]:
     return F, G, H, np.zeros((1, 1))
 
 
-def _cascade(chain: Chain, dt: float) -> tuple[Matrix, NDArray[np.float64], NDArray[np.float64]]:
+def _cascade(chain: Transfer, dt: float) -> tuple[Matrix, NDArray[np.float64], NDArray[np.float64]]:
     """(A, B, C) of the chain without its delay, time in units of dt, as sections of order two and one in a row.
 
     Each takes the output v of those before it:  x1' = x2, x2' = -e0 x1 - e1 x2 + v, y = n2 x2' + n1 x2 + n0 x1.

@@ -29,7 +29,7 @@ from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.identification.plant_of_discrete import plant_of_discrete
 from gaident.models.discrete import Discrete
-from gaident.models.factors import Structure, factor_parameters
+from gaident.models.factors import FactorCounts, factor_parameters
 from gaident.models.mechanics import Mechanics, mechanics_from_model
 from gaident.models.model import Model
 
@@ -244,7 +244,7 @@ def _model_covariance(model: Model, theta: Vector, covariance: Vector, dt: float
 
     None where x does not follow smoothly, and where no noise is left to speak of.
     """
-    N, structure = len(theta) // 2, Structure.of(model)
+    N, structure = len(theta) // 2, FactorCounts.of(model)
     variance, directions = np.linalg.eigh(covariance)
     if variance[-1] < 1e-16 * float(theta @ theta):
         return None
@@ -253,7 +253,7 @@ def _model_covariance(model: Model, theta: Vector, covariance: Vector, dt: float
         ends = []
         for moved in (theta + 0.1 * step, theta - 0.1 * step):
             near = plant_of_discrete(moved[: N + 1], moved[N + 1 :], dt, controller, covariance).model
-            if near is None or Structure.of(near) != structure:
+            if near is None or FactorCounts.of(near) != structure:
                 return None
             ends.append(factor_parameters(near)[1])
         columns.append((ends[0] - ends[1]) / 0.2)

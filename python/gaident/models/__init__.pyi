@@ -1,7 +1,7 @@
 from . import effects
 from .discrete import Discrete
 from .effects import Effect
-from .factors import Structure, factor_parameters, model_from_factor_parameters
+from .factors import FactorCounts, factor_parameters, model_from_factor_parameters
 from .mechanics import Mechanics, OneMass, TwoMass, mechanics_from_dict, mechanics_from_model
 from .model import Model
 from .roots import Mode
@@ -20,7 +20,7 @@ __all__ = [
     "OneMass",
     "Run",
     "SearchSpace",
-    "Structure",
+    "FactorCounts",
     "TwoMass",
     "effects",
     "factor_parameters",

@@ -46,6 +46,8 @@ class Row(NamedTuple):
         Whether it is user-defined, registered from Python.
     says : Text
         The meaning without what the table says after it, for sentences.
+    turns : bool
+        Whether it depends on the shaft's angle; False for a user-defined effect, of which it is not known.
 
     See Also
     --------
@@ -61,6 +63,7 @@ class Row(NamedTuple):
     relation: str  # what the parameters have to meet among themselves, empty if nothing
     own: bool = False  # registered from Python
     says: Text = Text("")  # the meaning without what the table says after it, for sentences
+    turns: bool = False  # depends on the shaft's angle
 
     def to_dict(self) -> dict[str, Any]:
         """Return the row for JSON."""
@@ -99,10 +102,11 @@ class Table(tuple[Row, ...]):
 @lru_cache(maxsize=1)
 def _built_in() -> tuple[Row, ...]:
     rows = []
-    for name, place, meaning, parameters, simulated, two, relation, remark in _core.effect_table():
+    for name, place, meaning, parameters, simulated, two, relation, remark, turns in _core.effect_table():
         says = say(meaning)
         whole = say("{}; {}", says, say(remark)) if remark else says
-        rows.append(Row(name, place, tuple(Parameter(*p) for p in parameters), whole, simulated, two, relation, says=says))
+        own = tuple(Parameter(*p) for p in parameters)
+        rows.append(Row(name, place, own, whole, simulated, two, relation, says=says, turns=turns))
     return tuple(rows)
 
 

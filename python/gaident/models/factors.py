@@ -18,7 +18,7 @@ from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
 
 
-class Structure(NamedTuple):
+class FactorCounts(NamedTuple):
     """How many real roots and conjugate pairs a model has.
 
     Attributes
@@ -35,9 +35,9 @@ class Structure(NamedTuple):
     Examples
     --------
     >>> import gaident as ga
-    >>> from gaident.models import Structure
-    >>> Structure.of(ga.TwoMass(JM=1e-4, DM=0.003, JL=6e-4, DL=0.008, KG=2.6).model())
-    Structure(real_poles=1, pole_pairs=1, real_zeros=0, zero_pairs=1)
+    >>> from gaident.models import FactorCounts
+    >>> FactorCounts.of(ga.TwoMass(JM=1e-4, DM=0.003, JL=6e-4, DL=0.008, KG=2.6).model())
+    FactorCounts(real_poles=1, pole_pairs=1, real_zeros=0, zero_pairs=1)
     """
 
     real_poles: int
@@ -46,7 +46,7 @@ class Structure(NamedTuple):
     zero_pairs: int
 
     @classmethod
-    def of(cls, model: Model) -> Structure:
+    def of(cls, model: Model) -> FactorCounts:
         """Return the structure of a model."""
         pole_pairs = sum(r.imag > 0.0 for r in model.poles)
         zero_pairs = sum(r.imag > 0.0 for r in model.zeros)
@@ -107,7 +107,7 @@ def factor_parameters(model: Model) -> tuple[tuple[str, ...], NDArray[np.float64
     return tuple(names), np.array(values, dtype=np.float64), tuple(units)
 
 
-def model_from_factor_parameters(values: ArrayLike, structure: Structure) -> Model:
+def model_from_factor_parameters(values: ArrayLike, structure: FactorCounts) -> Model:
     """Return the model of natural parameters; the inverse of `factor_parameters`.
 
     A pair with e1^2 >= 4 e0 has two real roots: the model then has another structure than the one given.
@@ -116,7 +116,7 @@ def model_from_factor_parameters(values: ArrayLike, structure: Structure) -> Mod
     ----------
     values : array_like, shape (n,)
         The vector x in the order and units of `factor_parameters`.
-    structure : gaident.models.Structure
+    structure : gaident.models.FactorCounts
         How many real roots and pairs the model has.
 
     Returns
@@ -132,10 +132,10 @@ def model_from_factor_parameters(values: ArrayLike, structure: Structure) -> Mod
     Examples
     --------
     >>> import gaident as ga
-    >>> from gaident.models import Structure
+    >>> from gaident.models import FactorCounts
     >>> model = ga.Model(500.0, [-5.0])
     >>> names, values, units = ga.factor_parameters(model)
-    >>> ga.model_from_factor_parameters(values, Structure.of(model))
+    >>> ga.model_from_factor_parameters(values, FactorCounts.of(model))
     Model(gain=500.0, poles=[-5.0], zeros=[])
     """
     x = np.asarray(values, dtype=np.float64)

@@ -13,7 +13,7 @@ from gaident.axis import Text, say, unit_text
 from gaident.checks import known_keys, one_of, real_number
 from gaident.errors import ModelError
 from gaident.models import two_mass
-from gaident.models.factors import Structure
+from gaident.models.factors import FactorCounts
 from gaident.models.model import Model
 from gaident.models.roots import polynomial_roots
 from gaident.models.two_mass import Matrix, Vector
@@ -347,7 +347,7 @@ def _notes(drive: Mechanics, positive: tuple[str, ...], not_negative: tuple[str,
 def _checked_covariance(model: Model, covariance: ArrayLike | None) -> Matrix | None:
     if covariance is None:
         return None
-    n = Structure.of(model).size
+    n = FactorCounts.of(model).size
     cov = np.array(covariance, dtype=np.float64)
     if cov.shape != (n, n):
         raise ModelError(

@@ -20,7 +20,8 @@ from gaident.control.pi import PI
 from gaident.errors import ModelError
 from gaident.models.discrete import Discrete
 from gaident.models.effects import Effect, ordered
-from gaident.models.roots import Mode, canonical_roots, modes_of, quadratic_roots, roots_of, text_of
+from gaident.models.effects_linear import LINEAR
+from gaident.models.roots import Mode, canonical_roots, modes_of, roots_of, text_of
 from gaident.providers import provided
 
 Roots = Sequence[complex] | NDArray[np.complex128] | NDArray[np.float64]
@@ -121,11 +122,9 @@ class Model:
             return self
         base = self._with(())
         for effect in self.effects:
-            if effect.name == "extra_resonance":
-                wp, zp, wz, zz = effect.values
-                poles = [*base.poles, *quadratic_roots(2.0 * zp * wp, wp * wp)]
-                zeros = [*base.zeros, *quadratic_roots(2.0 * zz * wz, wz * wz)]
-                return Model(base.gain * (wp / wz) ** 2, poles, zeros)
+            if effect.row.place == "plant":
+                more = LINEAR[effect.name](effect.values)
+                base = Model(base.gain * more.gain, [*base.poles, *more.poles], [*base.zeros, *more.zeros])
         return base
 
     def _with(self, effects: tuple[Effect, ...]) -> Model:
@@ -137,7 +136,7 @@ class Model:
 
     def _checked(self, effects: Iterable[Effect]) -> tuple[Effect, ...]:
         found = ordered(effects)
-        names = {effect.name for effect in found}
+        in_series = next((effect.name for effect in found if effect.row.place == "plant"), None)
         if found and self.p == 0:
             raise ModelError(
                 f"the model has p = 0 (as many zeros as poles) and cannot carry {found[0].name}: effects need a drive "
@@ -149,9 +148,9 @@ class Model:
                     f"the model has p = {self.p}, q = {self.q}, but {effect.name} acts between two masses: use a model "
                     "with p = 1 and q = 2, for example TwoMass(...).model()"
                 )
-            if effect.row.needs_two_masses and "extra_resonance" in names:
+            if effect.row.needs_two_masses and in_series is not None:
                 raise ModelError(
-                    f"{effect.name} and extra_resonance cannot be simulated together: take one of them out with without_effect"
+                    f"{effect.name} and {in_series} cannot be simulated together: take one of them out with without_effect"
                 )
         return found
 

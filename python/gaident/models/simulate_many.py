@@ -13,7 +13,7 @@ from gaident.control.cascade import Controller
 from gaident.data.record import Record
 from gaident.errors import GaidentError, ModelError
 from gaident.models.effects import table as effect_table
-from gaident.models.factors import Structure
+from gaident.models.factors import FactorCounts
 from gaident.models.model import Model
 from gaident.models.own_effects import OWN
 from gaident.models.simulation_input import (
@@ -93,7 +93,7 @@ def simulate_many(
 
 
 def simulate_values(
-    structure: Structure,
+    structure: FactorCounts,
     effects: Sequence[str],
     values: ArrayLike,
     rec: Record,
@@ -109,7 +109,7 @@ def simulate_values(
 
     Parameters
     ----------
-    structure : Structure
+    structure : FactorCounts
         That of the linear part.
     effects : sequence of str
         Names of effects.
@@ -171,7 +171,7 @@ def simulated_with_effects(
     return found[0], found[1], found[2]
 
 
-def _parted(structure: Structure, effects: Sequence[str], values: Signal) -> tuple[Signal, OwnList]:
+def _parted(structure: FactorCounts, effects: Sequence[str], values: Signal) -> tuple[Signal, OwnList]:
     """Rows of values of `simulate_values` without the columns of user-defined effects, and these."""
     if not any(e in OWN for e in effects):
         return values, []

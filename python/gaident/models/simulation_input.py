@@ -59,8 +59,7 @@ def input_for(p: int, rec: Record, controller: Controller | None) -> tuple[Signa
 
 
 def check_start(plant: Model, controller: Controller | None, start: Signal, what: str) -> None:
-    extra = 2 * any(effect.name == "extra_resonance" for effect in plant.effects)
-    size = plant.order + extra + (controller is not None)
+    size = plant.linear.order + (controller is not None)
     if start.shape != (size,):
         raise ModelError(
             f"initial_state has the shape {start.shape}: this model driven by the {what} has "

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.models.factors import Structure
+from gaident.models.factors import FactorCounts
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -41,7 +41,7 @@ def coefficients_of_mechanics(mechanics: Vector) -> Vector:
     )
 
 
-def coefficients_of_parameters(x: Vector, structure: Structure) -> Vector:
+def coefficients_of_parameters(x: Vector, structure: FactorCounts) -> Vector:
     """c (6) of the natural parameters x of a model with three poles and two zeros (factors.py)."""
     poles_end = 1 + structure.real_poles + 2 * structure.pole_pairs
     denominator = _expanded(x[1:poles_end], structure.real_poles)

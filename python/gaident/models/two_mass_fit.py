@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gaident.models.factors import Structure, factor_parameters
+from gaident.models.factors import FactorCounts, factor_parameters
 from gaident.models.model import Model
 from gaident.models.two_mass import (
     WEAK_DAMPING,
@@ -41,7 +41,7 @@ def fit_two_masses(model: Model, cov: Matrix | None) -> TwoMassFit | None:
     None where a zero of the model lies at 0: then K_G is 0 and there is no second mass to speak of.
     """
     _, x, units = factor_parameters(model)
-    structure = Structure.of(model)
+    structure = FactorCounts.of(model)
     c = coefficients_of_parameters(x, structure)
     if c[5] == 0.0:
         return None

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gaident.identification.plant_of_discrete import plant_of_discrete
 from gaident.models import two_mass
-from gaident.models.factors import Structure, factor_parameters
+from gaident.models.factors import FactorCounts, factor_parameters
 from gaident.models.mechanics import OneMass, TwoMass, mechanics_from_model
 from gaident.models.model import Model
 from gaident.paper.facts import DT, Mechanism
@@ -66,7 +66,7 @@ def identified_mechanics(mechanism: Mechanism) -> IdentifiedMechanics:
     found = mechanics_from_model(model)
     if not isinstance(found, TwoMass):
         return IdentifiedMechanics(OneMass.from_model(model))
-    c = two_mass.coefficients_of_parameters(factor_parameters(model)[1], Structure.of(model))
+    c = two_mass.coefficients_of_parameters(factor_parameters(model)[1], FactorCounts.of(model))
     product, pairwise = (_mechanism(way(c)) for way in (two_mass.phi_by_product, two_mass.phi_by_pairwise))
     return IdentifiedMechanics(product, pairwise, found, found.with_shaft_damping)
 

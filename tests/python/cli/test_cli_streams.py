@@ -59,7 +59,7 @@ def test_a_command_imports_what_it_needs(here: Path) -> None:
         "controller.replay",
         "controller.replay_causes",
         "library",
-        "library.names",
+        "library.settings",
         "records",
         "records.lattice",
     )

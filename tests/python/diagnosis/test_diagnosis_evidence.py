@@ -15,7 +15,8 @@ from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.missing_torque import missing_torque
 from gaident.diagnosis.library import terms
-from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
+from gaident.diagnosis.library.coordinates import HIGHEST_ORDER
+from gaident.diagnosis.library.equivalences import EQUIVALENT
 from gaident.diagnosis.records.lattice import lattice_step, rounding_step
 from gaident.diagnosis.selection.offset import Offset
 from gaident.errors import ModelError, RecordError
@@ -204,7 +205,8 @@ def test_dry_friction_and_load_show_with_their_sign_and_size() -> None:
 
 
 def test_an_offset_is_told_in_the_units_of_the_axis() -> None:
-    text = Offset(0.512, 31.0, 0.0421).sentence
+    (two_levels,) = (e.of for e in EQUIVALENT if e.of is not None)
+    text = Offset(two_levels, 0.512, 31.0, 0.0421).sentence
     assert "load of 0.512 N m in" in text and "0.042 N m of it is left" in text
     assert "load of 0.512 N in" in text.linear and "0.042 N of it is left" in text.linear
 
@@ -334,21 +336,15 @@ def test_the_integral_is_read_where_no_limit_cuts_the_torque() -> None:
     assert f"above {integral:.3g} N m" in sizes["integrator_clamp"]
 
 
-def test_every_effect_has_one_row_of_what_is_known_of_it() -> None:
-    """A misspelt name would leave an effect without its family, its domains or its place in a replay."""
-    in_table = {row.name for row in ga.effects.table() if not row.own}
-    assert set(terms._METADATA) == set(terms._BUILT_IN) == in_table - {OUTLIERS, QUANTISATION}
-
-
 def test_an_axis_at_rest_shows_no_friction_of_the_family_and_no_order_up_to_the_highest() -> None:
     still = ga.Record(DT, velocity=np.zeros(500), torque=np.zeros(500))
-    family = {t.name for t in terms.LIBRARY.values() if t.family == terms.EVEN_FRICTION.family}
-    assert family == set(terms.friction_family()) <= set(excitation(still).not_testable)
+    family = {t.name for t in terms.LIBRARY.values() if t.levels}
+    assert family == {t.name for t in terms.LIBRARY.values() if t.family} <= set(excitation(still).not_testable)
     highest = {t.orders[1] for t in terms.LIBRARY.values() if t.harmonic and t.orders[1] > 1}
-    assert highest == {terms.HIGHEST_ORDER}
+    assert highest == {HIGHEST_ORDER}
     t = DT * np.arange(2000)
     for share, shown in ((0.99, False), (1.01, True)):  # of the travel that holds one period of the highest order
-        angle = 0.5 * share * math.tau / terms.HIGHEST_ORDER * np.sin(20.0 * t)
+        angle = 0.5 * share * math.tau / HIGHEST_ORDER * np.sin(20.0 * t)
         rec = ga.Record(DT, velocity=np.gradient(angle, DT), torque=np.cos(20.0 * t), position=angle)
         assert ("cogging" not in excitation(rec).not_testable) is shown
 

@@ -132,7 +132,7 @@ def _no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(prediction, "simulate_values", simulated)
     for module in (moves, model_space):
         monkeypatch.setattr(module, "LIBRARY", LIBRARY)
-        monkeypatch.setattr(module, "EQUIVALENT", {frozenset({"lag", "seen"}): ""})
+        monkeypatch.setattr(module, "equivalents", lambda effect: {"lag": ("seen",), "seen": ("lag",)}.get(effect, ()))
     monkeypatch.setattr(model_space, "ClosedLoop", lambda data, own=False: Toy(data, own, True))
     monkeypatch.setattr(score_test, "ClosedLoop", lambda data, own=False: Toy(data, own, True))
     monkeypatch.setattr(model_space, "OpenLoop", Toy)

@@ -20,7 +20,7 @@ from effect_sizes import SIZES
 from fine_integrator import Array, FineCase, FineRun, integrate
 from gaident import _core
 from gaident.cli import main
-from gaident.models import Structure, factor_parameters, initial_state, simulate_values
+from gaident.models import FactorCounts, factor_parameters, initial_state, simulate_values
 
 # Typical sizes of each effect on a small servo drive.
 TWO_MASSES = ("backlash", "hardening_stiffness")
@@ -233,7 +233,7 @@ def test_simulate_values_are_the_models() -> None:
     ]
     assert [e.name for e in models[0].effects] == ["coulomb_friction", "cogging"]
     values = [[*factor_parameters(m)[1], *(v for e in m.effects for v in e.values)] for m in models]
-    structure = Structure.of(models[0])
+    structure = FactorCounts.of(models[0])
     found = simulate_values(structure, ["coulomb_friction", "cogging"], values, rec, ctl)
     np.testing.assert_allclose(found, ga.simulate_many(models, rec, ctl), rtol=0, atol=1e-8)
     with pytest.raises(ga.GaidentError, match="rows of"):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from gaident.errors import ModelError
 from gaident.models import two_mass
-from gaident.models.factors import Structure, factor_parameters, model_from_factor_parameters
+from gaident.models.factors import FactorCounts, factor_parameters, model_from_factor_parameters
 from gaident.models.mechanics import OneMass, TwoMass, mechanics_from_dict, mechanics_from_model
 from gaident.models.model import Model
 
@@ -22,7 +22,7 @@ FIELDS = ("JM", "DM", "JL", "DL", "KG", "DG")
 
 
 def coefficients(model: Model) -> np.ndarray:
-    return two_mass.coefficients_of_parameters(factor_parameters(model)[1], Structure.of(model))
+    return two_mass.coefficients_of_parameters(factor_parameters(model)[1], FactorCounts.of(model))
 
 
 def values(mechanics: TwoMass) -> np.ndarray:
@@ -177,7 +177,7 @@ def test_two_mass_deviations_agree_with_repeated_draws() -> None:
     assert found.with_shaft_damping is not None
     np.testing.assert_allclose(values(found), values(TABLE_3), rtol=1e-9)
 
-    models = [model_from_factor_parameters(x + root @ rng.standard_normal(6), Structure.of(model)) for _ in range(600)]
+    models = [model_from_factor_parameters(x + root @ rng.standard_normal(6), FactorCounts.of(model)) for _ in range(600)]
     draws = [mechanics_from_model(m, cov) for m in models]
     for name in ("JM", "DM", "JL", "DL", "KG", "J", "D"):
         assert np.std([getattr(d, name) for d in draws]) == pytest.approx(found.std[name], rel=0.15), name

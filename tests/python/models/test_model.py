@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gaident.errors import ModelError
-from gaident.models.factors import Structure, factor_parameters, model_from_factor_parameters
+from gaident.models.factors import FactorCounts, factor_parameters, model_from_factor_parameters
 from gaident.models.model import Model
 from gaident.models.roots import polynomial_roots
 
@@ -149,11 +149,11 @@ def test_round_trips(model: Model) -> None:
     assert pickle.loads(pickle.dumps(model)) == model
     assert eval(repr(model)) == model
     names, values, units = factor_parameters(model)
-    structure = Structure.of(model)
+    structure = FactorCounts.of(model)
     assert len(names) == len(set(names)) == len(values) == len(units) == structure.size
     assert (structure.p, structure.q) == (model.p, model.q)
     again = model_from_factor_parameters(values, structure)
-    assert Structure.of(again) == structure
+    assert FactorCounts.of(again) == structure
     np.testing.assert_allclose(again.poles, model.poles, rtol=1e-9)
     np.testing.assert_allclose(again.zeros, model.zeros, rtol=1e-9)
 
@@ -177,13 +177,13 @@ def test_names_and_units_of_the_natural_parameters() -> None:
 
 
 def test_a_pair_may_become_two_real_roots() -> None:
-    model = model_from_factor_parameters([2.0, 1e6, 1.0], Structure(0, 1, 0, 0))
+    model = model_from_factor_parameters([2.0, 1e6, 1.0], FactorCounts(0, 1, 0, 0))
     np.testing.assert_allclose([r.real for r in model.poles], [-1e-6, -1e6], rtol=1e-11)
-    assert Structure.of(model) == Structure(2, 0, 0, 0)
+    assert FactorCounts.of(model) == FactorCounts(2, 0, 0, 0)
     with pytest.raises(ModelError, match="takes 3 numbers"):
-        model_from_factor_parameters([2.0, 1.0], Structure(0, 1, 0, 0))
+        model_from_factor_parameters([2.0, 1.0], FactorCounts(0, 1, 0, 0))
     with pytest.raises(ModelError, match=r"values\[1\] is nan"):
-        model_from_factor_parameters([2.0, math.nan, 1.0], Structure(0, 1, 0, 0))
+        model_from_factor_parameters([2.0, math.nan, 1.0], FactorCounts(0, 1, 0, 0))
 
 
 def test_to_scipy() -> None:

@@ -14,7 +14,7 @@ import pytest
 
 import gaident as ga
 from gaident.errors import ModelError
-from gaident.models.factors import Structure
+from gaident.models.factors import FactorCounts
 from gaident.models.own_effects import OWN, Parameter, starts
 from gaident.models.simulate_many import simulate_values
 from places import ROOT
@@ -113,7 +113,7 @@ def test_many_at_once_are_as_each_alone() -> None:
     np.testing.assert_array_equal(rows[0], rows[10])  # neutral
     values = np.array([[m.gain, -m.poles[0].real, 0.02, 0.2, 0.05] for m in models[:3]])
     names = ["coulomb_friction", "mine", "return_spring"]
-    fast = simulate_values(Structure(1, 0, 0, 0), names, values, rec, CONTROLLER, substeps=4)
+    fast = simulate_values(FactorCounts(1, 0, 0, 0), names, values, rec, CONTROLLER, substeps=4)
     model = (
         ONE.with_effect("coulomb_friction", torque=0.02)
         .with_effect("mine", share=0.2)
@@ -121,7 +121,7 @@ def test_many_at_once_are_as_each_alone() -> None:
     )
     np.testing.assert_array_equal(fast[0], ga.simulate(model, rec, CONTROLLER, substeps=4))
     with pytest.raises(ModelError, match="4 columns: 5 are needed"):
-        simulate_values(Structure(1, 0, 0, 0), names, values[:, :4], rec, CONTROLLER)
+        simulate_values(FactorCounts(1, 0, 0, 0), names, values[:, :4], rec, CONTROLLER)
 
 
 def test_a_diagnosis_finds_it_and_saves_it_by_name(tmp_path: Path) -> None:

@@ -326,48 +326,6 @@ def test_files_stay_readable() -> None:
     assert not long, f"over 400 lines: {long}"
 
 
-# Rooms and modules that may name an effect: the library of the diagnosis, the models with the effects themselves, what writes
-# them in another language; and the drive that the demonstration hides one in.
-NAMES_EFFECTS = ("diagnosis/library/", "models/", "export/", "cli/demonstration.py")
-
-
-def effects_named(text: str, effects: set[str]) -> list[tuple[int, str]]:
-    """(line, effect) of each string of a module that is an effect's name; docstrings and __all__ do not count."""
-    tree = ast.parse(text)
-    skipped: set[ast.AST] = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
-            skipped.add(node.value)
-        elif isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == "__all__" for t in node.targets):
-            skipped.update(ast.walk(node))
-    strings = [n for n in ast.walk(tree) if isinstance(n, ast.Constant) and n not in skipped]
-    return sorted((n.lineno, n.value) for n in strings if isinstance(n.value, str) and n.value in effects)
-
-
-def test_only_the_library_names_effects() -> None:
-    """What another room has to know of an effect is data of its term, or a constant of the library."""
-    effects = {row.name for row in gaident.effects.table()}
-    assert effects_named('"""cogging"""\n__all__ = ["cogging"]\nx = "cogging" + f"{x}backlash"', effects) == [
-        (3, "backlash"),
-        (3, "cogging"),
-    ]
-    found = []
-    for file in sources(PACKAGE, ".py"):
-        name = file.relative_to(PACKAGE).as_posix()
-        if not name.startswith(NAMES_EFFECTS):
-            found += [f"{name}:{line}: {effect}" for line, effect in effects_named(file.read_text(), effects)]
-    assert not found, "\n".join(found)
-
-
-def test_the_estimation_knows_no_effect_and_no_diagnosis() -> None:
-    effects = {row.name for row in gaident.effects.table()}
-    known = modules()
-    for name, file in known.items():
-        if name.startswith("gaident.estimation"):
-            assert not effects_named(file.read_text(), effects), name
-            assert not [t for t, _ in imports(name, known) if t.startswith("gaident.diagnosis")], name
-
-
 def test_pages_that_are_cited_are_there() -> None:
     """A page's name with its folder, or that of a page at the top or beside the file; no page that only its author has."""
     page = re.compile(r"(?<![\w/.*-])((?:[\w.-]+/)*[\w-]+\.md)\b")

@@ -25,8 +25,12 @@ FREE = (-1, 0, 1, 2)
 BOUNDS = {"max", "min", "maximum", "minimum", "clip"}
 FITS = {"fit", "fitted", "refitted", "continued", "reestimated", "evolved", "start"}
 TABLES = {
-    "diagnosis/library/terms": "bounds, steps and starts of the parameters of each effect",
-    "diagnosis/library/coordinates": "the same",
+    **dict.fromkeys(
+        (f"diagnosis/library/{place}" for place in ("plant", "friction", "load", "harmonic", "coupling", "actuator", "sensor")),
+        "bounds, steps and starts of the parameters of each effect",
+    ),
+    "diagnosis/library/controller": "the same",
+    "diagnosis/library/kinds": "the same",
     "diagnosis/experiments/menu": "shapes of the commands that are proposed",
     "diagnosis/experiments/commands": "the same",
     "diagnosis/experiments/first_experiment": "the same",

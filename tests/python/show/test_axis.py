@@ -39,7 +39,7 @@ from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.experiments.first_experiment import candidate_commands, first_experiment
 from gaident.diagnosis.explain.wording import evidence_of
-from gaident.diagnosis.library.terms import EQUIVALENT
+from gaident.diagnosis.library.equivalences import EQUIVALENT
 from gaident.diagnosis.records.folded import ADVICE
 from gaident.diagnosis.selection.offset import Offset
 from gaident.drive.draft import draft
@@ -58,6 +58,7 @@ ROTARY = re.compile(
     r"\brad\b|\bN m\b|\b[Tt]orques?\b|\b[Ii]nertias?\b|\b[Tt]urns?\b|\b[Aa]ngles?\b|\bdegrees?\b|\bkg m\b|\b[Tt]wist\b|"
     r"\b[Rr]otation\b"
 )
+TWO_LEVELS = next(e.of for e in EQUIVALENT if e.of is not None)
 LINEAR = re.compile(
     r"\bm/s|\b[Ff]orces?\b|\bN s?/m\b|\d N\b(?! m\b)|\[N\]|\[m\]|\bkg\b(?! m\b)|\bmetres?\b|\d m\b|\b1/m\b|\baxis moves\b"
 )
@@ -181,13 +182,20 @@ def sentences() -> list[Text]:
     limits = ga.Limits(50.0, 1.0, np.inf, 2.0)
     evidence = [evidence_of(row.name, 23.0, ()) for row in ga.effects.table()]
     evidence += [
-        evidence_of("asymmetric_friction", 23.0, (), Offset(0.5, 31.0, 0.04)),
+        evidence_of(TWO_LEVELS.whole, 23.0, (), Offset(TWO_LEVELS, 0.5, 31.0, 0.04)),
         evidence_of("backlash", 412.0, ("cogging",)),
     ]
     asked = [first_experiment(DT, limits, inertia, kp).reason for inertia in (None, 1e-4) for kp in (None, 0.02)]
     asked += [item.proposal(("cogging",), 1.0).reason for item in candidate_commands(DT, limits)]
     found: list[Any] = [*(s for e in excited for s in (e.sentence, *e.not_testable.values(), *e.one_sided.values()))]
-    found += [*(r.sentence for r in replays), *evidence, *asked, *EQUIVALENT.values(), ADVICE, *open_loop_notes([good], None)]
+    found += [
+        *(r.sentence for r in replays),
+        *evidence,
+        *asked,
+        *(e.otherwise for e in EQUIVALENT),
+        ADVICE,
+        *open_loop_notes([good], None),
+    ]
     found += [row.meaning for row in ga.effects.table()]
     found += ga.TwoMass(JM=-1e-4, DM=-1.0, JL=1e-4, DL=0.0, KG=-1.0, inconsistency=0.1).notes
     return found

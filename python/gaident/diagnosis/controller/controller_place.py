@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +19,8 @@ from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
 from gaident.data.record import Record
 from gaident.diagnosis.controller.replay import Replay, replay
 from gaident.diagnosis.controller.replay_causes import white_noise
-from gaident.diagnosis.library.names import CLAMP, SATURATION
-from gaident.diagnosis.library.terms import IN_CONTROLLER
+from gaident.diagnosis.library.settings import OF_SETTING
+from gaident.diagnosis.library.terms import in_controller
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.term import Scales, Term
 from gaident.models.effects import table
@@ -31,8 +32,12 @@ __all__ = ["AsLogged", "AtController", "as_logged", "as_read", "controller_findi
 
 Vector = NDArray[np.float64]
 
-DECIDED = tuple(t.name for t in IN_CONTROLLER)
-LIMITS = ("torque_limit", CLAMP, "anti_windup")  # causes that a replay finds
+LIMITS = ("torque_limit", OF_SETTING["integrator_limit"], "anti_windup")  # causes that a replay finds
+SHOWN = {
+    "torque_limit": say("plateau of the logged {torque}"),
+    "integrator_limit": Text("highest integral that the log shows"),
+}
+"""Limits of a PI that a log may show -> what shows them."""
 ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
 GRID = 25  # no decision: values from which a search for a limit starts
 
@@ -125,7 +130,7 @@ def controller_findings(
     replays = [known.get(r.digest) or replay(r, controller) for r in data.read]
     off = [r for r in replays if not r.follows]
     if not off:
-        return [], AtController(DECIDED), []
+        return [], AtController(_decided()), []
     said = [(rec.name or f"a record of {len(rec)} samples", r) for rec, r in zip(data.read, replays, strict=True)]
     texts = (say("{}: {}", name, r.sentence) if len(said) > 1 else r.sentence for name, r in said if not r.follows)
     notes = list(dict.fromkeys(texts))
@@ -134,7 +139,7 @@ def controller_findings(
     shown = _limits_shown(off, controller)
     if shown is not None:
         return _limit_findings(data, shown, off, plain, floor, notes)
-    best = min(((*_fitted(data, scales, term), term) for term in IN_CONTROLLER), key=lambda found: found[1])
+    best = min(((*_fitted(data, scales, term), term) for term in in_controller()), key=lambda found: found[1])
     value, cost, term = best
     effect = term.name
     n, before = len(plain), float(plain @ plain)
@@ -153,11 +158,18 @@ def controller_findings(
             np.sqrt(cost / n),
         )
         finding = _finding(effect, name, Estimate(value, _std(data, term, value, cost), unit), before, cost, floor, n, text)
-        at = AtController(DECIDED, {effect: {name: value}})
-        if effect == CLAMP:
-            at.controller = replace(controller, integrator_limit=value)
+        at = AtController(_decided(), {effect: {name: value}})
+        setting = next((s for s in SHOWN if OF_SETTING[s] == effect), None)
+        if setting is not None:
+            limit: dict[str, Any] = {setting: value}
+            at.controller = replace(controller, **limit)
         return [finding], at, []
-    return [], AtController(DECIDED, follows=False), notes
+    return [], AtController(_decided(), follows=False), notes
+
+
+def _decided() -> tuple[str, ...]:
+    """Effects that a replay of the controller decides."""
+    return tuple(t.name for t in in_controller())
 
 
 def _limits_shown(off: Sequence[Replay], controller: PI) -> PI | None:
@@ -181,19 +193,16 @@ def _limit_findings(
     assert given is not None
     n, before, after = len(plain), float(plain @ plain), _left_with(data, shown)
     held = any(r.cause == "anti_windup" for r in off)
-    at = AtController((*DECIDED, SATURATION), controller=shown, follows=not held)
+    at = AtController((*_decided(), *(OF_SETTING[s] for s in SHOWN)), controller=shown, follows=not held)
     if not held and shown.limits[1] == given.limits[1]:
         notes = []  # the finding says it all
     findings = []
-    for effect, value, was in (
-        (SATURATION, shown.torque_limit, given.torque_limit),
-        (CLAMP, shown.integrator_limit, given.integrator_limit),
-    ):
+    for setting, words in SHOWN.items():
+        effect, value, was = OF_SETTING[setting], getattr(shown, setting), getattr(given, setting)
         if value is None or value == was:
             continue
         at.effects[effect] = {"limit": value}
-        name = say("plateau of the logged {torque}") if effect == SATURATION else Text("highest integral that the log shows")
-        text = say("{} The limit is the {}; no model of the plant is involved.", off[0].sentence, name)
+        text = say("{} The limit is the {}; no model of the plant is involved.", off[0].sentence, words)
         std = max(*(r.resolution for r in off), float(np.sqrt(after / n)))
         findings.append(_finding(effect, "limit", Estimate(value, std, "N m"), before, after, floor, n, text))
     if held:

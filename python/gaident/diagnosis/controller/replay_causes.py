@@ -13,7 +13,7 @@ from gaident.axis import Text, joined, say
 from gaident.control.filtering import filtered, rate_limited
 from gaident.control.pi import PI
 from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
-from gaident.diagnosis.library.names import CLAMP, RATE_LIMIT
+from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.identification.adequacy import white_lags
 from gaident.identification.noise import chi2_tail, ljung_box
 from gaident.policy.table import POLICY
@@ -154,7 +154,7 @@ def _limits(case: _Case) -> Iterator[Explanation]:
         more = "" if torque_limit == controller.torque_limit else say(" and a {torque} limit of {:.4g} {N m}", torque_limit)
         acting = int(np.sum(np.abs(torque - proportional) >= POLICY.at_limit * clamp))
         sentence = say("It does with the integral clamped to {:.4g} {N m}{}; the clamp acts at {} samples.", clamp, more, acting)
-        yield Explanation(torque, CLAMP, clamp, sentence, controller=limited)
+        yield Explanation(torque, OF_SETTING["integrator_limit"], clamp, sentence, controller=limited)
 
 
 def _limited(case: _Case) -> list[PI]:
@@ -225,7 +225,7 @@ def _rate(case: _Case) -> Iterator[Explanation]:
         limited = rate_limited(case.command, rate, case.dt, start)
         torque = pi_torque(limited, case.velocity, case.dt, case.controller)
         sentence = say("It does with the command limited to a slope of {:.4g} {rad/s^2} ahead of the controller.", rate)
-        yield Explanation(torque, RATE_LIMIT, rate, sentence)
+        yield Explanation(torque, OF_SETTING["command_rate"], rate, sentence)
 
 
 def _linear(case: _Case) -> Iterator[Explanation]:

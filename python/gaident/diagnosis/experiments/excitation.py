@@ -17,8 +17,8 @@ from gaident.axis import TURN, Text, say, turns
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
-from gaident.diagnosis.library.terms import LIBRARY
-from gaident.diagnosis.library.triggers import Motion, not_testable, one_sided
+from gaident.diagnosis.library.terms import LIBRARY, not_testable, one_sided
+from gaident.diagnosis.library.triggers import Motion, Motions
 from gaident.errors import RecordError
 from gaident.estimation.regression.sensor_lag import velocity_lag
 from gaident.models.drive_torque import torque_of
@@ -103,6 +103,7 @@ def excitation(
         raise RecordError("records is empty: give at least one Record")
     top = max(float(np.abs(rec.velocity).max()) for rec in listed)
     motions = [_motion(rec, controller, top) for rec in listed]
+    seen = Motions(tuple(motions), controller, model, axis)
     speeds = _distinct([v for m in motions for v in m.held], POLICY.apart * top)
     torque = max(float(np.abs(m.torque).max()) for m in motions)
     limit = None if controller is None else controller.torque_limit
@@ -122,8 +123,8 @@ def excitation(
         revolutions=max(float(np.ptp(m.position)) for m in motions) / TURN,
         steps=_distinct([s for m in motions for s in m.jumps], POLICY.apart * max(top, TINY)),
         repeated=any(m.repeated for m in motions),
-        not_testable=not_testable(motions, controller, model, axis),
-        one_sided=one_sided(motions, controller),
+        not_testable=not_testable(seen),
+        one_sided=one_sided(seen),
     )
 
 

@@ -26,7 +26,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.experiments.commands import largest_jump
 from gaident.diagnosis.experiments.excitation import position_of
 from gaident.diagnosis.experiments.menu import MENU, Bench, Builder, prbs_moving, reversals, slow_stairs, speed_ladder, steps
-from gaident.diagnosis.library.names import SATURATION
+from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.errors import SettingsError
 from gaident.models.drive_torque import torque_of
@@ -112,7 +112,7 @@ def first_experiment(
     periodic = {name for name, term in LIBRARY.items() if term.harmonic} if checked_axis(axis) == "linear" else set()
     names = dict.fromkeys(effect for item in MENU for effect in item[2] if effect not in periodic)
     if kp is not None:
-        del names[SATURATION]
+        del names[OF_SETTING["torque_limit"]]
     return Proposal(command, dt, tuple(names), math.nan, _first_reason(command, limits, inertia, bench, axis))
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gaident.axis import Text, say
 from gaident.diagnosis.experiments.commands import dithered, rest, strokes, triangles
-from gaident.diagnosis.library.excited import EXCITED
+from gaident.diagnosis.library.terms import excited
 
 __all__ = ["MENU", "Bench", "Builder", "prbs_moving", "reversals", "slow_stairs", "speed_ladder", "steps"]
 
@@ -140,7 +140,7 @@ def _creep(b: Bench) -> Vector:
     return triangles((0.001 * b.speed, 0.003 * b.speed, 0.01 * b.speed), b.seconds / 3.0, b.travel, b.dt)
 
 
-MENU: tuple[tuple[str, Builder, tuple[str, ...], Text], ...] = tuple((name, build, EXCITED[name], why) for name, build, why in (
+MENU: tuple[tuple[str, Builder, tuple[str, ...], Text], ...] = tuple((name, build, excited(name), why) for name, build, why in (
     ("slow stairs", slow_stairs,
      say("slow levels with rests show how friction behaves from standstill on.")),
     ("triangle across zero", _triangles,

@@ -24,8 +24,9 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import COMMANDED, MEASURED
 from gaident.diagnosis.experiments.first_experiment import MenuItem, candidate_commands
-from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
-from gaident.diagnosis.selection.rivals import Rival
+from gaident.diagnosis.library.equivalences import EQUIVALENT, equivalents
+from gaident.diagnosis.library.terms import LIBRARY
+from gaident.diagnosis.selection.rivals import Replacement
 from gaident.errors import GaidentError
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit as fitted
@@ -88,7 +89,7 @@ class _Bench:
 
 def propose(
     findings: Sequence[Finding],
-    rivals: Mapping[str, tuple[float, Sequence[Rival]]],
+    rivals: Mapping[str, tuple[float, Sequence[Replacement]]],
     final: Fit,
     data: DataSet,
     count: float,
@@ -99,13 +100,13 @@ def propose(
     rivals: effect -> (its gain, the explanations in its place); final: the diagnosed model; count: samples behind its cost;
     elsewhere: effects at the controller, effect -> parameter -> value.
     """
-    notes = [text for alike, text in EQUIVALENT.items() if any(alike <= {f.effect, *f.alternatives} for f in findings)]
+    notes = [e.otherwise for e in EQUIVALENT if any(e.effects <= {f.effect, *f.alternatives} for f in findings)]
     pairs = [
         (f.effect, rival)
         for f in findings
         if f.effect in rivals
         for rival in rivals[f.effect][1]
-        if not any({f.effect, rival.effect} <= alike for alike in EQUIVALENT)
+        if rival.effect not in equivalents(f.effect)
     ]
     pairs = sorted(pairs, key=lambda p: p[1].behind)[: POLICY.starts]
     if not pairs:
@@ -172,7 +173,7 @@ def inertia_of(fit: Fit) -> float:
     return float(fit.parameters.inertias(fit.x[None, :])[0])
 
 
-def _trials(pairs: Sequence[tuple[str, Rival]], final: Fit) -> list[tuple[Fit, Fit]]:
+def _trials(pairs: Sequence[tuple[str, Replacement]], final: Fit) -> list[tuple[Fit, Fit]]:
     """(what is simulated, what is fitted) of every pair and direction that can fail."""
     trials = []
     for effect, rival in pairs:

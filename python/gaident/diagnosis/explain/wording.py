@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from gaident.axis import Text, say
-from gaident.diagnosis.library.names import OUTLIERS, QUANTISATION
-from gaident.diagnosis.library.terms import TWO_LEVELS
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
 from gaident.models.effects import table
 from gaident.results.estimate import Estimate
-from gaident.results.finding import Finding
 
-__all__ = ["basis_of", "drives_itself", "evidence_of", "far_off", "noise_findings"]
+__all__ = ["basis_of", "drives_itself", "evidence_of", "far_off"]
 
 
 def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None) -> Text:
@@ -27,7 +22,7 @@ def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: O
     if alternatives:
         others = " or ".join(a.replace("_", " ") for a in alternatives)
         return say("{}, or {}: one of these is there, {} {}; these data do not say which.", what, others, sure, worse)
-    if effect == TWO_LEVELS.name and offset is not None:
+    if offset is not None and effect == offset.effect:
         return say("{}: {} {}. {}", what, sure, worse, offset.sentence)
     return say("{}: {} {}.", what, sure, worse)
 
@@ -68,16 +63,3 @@ def drives_itself(damping: Estimate) -> Text:
         "does not depend on it, or a lag, is in its place. {Inertia} and friction are not to be trusted."
     )
     return say(text, damping.value)
-
-
-def noise_findings(spoiled: int, total: int, step: float) -> list[Finding]:
-    """What describes the record: `spoiled` of `total` samples left out, and the lattice of all velocities [rad/s], 0: none."""
-    found = []
-    if spoiled:
-        samples = "{} of {} samples leave the signal and come back; they are left out of every fit."
-        fraction = Estimate(spoiled / total, float(np.sqrt(spoiled) / total), "1")
-        found.append(Finding(OUTLIERS, {"fraction": fraction}, evidence=say(samples, spoiled, total), is_noise=True))
-    if step > 0.0:
-        text = say("All velocities lie on a lattice of {:.4g} {rad/s}: the resolution of the encoder or of the log.", step)
-        found.append(Finding(QUANTISATION, {"step": Estimate(step, 0.0, "rad/s")}, evidence=text, is_noise=True))
-    return found

@@ -1,21 +1,24 @@
-"""Per effect: was it triggered at all? One function per kind of reason, plain physics, the record's own figures."""
+"""What records have to hold for an effect to show: conditions, plain physics with the record's own figures.
+
+Each condition takes the records and says why it is not met, or None. The rows of the library name the conditions of an effect.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import TURN, Text, joined, order, say, turns
 from gaident.control.pi import PI
-from gaident.diagnosis.library.terms import HIGHEST_ORDER, LIBRARY, friction_family
+from gaident.diagnosis.library.coordinates import HIGHEST_ORDER
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
-__all__ = ["Motion", "not_testable", "one_sided"]
+__all__ = ["Motion", "Motions"]
 
 Vector = NDArray[np.float64]
 
@@ -43,51 +46,183 @@ class Motion:
     repeated: bool
 
 
-def not_testable(motions: Sequence[Motion], controller: PI | None, model: Model | None, axis: str = "rotary") -> dict[str, Text]:
-    """Effect -> why these records say nothing about it; effects that were triggered are not in it. axis: rotary or linear."""
-    why: dict[str, Text] = {}
-    for part in (_turn(axis), _speed(motions), _travel(motions), _torque(motions), _loop(motions, controller), _structure(model)):
-        for effect, reason in part.items():
-            why.setdefault(effect, reason)
-    return why
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """The records of a diagnosis; controller, model: None where not known; axis: rotary or linear."""
+
+    records: tuple[Motion, ...]
+    controller: PI | None = None
+    model: Model | None = None
+    axis: str = "rotary"
+
+    @cached_property
+    def top(self) -> float:
+        """Highest smooth speed [rad/s]."""
+        return max(float(np.abs(m.smooth).max()) for m in self.records)
+
+    @cached_property
+    def slowest(self) -> float:
+        """Lowest speed measured [rad/s]."""
+        return min(float(np.abs(m.velocity).min()) for m in self.records)
+
+    @cached_property
+    def travel(self) -> float:
+        """Largest travel of a record [rad]."""
+        return max(float(np.ptp(m.position)) for m in self.records)
+
+    @cached_property
+    def highest_torque(self) -> float:
+        """[N m]"""
+        return max(float(np.abs(m.torque).max()) for m in self.records)
+
+    @cached_property
+    def torque_changes_sign(self) -> bool:
+        """Whether the torque of a record is beyond its noise in either direction."""
+        return any(np.any(m.torque > m.torque_floor) and np.any(m.torque < -m.torque_floor) for m in self.records)
 
 
-def one_sided(motions: Sequence[Motion], controller: PI | None) -> dict[str, Text]:
-    """Effect -> which sizes of it could not have shown in these records; what stands there is tested, but not beyond."""
-    limit, clamp = (math.inf, math.inf) if controller is None else controller.limits
-    highest = max(float(np.abs(m.torque).max()) for m in motions)
-    own = highest > POLICY.at_limit * limit
+# Conditions.
+
+
+def rotary(s: Motions) -> Text | None:
+    """Of what returns with every turn: the position of a linear axis is a length, which does not say what one turn is."""
+    if s.axis == "rotary":
+        return None
+    return Text("positions are lengths on a linear axis: which length is one turn, they do not say")
+
+
+def moves(s: Motions) -> Text | None:
+    """The axis moves."""
+    return None if any(np.any(m.moving) for m in s.records) else Text("the axis does not move")
+
+
+def both_directions(s: Motions) -> Text | None:
+    """It moves forwards and backwards."""
+    forward = any(np.any(m.moving & (m.smooth > 0.0)) for m in s.records)
+    backward = any(np.any(m.moving & (m.smooth < 0.0)) for m in s.records)
+    return None if forward and backward else say("the axis {turns} {} only", "forwards" if forward else "backwards")
+
+
+def creeps(s: Motions) -> Text | None:
+    """It moves slowly, or reverses."""
+    return say("the axis never {turns} slower than {:.3g} {rad/s}", s.slowest) if s.slowest > POLICY.slow * s.top else None
+
+
+def stands_or_reverses(s: Motions) -> Text | None:
+    """It stands still, or reverses."""
+    if s.slowest > max(m.velocity_floor for m in s.records):
+        return say("the axis neither stands nor reverses (slowest {:.3g} {rad/s})", s.slowest)
+    return None
+
+
+def several_speeds(s: Motions) -> Text | None:
+    """Speeds of different size are held, or swept through."""
+    speeds = sorted({round(abs(v) / (POLICY.slow * s.top)) for m in s.records for v in m.held if v})
+    near = sum(int(np.sum(np.abs(np.abs(m.smooth[m.moving]) - s.top) < POLICY.slow * s.top)) for m in s.records)
+    if len(speeds) < 2 and 2 * near > sum(int(np.sum(m.moving)) for m in s.records):
+        return say("one speed only ({:.3g} {rad/s}): its drag is viscous friction there", s.top)
+    return None
+
+
+def speeds_mixed_in_time(s: Motions) -> Text | None:
+    """The speed does not only rise or only fall in the course of the record."""
+    if all(_monotone(m, POLICY.apart * s.top) for m in s.records):
+        return Text("no speed is held early and late, nor are speeds mixed in time: a drift would be drag")
+    return None
+
+
+def _monotone(m: Motion, apart: float) -> bool:
+    """Nothing is repeated, and the speeds held while moving only rise or only fall with time."""
+    steps = np.diff([abs(v) for v in m.held if v])
+    return not m.repeated and bool(np.all(steps > -apart) or np.all(steps < apart))
+
+
+def part_of_a_turn(s: Motions) -> Text | None:
+    """A torque once per turn changes over the travel."""
+    if s.travel < POLICY.gravity_turn * TURN:
+        return say("{}: over so little it is a constant load", _travelled(s))
+    return None
+
+
+def period_of_an_order(s: Motions) -> Text | None:
+    """The travel holds a period of the highest order that a drive is expected to have."""
+    if s.travel < TURN / HIGHEST_ORDER:
+        return say("{} hold no period of order {} or less", _travelled(s), order(HIGHEST_ORDER))
+    return None
+
+
+def _travelled(s: Motions) -> Text:
+    return Text(f"{math.degrees(s.travel):.2g} degrees of travel", f"{s.travel:.2g} m of travel")
+
+
+def torque_reverses(s: Motions) -> Text | None:
+    """The torque changes its sign, so that a coupling leaves its flank."""
+    return None if s.torque_changes_sign else say("the {torque} never changes its sign: the coupling stays on one flank")
+
+
+def torque_near_zero(s: Motions) -> Text | None:
+    """The torque passes through zero, or comes near it."""
+    if s.torque_changes_sign:
+        return None
+    least = min(float(np.abs(m.torque).min()) for m in s.records)
+    if least > POLICY.slow * s.highest_torque:
+        return say("the {torque} never comes near zero (least {:.2g} {N m}): a dead band is a constant load", least)
+    return None
+
+
+def torque_changes(s: Motions) -> Text | None:
+    """The torque is not one number throughout."""
+    return say("the {torque} never changes") if all(float(np.ptp(m.torque)) == 0.0 for m in s.records) else None
+
+
+def in_a_loop(s: Motions) -> Text | None:
+    """A command drives the model through a controller."""
+    if s.controller is None or all(m.command is None for m in s.records):
+        return say("the {torque} drives the model: no controller is simulated from a command")
+    return None
+
+
+def integrates(s: Motions) -> Text | None:
+    """The controller has an integral part."""
+    none = s.controller is not None and s.controller.ki == 0.0
+    return Text("the controller has no integral part") if none else None
+
+
+def command_changes(s: Motions) -> Text | None:
+    """The command is not one number throughout."""
+    if any(m.jumps or (m.command is not None and np.any(np.diff(m.command) != 0.0)) for m in s.records):
+        return None
+    return Text("the command never changes")
+
+
+def shaft_resonates(s: Motions) -> Text | None:
+    """The identified model has a resonance, or there is none yet."""
+    if s.model is None or any(pole.imag > 0.0 for pole in s.model.poles):
+        return None
+    return Text(f"the model ({s.model.p},{s.model.q}) shows no shaft resonance, so that there is no coupling to have it")
+
+
+# Sizes that could not have shown.
+
+
+def torque_beyond(s: Motions) -> Text | None:
+    """Limits of the torque above what the records hold."""
+    limit = math.inf if s.controller is None else s.controller.limits[0]
+    own = s.highest_torque > POLICY.at_limit * limit
     why = Text("the controller's own limit lets no more through") if own else say("no more {torque} was asked for")
-    notes = {"torque_saturation": say("a limit above {:.3g} {N m} would not have shown: {}", highest, why)}
-    if controller is not None:
-        integral = max((_integral(m, controller) for m in motions), default=0.0)
-        if integral > 0.0:
-            own = integral > POLICY.at_limit * clamp
-            why = Text("the controller's own clamp lets it go no higher" if own else "the integral went no higher")
-            notes["integrator_clamp"] = say("a clamp above {:.3g} {N m} would not have shown: {}", integral, why)
-        slope = max((float(np.abs(np.diff(m.command)).max()) / m.dt for m in motions if m.command is not None), default=0.0)
-        if slope > 0.0:
-            rate = say("a limit above {:.3g} {rad/s^2} would not have shown: no command rises faster", slope)
-            notes["command_rate_limit"] = rate
-    travel = max(float(np.ptp(m.position)) for m in motions)
-    least = math.ceil(POLICY.seen_turn * TURN / travel) if travel > 0.0 else HIGHEST_ORDER
-    per_sample = max(_slowest(m) * m.dt for m in motions)
-    fastest = math.floor(POLICY.seen_band * math.pi / per_sample) if per_sample > 0.0 else None
-    for effect in ("cogging", "velocity_ripple"):
-        parts = [say("orders below {} need more than the {} travelled", order(least), turns(travel))] if least > 2 else []
-        if fastest is not None and fastest < HIGHEST_ORDER:
-            parts.append(say("orders above {} are faster than the sampling even at the slowest speed held", order(fastest)))
-        if parts and least <= HIGHEST_ORDER:
-            notes[effect] = joined("; ", parts)
-    return notes
+    return say("a limit above {:.3g} {N m} would not have shown: {}", s.highest_torque, why)
 
 
-def _turn(axis: str) -> dict[str, Text]:
-    """What returns with every turn: the position of a linear axis is a length, which does not say what one turn is."""
-    if axis == "rotary":
-        return {}
-    why = Text("positions are lengths on a linear axis: which length is one turn, they do not say")
-    return {name: why for name, term in LIBRARY.items() if term.harmonic}
+def integral_beyond(s: Motions) -> Text | None:
+    """Clamps of the controller's integral above what the records hold."""
+    if s.controller is None:
+        return None
+    integral = max((_integral(m, s.controller) for m in s.records), default=0.0)
+    if not integral > 0.0:
+        return None
+    own = integral > POLICY.at_limit * s.controller.limits[1]
+    why = Text("the controller's own clamp lets it go no higher" if own else "the integral went no higher")
+    return say("a clamp above {:.3g} {N m} would not have shown: {}", integral, why)
 
 
 def _integral(m: Motion, controller: PI) -> float:
@@ -99,85 +234,25 @@ def _integral(m: Motion, controller: PI) -> float:
     return float(held.max(initial=0.0))
 
 
-def _slowest(m: Motion) -> float:
+def slope_beyond(s: Motions) -> Text | None:
+    """Limits of the command's slope above the steepest one."""
+    if s.controller is None:
+        return None
+    slope = max((float(np.abs(np.diff(m.command)).max()) / m.dt for m in s.records if m.command is not None), default=0.0)
+    return say("a limit above {:.3g} {rad/s^2} would not have shown: no command rises faster", slope) if slope > 0.0 else None
+
+
+def orders_beyond(s: Motions) -> Text | None:
+    """Orders of the angle too low for the travel, or too high for the sampling."""
+    least = math.ceil(POLICY.seen_turn * TURN / s.travel) if s.travel > 0.0 else HIGHEST_ORDER
+    per_sample = max(_slowest_held(m) * m.dt for m in s.records)
+    fastest = math.floor(POLICY.seen_band * math.pi / per_sample) if per_sample > 0.0 else None
+    parts = [say("orders below {} need more than the {} travelled", order(least), turns(s.travel))] if least > 2 else []
+    if fastest is not None and fastest < HIGHEST_ORDER:
+        parts.append(say("orders above {} are faster than the sampling even at the slowest speed held", order(fastest)))
+    return joined("; ", parts) if parts and least <= HIGHEST_ORDER else None
+
+
+def _slowest_held(m: Motion) -> float:
     """Least speed held while moving [rad/s]; 0 where none is held."""
     return min((abs(v) for v in m.held if v), default=0.0)
-
-
-def _monotone(m: Motion, apart: float) -> bool:
-    """Nothing is repeated, and the speeds held while moving only rise or only fall with time."""
-    steps = np.diff([abs(v) for v in m.held if v])
-    return not m.repeated and bool(np.all(steps > -apart) or np.all(steps < apart))
-
-
-def _speed(motions: Sequence[Motion]) -> dict[str, Text]:
-    top = max(float(np.abs(m.smooth).max()) for m in motions)
-    if not any(np.any(m.moving) for m in motions):
-        moving = ("quadratic_drag", "unbalance", "cogging", "backlash", "hardening_stiffness", "velocity_ripple")
-        return dict.fromkeys((*friction_family(), *moving), Text("the axis does not move"))
-    why = {}
-    forward = any(np.any(m.moving & (m.smooth > 0.0)) for m in motions)
-    backward = any(np.any(m.moving & (m.smooth < 0.0)) for m in motions)
-    if not (forward and backward):
-        why["asymmetric_friction"] = say("the axis {turns} {} only", "forwards" if forward else "backwards")
-    slowest = min(float(np.abs(m.velocity).min()) for m in motions)
-    if slowest > POLICY.slow * top:
-        why["stribeck_friction"] = say("the axis never {turns} slower than {:.3g} {rad/s}", slowest)
-    if slowest > max(m.velocity_floor for m in motions):
-        restless = say("the axis neither stands nor reverses (slowest {:.3g} {rad/s})", slowest)
-        why["presliding_friction"] = why["lugre_friction"] = restless
-    speeds = sorted({round(abs(v) / (POLICY.slow * top)) for m in motions for v in m.held if v})
-    near = sum(int(np.sum(np.abs(np.abs(m.smooth[m.moving]) - top) < POLICY.slow * top)) for m in motions)
-    if len(speeds) < 2 and 2 * near > sum(int(np.sum(m.moving)) for m in motions):
-        why["quadratic_drag"] = say("one speed only ({:.3g} {rad/s}): its drag is viscous friction there", top)
-    if all(_monotone(m, POLICY.apart * top) for m in motions):
-        why["friction_drift"] = Text("no speed is held early and late, nor are speeds mixed in time: a drift would be drag")
-    return why
-
-
-def _travel(motions: Sequence[Motion]) -> dict[str, Text]:
-    travel = max(float(np.ptp(m.position)) for m in motions)
-    moved = Text(f"{math.degrees(travel):.2g} degrees of travel", f"{travel:.2g} m of travel")
-    why = {}
-    if travel < POLICY.gravity_turn * TURN:
-        why["unbalance"] = say("{}: over so little it is a constant load", moved)
-    if travel < TURN / HIGHEST_ORDER:
-        for effect in ("cogging", "velocity_ripple"):
-            why[effect] = say("{} hold no period of order {} or less", moved, order(HIGHEST_ORDER))
-    return why
-
-
-def _torque(motions: Sequence[Motion]) -> dict[str, Text]:
-    why = {}
-    changes = any(np.any(m.torque > m.torque_floor) and np.any(m.torque < -m.torque_floor) for m in motions)
-    if not changes:
-        why["backlash"] = say("the {torque} never changes its sign: the coupling stays on one flank")
-        least = min(float(np.abs(m.torque).min()) for m in motions)
-        highest = max(float(np.abs(m.torque).max()) for m in motions)
-        if least > POLICY.slow * highest:
-            near = "the {torque} never comes near zero (least {:.2g} {N m}): a dead band is a constant load"
-            why["torque_dead_band"] = say(near, least)
-    if all(float(np.ptp(m.torque)) == 0.0 for m in motions):
-        constant = say("the {torque} never changes")
-        for effect in ("transport_delay", "torque_lag", "torque_saturation", "extra_resonance", "hardening_stiffness"):
-            why[effect] = constant
-    return why
-
-
-def _loop(motions: Sequence[Motion], controller: PI | None) -> dict[str, Text]:
-    if controller is None or all(m.command is None for m in motions):
-        why = say("the {torque} drives the model: no controller is simulated from a command")
-        return dict.fromkeys(("integrator_clamp", "command_rate_limit"), why)
-    reasons = {}
-    if controller.ki == 0.0:
-        reasons["integrator_clamp"] = Text("the controller has no integral part")
-    if not any(m.jumps or (m.command is not None and np.any(np.diff(m.command) != 0.0)) for m in motions):
-        reasons["command_rate_limit"] = Text("the command never changes")
-    return reasons
-
-
-def _structure(model: Model | None) -> dict[str, Text]:
-    if model is None or any(pole.imag > 0.0 for pole in model.poles):
-        return {}
-    reason = Text(f"the model ({model.p},{model.q}) shows no shaft resonance, so that there is no coupling to have it")
-    return dict.fromkeys(("backlash", "hardening_stiffness"), reason)

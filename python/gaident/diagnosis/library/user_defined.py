@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.estimation.term import Term
+from gaident.diagnosis.library.cause import Cause
 from gaident.models.effects import Row, table
 from gaident.models.own_effects import starts
 
@@ -20,14 +20,14 @@ STEP = 0.05  # no decision: of the range between the bounds: what makes a differ
 MOST_STARTS = 64  # no decision: starts of a fit, as many as the built-in effects have at most
 
 
-class Library(Mapping[str, Term]):
+class Library(Mapping[str, Cause]):
     """The built-in terms, and behind them those of the user-defined effects that are registered now."""
 
-    def __init__(self, built_in: Mapping[str, Term]) -> None:
+    def __init__(self, built_in: Mapping[str, Cause]) -> None:
         self._built_in = dict(built_in)
-        self._own: dict[str, tuple[Row, Term]] = {}
+        self._own: dict[str, tuple[Row, Cause]] = {}
 
-    def __getitem__(self, effect: str) -> Term:
+    def __getitem__(self, effect: str) -> Cause:
         if effect in self._built_in:
             return self._built_in[effect]
         row = next((row for row in table() if row.own and row.name == effect), None)
@@ -46,7 +46,7 @@ class Library(Mapping[str, Term]):
         return sum(1 for _ in self)
 
 
-def _term(row: Row) -> Term:
+def _term(row: Row) -> Cause:
     logs = [i for i, p in enumerate(row.parameters) if p.logarithmic]
 
     def natural(z: Matrix) -> Matrix:
@@ -69,7 +69,7 @@ def _term(row: Row) -> Term:
     rows = list(itertools.islice(itertools.product(*axes), MOST_STARTS))
     steps = tuple(1.0 if p.logarithmic else STEP * (p.highest - p.lowest) for p in row.parameters)
 
-    return Term(
+    return Cause(
         row.name,
         row.place,
         natural,

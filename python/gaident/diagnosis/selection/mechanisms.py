@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.diagnosis.library.terms import RESONANCE
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.objective import LOST, Fit, Hypothesis, Objective
 from gaident.estimation.parameterisation import Parameterisation
@@ -124,8 +124,9 @@ def reduced(identified: Model) -> list[Model]:
 
 def resonant(objective: Objective, one: Fit) -> list[Model]:
     """Two-mass starts: the resonances that help the one mass most, linearised."""
-    longer = one.hypothesis.extended(RESONANCE)
-    rows = np.array(RESONANCE.starts(one.parameters.scales))
+    term = next(t for t in LIBRARY.values() if t.resonates)
+    longer = one.hypothesis.extended(term)
+    rows = np.array(term.starts(one.parameters.scales))
     X = np.vstack([one.parameters.inserted(one.x, z) for z in rows])
     J, _ = objective.sensitivities(one.hypothesis, one.x)
     E = objective.errors(longer, X)

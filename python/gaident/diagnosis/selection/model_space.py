@@ -16,7 +16,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
+from gaident.diagnosis.library.equivalences import equivalents
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.mechanisms import as_two_masses, resonance, swings
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import effective_samples
@@ -39,7 +40,7 @@ def words(effects: Iterable[str]) -> str:
 
 def _representative(term: Term) -> str:
     """Of effects that are the same to every record and have as many parameters, the first."""
-    alike = (n for c in EQUIVALENT if term.name in c for n in c if LIBRARY[n].size == term.size)
+    alike = (n for n in equivalents(term.name) if LIBRARY[n].size == term.size)
     return min((*alike, term.name))
 
 
@@ -92,10 +93,9 @@ class ModelSpace:
         """BIC and what the effects cost; the lower the better."""
         # The penalty is for the number of candidates tried: what the records show by themselves was not found by trying.
         effects = sum(_depth(t) - (t.family in self.shown) for t in fit.parameters.terms)
-        # An order of the angle that was searched for counts as so many candidates more.
-        orders = sum(2.0 * float(np.log(t.orders[1] - t.orders[0] + 1)) for t in fit.parameters.terms)
+        searched = sum(t.search_cost for t in fit.parameters.terms)
         more = fit.parameters.masses - 1 + fit.parameters.held  # a second mass, or a spring, counts as an effect
-        return fit.bic + self.penalty * (effects + more) + orders
+        return fit.bic + self.penalty * (effects + more) + searched
 
     def key(self, fit: Fit) -> Hashable:
         """The same for the same mechanism with the same effects, or with equivalent ones."""

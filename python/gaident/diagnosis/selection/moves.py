@@ -22,7 +22,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
+from gaident.diagnosis.library.equivalences import equivalents
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.mechanisms import (
     as_held,
     as_one_mass,
@@ -262,7 +263,7 @@ class Moves(ModelSpace):
             return []
         found = []
         for t in fit.parameters.terms:
-            for other in [LIBRARY[n] for c in EQUIVALENT if t.name in c for n in sorted(c - {t.name})]:
+            for other in [LIBRARY[n] for n in equivalents(t.name)]:
                 if other.seen_angle is None or other not in self.allowed or other.size != t.size:
                     continue
                 short = fit.hypothesis.without(t.name)

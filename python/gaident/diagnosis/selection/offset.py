@@ -12,10 +12,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from gaident.axis import Text, say
-from gaident.diagnosis.library.terms import EVEN_FRICTION, LOAD, TWO_LEVELS
+from gaident.diagnosis.library.equivalences import EQUIVALENT, Composition
+from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.moves import Moves
 from gaident.estimation.objective import Fit
 
@@ -24,39 +23,49 @@ __all__ = ["Offset", "offset_of"]
 
 @dataclass(frozen=True)
 class Offset:
-    """load: of even friction and a load in the place of asymmetric friction [N m]; behind: BIC units by which that is worse.
+    """What an effect stands for that is the same torque as several others together but for some of its parameters.
 
-    left: (Tp - Tn)/2, what the directions' levels leave of it [N m].
+    load: the constant torque [N m] that is fitted with the others in its place; behind: BIC units by which they are worse; left:
+    the constant torque that its own parameters make [N m], of two levels (Tp - Tn)/2.
     """
 
+    of: Composition
     load: float
     behind: float
     left: float
 
     @property
+    def effect(self) -> str:
+        """The effect that is not the same as the others here."""
+        return self.of.whole
+
+    @property
     def sentence(self) -> Text:
         """What looks like an offset, in words."""
-        return say(
-            "Even dry friction with a constant load of {:.3g} {N m} in its place would leave the model {:.0f} BIC units worse: "
-            "what looks like an offset is mostly viscous friction that depends on the direction, {:.2g} {N m} of it is left.",
-            self.load,
-            self.behind,
-            self.left,
-        )
+        return say(self.of.different, self.load, self.behind, self.left)
 
 
 def offset_of(space: Moves, fit: Fit) -> Offset | None:
-    """The offset that friction of two levels stands for; None where it is not in the model, or a load is as good."""
-    name = TWO_LEVELS.name
-    if name not in fit.effects or LOAD.name in fit.effects:
+    """The offset that an effect of the model stands for; None where there is none, or where a load is as good."""
+    compositions = (e.of for e in EQUIVALENT if e.of is not None and e.of.whole in fit.effects)
+    found = (_of(composition, space, fit) for composition in compositions)
+    return next((offset for offset in found if offset is not None), None)
+
+
+def _of(composition: Composition, space: Moves, fit: Fit) -> Offset | None:
+    whole = composition.whole
+    parts = composition.parts(next(e for e in fit.parameters.model(fit.x).effects if e.name == whole).parameters)
+    constant = next(name for name in parts if LIBRARY[name].constant)
+    if constant in fit.effects:
         return None
-    positive, negative = (float(v) for v in fit.parameters.effect_values(fit.x[None, :], name)[0][:2])
-    x, hypothesis = fit.parameters.removed(fit.x, name), fit.hypothesis.without(name)
-    for term, value in ((EVEN_FRICTION, 0.5 * (positive + negative)), (LOAD, 0.5 * (positive - negative))):
-        x = hypothesis.parameters.inserted(x, np.array([value]))
-        hypothesis = hypothesis.extended(term)
+    x, hypothesis = fit.parameters.removed(fit.x, whole), fit.hypothesis.without(whole)
+    for name, own in parts.items():
+        x = hypothesis.parameters.inserted(x, LIBRARY[name].coordinates(own))
+        hypothesis = hypothesis.extended(LIBRARY[name])
     other = space.refitted(hypothesis, x)
     behind = other.bic - fit.bic
     if not behind > space.penalty:
         return None
-    return Offset(float(other.parameters.effect_values(other.x[None, :], LOAD.name)[0, 0]), behind, 0.5 * (positive - negative))
+    load = float(other.parameters.effect_values(other.x[None, :], constant)[0, 0])
+    left = float(LIBRARY[constant].coordinates(parts[constant])[0])
+    return Offset(composition, load, behind, left)

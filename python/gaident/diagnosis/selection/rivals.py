@@ -10,20 +10,26 @@ import numpy as np
 from gaident.diagnosis.selection.moves import Moves
 from gaident.estimation.criterion import chi_square_bound
 from gaident.estimation.objective import Fit
+from gaident.estimation.term import Term
 
-__all__ = ["Rival", "rivals_of"]
+__all__ = ["Replacement", "rivals_of"]
 
 
 @dataclass(frozen=True)
-class Rival:
+class Replacement:
     """Another effect in the place of one: how much worse (BIC units) the whole model is with it."""
 
     effect: str
     behind: float
     fit: Fit
 
+    @property
+    def term(self) -> Term:
+        """The other effect."""
+        return self.fit.parameters.term(self.effect)
 
-def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str] = ()) -> tuple[float, list[Rival]]:
+
+def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str] = ()) -> tuple[float, list[Replacement]]:
     """(gain of `effect` in the final model, other effects in its place that come within reach, or are equivalent here)."""
     less = space.known(space.without(final, effect))
     gain = space.under_predictor_of(less, final).bic - final.bic
@@ -36,7 +42,7 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
         (other,) = new
         behind = f.bic - final.bic
         if other.name in equivalent:
-            found.append(Rival(other.name, behind, f))
+            found.append(Replacement(other.name, behind, f))
             continue
         if effect in other.nested:
             if not space.whitens:  # of a misfit any detail explains a part
@@ -49,5 +55,5 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
             if behind < -space.penalty and not space.in_both_loops(final, f):
                 continue
         if behind < space.margin:
-            found.append(Rival(other.name, behind, f))
+            found.append(Replacement(other.name, behind, f))
     return float(gain), found

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.diagnosis.library.terms import EVEN_FRICTION
 from gaident.diagnosis.selection.bases import ByOutputErrors, Task, linear_bases, noise_floor, output_error_bases
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
@@ -29,7 +28,7 @@ from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective
 from gaident.diagnosis.selection.mechanisms import resonance
 from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.moves import Moves
-from gaident.diagnosis.selection.rivals import Rival, rivals_of
+from gaident.diagnosis.selection.rivals import Replacement, rivals_of
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import Specification, chi_square_bound, effective_samples, specification_statistic
 from gaident.estimation.noise_model import WHITE, ShaftNoise
@@ -56,7 +55,7 @@ class Selection:
     space: Moves
     base: Fit
     final: Fit
-    rivals: dict[str, tuple[float, list[Rival]]]
+    rivals: dict[str, tuple[float, list[Replacement]]]
     specification: Specification | None
     whitened: _Found | None = None
 
@@ -316,12 +315,12 @@ def compared(selection: Selection, final: Fit, classes: Classes, note: Callable[
 
 def _rivals(
     space: Moves, final: Fit, may_swap: bool, classes: Classes, note: Callable[[str], None]
-) -> tuple[dict[str, tuple[float, list[Rival]]], Fit | None]:
+) -> tuple[dict[str, tuple[float, list[Replacement]]], Fit | None]:
     """(rivals of each effect, a better model where there is one and a swap is allowed).
 
     Where a record cannot split a load or a dead band from dry friction, friction stands first: every axis has it.
     """
-    found: dict[str, tuple[float, list[Rival]]] = {}
+    found: dict[str, tuple[float, list[Replacement]]] = {}
     for term in final.parameters.terms:
         note(f"rivals of {words([term.name])}")
         here = classes(term.name)
@@ -333,8 +332,10 @@ def _rivals(
         contained = term.name in first.fit.parameters.term(first.effect).nested
         needed = space.penalty if contained else space.margin if first.effect in here else space.policy.swap
         better = first if first.behind < -needed else None
-        if better is None and term.family != EVEN_FRICTION.family and EVEN_FRICTION.name in here:
-            better = next((r for r in rivals if r.effect == EVEN_FRICTION.name and r.behind < space.margin), None)
+        if better is None:
+            # Of what these records cannot tell apart, the simplest of a family before what belongs to another one, or to none.
+            others = (r for r in rivals if r.effect in here and r.behind < space.margin)
+            better = next((r for r in others if r.term.simplest and r.term.family != term.family), None)
         if better is not None:
             return found, better.fit
     return found, None

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gaident.estimation.regression.motion import Motion
 from gaident.results.estimate import Estimate
 
-__all__ = ["CHOICES", "COLUMNS", "STEEP_DRAG", "TERMS", "Term", "columns_of", "estimates_of"]
+__all__ = ["CHOICES", "COLUMNS", "STEEP_DRAG", "TERMS", "TorqueTerm", "columns_of", "estimates_of"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -34,7 +34,7 @@ class Parameter(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Term:
+class TorqueTerm:
     """One term: `columns(motion, sign)` gives an array (n,) for each coefficient."""
 
     columns: Callable[[Motion, Vector], list[Vector]]
@@ -52,31 +52,31 @@ def _force(name: str) -> Parameter:
     return Parameter(name, "N m", "N")
 
 
-TERMS: dict[str, Term] = {
-    "inertia": Term(lambda m, _: [m.acceleration], (INERTIA,)),
-    "viscous": Term(lambda m, _: [m.velocity], (_viscous("viscous"),)),
-    "viscous_by_direction": Term(
+TERMS: dict[str, TorqueTerm] = {
+    "inertia": TorqueTerm(lambda m, _: [m.acceleration], (INERTIA,)),
+    "viscous": TorqueTerm(lambda m, _: [m.velocity], (_viscous("viscous"),)),
+    "viscous_by_direction": TorqueTerm(
         lambda m, _: [np.maximum(m.velocity, 0.0), np.minimum(m.velocity, 0.0)],
         (_viscous("viscous_positive"), _viscous("viscous_negative")),
     ),
-    "coulomb": Term(lambda _, sign: [sign], (_force("coulomb"),)),
-    "coulomb_by_direction": Term(
+    "coulomb": TorqueTerm(lambda _, sign: [sign], (_force("coulomb"),)),
+    "coulomb_by_direction": TorqueTerm(
         lambda _, sign: [np.maximum(sign, 0.0), np.minimum(sign, 0.0)],
         (_force("coulomb_positive"), _force("coulomb_negative")),
     ),
-    "offset": Term(lambda m, _: [np.ones_like(m.velocity)], (_force("offset"),)),
-    "gravity": Term(
+    "offset": TorqueTerm(lambda m, _: [np.ones_like(m.velocity)], (_force("offset"),)),
+    "gravity": TorqueTerm(
         lambda m, _: [np.sin(m.position), np.cos(m.position)],
         (_force("gravity_amplitude"), Parameter("gravity_phase", "rad", "rad")),
     ),
-    "spring": Term(lambda m, _: [m.position], (Parameter("spring", "N m/rad", "N/m"),)),
+    "spring": TorqueTerm(lambda m, _: [m.position], (Parameter("spring", "N m/rad", "N/m"),)),
 }
 
 STEEP_DRAG = "steep_drag"
 """A drag cbrt(w) that no choice of terms holds: beside it a jump at the reversal is dry friction (`reversal.py`)."""
 
-COLUMNS: dict[str, Term] = TERMS | {
-    STEEP_DRAG: Term(lambda m, _: [np.cbrt(m.velocity)], (Parameter("steep_drag", "N m (s/rad)^(1/3)", "N (s/m)^(1/3)"),))
+COLUMNS: dict[str, TorqueTerm] = TERMS | {
+    STEEP_DRAG: TorqueTerm(lambda m, _: [np.cbrt(m.velocity)], (Parameter("steep_drag", "N m (s/rad)^(1/3)", "N (s/m)^(1/3)"),))
 }
 """The terms that a user can ask for, and those of tests."""
 

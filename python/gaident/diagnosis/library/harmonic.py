@@ -1,0 +1,60 @@
+"""What returns with every turn of the shaft: torques, and the ripple of an encoder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.diagnosis.library import triggers as t
+from gaident.diagnosis.library.cause import AT_THE_SHAFT, Cause
+from gaident.diagnosis.library.coordinates import HIGHEST_ORDER
+from gaident.diagnosis.library.kinds import harmonic
+
+__all__ = ["CAUSES"]
+
+Vector = NDArray[np.float64]
+
+
+def _behind_ripple(seen: Vector, velocity: Vector, values: Vector) -> Vector:
+    """theta = theta_m - a (sin(n theta + phase) - sin(phase)), two rounds: a is small."""
+    amplitude, order, phase = values
+    angle = seen
+    for _ in range(2):
+        angle = seen - amplitude * (np.sin(order * angle + phase) - np.sin(phase))
+    return angle
+
+
+def _gravity_of_regression(values: Mapping[str, float]) -> dict[str, float] | None:
+    if "gravity_amplitude" not in values:
+        return None
+    return {"amplitude": values["gravity_amplitude"], "phase": values["gravity_phase"]}
+
+
+CAUSES: tuple[Cause, ...] = (
+    harmonic(
+        "unbalance", "shaft", 1, False, "torque",
+        domains=AT_THE_SHAFT,
+        needs=(t.rotary, t.moves, t.part_of_a_turn),
+        excited_by=("slow constant speeds", "holds up and down"),
+        regressed=_gravity_of_regression,
+    ),
+    harmonic(
+        "cogging", "shaft", 2, True, "torque",
+        domains=AT_THE_SHAFT,
+        orders=(2, HIGHEST_ORDER),
+        needs=(t.rotary, t.moves, t.period_of_an_order),
+        unseen=t.orders_beyond,
+        excited_by=("slow constant speeds",),
+    ),
+    harmonic(
+        "velocity_ripple", "sensor", 1, True, "velocity",
+        domains=AT_THE_SHAFT,
+        orders=(1, HIGHEST_ORDER),
+        seen_angle=_behind_ripple,
+        needs=(t.rotary, t.moves, t.period_of_an_order),
+        unseen=t.orders_beyond,
+        excited_by=("slow constant speeds",),
+    ),
+)  # fmt: skip

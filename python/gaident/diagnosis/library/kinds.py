@@ -1,0 +1,89 @@
+"""Effects of the same kind, made by one function each; `known`: what else a `Cause` holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.diagnosis.library.cause import Cause
+from gaident.diagnosis.library.coordinates import positive
+from gaident.estimation.term import Rows, Scales
+
+__all__ = ["harmonic", "linear", "single"]
+
+FREE = 1e6  # no decision: a bound that nothing reaches;
+"""Times the largest torque of the log: a pendulum that swings with little friction has far more torque than drives it."""
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+def single(
+    effect: str,
+    place: str,
+    name: str,
+    low: Callable[[Scales], float],
+    high: Callable[[Scales], float],
+    starts: Callable[[Scales], tuple[float, ...]],
+    **known: Any,
+) -> Cause:
+    """An effect of one positive number of unknown size, moved by its logarithm."""
+    return Cause(
+        effect,
+        place,
+        positive(0),
+        lambda p: np.log([max(p[name], 1e-300)]),
+        lambda s: [(float(np.log(low(s))), float(np.log(high(s))))],
+        lambda s: [(float(np.log(v)),) for v in starts(s) if low(s) < v < high(s)],
+        lambda s: (1.0,),
+        **known,
+    )
+
+
+def linear(effect: str, name: str, low: Callable[[Scales], float], high: Callable[[Scales], float],
+            starts: Callable[[Scales], tuple[float, ...]], step: Callable[[Scales], float], **known: Any) -> Cause:  # fmt: skip
+    """A shaft torque in proportion to one number, moved as it is."""
+    return Cause(
+        effect,
+        "shaft",
+        lambda z: z.copy(),
+        lambda p: np.array([p[name]]),
+        lambda s: [(low(s), high(s))],
+        lambda s: [(v,) for v in starts(s)],
+        lambda s: (step(s),),
+        proportional=True,
+        **known,
+    )
+
+
+def harmonic(effect: str, place: str, first: int, with_order: bool, kind: str, **known: Any) -> Cause:
+    """A harmonic of the angle: (a cos(phase), a sin(phase)[, order]) -> (amplitude[, order], phase)."""
+
+    def natural(z: Matrix) -> Matrix:
+        columns = [np.hypot(z[:, 0], z[:, 1])]
+        if with_order:
+            columns.append(z[:, 2])
+        columns.append(np.arctan2(z[:, 1], z[:, 0]))
+        return np.column_stack(columns)
+
+    def coordinates(p: Mapping[str, float]) -> Vector:
+        a, phase = p["amplitude"], p["phase"]
+        pair = [a * np.cos(phase), a * np.sin(phase)]
+        return np.array([*pair, p["order"]] if with_order else pair)
+
+    def amplitude(s: Scales) -> float:
+        return s.torque if kind == "torque" else 0.2
+
+    def limits(s: Scales) -> Rows:
+        a = (10.0 if with_order else FREE) * amplitude(s) if kind == "torque" else amplitude(s)
+        rows: Rows = [(-a, a), (-a, a), (float(first), 1000.0)]
+        return rows[: 3 if with_order else 2]
+
+    def steps(s: Scales) -> tuple[float, ...]:
+        a = 0.05 * amplitude(s)
+        return (a, a, 0.0)[: 3 if with_order else 2]
+
+    return Cause(effect, place, natural, coordinates, limits, lambda s: [], steps, harmonic=kind, **known)
