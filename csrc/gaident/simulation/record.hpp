@@ -22,7 +22,8 @@ struct Record {
     Start start = Start::rest;
     double velocity0 = 0.0;
     const ServoEquation* servo = nullptr;  // of the loop LoopKind::servo, from line to line of this record
-    std::span<const double> straight;  // the part of a mixed command that goes straight from line to line (plant/decimation.hpp)
+    std::span<const double> straight =
+        {};  // the part of a mixed command that goes straight from line to line (plant/decimation.hpp)
 
     std::size_t size() const { return output.size(); }
     // Of the sample `first` and those behind it; null without a part that goes straight.
