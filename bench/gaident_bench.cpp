@@ -21,7 +21,7 @@
 using namespace gaident;
 
 void effect_rows(bool quick);     // effects.cpp
-void log_every_rows(bool quick);  // log_every.cpp
+void log_every_rows(bool quick);  // core/log_every.cpp
 
 namespace {
 

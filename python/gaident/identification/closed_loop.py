@@ -1,21 +1,49 @@
-"""A loop that is simulated from its command although its controller is faster than the log."""
+"""Over what an identification closes the loop: a PI or a cascade, driven by the command; none, driven by the torque."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident import _core
 from gaident.arguments import TORQUE
+from gaident.axis import Text
 from gaident.control import core
 from gaident.control.cascade import Cascade, Controller, cascade_of
 from gaident.data.record import Record
 from gaident.errors import RecordError
+from gaident.identification.space import derive_space
+from gaident.models.drive_torque import torque_driven
 from gaident.models.search_space import SearchSpace
 from gaident.models.starts import starts_moving
 
-__all__ = ["closed_cascade", "with_torque"]
+__all__ = ["Looped", "closed_cascade", "input_of", "line_record", "looped_over", "space_of", "with_torque"]
+
+Vector = NDArray[np.float64]
 
 USUAL_POLES = 6  # no decision: p + q of the largest structure of a derived space
+
+
+class Looped(NamedTuple):
+    """Records, the controller that the loop is closed over, None where their torque drives the model, and notes on that."""
+
+    records: Sequence[Record]
+    controller: Controller | None
+    notes: tuple[Text, ...] = ()
+
+
+def looped_over(records: Sequence[Record], controller: Controller | None, space: object) -> Looped:
+    """What an identification of the records does under a controller; space: the search space, or None. Raises RecordError."""
+    cascade = closed_cascade(records, controller, space if isinstance(space, SearchSpace) else None)
+    if cascade is not None:
+        return Looped(records, cascade)
+    driven = torque_driven(records, controller)
+    given = [r.with_channels(command=None) for r in driven.records] if driven.cascade is not None else driven.records
+    return Looped(given, driven.controller, driven.notes)
 
 
 def closed_cascade(records: Sequence[Record], controller: Controller | None, space: SearchSpace | None) -> Cascade | None:
@@ -64,3 +92,24 @@ def with_torque(records: Sequence[Record], cascade: Cascade) -> list[Record]:
         else:
             made.append(rec.with_channels(torque=core.servo_torque(rec.dt, source, rec.velocity, rec.position, plain)))
     return made
+
+
+def space_of(records: Sequence[Record], controller: Controller | None) -> SearchSpace:
+    """Search ranges from the data; controller: what the loop is closed over."""
+    if isinstance(controller, Cascade):
+        return derive_space(with_torque(records, controller), None)
+    return derive_space(records, controller)
+
+
+def input_of(rec: Record, controller: Controller | None) -> Vector:
+    """What drives the loop, shape (n,): command [rad/s], position command [rad], or without a controller torque [N m]."""
+    placed = isinstance(controller, Cascade) and controller.position is not None
+    source = rec.torque if controller is None else rec.position_command if placed else rec.command
+    assert source is not None  # checked on entry
+    return source
+
+
+def line_record(rec: Record, cascade: Cascade) -> _core.Record:
+    """The core's record, from rest, of a loop whose controller is faster than the log."""
+    start = 0.0 if rec.position is None else float(rec.position[0])
+    return core.line_record(rec.dt, input_of(rec, cascade), rec.velocity, start, cascade)

@@ -13,21 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
-from gaident.axis import Text
 from gaident.control import core
 from gaident.control.cascade import Cascade, Controller
 from gaident.data.record import Record
 from gaident.errors import SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
 from gaident.identification.arguments import check_arithmetic, check_numbers, checked_records, checked_space, distinct
-from gaident.identification.closed_loop import closed_cascade, with_torque
+from gaident.identification.closed_loop import input_of, line_record, looped_over, space_of
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.identification.notes import record_notes, warnings_of
 from gaident.identification.parts import search_parts
 from gaident.identification.selection import Candidate
-from gaident.identification.space import derive_space
 from gaident.messages import Message
-from gaident.models.drive_torque import torque_driven
 from gaident.models.mechanics import mechanics_from_model
 from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
@@ -120,15 +117,8 @@ def identify(
     (1, 0, 0.01, 0.05, False)
     """
     began = time.perf_counter()
-    checked = checked_records(rec, controller)
-    cascade = closed_cascade(checked, controller, space if isinstance(space, SearchSpace) else None)
-    loop: Controller | None = cascade
-    driven_notes: tuple[Text, ...] = ()
-    given = checked
-    if cascade is None:
-        driven = torque_driven(checked, controller)
-        loop, driven_notes = driven.controller, driven.notes
-        given = [r.with_channels(command=None) for r in driven.records] if driven.cascade is not None else list(driven.records)
+    looped = looped_over(checked_records(rec, controller), controller, space)
+    given, loop = list(looped.records), looped.controller
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
@@ -140,9 +130,7 @@ def identify(
     order = sorted(range(len(given)), key=lambda i: (digests[i], given[i].name))
     records, digests = [given[i] for i in order], [digests[i] for i in order]
     derived = space is None
-    if space is None:
-        space = _derived(records, loop)
-    space = checked_space(space, loop)
+    space = checked_space(space_of(records, loop) if space is None else space, loop)
 
     moving = [settings.initial_state == "free" or (settings.initial_state == "auto" and starts_moving(r, loop)) for r in records]
     work = _Work(records, digests, loop, space, settings, moving, threads)
@@ -152,8 +140,8 @@ def identify(
     if derived and not settings.species:
         warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
         object.__setattr__(result, "warnings", (*result.warnings, warning))
-    if driven_notes:
-        object.__setattr__(result, "warnings", (*driven_notes, *result.warnings))
+    if looped.notes:
+        object.__setattr__(result, "warnings", (*looped.notes, *result.warnings))
     overflows = sum(t.overflows for t in found)
     if overflows:
         evaluations = sum(t.evaluations for t in found)
@@ -209,11 +197,10 @@ class _Work:
         """The core's view of (record, whether it starts in motion)."""
         c = self.controller
         if isinstance(c, Cascade):
-            lines = [core.line_record(r.dt, _input(r, c), r.velocity, _angle(r), c) for r, _ in parts]
-            return core.experiment(lines, c)
+            return core.experiment([line_record(r, c) for r, _ in parts], c)
         rows = [
             # no decision: a start
-            core.record(r.dt, _input(r, c), r.velocity, "free" if moving else "rest", float(r.velocity[:3].mean()))
+            core.record(r.dt, input_of(r, c), r.velocity, "free" if moving else "rest", float(r.velocity[:3].mean()))
             for r, moving in parts
         ]
         return core.experiment(rows, c)
@@ -397,24 +384,6 @@ def _spread(records: Sequence[Record], block: int = 1 << 18) -> float:  # no dec
     mean = sum(float(r.velocity.sum()) for r in records) / sum(len(r) for r in records)
     parts = (r.velocity[i : i + block] - mean for r in records for i in range(0, len(r), block))
     return sum(float(np.einsum("i,i", w, w)) for w in parts)  # in one thread, unlike w @ w
-
-
-def _input(r: Record, controller: Controller | None) -> Vector:
-    placed = isinstance(controller, Cascade) and controller.position is not None
-    source = r.torque if controller is None else r.position_command if placed else r.command
-    assert source is not None  # checked on entry
-    return source
-
-
-def _angle(r: Record) -> float:
-    """At the start [rad]."""
-    return 0.0 if r.position is None else float(r.position[0])
-
-
-def _derived(records: Sequence[Record], controller: Controller | None) -> SearchSpace:
-    if isinstance(controller, Cascade):
-        return derive_space(with_torque(records, controller), None)
-    return derive_space(records, controller)
 
 
 def _processors() -> int:

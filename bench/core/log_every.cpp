@@ -1,12 +1,12 @@
 // What a log that has a line for every 8th sample of the controller costs the genetic search: a whole generation beside one of the
 // same drive with one sample a line. The bound that is asked for is 1.5.
 // Error sums are first checked against controller and plant in turn, at the controller's clock.
-#include "../csrc/gaident/control/servo.hpp"
-#include "../csrc/gaident/control/servo_equation.hpp"
-#include "../csrc/gaident/plant/roots.hpp"
-#include "../csrc/gaident/identification/velocity_objective.hpp"
-#include "../csrc/gaident/search/breeder.hpp"
-#include "require.hpp"
+#include "../../csrc/gaident/control/servo.hpp"
+#include "../../csrc/gaident/control/servo_equation.hpp"
+#include "../../csrc/gaident/plant/roots.hpp"
+#include "../../csrc/gaident/identification/velocity_objective.hpp"
+#include "../../csrc/gaident/search/breeder.hpp"
+#include "../require.hpp"
 
 #include <algorithm>
 #include <cstdio>
