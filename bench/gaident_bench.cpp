@@ -20,7 +20,8 @@
 
 using namespace gaident;
 
-void effect_rows(bool quick);  // effects.cpp
+void effect_rows(bool quick);     // effects.cpp
+void log_every_rows(bool quick);  // core/log_every.cpp
 
 namespace {
 
@@ -326,6 +327,7 @@ int main(int argc, char** argv) {
     generation_rows();
     referee_row();
     simulation_rows();
+    log_every_rows(quick);
     effect_rows(quick);
     return 0;
 }

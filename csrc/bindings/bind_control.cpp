@@ -18,6 +18,13 @@ LoopKind loop_named(const std::string& name) {
     throw std::invalid_argument("kind must be 'continuous', 'sampled', 'servo' or 'open', not '" + name + "'");
 }
 
+Between between_named(const std::string& name) {
+    if (name == "held") return Between::held;
+    if (name == "straight") return Between::straight;
+    if (name == "mixed") return Between::mixed;
+    throw std::invalid_argument("between must be 'held', 'straight' or 'mixed', not '" + name + "'");
+}
+
 AntiWindup anti_windup_named(const std::string& name) {
     if (name == "none") return AntiWindup::none;
     if (name == "hold") return AntiWindup::hold;
@@ -57,10 +64,33 @@ RealArray servo_torque(const Clock& clock, const Loop& loop, const RealArray& so
 
 }  // namespace
 
-PyRecord::PyRecord(const Clock& clock, RealArray in, RealArray out, const std::string& start, double velocity0)
+PyRecord::PyRecord(const Clock& controller, RealArray in, RealArray out, const std::string& start, double velocity0,
+                   const std::string& between_lines, RealArray straight_part, const Feedforward& fed)
     : input(std::move(in)),
       output(std::move(out)),
-      record{view(input), view(output), clock.period, start_named(start), velocity0} {}
+      straight(std::move(straight_part)),
+      clock(controller),
+      feedforward(fed),
+      between(between_named(between_lines)) {
+    record.input = view(input);
+    record.output = view(output);
+    record.sample_time = clock.period * clock.log_every;
+    record.start = start_named(start);
+    record.velocity0 = velocity0;
+    if ((between == Between::mixed) != (straight.size() > 0))
+        throw std::invalid_argument("straight: it belongs to a mixed command, and only to it");
+    record.straight = view(straight);
+}
+
+void PyRecord::close(const Loop& loop) {
+    if (loop.kind != LoopKind::servo) {
+        if (clock.log_every != 1 || between != Between::held)
+            throw std::invalid_argument("records: only a servo is faster than its log");
+        return;
+    }
+    equation = std::make_shared<const ServoEquation>(loop, clock, feedforward, between);
+    record.servo = equation.get();
+}
 
 void bind_control(py::module_& m) {
     py::class_<Clock>(m, "Clock")
@@ -106,7 +136,20 @@ void bind_control(py::module_& m) {
         py::kw_only(), py::arg("kind"), py::arg("controller") = Controller{}, py::arg("servo") = ServoSettings{});
     m.def("servo_torque", &servo_torque, py::kw_only(), py::arg("clock"), py::arg("loop"), py::arg("source"), py::arg("velocity"),
           py::arg("position"), py::arg("velocity_feedforward"), py::arg("torque_feedforward"));
+    m.attr("MOST_STATES") = max_loop_order;
+    m.def(
+        "servo_order",
+        [](const Loop& loop, const Clock& clock) { return ServoEquation(loop, clock, {}, Between::held).order(0); },
+        py::kw_only(), py::arg("loop"), py::arg("clock"));
     py::class_<PyRecord>(m, "Record")
-        .def(py::init<const Clock&, RealArray, RealArray, const std::string&, double>(), py::kw_only(), py::arg("clock"),
-             py::arg("input"), py::arg("output"), py::arg("start"), py::arg("velocity0"));
+        .def(py::init([](const Clock& clock, RealArray input, RealArray output, const std::string& start, double velocity0,
+                         const std::string& between, std::optional<RealArray> straight, double velocity_feedforward,
+                         double acceleration_feedforward) {
+                 const Feedforward fed{velocity_feedforward, acceleration_feedforward};
+                 return PyRecord(clock, std::move(input), std::move(output), start, velocity0, between,
+                                 straight ? std::move(*straight) : RealArray(0), fed);
+             }),
+             py::kw_only(), py::arg("clock"), py::arg("input"), py::arg("output"), py::arg("start"), py::arg("velocity0"),
+             py::arg("between") = "held", py::arg("straight") = py::none(), py::arg("velocity_feedforward") = 0.0,
+             py::arg("acceleration_feedforward") = 0.0);
 }

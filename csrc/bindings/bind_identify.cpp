@@ -14,7 +14,10 @@ struct PyExperiment {
     std::atomic<bool> stop{false};
 
     PyExperiment(std::vector<PyRecord> records, const Loop& loop, const std::string& kernels) : arrays(std::move(records)) {
-        for (const PyRecord& r : arrays) experiment.records.push_back(r.record);
+        for (PyRecord& r : arrays) {
+            r.close(loop);
+            experiment.records.push_back(r.record);
+        }
         experiment.loop = loop;
         if (!kernels.empty()) {
             experiment.kernels = kernels_named(kernels.c_str());

@@ -1,6 +1,7 @@
 // Shared by the binding files: array types and the way long work is run so that Ctrl-C and progress reach Python.
 #pragma once
 
+#include "../gaident/control/servo_equation.hpp"
 #include "../gaident/identification/plant_search.hpp"
 
 #include <pybind11/complex.h>
@@ -10,6 +11,7 @@
 #include <pybind11/stl.h>
 
 #include <functional>
+#include <memory>
 
 namespace py = pybind11;
 
@@ -25,10 +27,16 @@ RealArray to_array(const std::vector<double>& v);
 
 // A record with the arrays it borrows.
 struct PyRecord {
-    RealArray input, output;
+    RealArray input, output, straight;
     gaident::Record record;
+    gaident::Clock clock;
+    gaident::Feedforward feedforward;
+    gaident::Between between;
+    std::shared_ptr<const gaident::ServoEquation> equation;  // of a servo loop
 
-    PyRecord(const gaident::Clock& clock, RealArray in, RealArray out, const std::string& start, double velocity0);
+    PyRecord(const gaident::Clock& controller, RealArray in, RealArray out, const std::string& start, double velocity0,
+             const std::string& between_lines, RealArray straight_part, const gaident::Feedforward& fed);
+    void close(const gaident::Loop& loop);
 };
 
 // Runs `work` on a thread of its own with the GIL released; every 50 ms looks for Ctrl-C (sets `stop`, waits for the work to end,

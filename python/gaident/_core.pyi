@@ -147,11 +147,28 @@ class Record:
     """Input (velocity command [rad/s], torque [N m] in the open loop) and measured velocity [rad/s] of an identification.
 
     start: "rest", "steady" (velocity0 [rad/s] under constant input) or "free" (unknown, estimated from "steady" on).
+    clock: of the controller. In the loop of a servo the record starts at rest, and its command is "held", "straight" or "mixed"
+    between the lines of the log; `straight` is the part of a mixed one that goes straight.
     """
 
     def __init__(
-        self, *, clock: Clock, input: NDArray[np.float64], output: NDArray[np.float64], start: str, velocity0: float
+        self,
+        *,
+        clock: Clock,
+        input: NDArray[np.float64],
+        output: NDArray[np.float64],
+        start: str,
+        velocity0: float,
+        between: str = "held",
+        straight: NDArray[np.float64] | None = None,
+        velocity_feedforward: float = 0.0,
+        acceleration_feedforward: float = 0.0,
     ) -> None: ...
+
+MOST_STATES: int  # of plant and controller in one difference equation
+
+def servo_order(*, loop: Loop, clock: Clock) -> int:
+    """States that a servo adds to those of the plant; ValueError where plant and servo make no linear equation."""
 
 class Experiment:
     """Records and their loop: what candidates are simulated against.

@@ -53,6 +53,16 @@ template <class R, int N, bool driven = true, class C = R, class X = R>
     return y;
 }
 
+// The same with two inputs r and s, that of s with the coefficients c.
+template <class R, int N>
+[[gnu::always_inline]] inline R recurrence_step(int order, const R* a, const R* b, const R* c, R* x, R r, R s) {
+    const int n = N >= 0 ? N : order;
+    const R y = (x[0] + b[0] * r) + c[0] * s;
+    for (int i = 0; i + 1 < n; ++i) x[i] = (((x[i] + x[i + 1]) + b[i + 1] * r) + c[i + 1] * s) - a[i] * y;
+    if (n > 0) x[n - 1] = ((x[n - 1] + b[n] * r) + c[n] * s) - a[n - 1] * y;
+    return y;
+}
+
 // Under a constant command r a PI loop rests at y = r, since its a[N-1] is its b[N], and its states at x[i] = at_rest(i) r.
 // Deviations from that rest obey the recurrence without input, which is nearly half the work.
 template <class A, class B>

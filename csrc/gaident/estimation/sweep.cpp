@@ -98,8 +98,8 @@ void Sweep::linearise(std::span<const double> x, const Unknowns& unknowns, std::
             for (std::size_t g = 0; g < groups; ++g) {
                 keep_history(columns_[g], history, first);
                 double* const rows = columns_[g].data() + history * W;
-                advance_outputs(*experiment_.kernels, experiment_.loop, controller, bank_[g], record.input.data() + first, n,
-                                rows);
+                advance_outputs(*experiment_.kernels, experiment_.loop, controller, bank_[g], record.input.data() + first,
+                                record.straight_from(first), n, rows);
                 experiment_.kernels->differences(scale.data() + g * W, record.output.data() + first, n, rows);
             }
             on_chunk({r, first, n, own, columns_, history});
@@ -116,8 +116,8 @@ void Sweep::outputs(std::span<const double> x, const Unknowns& unknowns, const O
         const ControllerState<double> controller(experiment_.loop.controller, Clock{record.sample_time});
         load(r, points, unknowns, group);
         each_chunk(record, [&](std::size_t first, std::size_t n) {
-            advance_outputs(*experiment_.kernels, experiment_.loop, controller, group, record.input.data() + first, n,
-                            rows.data());
+            advance_outputs(*experiment_.kernels, experiment_.loop, controller, group, record.input.data() + first,
+                            record.straight_from(first), n, rows.data());
             for (std::size_t k = 0; k < n; ++k) y[k] = rows[k * W];
             on_outputs(r, first, {y.data(), n});
         });
@@ -136,11 +136,13 @@ void Sweep::errors(std::span<const double* const> points, const Unknowns& unknow
             const double *const in = record.input.data() + first, *const out = record.output.data() + first;
             double part[W] = {};
             if (phi.empty()) {
-                advance_errors(*experiment_.kernels, experiment_.loop, controller, group, in, out, n, part);
+                advance_errors(*experiment_.kernels, experiment_.loop, controller, group, in, record.straight_from(first), out, n,
+                               part);
             } else {
                 keep_history(coloured_, history, first);
                 double* const rows = coloured_.data() + history * W;
-                advance_outputs(*experiment_.kernels, experiment_.loop, controller, group, in, n, rows);
+                advance_outputs(*experiment_.kernels, experiment_.loop, controller, group, in, record.straight_from(first), n,
+                                rows);
                 for (std::size_t k = 0; k < n; ++k)
                     for (std::size_t lane = 0; lane < W; ++lane) rows[k * W + lane] = out[k] - rows[k * W + lane];
                 white_.resize(chunk_samples * W);

@@ -1,6 +1,7 @@
 #include "batch.hpp"
 
 #include "advance.hpp"
+#include "../control/servo_equation.hpp"
 #include "../runtime/parallel.hpp"
 
 #include <algorithm>
@@ -14,6 +15,12 @@ void Experiment::check() const {
         if (r.size() == 0 || r.input.size() != r.output.size())
             throw std::invalid_argument("records: input and output must have the same length, at least 1");
         if (!(r.sample_time > 0.0)) throw std::invalid_argument("records: sample_time must be positive");
+        if ((loop.kind == LoopKind::servo) != (r.servo != nullptr))
+            throw std::invalid_argument("records: the equation of the loop belongs to a servo loop, and to every record in it");
+        if (loop.kind == LoopKind::servo && r.start != Start::rest)
+            throw std::invalid_argument("records: a record in a servo loop must start at rest");
+        if (!r.straight.empty() && r.straight.size() != r.size())
+            throw std::invalid_argument("records: input and its straight part must have the same length");
     }
 }
 
@@ -126,8 +133,12 @@ void load_lanes(const Experiment& experiment, const Record& record, const Candid
     std::size_t of_lane[FactorGroup::width];
     for (std::size_t lane = 0; lane < FactorGroup::width; ++lane) of_lane[lane] = index[std::min(lane, count - 1)];
     candidates.place(of_lane, s, count, factors);
-    if (loop.kind != LoopKind::continuous) factors.doublings = held_doublings(largest_root(factors), record.sample_time);
-    experiment.kernels->coefficients(factors, loop, record.sample_time, closed, group);
+    if (record.servo != nullptr && record.servo->order(factors.counts.order) > max_loop_order)
+        throw std::invalid_argument("loop: plant and controller have more than 15 states together");
+    const double period = record.servo != nullptr ? record.servo->period() : record.sample_time;
+    if (loop.kind != LoopKind::continuous) factors.doublings = held_doublings(largest_root(factors), period);
+    if (record.servo != nullptr) experiment.kernels->servo_coefficients(factors, *record.servo, group);
+    else experiment.kernels->coefficients(factors, loop, period, closed, group);
 
     for (int k = 0; k < group.order; ++k) std::fill(group.x[k], group.x[k] + DoubleGroup::width, 0.0);
     std::fill(group.s, group.s + DoubleGroup::width, 0.0);
@@ -156,7 +167,7 @@ void load_group(const Experiment& experiment, const Record& record, std::span<co
 namespace {
 
 bool settles(const Record& r, const Loop& loop) {
-    return loop.kind != LoopKind::open && !loop.limited() &&
+    return loop.kind != LoopKind::open && !loop.limited() && (r.servo == nullptr || r.servo->rests_at_its_command()) &&
            std::all_of(r.input.begin(), r.input.end(), [&](double v) { return v == r.input[0]; });
 }
 
@@ -164,7 +175,7 @@ bool settles(const Record& r, const Loop& loop) {
 
 Batch::Batch(const Experiment& experiment, std::size_t capacity, bool in_float)
     : experiment_(experiment),
-      in_float_(in_float && !experiment.loop.limited()),
+      in_float_(in_float && !experiment.loop.limited() && experiment.loop.kind != LoopKind::servo),
       order_(capacity),
       sorted_(capacity),
       keys_(capacity),
@@ -275,6 +286,8 @@ void Batch::advance_part(const View<T>& view, const Record& record, G* groups, i
         };
         if constexpr (std::same_as<T, float>) {
             run(experiment_.kernels->in_float);
+        } else if (!record.straight.empty()) {
+            experiment_.kernels->in_double.both_errors(groups, lanes, in, record.straight.data() + i, out, n, part);
         } else if (experiment_.loop.limited()) {
             for (int g = 0; g * G::width < lanes; ++g)
                 experiment_.kernels->in_double.stepped_errors(groups[g], controller, in, out, n, part + g * G::width);

@@ -37,6 +37,7 @@ struct Experiment {
 };
 
 // Number of states a record's start is described by: the plant's p + q, and the controller's stored torque in a closed loop.
+// (A record in a servo loop starts at rest.)
 inline int start_states(Structure s, const Loop& loop) { return s.poles() + (loop.kind == LoopKind::open ? 0 : 1); }
 
 // Samples between two looks at the stop flag, and the chunk a long record is run in.
@@ -69,7 +70,7 @@ void load_group(const Experiment& experiment, const Record& record, std::span<co
 // Error sums of candidates of any mixture of structures.
 // All memory is taken in the constructor.
 // In float a candidate that 24 bits cannot hold (float_suffices) is run in double all the same, and so is every loop with limits,
-// where a rounded torque goes through the plant.
+// where a rounded torque goes through the plant, and every servo loop, whose filters leave poles far from z = 1.
 class Batch {
 public:
     Batch(const Experiment& experiment, std::size_t capacity, bool in_float);

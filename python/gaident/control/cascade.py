@@ -12,7 +12,7 @@ from gaident.control.filters import LowPass, Notch, filter_of
 from gaident.control.pi import PI
 from gaident.errors import ControllerError
 
-__all__ = ["Cascade", "Controller", "Filter", "P", "cascade_of"]
+__all__ = ["Cascade", "Controller", "Filter", "P", "cascade_of", "controller_from_dict"]
 
 Filter: TypeAlias = LowPass | Notch
 
@@ -218,6 +218,11 @@ class Cascade:
 
 
 Controller: TypeAlias = PI | Cascade
+
+
+def controller_from_dict(data: Mapping[str, Any]) -> Controller:
+    """Return the controller of what `PI.to_dict` or `Cascade.to_dict` gave; raises ControllerError."""
+    return Cascade.from_dict(data) if "velocity" in data else PI.from_dict(data)
 
 
 def cascade_of(controller: Controller) -> Cascade | None:

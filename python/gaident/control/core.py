@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gaident import _core
 from gaident.control.cascade import Cascade, Controller, cascade_of
 from gaident.control.pi import PI, RULES
-from gaident.control.ticks import ticks_of
+from gaident.control.ticks import straight_part, ticks_of
 
 __all__ = [
     "clock",
@@ -23,6 +23,8 @@ __all__ = [
     "effect_record",
     "experiment",
     "held_torque",
+    "is_one_equation",
+    "line_record",
     "loop",
     "loop_name",
     "one_equation",
@@ -152,8 +154,47 @@ def record(dt: float, source: Vector, velocity: Vector, start: str, velocity0: f
     return _core.Record(clock=clock(dt), input=source, output=velocity, start=start, velocity0=velocity0)
 
 
-def experiment(records: Sequence[_core.Record], controller: PI | None, kernels: str = "") -> _core.Experiment:
-    """Records and their loop, for the genetic search and the local fit."""
+def line_record(dt: float, source: Vector, velocity: Vector, start_angle: float, cascade: Cascade) -> _core.Record:
+    """A record, from rest, of a loop whose controller is faster than the log.
+
+    source: velocity command [rad/s], or with a position controller position command [rad], with the angle at the start [rad].
+    """
+    is_position = cascade.position is not None
+    command = source - start_angle if is_position else source
+    between, straight = straight_part(command, is_position)
+    every = cascade.log_every(dt)
+    return _core.Record(
+        clock=_core.Clock(period=dt / every, log_every=every),
+        input=command,
+        output=velocity,
+        start="rest",
+        velocity0=0.0,
+        between=between,
+        straight=straight,
+        velocity_feedforward=cascade.velocity_feedforward,
+        acceleration_feedforward=cascade.acceleration_feedforward,
+    )
+
+
+def is_one_equation(dt: float, cascade: Cascade, poles: int) -> bool:
+    """Whether one difference equation holds a cascade and a plant with so many poles, from line to line of a log."""
+    every = cascade.log_every(dt)
+    period = dt / every
+    try:
+        at_the_clock = _core.Clock(period=period, log_every=every)
+        order = _core.servo_order(loop=_servo(cascade, period, cascade.position_every(dt)), clock=at_the_clock)
+    except ValueError:
+        return False
+    return poles + order <= _core.MOST_STATES
+
+
+def experiment(records: Sequence[_core.Record], controller: Controller | None, kernels: str = "") -> _core.Experiment:
+    """Records and their loop, for the genetic search and the local fit; of a cascade each is a `line_record`."""
+    cascade = None if controller is None else cascade_of(controller)
+    if cascade is not None:
+        assert cascade.period is not None  # it is faster than the log
+        return _core.Experiment(records, _servo(cascade, cascade.period, cascade.position_every(cascade.period)), kernels)
+    assert not isinstance(controller, Cascade)
     return _core.Experiment(records, loop(controller), kernels)
 
 

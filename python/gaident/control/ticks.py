@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gaident.control.cascade import Cascade
 from gaident.policy.table import POLICY
 
-__all__ = ["Ticks", "at_the_clock", "between_lines", "ticks_of"]
+__all__ = ["Ticks", "at_the_clock", "between_lines", "straight_part", "ticks_of"]
 
 Vector = NDArray[np.float64]
 
@@ -66,11 +66,30 @@ def between_lines(line: Vector, every: int) -> Vector:
     """
     if every == 1:
         return np.ascontiguousarray(line, dtype=np.float64)
+    steps = np.append(_ramps(line), 0.0)
+    return (line[:, None] + steps[:, None] * (np.arange(every) / every)).ravel()
+
+
+def _ramps(line: Vector) -> Vector:
+    """Change over each interval of a velocity command that belongs to a ramp, otherwise 0; shape (n - 1,)."""
     steps = np.diff(line)
     size = np.abs(steps)
     near = np.maximum(np.append(0.0, size[:-1]), np.append(size[1:], 0.0))
-    steps = np.append(np.where(size <= POLICY.ramp * near, steps, 0.0), 0.0)
-    return (line[:, None] + steps[:, None] * (np.arange(every) / every)).ravel()
+    return np.where(size <= POLICY.ramp * near, steps, 0.0)
+
+
+def straight_part(line: Vector, is_position: bool) -> tuple[str, Vector]:
+    """How a command goes from line to line, and the part of it that goes straight where it is mixed; shape (n,) or (0,).
+
+    "held": it changes at the lines only; "straight"; "mixed": the sum of two such commands. A part that goes straight is 0 at
+    the first line, so that nothing of it lies before the record.
+    """
+    steps = np.diff(line) if is_position else _ramps(line)
+    if not np.any(steps):
+        return "held", np.zeros(0)
+    if line[0] == 0.0 and np.array_equal(steps, np.diff(line)):
+        return "straight", np.zeros(0)
+    return "mixed", np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _slope(signal: Vector, step: int, period: float) -> Vector:

@@ -18,8 +18,7 @@ from gaident.data.record import CHANNELS, Record
 from gaident.drive import kinds
 from gaident.drive.controller_section import CONTROLLER_KEYS, controller_of, proportional_gain_of
 from gaident.errors import ReadError, SettingsError, SpaceError
-from gaident.identification.space import derive_space
-from gaident.models.drive_torque import torque_driven
+from gaident.identification.closed_loop import looped_over, space_of
 from gaident.models.search_space import SearchSpace
 from gaident.results.experiment import Limits
 
@@ -144,8 +143,8 @@ class Drive:
                 raise SpaceError(f"{name} and {other} both say where to look for the same thing: leave one out")
         if "damping" in given and "inertia" not in given:
             raise SpaceError("damping is given without inertia: give both, their ratio bounds the real parts")
-        driven = torque_driven(records, controller)
-        derived = derive_space(driven.records, driven.controller)
+        looped = looped_over(records, controller, None)
+        derived = space_of(looped.records, looped.controller)
         mechanics = {k: given.pop(k) for k in ("inertia", "resonance_hz", "damping") if k in given}
         if mechanics:
             # What is not given stands in with any value; the ranges that come from it are not used.

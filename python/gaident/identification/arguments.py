@@ -52,7 +52,7 @@ def check_numbers(trials: object, seed: object, workers: object) -> None:
             raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
 
 
-def check_arithmetic(settings: Settings, controller: PI | None) -> None:
+def check_arithmetic(settings: Settings, controller: Controller | None) -> None:
     """Raises SettingsError where a drive's arithmetic is asked for in a loop that it does not know."""
     if settings.in_drive and (
         controller is None or controller.loop != "continuous" or any(map(math.isfinite, controller.limits))
@@ -76,7 +76,7 @@ def distinct(records: Sequence[Record]) -> list[str]:
     return digests
 
 
-def checked_space(space: SearchSpace, controller: PI | None) -> SearchSpace:
+def checked_space(space: SearchSpace, controller: Controller | None) -> SearchSpace:
     """The space, with p from 1 on where the torque is held. Raises SpaceError."""
     if not isinstance(space, SearchSpace):
         raise SpaceError(f"space is {space!r}: give a gaident.SearchSpace, or None to derive it from the data")

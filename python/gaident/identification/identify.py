@@ -14,19 +14,17 @@ from numpy.typing import NDArray
 
 from gaident import _core
 from gaident.control import core
-from gaident.control.cascade import Controller
-from gaident.control.pi import PI
+from gaident.control.cascade import Cascade, Controller
 from gaident.data.record import Record
 from gaident.errors import SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
 from gaident.identification.arguments import check_arithmetic, check_numbers, checked_records, checked_space, distinct
+from gaident.identification.closed_loop import input_of, line_record, looped_over, space_of
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.identification.notes import record_notes, warnings_of
 from gaident.identification.parts import search_parts
 from gaident.identification.selection import Candidate
-from gaident.identification.space import derive_space
 from gaident.messages import Message
-from gaident.models.drive_torque import torque_driven
 from gaident.models.mechanics import mechanics_from_model
 from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
@@ -70,7 +68,8 @@ def identify(
         The data; one model for all, each record with its own initial state.
     controller : PI or Cascade, optional
         The velocity loop, driven by the record's command; None: open loop, the record's torque drives the model.
-        Under what is no bare PI at the log's rate the torque drives the model too: as logged, or as this controller makes it.
+        Under a linear Cascade that is faster than the log, and starts at rest, the command drives the loop as well.
+        Under any other Cascade the torque drives the model: as logged, or as this controller makes it.
     space : SearchSpace, optional
         Search ranges; None: derived from the data, see `Identification.space`.
     settings : Settings, optional
@@ -118,9 +117,8 @@ def identify(
     (1, 0, 0.01, 0.05, False)
     """
     began = time.perf_counter()
-    driven = torque_driven(checked_records(rec, controller), controller)
-    loop = driven.controller
-    given = [r.with_channels(command=None) for r in driven.records] if driven.cascade is not None else list(driven.records)
+    looped = looped_over(checked_records(rec, controller), controller, space)
+    given, loop = list(looped.records), looped.controller
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
@@ -132,7 +130,7 @@ def identify(
     order = sorted(range(len(given)), key=lambda i: (digests[i], given[i].name))
     records, digests = [given[i] for i in order], [digests[i] for i in order]
     derived = space is None
-    space = checked_space(derive_space(records, loop) if space is None else space, loop)
+    space = checked_space(space_of(records, loop) if space is None else space, loop)
 
     moving = [settings.initial_state == "free" or (settings.initial_state == "auto" and starts_moving(r, loop)) for r in records]
     work = _Work(records, digests, loop, space, settings, moving, threads)
@@ -142,8 +140,8 @@ def identify(
     if derived and not settings.species:
         warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
         object.__setattr__(result, "warnings", (*result.warnings, warning))
-    if driven.notes:
-        object.__setattr__(result, "warnings", (*driven.notes, *result.warnings))
+    if looped.notes:
+        object.__setattr__(result, "warnings", (*looped.notes, *result.warnings))
     overflows = sum(t.overflows for t in found)
     if overflows:
         evaluations = sum(t.evaluations for t in found)
@@ -173,7 +171,7 @@ class _Work:
 
     records: list[Record]
     digests: list[str]
-    controller: PI | None
+    controller: Controller | None
     space: SearchSpace
     settings: Settings
     moving: list[bool]
@@ -186,7 +184,11 @@ class _Work:
         whole = list(zip(self.records, self.moving, strict=True))
         self.experiment = self.experiment_of(whole)
         # A long record is searched in part, and what is found fitted to all of it.
-        parts = search_parts(self.records, self.controller, self.moving) if self.settings.species else whole
+        # The middle of a record has no start at rest, which a cascade needs.
+        c = self.controller
+        parts = whole
+        if self.settings.species and not isinstance(c, Cascade):
+            parts = search_parts(self.records, c, self.moving)
         self.in_parts = sum(len(r) for r, _ in parts) < self.samples
         self.search_lengths = [len(r) for r, _ in parts]
         self.searched = self.experiment_of(parts) if self.in_parts else self.experiment
@@ -194,9 +196,11 @@ class _Work:
     def experiment_of(self, parts: Sequence[tuple[Record, bool]]) -> _core.Experiment:
         """The core's view of (record, whether it starts in motion)."""
         c = self.controller
+        if isinstance(c, Cascade):
+            return core.experiment([line_record(r, c) for r, _ in parts], c)
         rows = [
             # no decision: a start
-            core.record(r.dt, _input(r, c), r.velocity, "free" if moving else "rest", float(r.velocity[:3].mean()))
+            core.record(r.dt, input_of(r, c), r.velocity, "free" if moving else "rest", float(r.velocity[:3].mean()))
             for r, moving in parts
         ]
         return core.experiment(rows, c)
@@ -380,12 +384,6 @@ def _spread(records: Sequence[Record], block: int = 1 << 18) -> float:  # no dec
     mean = sum(float(r.velocity.sum()) for r in records) / sum(len(r) for r in records)
     parts = (r.velocity[i : i + block] - mean for r in records for i in range(0, len(r), block))
     return sum(float(np.einsum("i,i", w, w)) for w in parts)  # in one thread, unlike w @ w
-
-
-def _input(r: Record, controller: PI | None) -> Vector:
-    source = r.torque if controller is None else r.command
-    assert source is not None  # checked on entry
-    return source
 
 
 def _processors() -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gaident.axis import Text, say
-from gaident.control.pi import PI
+from gaident.control.cascade import Controller
 from gaident.data.record import Record
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Model
@@ -69,7 +69,7 @@ def _shaft_notes(mechanics: OneMass | TwoMass) -> list[str]:
     return [f"The mechanics without shaft damping contradict the model by {100 * found:.2g} +- {100 * std:.2g} %: {remedy}."]
 
 
-def open_loop_notes(records: Sequence[Record], controller: PI | None) -> list[Text]:
+def open_loop_notes(records: Sequence[Record], controller: Controller | None) -> list[Text]:
     """A sentence where a record's torque is that of a loop, u = C (r - w - noise): no input that is independent of the noise."""
     if controller is not None or all(rec.command is None for rec in records):
         return []
@@ -81,7 +81,7 @@ def open_loop_notes(records: Sequence[Record], controller: PI | None) -> list[Te
     ]
 
 
-def record_notes(records: Sequence[Record], controller: PI | None, initial_state: str) -> list[Text]:
+def record_notes(records: Sequence[Record], controller: Controller | None, initial_state: str) -> list[Text]:
     """What is doubtful about the records themselves: their input, and how they begin."""
     begun = [n for r in records if (n := doubtful_start(r, controller))] if initial_state == "auto" else []
     return [*reading_notes(records), *open_loop_notes(records, controller), *begun]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, say
-from gaident.control.pi import PI
+from gaident.control.cascade import Controller
 from gaident.data.record import Record
 from gaident.policy.table import POLICY
 
@@ -47,7 +47,7 @@ def stretches(x: NDArray[np.float64], count: int = 64, length: int = 16384) -> l
     return [x[i : i + length] for i in np.linspace(0, len(x) - length, count).astype(int).tolist()]
 
 
-def starts_moving(rec: Record, controller: PI | None) -> bool:
+def starts_moving(rec: Record, controller: Controller | None) -> bool:
     """Whether the record does not start at rest.
 
     At rest the first velocity is noise: within six standard deviations of it, or one step of a quantised signal, of zero. In the
@@ -59,7 +59,7 @@ def starts_moving(rec: Record, controller: PI | None) -> bool:
     return _first_is_motion(rec, controller) and not _constant_input(rec, controller)
 
 
-def doubtful_start(rec: Record, controller: PI | None) -> Text | None:
+def doubtful_start(rec: Record, controller: Controller | None) -> Text | None:
     """A sentence where a record's input is constant and its first velocity is not that of rest."""
     if not (_constant_input(rec, controller) and _first_is_motion(rec, controller)):
         return None
@@ -72,12 +72,12 @@ def doubtful_start(rec: Record, controller: PI | None) -> Text | None:
     )
 
 
-def _constant_input(rec: Record, controller: PI | None) -> bool:
+def _constant_input(rec: Record, controller: Controller | None) -> bool:
     source = rec.torque if controller is None else rec.command
     return source is not None and bool(np.all(source == source[0]))
 
 
-def _first_is_motion(rec: Record, controller: PI | None) -> bool:
+def _first_is_motion(rec: Record, controller: Controller | None) -> bool:
     w = rec.velocity
     steps = np.concatenate([np.abs(np.diff(part)) for part in stretches(w)])
     moves = steps[steps > 0.0]

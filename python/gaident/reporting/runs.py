@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import message_of, say
+from gaident.control.cascade import Cascade
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.experiments.excitation import position_of
@@ -19,6 +20,7 @@ from gaident.diagnosis.records.hygiene import cleaned, outliers
 from gaident.errors import GaidentError
 from gaident.models.drive_torque import torque_of
 from gaident.models.model import Model
+from gaident.models.simulate import run
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.show.report.views import Run
@@ -31,6 +33,7 @@ Vector = NDArray[np.float64]
 def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
     """One record and what the models make of it."""
     controller = result.controller
+    loop = None if isinstance(controller, Cascade) else controller
     linear: Model = result.model.linear if isinstance(result, Diagnosis) else result.model
     digest = rec.digest
     used = "fitted" if digest in result.digests else "new"
@@ -42,16 +45,17 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
             used, first_held = "held out", 0
         elif used == "fitted" and not result.validation_digests and result.held_out != IN_SAMPLE:
             first_held = held_from(rec)
-        before = _free_run(result.identification.model, rec, controller, "linear", notes)
+        before = _free_run(result.identification.model, rec, loop, "linear", notes)
         if result.model.effects:
-            extended = _free_run(result.model, rec, controller, "extended", notes)
+            extended = _free_run(result.model, rec, loop, "extended", notes)
     else:
         before = _finite(result.simulate(rec), rec, "linear", notes)
-    torque = torque_of(rec, controller)
+    simulated = rec.torque is None and isinstance(controller, Cascade)
+    torque = run(linear, rec, controller).torque if simulated else torque_of(rec, loop)
     dhat, std = None, 0.0
     try:
         hit = outliers(rec.velocity, rec.velocity - before if np.all(np.isfinite(before)) else None)
-        missing = missing_torque(linear, cleaned(rec, hit), controller, torque)
+        missing = missing_torque(linear, cleaned(rec, hit), loop, torque)
         dhat, std = missing.dhat, float(np.median(missing.std))
     except GaidentError as error:
         notes.append(say("The missing {torque} cannot be worked out: {}", message_of(error)))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import linear_sentences, restored
-from gaident.control.pi import PI
+from gaident.control.cascade import Cascade, Controller, controller_from_dict
 from gaident.data.record import Record
 from gaident.errors import GaidentError, check_schema
 from gaident.models.mechanics import Mechanics, mechanics_from_dict
@@ -42,8 +42,8 @@ class Identification(SavedResult):
     ----------
     model : Model
         The model that was found.
-    controller : PI or None
-        The velocity loop; None: open loop.
+    controller : PI, Cascade or None
+        The loop that was simulated; None: open loop, where the torque drives the model.
     parameters : mapping of str to Estimate
         Natural parameters of the model by name, see `factor_parameters`.
     mechanics : OneMass, TwoMass or None
@@ -91,7 +91,7 @@ class Identification(SavedResult):
     KIND: ClassVar[str] = "identification"
 
     model: Model
-    controller: PI | None
+    controller: Controller | None
     parameters: Mapping[str, Estimate] = field(hash=False)
     mechanics: Mechanics | None
     fitness: float
@@ -148,6 +148,10 @@ class Identification(SavedResult):
         state: Sequence[float] | NDArray[np.float64] | None = self.initial_states.get(rec.digest)
         unseen = rec.digest not in self.digests and self.settings.initial_state != "rest"
         if state is None and unseen and starts_moving(rec, self.controller):
+            if isinstance(self.controller, Cascade):
+                raise GaidentError(
+                    "rec starts in motion, and the initial state of a cascade cannot be estimated; use a record from rest"
+                )
             if self.controller is not None and self.controller.limited:
                 raise GaidentError(
                     "rec starts in motion and the controller has limits: its initial state cannot be estimated; use a record "
@@ -286,7 +290,7 @@ class Identification(SavedResult):
         with undamaged(cls.KIND):
             return cls(
                 model=Model.from_dict(data["model"]),
-                controller=None if data["controller"] is None else PI.from_dict(data["controller"]),
+                controller=None if data["controller"] is None else controller_from_dict(data["controller"]),
                 parameters={name: Estimate(**e) for name, e in data["parameters"].items()},
                 mechanics=None if data["mechanics"] is None else mechanics_from_dict(data["mechanics"]),
                 fitness=data["fitness"],

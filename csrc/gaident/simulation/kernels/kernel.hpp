@@ -4,6 +4,7 @@
 #include "../../plant/held.hpp"
 #include "../../numeric/lanes.hpp"
 #include "../../control/loop.hpp"
+#include "../../control/servo_equation.hpp"
 #include "kernels.hpp"
 #include "products.hpp"
 
@@ -35,8 +36,9 @@ struct KernelSource {
         else return by_order<most, n + 1>(order, call);
     }
 
-    static void coefficients(const FactorGroup& f, const Loop& loop, double sample_time, bool closed, DoubleGroup& out) {
-        using L = Lanes<double, double_lanes, Isa>;
+    using LD = Lanes<double, double_lanes, Isa>;
+    static LaneFactors<LD> factors_of(const FactorGroup& f) {
+        using L = LD;
         LaneFactors<L> g;
         g.sizes = f.counts;
         g.gain = L::load(f.gain);
@@ -45,6 +47,28 @@ struct KernelSource {
         if (f.counts.single_pole) g.pole = L::load(f.pole);
         if (f.counts.single_zero) g.zero = L::load(f.zero);
         for (int i = 0; i < f.counts.p; ++i) g.has_excess[i] = L::load(f.excess[i]);
+        return g;
+    }
+
+    static void servo_coefficients(const FactorGroup& f, const ServoEquation& servo, DoubleGroup& out) {
+        const LaneFactors<LD> g = factors_of(f);
+        by_order<6>(f.counts.order, [&](auto constant) {
+            constexpr int N = constant;
+            if constexpr (N != 0) {
+                LD straight[max_loop_order + 1];
+                const Delta<LD> h = servo(held_plant<LD, N>(g, servo.period(), f.doublings), straight);
+                out.order = h.order;
+                for (int i = 0; i < h.order; ++i) h.a[i].store(out.a[i]);
+                for (int i = 0; i <= h.order; ++i) h.b[i].store(out.b[i]);
+                if (servo.between() != Between::mixed) return;
+                for (int i = 0; i <= h.order; ++i) straight[i].store(out.c[i]);
+            }
+        });
+    }
+
+    static void coefficients(const FactorGroup& f, const Loop& loop, double sample_time, bool closed, DoubleGroup& out) {
+        using L = LD;
+        const LaneFactors<L> g = factors_of(f);
         const auto store = [&](const auto& h, int order) {
             out.order = order;
             for (int i = 0; i < order; ++i) h.a[i].store(out.a[i]);
@@ -98,19 +122,31 @@ struct KernelSource {
             for (std::size_t i = 0; i < n; ++i) recurrence_step<L, N>(k.order, k.a, k.b, k.x, L::all(input[i])).store(y + i * W);
             k.save(g);
         }
+        static void both_outputs(Group<T, W>& g, const T* input, const T* straight, std::size_t n, T* y) {
+            using L = Lanes<T, W, Isa>;
+            Bank<T, W, N> k(g);
+            L c[Bank<T, W, N>::capacity + 1];
+            for (int i = 0; i <= k.order; ++i) c[i] = L::load(g.c[i]);
+            for (std::size_t i = 0; i < n; ++i)
+                recurrence_step<L, N>(k.order, k.a, k.b, c, k.x, L::all(input[i]), L::all(straight[i])).store(y + i * W);
+            k.save(g);
+        }
     };
 
     // Squared errors of S registers of candidates of one order side by side, from register `first` of the array of groups on:
     // while one waits for the sample before, the others compute.
-    // `driven` false: without input, outputs being deviations from rest.
-    template <class T, int W, int N, bool driven>
+    // `inputs`: 0, outputs being deviations from rest; 1; or 2, the command and its part that goes straight.
+    template <class T, int W, int N, int inputs>
     struct SideBySide {
         using L = Lanes<T, static_cast<int>(Isa::register_bytes / sizeof(T)), Isa>;
         static constexpr int per_group = W / L::per_register, capacity = room_for(N);
         template <int S>
-        static void errors(Group<T, W>* groups, int first, const T* input, const T* output, std::size_t n, T* sums) {
+        static void errors(Group<T, W>* groups, int first, const T* input, const T* straight, const T* output, std::size_t n,
+                           T* sums) {
+            constexpr bool driven = inputs > 0;
             const int order = N >= 0 ? N : groups[first / per_group].order;
             L a[S][capacity], b[S][capacity + 1], x[S][capacity], sum[S];
+            [[maybe_unused]] L c[inputs == 2 ? S : 1][inputs == 2 ? capacity + 1 : 1];
             const auto row = [&](auto& rows, int s, int i) { return rows[i] + (first + s) % per_group * L::per_register; };
             for (int s = 0; s < S; ++s) {
                 Group<T, W>& g = groups[(first + s) / per_group];
@@ -119,12 +155,17 @@ struct KernelSource {
                 if (order == 0) x[s][0] = L(0.0);
                 if constexpr (driven)
                     for (int i = 0; i <= order; ++i) b[s][i] = L::load(row(g.b, s, i));
+                if constexpr (inputs == 2)
+                    for (int i = 0; i <= order; ++i) c[s][i] = L::load(row(g.c, s, i));
                 sum[s] = L(0.0);
             }
             for (std::size_t i = 0; i < n; ++i) {
                 const L wanted = L::all(output[i]), r = driven ? L::all(input[i]) : L(0.0);
                 for (int s = 0; s < S; ++s) {
-                    const L e = wanted - recurrence_step<L, N, driven>(order, a[s], b[s], x[s], r);
+                    L e;
+                    if constexpr (inputs == 2)
+                        e = wanted - recurrence_step<L, N>(order, a[s], b[s], c[s], x[s], r, L::all(straight[i]));
+                    else e = wanted - recurrence_step<L, N, driven>(order, a[s], b[s], x[s], r);
                     sum[s] = sum[s] + e * e;
                 }
             }
@@ -170,8 +211,9 @@ struct KernelSource {
         }
     };
 
-    template <class T, int W, bool driven>
-    static void side_by_side(Group<T, W>* groups, int lanes, const T* input, const T* output, std::size_t n, T* sums) {
+    template <class T, int W, int inputs>
+    static void side_by_side(Group<T, W>* groups, int lanes, const T* input, const T* straight, const T* output, std::size_t n,
+                             T* sums) {
         constexpr int per_register = static_cast<int>(Isa::register_bytes / sizeof(T));
         const int registers = (lanes + per_register - 1) / per_register;
         const auto order = [&](int r) { return groups[r * per_register / W].order; };
@@ -180,21 +222,28 @@ struct KernelSource {
             while (r + same < registers && order(r + same) == order(r)) ++same;
             const int s = same <= 3 ? same : (same == 4 ? 2 : Isa::side_by_side);  // none stays alone that need not
             by_order<8>(order(r), [&](auto N) {
-                using Form = SideBySide<T, W, N, driven>;
-                if (s == 3) Form::template errors<3>(groups, r, input, output, n, sums);
-                else if (s == 2) Form::template errors<2>(groups, r, input, output, n, sums);
-                else Form::template errors<1>(groups, r, input, output, n, sums);
+                using Form = SideBySide<T, W, N, inputs>;
+                if (s == 3) Form::template errors<3>(groups, r, input, straight, output, n, sums);
+                else if (s == 2) Form::template errors<2>(groups, r, input, straight, output, n, sums);
+                else Form::template errors<1>(groups, r, input, straight, output, n, sums);
             });
             r += s;
         }
     }
     template <class T, int W>
     static void errors(Group<T, W>* groups, int lanes, const T* input, const T* output, std::size_t n, T* sums) {
-        side_by_side<T, W, true>(groups, lanes, input, output, n, sums);
+        side_by_side<T, W, 1>(groups, lanes, input, nullptr, output, n, sums);
     }
     template <class T, int W>
     static void settling_errors(Group<T, W>* groups, int lanes, const T* output, std::size_t n, T* sums) {
-        side_by_side<T, W, false>(groups, lanes, nullptr, output, n, sums);
+        side_by_side<T, W, 0>(groups, lanes, nullptr, nullptr, output, n, sums);
+    }
+    static void both_errors(DoubleGroup* groups, int lanes, const double* input, const double* straight, const double* output,
+                            std::size_t n, double* sums) {
+        side_by_side<double, double_lanes, 2>(groups, lanes, input, straight, output, n, sums);
+    }
+    static void both_outputs(DoubleGroup& g, const double* input, const double* straight, std::size_t n, double* y) {
+        by_order<8>(g.order, [&](auto N) { Linear<double, double_lanes, N>::both_outputs(g, input, straight, n, y); });
     }
     template <class T, int W>
     static void group_errors(Group<T, W>& g, const T* input, const T* output, std::size_t n, T* sums) {
@@ -221,8 +270,10 @@ struct KernelSource {
         using Products = ProductSource<Isa>;
         return {name,
                 coefficients,
+                servo_coefficients,
                 words,
-                {set<double, double_lanes>(), stepped_errors<double, double_lanes>, stepped_outputs<double, double_lanes>},
+                {set<double, double_lanes>(), stepped_errors<double, double_lanes>, stepped_outputs<double, double_lanes>,
+                 both_errors, both_outputs},
                 set<float, float_lanes>(),
                 Products::gram,
                 Products::differences,

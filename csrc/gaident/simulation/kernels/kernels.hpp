@@ -9,12 +9,15 @@
 
 namespace gaident {
 
+class ServoEquation;
+
 template <class T, int W>
 struct Group {
     static constexpr int width = W;
     int order = 0;
     alignas(64) T a[max_loop_order][W];
     alignas(64) T b[max_loop_order + 1][W];
+    alignas(64) T c[max_loop_order + 1][W];  // of a second input
     alignas(64) T x[max_loop_order][W];
     alignas(64) T s[W];  // the controller's stored torque, in the stepped loop
 };
@@ -51,11 +54,14 @@ struct KernelSet {
     void (*outputs)(G&, const T* input, std::size_t n, T* y);
 };
 
-// The same with the controller's limits, the group holding plants and not closed loops.
+// The same with the controller's limits, the group holding plants and not closed loops; and with two inputs.
 struct SteppedKernelSet : KernelSet<DoubleGroup, double> {
     void (*stepped_errors)(DoubleGroup&, const ControllerState<double>&, const double* input, const double* output, std::size_t n,
                            double* sums);
     void (*stepped_outputs)(DoubleGroup&, const ControllerState<double>&, const double* input, std::size_t n, double* y);
+    void (*both_errors)(DoubleGroup* groups, int lanes, const double* input, const double* straight, const double* output,
+                        std::size_t n, double* sums);
+    void (*both_outputs)(DoubleGroup&, const double* input, const double* straight, std::size_t n, double* y);
 };
 
 struct Kernels {
@@ -63,6 +69,8 @@ struct Kernels {
     // Coefficients of the plants (`closed` false) or of the closed loops into the group's a, b and order; its states are left
     // alone.
     void (*coefficients)(const FactorGroup&, const Loop&, double sample_time, bool closed, DoubleGroup&);
+    // Of the loops of a servo axis from line to line of a log, c for the part of the command that goes straight.
+    void (*servo_coefficients)(const FactorGroup&, const ServoEquation&, DoubleGroup&);
     // Random words: out[i] = mix(base + i * golden_gamma).
     WordStream::Fill words;
     SteppedKernelSet in_double;

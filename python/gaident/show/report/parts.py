@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaident.axis import identifier_words, said, unit, velocity_unit, word
-from gaident.control.pi import PI
+from gaident.control.cascade import Cascade, Controller
 from gaident.show.chart import Chart
 from gaident.show.diagnosis_charts import missing_over_velocity, missing_reversals, residual_spectrum
 from gaident.show.draw import picture
@@ -196,18 +196,21 @@ def _hash(digest: str) -> Html:
     return tag("code", digest, class_="hash")
 
 
-def controller_words(controller: PI | None, axis: str) -> str:
+def controller_words(controller: Controller | None, axis: str) -> str:
     """The loop that was simulated."""
     if controller is None:
         kind = word("torque", axis)
         return f"none: open loop, {kind} [{unit('N m', axis)}] to velocity [{velocity_unit(axis)}]"
+    pi = controller.velocity if isinstance(controller, Cascade) else controller
     parts = [
-        f"{controller.loop} PI, kp {plain_number(controller.kp)} {unit('N m s/rad', axis)}",
-        f"ki {plain_number(controller.ki)} {unit('N m/rad', axis)}",
+        f"{pi.loop} PI, kp {plain_number(pi.kp)} {unit('N m s/rad', axis)}",
+        f"ki {plain_number(pi.ki)} {unit('N m/rad', axis)}",
     ]
+    if isinstance(controller, Cascade) and controller.period is not None:
+        parts.append(f"in a cascade every {plain_number(1e6 * controller.period)} us")
     for name in ("torque_limit", "integrator_limit"):
-        if getattr(controller, name) is not None:
-            parts.append(f"{identifier_words(name, axis)} {plain_number(getattr(controller, name))} {unit('N m', axis)}")
+        if getattr(pi, name) is not None:
+            parts.append(f"{identifier_words(name, axis)} {plain_number(getattr(pi, name))} {unit('N m', axis)}")
     return ", ".join(parts)
 
 
