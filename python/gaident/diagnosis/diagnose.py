@@ -10,19 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, called, say
-from gaident.control.cascade import Cascade, Controller
+from gaident.control.controller import Controller, checked_controller
+from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
-from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
-from gaident.diagnosis.controller.form_findings import driver_of
-from gaident.diagnosis.controller.log_shift import aligned
+from gaident.diagnosis.controller.controller_place import as_read, controller_findings
+from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.experiments.excitation import decided_by_the_angle, excitation
 from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off, noise_findings
 from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, LOAD, TWO_LEVELS, conditional_classes
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
 from gaident.diagnosis.note import Note
-from gaident.diagnosis.records.arguments import ProgressCallback, check_controller, checked, in_order, noise_std_of, records_of
+from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_order, noise_std_of, records_of
 from gaident.diagnosis.records.folded import ADVICE, FOLDED, folded
 from gaident.diagnosis.records.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.records.sizes import scales_of
@@ -118,11 +118,12 @@ def diagnose(
     """
     began = time.perf_counter()
     note = Note(progress)
-    check_controller(controller)
-    records, loop, under, cascade = torque_driven(records_of(rec, "rec"), controller)
-    held = () if validation is None else torque_driven(records_of(validation, "validation"), controller).records
-    controller = loop
-    checked(records, held, controller, identification, bootstrap, seed, progress, axis)
+    given = records_of(rec, "rec")
+    driven = torque_driven(given, checked_controller(controller))
+    kept = () if validation is None else records_of(validation, "validation")
+    records, held = driven.records, torque_driven(kept, controller).records if kept else ()
+    checked(records, held, driven.loop, identification, bootstrap, seed, progress, axis)
+    origin = {r.digest: whole for r, whole in zip((*records, *held), (*given, *kept), strict=True)}
     records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
     import scipy.linalg  # noqa: F401  brings a BLAS of its own, to be limited too
@@ -131,28 +132,20 @@ def diagnose(
     # A sum that several threads share is rounded otherwise with each number of them, and a search follows the last digit.
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.01, "replaying the controller")
-        moved = aligned(records, held, controller)
-        driver = None if moved.shifts else driver_of(records, held, controller)
-        if driver is not None:
-            controller, under = None, (*under, *driver.notes)
-            moved = aligned(driver.records, driver.held, controller)
-        logged = as_logged(moved.records, controller)
-        controller = logged.controller
+        driving = driving_of(records, held, driven, origin)
         note(0.02, "identifying the linear model")
-        idn = identification if identification is not None else identify(list(moved.records), controller, seed=seed)
-        work = _Work(
-            moved.records, moved.held, logged, idn, noise_std, note, axis, cascade, () if driver is None else driver.findings
-        )
+        moved, pi = driving.moved, bare_pi(driving.controller)
+        idn = identification if identification is not None else identify(list(moved.records), pi, seed=seed)
+        work = _Work(moved.records, moved.held, driving, idn, noise_std, note, axis)
         work.search()
         result = moved.noted(replace(work.report(seed), noise=noise_std, bootstrap=bootstrap))
-        result = replace(result, notes=(*under, *result.notes)) if under else result
+        result = replace(result, notes=(*driving.notes, *driving.doubts, *result.notes))
         if bootstrap:
             from gaident.diagnosis.selection.bootstrap import with_p_value
 
             space = work.found.space
             result = with_p_value(result, space, work.base, work.final, bootstrap, seed, lambda message: note(None, message))
-    object.__setattr__(result, "seconds", time.perf_counter() - began)
-    return result
+    return replace(result, seconds=time.perf_counter() - began)
 
 
 @dataclass
@@ -161,29 +154,29 @@ class _Work:
 
     records: tuple[Record, ...]
     held: tuple[Record, ...]
-    logged: AsLogged
+    driving: Driving
     idn: Identification
     noise: float | None
     note: Note
     axis: str
-    cascade: Cascade | None = None
-    form: tuple[Finding, ...] = ()  # of the controller
 
     def __post_init__(self) -> None:
-        self.controller = self.logged.controller
-        self.notes: list[Text] = list(self.logged.notes)
-        if self.cascade is None:
-            self.notes += open_loop_notes(self.records, self.controller)
+        self.controller = self.driving.controller
+        self.pi = bare_pi(self.controller)
+        self.notes: list[Text] = list(self.driving.logged.notes)
+        if self.controller is None or self.pi is not None:
+            self.notes += open_loop_notes(self.records, self.pi)
         hit = [self._spikes(r) for r in self.records]
         clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
         self.clean = tuple(clean)
         self.step = quantisation(self.records)
-        read = as_read(self.records, clean, self.controller)
-        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis, self.cascade)
+        whole = self.driving.read
+        read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, hit, strict=True)], self.controller)
+        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis)
         self.scales = scales_of(data)
-        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.logged.replays)
+        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.driving.logged.replays)
         self.notes += notes
-        self.controller_steps += self.form
+        self.controller_steps += self.driving.findings
         # Limits that the log shows act in every loop that is closed for a fit.
         known = {t: np.array(list(self.at_controller.effects[t.name].values())) for t in IN_CONTROLLER if self._shown(t.name)}
         shown = self.at_controller.controller or self.controller
@@ -192,7 +185,7 @@ class _Work:
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
         self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
         self.spoiled = int(sum(len(h) for h in hit))
-        self.excited = excitation(self.clean, shown, axis=self.axis)
+        self.excited = excitation(self.clean, self.data.loop, axis=self.axis)
 
     def _shown(self, effect: str) -> bool:
         return effect in self.at_controller.effects
@@ -200,7 +193,7 @@ class _Work:
     def _spikes(self, rec: Record) -> NDArray[np.intp]:
         """Samples that stand out of the velocity, or out of the linear model's error: a slope of the velocity may hide them."""
         with np.errstate(over="ignore", invalid="ignore"):
-            error = rec.velocity - simulate(self.idn.model, rec, self.controller)
+            error = rec.velocity - simulate(self.idn.model, rec, self.pi)
         if np.all(np.abs(error) < DIVERGED * np.abs(rec.velocity).max()):
             return outliers(rec.velocity, error)
         return outliers(rec.velocity)
@@ -215,7 +208,7 @@ class _Work:
             behind = say("the {torque} was measured behind the actuator, which it does not show")
             not_testable |= {t.name: behind for t in LIBRARY.values() if t.place == "actuator"}
         out = {*not_testable, *self.at_controller.decided, *decided_by_the_angle(self.clean)}
-        allowed = [t for t in LIBRARY.values() if t.name not in out and (self.controller is not None or not t.in_controller)]
+        allowed = [t for t in LIBRARY.values() if t.name not in out and (self.pi is not None or not t.in_controller)]
         self.not_testable = not_testable
         found = selected(self.objective, self.scales, self.idn.model, allowed, self._equivalent_here, self._say)
         self.note(0.85, "looking for what is left")
@@ -298,7 +291,7 @@ class _Work:
                 of_driver = say(" that depends on {}", called(driver)) if self.left.gains[driver] > self.left.needed else ""
                 text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
                 self.notes.append(say(text, " and ".join(dropped), of_driver))
-        check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None, self.axis)
+        check = by_second_method(self.clean, gains, model, mechanics, estimates, self.pi is None, self.axis)
         self.notes += check.notes
         if self.final.parameters.held and LOAD.name in self.final.effects:
             self.notes.append(
@@ -357,7 +350,7 @@ class _Work:
             gains = measured_gains(
                 self.clean,
                 self.held,
-                self.cascade or self.controller,
+                None if self.controller is None else self.controller.simulated_with(self.data.dt),
                 self.idn.model,
                 self.final,
                 self.objective,

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.control.cascade import Cascade, Controller
+from gaident.control.controller import Controller
+from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.library.terms import RESONANCE
 from gaident.diagnosis.records.hygiene import quantisation
@@ -88,7 +89,7 @@ def measured_gains(
     named = list(at_controller.items())
     bare = stages[0].parameters.model(stages[0].x)
     # What the torque did between the lines of a slower log is lost to the identification, not to a fit of the whole loop.
-    chain = [linear if objective.data.cascade is None else bare]
+    chain = [linear if not objective.data.slower else bare]
     chain += [_with(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
     chain += [_with(f.parameters.model(f.x), at_controller) for f in stages[1:]]
     errors = [free_run_errors(m, scored, controller) for m in chain]
@@ -146,8 +147,7 @@ def _turned(rec: Record, controller: Controller | None, final: Fit) -> Record:
     """
     if final.predictor.own_angle or rec.position is not None or not any(t.harmonic == "torque" for t in final.parameters.terms):
         return rec
-    # The torque of a cascade is in its record already.
-    (turned,) = DataSet.of([rec], None if isinstance(controller, Cascade) else controller).turned
+    (turned,) = DataSet.of([rec], controller).turned
     return turned
 
 
@@ -212,9 +212,7 @@ def start_state(model: Model, rec: Record, controller: Controller | None) -> Vec
 
     A model with effects is not linear in it: two steps of Gauss and Newton over the record's head, from the first velocity.
     """
-    if not starts_moving(rec, None if isinstance(controller, Cascade) else controller) or (
-        controller is not None and (controller.limited or model.effects)
-    ):
+    if not starts_moving(rec, bare_pi(controller)) or (controller is not None and (controller.limited or model.effects)):
         return None
     if not model.effects:
         return np.asarray(initial_state(model, rec, controller))

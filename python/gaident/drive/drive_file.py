@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gaident.checks import known_keys, one_of
-from gaident.control.cascade import Controller
+from gaident.control.controller import Controller
 from gaident.data.readers import read
 from gaident.data.record import CHANNELS, Record
 from gaident.drive import kinds
@@ -145,7 +145,7 @@ class Drive:
         if "damping" in given and "inertia" not in given:
             raise SpaceError("damping is given without inertia: give both, their ratio bounds the real parts")
         driven = torque_driven(records, controller)
-        derived = derive_space(driven.records, driven.controller)
+        derived = derive_space(driven.records, driven.loop)
         mechanics = {k: given.pop(k) for k in ("inertia", "resonance_hz", "damping") if k in given}
         if mechanics:
             # What is not given stands in with any value; the ranges that come from it are not used.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gaident import _core
 from gaident.control import core
-from gaident.control.cascade import Controller
+from gaident.control.controller import Controller
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import SettingsError, SpaceError
@@ -119,8 +119,8 @@ def identify(
     """
     began = time.perf_counter()
     driven = torque_driven(checked_records(rec, controller), controller)
-    loop = driven.controller
-    given = [r.with_channels(command=None) for r in driven.records] if driven.cascade is not None else list(driven.records)
+    loop = driven.loop
+    given = [r.with_channels(command=None) for r in driven.records] if driven.slower else list(driven.records)
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
@@ -143,7 +143,7 @@ def identify(
         warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
         object.__setattr__(result, "warnings", (*result.warnings, warning))
     if driven.notes:
-        object.__setattr__(result, "warnings", (*driven.notes, *result.warnings))
+        object.__setattr__(result, "warnings", (*driven.notes, *driven.doubts, *result.warnings))
     overflows = sum(t.overflows for t in found)
     if overflows:
         evaluations = sum(t.evaluations for t in found)

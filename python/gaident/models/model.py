@@ -15,7 +15,7 @@ from gaident import _core
 from gaident.arguments import CONTINUOUS_LOOP
 from gaident.checks import known_keys, real_number
 from gaident.control import core
-from gaident.control.cascade import Controller
+from gaident.control.controller import Controller
 from gaident.control.pi import PI
 from gaident.errors import ModelError
 from gaident.models.discrete import Discrete

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import message_of, say
-from gaident.control.pi import PI
+from gaident.control.controller import Controller
+from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.experiments.excitation import position_of
 from gaident.diagnosis.explain.missing_torque import missing_torque
@@ -30,7 +31,7 @@ Vector = NDArray[np.float64]
 
 def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
     """One record and what the models make of it."""
-    controller = result.controller
+    controller = bare_pi(result.controller)
     linear: Model = result.model.linear if isinstance(result, Diagnosis) else result.model
     digest = rec.digest
     used = "fitted" if digest in result.digests else "new"
@@ -42,9 +43,10 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
             used, first_held = "held out", 0
         elif used == "fitted" and not result.validation_digests and result.held_out != IN_SAMPLE:
             first_held = held_from(rec)
-        before = _free_run(result.identification.model, rec, controller, "linear", notes)
+        loop = None if result.controller is None else result.controller.simulated_with(rec.dt)
+        before = _free_run(result.identification.model, rec, loop, "linear", notes)
         if result.model.effects:
-            extended = _free_run(result.model, rec, controller, "extended", notes)
+            extended = _free_run(result.model, rec, loop, "extended", notes)
     else:
         before = _finite(result.simulate(rec), rec, "linear", notes)
     torque = torque_of(rec, controller)
@@ -74,7 +76,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
     )
 
 
-def _free_run(model: Model, rec: Record, controller: PI | None, what: str, notes: list[str]) -> Vector:
+def _free_run(model: Model, rec: Record, controller: Controller | None, what: str, notes: list[str]) -> Vector:
     (error,) = free_run_errors(model, [(rec, 0)], controller)
     return _finite(rec.velocity - error, rec, what, notes)
 

@@ -218,7 +218,7 @@ def fall_words(dia: Diagnosis) -> str:
     if fall < 1.0:
         if dia.before.rmse < 1.2 * dia.before.noise_floor:
             hidden = Text(": it is at the noise with and without")
-        elif dia.controller is None:
+        elif dia.controller is None or not dia.controller.one_equation:
             hidden = Text("")
         elif dia.torque_logged:
             hidden = say(": the loop's integrator hides this effect in the velocity, the {torque} shows it")

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, say, unit_text
+from gaident.control.controller import Controller
 from gaident.control.pi import PI
 from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
 from gaident.data.record import Record
@@ -95,9 +96,9 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
     return AsLogged(replace(controller, kp=kp, ki=ki), (off[0].sentence, used))
 
 
-def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: PI | None) -> tuple[Record, ...]:
+def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: Controller | None) -> tuple[Record, ...]:
     """The records as the controller read them: cleaned of outliers only where the logged torque follows better from that."""
-    if controller is None or any(r.torque is None or r.command is None for r in recorded):
+    if controller is None or any(r.torque is None or not controller.replayable(r) for r in recorded):
         return tuple(cleaned)
     pairs = [
         (r, c) if r is c else min((r, c), (c, r), key=lambda pair: _replay_error(pair[0], controller))
@@ -106,10 +107,10 @@ def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: P
     return tuple(best for best, _ in pairs)
 
 
-def _replay_error(rec: Record, controller: PI) -> float:
+def _replay_error(rec: Record, controller: Controller) -> float:
     """Mean square of logged minus replayed torque [(N m)^2]."""
-    assert rec.command is not None and rec.torque is not None
-    return float(np.mean((rec.torque - pi_torque(rec.command, rec.velocity, rec.dt, controller)) ** 2))
+    assert rec.torque is not None
+    return float(np.mean((rec.torque - controller.torque_of(rec)) ** 2))
 
 
 def controller_findings(
@@ -119,7 +120,7 @@ def controller_findings(
 
     known: digest of a record -> its replay with the controller of `data`; records that are not in it are replayed.
     """
-    controller = data.controller
+    controller = data.pi
     if controller is None or not data.torque_logged or data.command is None:
         return [], AtController(), []
     replays = [known.get(r.digest) or replay(r, controller) for r in data.read]
@@ -177,7 +178,7 @@ def _limit_findings(
     data: DataSet, shown: PI, off: Sequence[Replay], plain: Vector, floor: float, notes: list[Text]
 ) -> tuple[list[Finding], AtController, list[Text]]:
     """What the limits that the log shows are findings of; the note that the replay wrote is their evidence."""
-    given = data.controller
+    given = data.pi
     assert given is not None
     n, before, after = len(plain), float(plain @ plain), _left_with(data, shown)
     held = any(r.cause == "anti_windup" for r in off)

@@ -16,9 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, say
-from gaident.control.filtering import rate_limited
-from gaident.control.pi import PI
-from gaident.data.record import Record
+from gaident.control.controller import Limiting
 from gaident.diagnosis.library.coordinates import (
     asymmetric,
     friction_steps,
@@ -219,16 +217,6 @@ def _behind_ripple(seen: Vector, velocity: Vector, values: Vector) -> Vector:
     return angle
 
 
-def _clamped(rec: Record, controller: PI, values: Vector) -> tuple[Record, PI]:
-    return rec, replace(controller, integrator_limit=min(float(values[0]), controller.limits[1]))
-
-
-def _rate_limited(rec: Record, controller: PI, values: Vector) -> tuple[Record, PI]:
-    assert rec.command is not None
-    command = rate_limited(rec.command, float(values[0]), rec.dt, 0.0)
-    return rec.with_channels(command=command), controller
-
-
 def _dry(w: Vector, p: Mapping[str, float]) -> Vector:
     return -p["torque"] * np.sign(w)
 
@@ -273,8 +261,8 @@ _METADATA: dict[str, dict[str, object]] = {
     "transport_delay": {},
     "torque_lag": {},
     "velocity_filter": {"seen_angle": _behind_filter, "late": True},
-    "integrator_clamp": {"replayed": _clamped},
-    "command_rate_limit": {"replayed": _rate_limited},
+    "integrator_clamp": {"limiting": lambda p: Limiting(integrator=float(p[0]))},
+    "command_rate_limit": {"limiting": lambda p: Limiting(slope=float(p[0]))},
 }
 """What the rest of the package has to know of an effect: a row for each."""
 

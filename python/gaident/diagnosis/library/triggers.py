@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import TURN, Text, joined, order, say, turns
-from gaident.control.pi import PI
+from gaident.control.controller import Controller
 from gaident.diagnosis.library.terms import HIGHEST_ORDER, LIBRARY, friction_family
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
@@ -43,7 +43,9 @@ class Motion:
     repeated: bool
 
 
-def not_testable(motions: Sequence[Motion], controller: PI | None, model: Model | None, axis: str = "rotary") -> dict[str, Text]:
+def not_testable(
+    motions: Sequence[Motion], controller: Controller | None, model: Model | None, axis: str = "rotary"
+) -> dict[str, Text]:
     """Effect -> why these records say nothing about it; effects that were triggered are not in it. axis: rotary or linear."""
     why: dict[str, Text] = {}
     for part in (_turn(axis), _speed(motions), _travel(motions), _torque(motions), _loop(motions, controller), _structure(model)):
@@ -52,7 +54,7 @@ def not_testable(motions: Sequence[Motion], controller: PI | None, model: Model 
     return why
 
 
-def one_sided(motions: Sequence[Motion], controller: PI | None) -> dict[str, Text]:
+def one_sided(motions: Sequence[Motion], controller: Controller | None) -> dict[str, Text]:
     """Effect -> which sizes of it could not have shown in these records; what stands there is tested, but not beyond."""
     limit, clamp = (math.inf, math.inf) if controller is None else controller.limits
     highest = max(float(np.abs(m.torque).max()) for m in motions)
@@ -90,12 +92,12 @@ def _turn(axis: str) -> dict[str, Text]:
     return {name: why for name, term in LIBRARY.items() if term.harmonic}
 
 
-def _integral(m: Motion, controller: PI) -> float:
-    """Highest |u - kp (r - w)| [N m] while the controller's limit does not cut its torque u; 0 without a command."""
-    if m.command is None:
+def _integral(m: Motion, controller: Controller) -> float:
+    """Highest |u - kp (r - w)| [N m] of a bare PI while its limit does not cut its torque u; 0 without a command."""
+    if m.command is None or not controller.one_equation:
         return 0.0
     free = np.abs(m.torque) <= POLICY.at_limit * controller.limits[0]
-    held = np.abs(m.torque - controller.kp * (m.command - m.velocity))[free]
+    held = np.abs(m.torque - controller.gains.kp * (m.command - m.velocity))[free]
     return float(held.max(initial=0.0))
 
 
@@ -164,12 +166,12 @@ def _torque(motions: Sequence[Motion]) -> dict[str, Text]:
     return why
 
 
-def _loop(motions: Sequence[Motion], controller: PI | None) -> dict[str, Text]:
+def _loop(motions: Sequence[Motion], controller: Controller | None) -> dict[str, Text]:
     if controller is None or all(m.command is None for m in motions):
         why = say("the {torque} drives the model: no controller is simulated from a command")
         return dict.fromkeys(("integrator_clamp", "command_rate_limit"), why)
     reasons = {}
-    if controller.ki == 0.0:
+    if controller.gains.ki == 0.0:
         reasons["integrator_clamp"] = Text("the controller has no integral part")
     if not any(m.jumps or (m.command is not None and np.any(np.diff(m.command) != 0.0)) for m in motions):
         reasons["command_rate_limit"] = Text("the command never changes")

@@ -10,6 +10,7 @@ from gaident.axis import said, unit, velocity_unit, word
 from gaident.models.factors import gain_unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
+from gaident.show.controller_words import controller_words
 from gaident.show.diagnosis_summary import (
     DRIVERS,
     TESTED_UP_TO,
@@ -32,7 +33,6 @@ from gaident.show.report.parts import (
     Head,
     Section,
     box,
-    controller_words,
     estimate,
     facts,
     measured_section,
