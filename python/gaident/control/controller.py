@@ -96,8 +96,8 @@ class Controller(ABC):
         return 0.0
 
     def ahead(self, dt: float) -> int:
-        """Its samples by which a feedforward looks ahead, in a log with the sample time dt [s]: the log's end lacks them."""
-        return 1
+        """Lines at the end of a log with the sample time dt [s] that a feedforward makes of what would come behind them."""
+        return 0
 
     @abstractmethod
     def log_every(self, dt: float) -> int:

@@ -139,7 +139,7 @@ def diagnose(
         work = _Work(moved.records, moved.held, driving, idn, noise_std, note, axis)
         work.search()
         result = moved.noted(replace(work.report(seed), noise=noise_std, bootstrap=bootstrap))
-        result = replace(result, notes=(*driving.notes, *driving.doubts, *result.notes))
+        result = replace(result, notes=(*driving.notes, *(() if work.at_controller.decided else driving.doubts), *result.notes))
         if bootstrap:
             from gaident.diagnosis.selection.bootstrap import with_p_value
 
@@ -207,8 +207,11 @@ class _Work:
         if self.data.torque_measured:
             behind = say("the {torque} was measured behind the actuator, which it does not show")
             not_testable |= {t.name: behind for t in LIBRARY.values() if t.place == "actuator"}
+        if self.data.loop is None:  # of a controller whose loop is not simulated the replay has decided
+            not_testable = {name: why for name, why in not_testable.items() if name not in self.at_controller.decided}
+        simulated = self.pi is not None or (self.data.slower and self.data.loopable)
         out = {*not_testable, *self.at_controller.decided, *decided_by_the_angle(self.clean)}
-        allowed = [t for t in LIBRARY.values() if t.name not in out and (self.pi is not None or not t.in_controller)]
+        allowed = [t for t in LIBRARY.values() if t.name not in out and (simulated or not t.in_controller)]
         self.not_testable = not_testable
         found = selected(self.objective, self.scales, self.idn.model, allowed, self._equivalent_here, self._say)
         self.note(0.85, "looking for what is left")
@@ -271,6 +274,7 @@ class _Work:
                     gain=gains.of(effect),
                     delta_bic=gain,
                     evidence=evidence_of(effect, gain, alternatives, offset),
+                    place=LIBRARY[effect].place,
                 )
             )
         mechanics = mechanics_of(self.objective, self.final)

@@ -183,7 +183,10 @@ class DataSet:
 
     def replayed_error(self, effects: Mapping[Term, Vector]) -> Vector:
         """Logged torque minus the controller's replay with these effects, records one after the other [N m]."""
-        return np.concatenate([torque_in(r) - replayed(r, self.controller, effects) for r in self.read])
+        assert self.controller is not None
+        known = [len(r) - self.controller.ahead(r.dt) for r in self.read]
+        off = [(torque_in(r) - replayed(r, self.controller, effects))[:n] for r, n in zip(self.read, known, strict=True)]
+        return np.concatenate(off)
 
     def with_effects(self, effects: Mapping[Term, Vector]) -> DataSet:
         """The same with records and controller as effects at the controller, which are known, make them in the simulated loop."""

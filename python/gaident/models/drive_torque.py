@@ -59,7 +59,8 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
     for rec in records:
         if rec.torque is None or not controller.replayable(rec):
             continue
-        off = float(np.sqrt(np.mean((rec.torque - controller.torque_of(rec))[: -controller.ahead(rec.dt)] ** 2)))
+        known = len(rec) - controller.ahead(rec.dt)
+        off = float(np.sqrt(np.mean((rec.torque - controller.torque_of(rec))[:known] ** 2)))
         size = float(np.sqrt(np.mean(rec.torque**2)))
         if off > POLICY.negligible * size:
             text = (

@@ -12,6 +12,7 @@ from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import check_schema
 from gaident.models.drive_torque import driven_by
+from gaident.models.effects import table
 from gaident.models.model import Model
 from gaident.providers import provided
 from gaident.results.estimate import Estimate
@@ -339,6 +340,7 @@ class Diagnosis(SavedResult):
                             "parameters": {n: Estimate(**e) for n, e in f["parameters"].items()},
                             "alternatives": tuple(f["alternatives"]),
                             "evidence": restored(f["evidence"], linear),
+                            "place": f.get("place") or _place_of(f["effect"]),
                         }
                     )
                     for f in data["findings"]
@@ -382,3 +384,8 @@ class Diagnosis(SavedResult):
                 left_needed=data.get("left_needed", 0.0),
                 axis=data.get("axis", "rotary"),
             )
+
+
+def _place_of(effect: str) -> str:
+    """The place of a finding in a file of gaident 0.1.0, which lacks it: what is no effect is a form of the controller."""
+    return next((row.place for row in table() if row.name == effect), "controller")

@@ -133,7 +133,8 @@ def _causes(dia: Diagnosis, axis: str) -> list[str]:
     for f in dia.findings:
         if f.is_noise:
             continue
-        lines.append(words(f.effect) + "".join(f", or {words(a)}" for a in f.alternatives))
+        place = ", in the controller" if f.place == "controller" else ""
+        lines.append(words(f.effect) + place + "".join(f", or {words(a)}" for a in f.alternatives))
         lines += table([parameter_row(n, e, axis) for n, e in f.parameters.items()], "    ")
         lines += _wrapped(said(f.evidence, axis), "    ")
         if f.p_value is not None:

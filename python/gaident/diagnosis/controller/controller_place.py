@@ -21,7 +21,7 @@ from gaident.diagnosis.controller.replay import Replay, replay
 from gaident.diagnosis.controller.replay_causes import white_noise
 from gaident.diagnosis.library.names import CLAMP, SATURATION
 from gaident.diagnosis.library.terms import IN_CONTROLLER
-from gaident.estimation.dataset import DataSet
+from gaident.estimation.dataset import DataSet, torque_in
 from gaident.estimation.term import Scales, Term
 from gaident.models.effects import table
 from gaident.policy.table import POLICY
@@ -48,7 +48,7 @@ class AtController:
 
     decided: tuple[str, ...] = ()
     effects: dict[str, dict[str, float]] = field(default_factory=dict)
-    controller: PI | None = None
+    controller: Controller | None = None
     follows: bool = True
 
 
@@ -120,8 +120,8 @@ def controller_findings(
 
     known: digest of a record -> its replay with the controller of `data`; records that are not in it are replayed.
     """
-    controller = data.pi
-    if controller is None or not data.torque_logged or data.command is None:
+    controller = data.controller
+    if controller is None or not data.torque_logged or not all(controller.replayable(r) for r in data.read):
         return [], AtController(), []
     replays = [known.get(r.digest) or replay(r, controller) for r in data.read]
     off = [r for r in replays if not r.follows]
@@ -131,16 +131,19 @@ def controller_findings(
     texts = (say("{}: {}", name, r.sentence) if len(said) > 1 else r.sentence for name, r in said if not r.follows)
     notes = list(dict.fromkeys(texts))
     plain = data.replayed_error({})
+    logged = np.concatenate([torque_in(r) for r in data.read])
     floor = len(plain) * max(max(r.resolution for r in replays), ROUNDING * scales.torque) ** 2
-    shown = _limits_shown(off, controller)
+    shown = None if data.pi is None else _limits_shown(off, data.pi)
     if shown is not None:
         return _limit_findings(data, shown, off, plain, floor, notes)
+    steps = (float(np.abs(np.diff(controller.asked(r), prepend=0.0)).max()) / r.dt for r in data.read)
+    scales = replace(scales, acceleration=max(steps) or float("inf"))
     best = min(((*_fitted(data, scales, term), term) for term in IN_CONTROLLER), key=lambda found: found[1])
     value, cost, term = best
     effect = term.name
     n, before = len(plain), float(plain @ plain)
     left = data.replayed_error({term: np.array([value])})
-    if cost < POLICY.replay_left * before or cost < POLICY.replay_rms**2 * floor or white_noise(left, data.torque):
+    if cost < POLICY.replay_left * before or cost < POLICY.replay_rms**2 * floor or white_noise(left, logged):
         parameter = next(r for r in table() if r.name == effect).parameters[0]
         name, unit = parameter.name, parameter.unit
         text = say(
@@ -156,9 +159,9 @@ def controller_findings(
         finding = _finding(effect, name, Estimate(value, _std(data, term, value, cost), unit), before, cost, floor, n, text)
         at = AtController(DECIDED, {effect: {name: value}})
         if effect == CLAMP:
-            at.controller = replace(controller, integrator_limit=value)
+            at.controller = controller.with_limits(controller.limits[0], value)
         return [finding], at, []
-    return [], AtController(DECIDED, follows=False), notes
+    return [], AtController(DECIDED, follows=data.loop is None), notes  # where no loop is simulated, none is wrong
 
 
 def _limits_shown(off: Sequence[Replay], controller: PI) -> PI | None:
@@ -223,7 +226,8 @@ def _finding(
     effect: str, name: str, estimate: Estimate, before: float, after: float, floor: float, n: int, text: Text
 ) -> Finding:
     gain = float(n * np.log(before / max(after, floor, 1e-300)) - np.log(n))
-    return Finding(effect, {name: estimate}, (), 1.0 - float(np.sqrt(min(after / before, 1.0))), gain, None, text)
+    fall = 1.0 - float(np.sqrt(min(after / before, 1.0)))
+    return Finding(effect, {name: estimate}, (), fall, gain, None, text, place="controller")
 
 
 def _fitted(data: DataSet, scales: Scales, term: Term) -> tuple[float, float]:

@@ -62,7 +62,7 @@ def driver_of(records: Sequence[Record], held: Sequence[Record], given: PI | Non
 
 def _findings(shown: Shown) -> tuple[Finding, ...]:
     return tuple(
-        Finding(name, _estimates(numbers), (), 0.0, shown.gains[name], None, _evidence(shown, name))
+        Finding(name, _estimates(numbers), (), 0.0, shown.gains[name], None, _evidence(shown, name), place="controller")
         for name, numbers in shown.numbers.items()
     )
 

@@ -76,8 +76,11 @@ def noise_findings(spoiled: int, total: int, step: float) -> list[Finding]:
     if spoiled:
         samples = "{} of {} samples leave the signal and come back; they are left out of every fit."
         fraction = Estimate(spoiled / total, float(np.sqrt(spoiled) / total), "1")
-        found.append(Finding(OUTLIERS, {"fraction": fraction}, evidence=say(samples, spoiled, total), is_noise=True))
+        found.append(
+            Finding(OUTLIERS, {"fraction": fraction}, evidence=say(samples, spoiled, total), is_noise=True, place="record")
+        )
     if step > 0.0:
         text = say("All velocities lie on a lattice of {:.4g} {rad/s}: the resolution of the encoder or of the log.", step)
-        found.append(Finding(QUANTISATION, {"step": Estimate(step, 0.0, "rad/s")}, evidence=text, is_noise=True))
+        estimate = Estimate(step, 0.0, "rad/s")
+        found.append(Finding(QUANTISATION, {"step": estimate}, evidence=text, is_noise=True, place="sensor"))
     return found

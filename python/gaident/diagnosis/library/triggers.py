@@ -167,13 +167,14 @@ def _torque(motions: Sequence[Motion]) -> dict[str, Text]:
 
 
 def _loop(motions: Sequence[Motion], controller: Controller | None) -> dict[str, Text]:
-    if controller is None or all(m.command is None for m in motions):
-        why = say("the {torque} drives the model: no controller is simulated from a command")
+    why = say("the {torque} drives the model: no controller is simulated from a command")
+    unseen = all(m.command is None for m in motions)
+    if controller is None or (unseen and controller.one_equation):
         return dict.fromkeys(("integrator_clamp", "command_rate_limit"), why)
-    reasons = {}
+    reasons = {"command_rate_limit": say("the velocity command is not logged")} if unseen else {}
     if controller.gains.ki == 0.0:
         reasons["integrator_clamp"] = Text("the controller has no integral part")
-    if not any(m.jumps or (m.command is not None and np.any(np.diff(m.command) != 0.0)) for m in motions):
+    if not unseen and not any(m.jumps or (m.command is not None and np.any(np.diff(m.command) != 0.0)) for m in motions):
         reasons["command_rate_limit"] = Text("the command never changes")
     return reasons
 

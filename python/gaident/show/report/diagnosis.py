@@ -141,7 +141,8 @@ def _causes(dia: Diagnosis, view: View) -> Section:
             (n, typeset(value), typeset(u), remark) for n, value, u, remark in map(_row(axis), f.parameters.items())
         ]
         held = "in-sample" if dia.held_out == "in-sample" else "held-out"
-        figures = f"{f.delta_bic:.0f} BIC units; the {held} error falls by {percent(f.gain)} % of what was left before it."
+        place = f"Place: {f.place}. " if f.place else ""
+        figures = f"{place}{f.delta_bic:.0f} BIC units; the {held} error falls by {percent(f.gain)} % of what was left before it."
         parts.append(
             box(
                 tag("h3", name, " ", tag("small", "cannot be told apart" if f.alternatives else "named")),
