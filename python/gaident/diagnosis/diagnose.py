@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,19 +17,20 @@ from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import as_read, controller_findings
 from gaident.diagnosis.controller.driving import Driving, driving_of
-from gaident.diagnosis.experiments.excitation import decided_by_the_angle, excitation
+from gaident.diagnosis.experiments.candidates import candidates
+from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off, noise_findings
 from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.library.terms import EQUIVALENT, IN_CONTROLLER, LIBRARY, LOAD, TWO_LEVELS, conditional_classes
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_order, noise_std_of, records_of
-from gaident.diagnosis.records.folded import ADVICE, FOLDED, folded
+from gaident.diagnosis.records.folded import ADVICE, folded
 from gaident.diagnosis.records.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection.attribution import only_describes, simplified
 from gaident.diagnosis.selection.dependence import dependence
-from gaident.diagnosis.selection.offset import offset_of
+from gaident.diagnosis.selection.offset import Offset, offset_of
 from gaident.diagnosis.selection.rivals import Rival
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
 from gaident.estimation.dataset import DataSet
@@ -148,6 +150,16 @@ def diagnose(
     return replace(result, seconds=time.perf_counter() - began)
 
 
+class _Judged(NamedTuple):
+    """What is reported of a search: figures, what the error that is left depends on, effects that count, all effects' numbers."""
+
+    gains: Gains
+    driver: str | None
+    causes: list[str]
+    estimates: dict[str, dict[str, Estimate]]
+    offset: Offset | None
+
+
 @dataclass
 class _Work:
     """One diagnosis on its way."""
@@ -200,19 +212,8 @@ class _Work:
 
     def search(self) -> None:
         """The selected model, its rivals, what is left."""
-        not_testable = dict(self.excited.not_testable)
-        if any(folded(r) for r in self.records):
-            not_testable = dict.fromkeys(LIBRARY, FOLDED)
-            self.notes.append(ADVICE)
-        if self.data.torque_measured:
-            behind = say("the {torque} was measured behind the actuator, which it does not show")
-            not_testable |= {t.name: behind for t in LIBRARY.values() if t.place == "actuator"}
-        if self.data.loop is None:  # of a controller whose loop is not simulated the replay has decided
-            not_testable = {name: why for name, why in not_testable.items() if name not in self.at_controller.decided}
-        simulated = self.pi is not None or (self.data.slower and self.data.loopable)
-        out = {*not_testable, *self.at_controller.decided, *decided_by_the_angle(self.clean)}
-        allowed = [t for t in LIBRARY.values() if t.name not in out and (simulated or not t.in_controller)]
-        self.not_testable = not_testable
+        allowed, self.not_testable = candidates(self.records, self.clean, self.data, self.excited, self.at_controller)
+        self.notes += [ADVICE] * any(folded(r) for r in self.records)
         found = selected(self.objective, self.scales, self.idn.model, allowed, self._equivalent_here, self._say)
         self.note(0.85, "looking for what is left")
         self.take(found)
@@ -234,33 +235,36 @@ class _Work:
         self.adequate = self.found.space.is_noise(final)
         self.left = dependence(self.objective, final)
 
+    def judged(self) -> _Judged:
+        """What is shown, and what it gains; where no effect is, that of a search by whitened errors instead."""
+        while True:
+            said = list(self.notes)
+            self.notes += basis_of(self.found)
+            gains = self._accepted_gains()
+            driver = self.left.driver if self.adequate else self.left.strongest
+            after = gains.after
+            if driver is None and after.rmse > POLICY.free_run_ratio * after.noise_floor > 0.0:
+                # A noise filter removes a slow misfit completely; the free run shows it.
+                driver = self.left.strongest or "time"
+                self.notes.append(far_off(after.rmse / after.noise_floor))
+            space = self.found.space
+            causes = []
+            for e in self.final.effects:
+                of_class = bool(self._equivalent_here(e))
+                if not only_describes(space, self.final, e, self.rivals[e][0], driver, self.left, of_class):
+                    causes.append(e)
+            estimates = estimates_of(self.objective, self.final)
+            causes = [e for e in causes if self._determined(e, estimates[e])]
+            instead = None if causes else by_whitened_errors(self.found, self._equivalent_here, self._say)
+            if instead is None:
+                return _Judged(gains, driver, causes, estimates, offset_of(space, self.final))
+            self.notes = said
+            self.take(instead)
+
     def report(self, seed: int) -> Diagnosis:
         """Everything the user sees."""
         self.note(0.9, "measuring the gain")
-        said = list(self.notes)
-        self.notes += basis_of(self.found)
-        gains = self._accepted_gains()
-        driver = self.left.driver if self.adequate else self.left.strongest
-        after = gains.after
-        if driver is None and after.rmse > POLICY.free_run_ratio * after.noise_floor > 0.0:
-            # A noise filter removes a slow misfit completely; the free run shows it.
-            driver = self.left.strongest or "time"
-            self.notes.append(far_off(after.rmse / after.noise_floor))
-        space = self.found.space
-        causes = []
-        for e in self.final.effects:
-            of_class = bool(self._equivalent_here(e))
-            if not only_describes(space, self.final, e, self.rivals[e][0], driver, self.left, of_class):
-                causes.append(e)
-        offset = offset_of(space, self.final)
-        estimates = estimates_of(self.objective, self.final)
-        causes = [e for e in causes if self._determined(e, estimates[e])]
-        if not causes:
-            instead = by_whitened_errors(self.found, self._equivalent_here, self._say)
-            if instead is not None:
-                self.notes = said
-                self.take(instead)
-                return self.report(seed)
+        gains, driver, causes, estimates, offset = self.judged()
         findings = noise_findings(self.spoiled, sum(len(r) for r in self.records), self.step)
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         for effect in causes:

@@ -6,7 +6,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -139,20 +139,18 @@ def identify(
     found = work.search(int(trials), int(seed), progress)
     best, scored = work.select(found)
     result = work.report(best, scored, found, int(seed))
+    warnings = [*driven.notes, *driven.doubts, *result.warnings]
     if derived and not settings.species:
-        warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
-        object.__setattr__(result, "warnings", (*result.warnings, warning))
-    if driven.notes:
-        object.__setattr__(result, "warnings", (*driven.notes, *driven.doubts, *result.warnings))
+        warnings.append(
+            "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
+        )
     overflows = sum(t.overflows for t in found)
     if overflows:
         evaluations = sum(t.evaluations for t in found)
-        warning = (
+        warnings.append(
             f"In {settings.arithmetic} {overflows} of {evaluations} candidates left its range or diverged; they count as worst."
         )
-        object.__setattr__(result, "warnings", (*result.warnings, warning))
-    object.__setattr__(result, "seconds", time.perf_counter() - began)
-    return result
+    return replace(result, warnings=tuple(warnings), seconds=time.perf_counter() - began)
 
 
 @dataclass(frozen=True)

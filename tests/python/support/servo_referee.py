@@ -67,8 +67,9 @@ def simulate(axis: Axis, source: np.ndarray, T: float, every: int = 1, **c: Any)
     """(velocity, torque, position) at every `every`-th controller sample; source: command at the controller's samples.
 
     c: kp, ki, rule, weight, windup, tracking, torque_limit, integrator_limit, position_gain, position_every, kff, aff, fff,
-    rate_limit [rad/s^2] of the velocity command behind its filters, filters as lists of Filter (torque_filters, velocity_filters, command_filters), delay in tenths of T: a line of past torques,
-    one each fine step, from whose end the motor takes its own.
+    rate_limit [rad/s^2] of the velocity command behind its filters, filters as lists of Filter (torque_filters,
+    velocity_filters, command_filters), delay in tenths of T: a line of past torques, one each fine step, from whose end the motor
+    takes its own.
     """
     A, B = axis.state_space()
     F, G, *_ = signal.cont2discrete((A, B, np.eye(len(A)), np.zeros((len(A), 1))), T / FINE, "zoh")
