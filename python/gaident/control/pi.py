@@ -14,12 +14,12 @@ from gaident import _core
 from gaident.arguments import NO_CONTROLLER, arg
 from gaident.checks import known_keys, one_of, real_number
 from gaident.control import core
-from gaident.control.controller import Controller, Limiting, Signals
+from gaident.control.controller import Controller, Limiting, Signals, checked_controller
 from gaident.control.drive_parameters import kp_and_ki
 from gaident.control.filtering import rate_limited
 from gaident.control.pi_torque import pi_torque
 from gaident.control.ticks import Ticks, of_lines
-from gaident.errors import ControllerError
+from gaident.errors import ControllerError, SettingsError
 
 Vector = NDArray[np.float64]
 
@@ -280,4 +280,13 @@ def bare_pi(controller: Controller | None) -> PI | None:
     """The bare PI that a controller is, limits or not; None for every other, and for none."""
     pi = None if controller is None or not controller.one_equation else controller.gains
     assert pi is None or isinstance(pi, PI)
+    return pi
+
+
+def checked_pi(controller: object, what: str) -> PI | None:
+    """The bare PI that a public function was given as `controller=`; SettingsError for all else, because of `what` it does."""
+    given = checked_controller(controller)
+    pi = bare_pi(given)
+    if given is not None and pi is None:
+        raise SettingsError(f"controller is {given!r}: {what} of a bare PI only; give PI(kp, ki), or None for the drive alone")
     return pi

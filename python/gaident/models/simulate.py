@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident.checks import one_of
 from gaident.control import core
-from gaident.control.controller import Controller
+from gaident.control.controller import Controller, checked_controller
 from gaident.data.record import Record
 from gaident.errors import ModelError
 from gaident.models.model import Model
@@ -188,6 +188,7 @@ def initial_state(model: AnyModel, rec: Record, controller: Controller | None = 
     [20.0]
     """
     plant = as_model(model).linear
+    checked_controller(controller)
     if controller is not None and controller.limited:
         raise ModelError(
             "the controller has a torque_limit or integrator_limit: with limits the response is "
