@@ -17,7 +17,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import as_read, controller_findings
 from gaident.diagnosis.controller.driving import Driving, driving_of
-from gaident.diagnosis.experiments.candidates import candidates
+from gaident.diagnosis.experiments.candidates import IN_MOTION, candidates
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off, noise_findings
 from gaident.diagnosis.gains import Gains, measured_gains
@@ -214,6 +214,7 @@ class _Work:
         """The selected model, its rivals, what is left."""
         allowed, self.not_testable = candidates(self.records, self.clean, self.data, self.excited, self.at_controller)
         self.notes += [ADVICE] * any(folded(r) for r in self.records)
+        self.notes += [IN_MOTION] * (self.data.slower and any(self.data.moving))
         found = selected(self.objective, self.scales, self.idn.model, allowed, self._equivalent_here, self._say)
         self.note(0.85, "looking for what is left")
         self.take(found)
@@ -358,7 +359,7 @@ class _Work:
             gains = measured_gains(
                 self.clean,
                 self.held,
-                None if self.controller is None else self.controller.simulated_with(self.data.dt),
+                self.controller,
                 self.idn.model,
                 self.final,
                 self.objective,

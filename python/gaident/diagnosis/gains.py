@@ -28,7 +28,7 @@ from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
 from gaident.results.fitness import Fitness
 
-__all__ = ["Gains", "free_run_errors", "held_from", "measured_gains"]
+__all__ = ["Gains", "closed_over", "free_run_errors", "held_from", "measured_gains"]
 
 Vector = NDArray[np.float64]
 
@@ -73,7 +73,8 @@ def measured_gains(
     noise: float | None,
     at_controller: dict[str, dict[str, float]],
 ) -> Gains:
-    """Errors of the linear model, of each stage and of the extended model."""
+    """Errors of the linear model, of each stage and of the extended model, closed over the controller where they can be."""
+    controller = closed_over(controller, (*records, *held))
     part: tuple[int, ...] | None
     if held:
         scored, words, part = [(r, 0) for r in held], "validation records", None
@@ -137,6 +138,17 @@ def measured_gains(
         extended=chain[-1],
         harmful=tuple(harmful),
     )
+
+
+def closed_over(controller: Controller | None, records: Sequence[Record]) -> Controller | None:
+    """What the free runs of these records are closed over; None: their torque drives them.
+
+    How a loop moved before a record is known of a bare PI only; any other is simulated from rest.
+    """
+    loop = None if controller is None else controller.simulated_with(records[0].dt)
+    if loop is not None and not loop.one_equation and any(starts_moving(r, None) for r in records):
+        return None
+    return loop
 
 
 def _turned(rec: Record, controller: Controller | None, final: Fit) -> Record:

@@ -15,7 +15,7 @@ from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.experiments.excitation import position_of
 from gaident.diagnosis.explain.missing_torque import missing_torque
-from gaident.diagnosis.gains import IN_SAMPLE, free_run_errors, held_from
+from gaident.diagnosis.gains import IN_SAMPLE, closed_over, free_run_errors, held_from
 from gaident.diagnosis.records.hygiene import cleaned, outliers
 from gaident.errors import GaidentError
 from gaident.models.drive_torque import torque_of
@@ -43,7 +43,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
             used, first_held = "held out", 0
         elif used == "fitted" and not result.validation_digests and result.held_out != IN_SAMPLE:
             first_held = held_from(rec)
-        loop = None if result.controller is None else result.controller.simulated_with(rec.dt)
+        loop = closed_over(result.controller, (rec,))
         before = _free_run(result.identification.model, rec, loop, "linear", notes)
         if result.model.effects:
             extended = _free_run(result.model, rec, loop, "extended", notes)

@@ -69,6 +69,17 @@ def test_a_known_limit_is_no_finding(every: int) -> None:
     assert "integrator_clamp" not in dia.not_testable
 
 
+def test_a_slower_log_that_starts_in_motion() -> None:
+    """How its loop moved before is not known: the torque drives the models, and limits inside are not testable."""
+    rec = record(4, steps(8000), {})[350:]
+    assert rec.velocity[0] > 10.0
+    dia = ga.diagnose(rec, drive(), seed=1)
+    assert any("A record starts in motion" in note for note in dia.notes)
+    assert not any(f.place == "controller" for f in dia.findings)
+    assert dia.after.rmse < 0.1
+    assert "starts in motion" in dia.not_testable["integrator_clamp"]
+
+
 REPLAYS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "alone": ({}, {}),
     "behind a filter": ({"command_filters": (ga.LowPass(2e-3),)}, {"command_filters": [referee.low_pass(2e-3, T)]}),

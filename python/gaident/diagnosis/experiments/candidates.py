@@ -13,7 +13,14 @@ from gaident.diagnosis.records.folded import FOLDED, folded
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.term import Term
 
-__all__ = ["candidates"]
+__all__ = ["IN_MOTION", "candidates"]
+
+IN_MOTION = say(
+    "A record starts in motion, and the loop of this controller is simulated from rest only: the {torque}, taken straight from "
+    "line to line of the log, drives the models. What that misses can look like a short lag or delay; give a record that starts "
+    "at rest."
+)
+"""Of a log with fewer lines than the controller samples."""
 
 
 def candidates(
