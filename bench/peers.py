@@ -136,7 +136,7 @@ def bits_of(fields: np.ndarray) -> np.ndarray:
 def our_generation(p: Problem, arithmetic: str, generations: int, repeats: int) -> str:
     settings = ga.Settings(code="binary", scale="linear", engine="plain", generations=generations, arithmetic=arithmetic)
     pi = p.case.controller
-    experiment = core.experiment([core.record(DT, p.case.command, p.output, "rest", 0.0)], pi)
+    experiment = core.experiment([core.record(DT, p.case.command, p.output, "rest", 0.0)], pi, DT)
     seconds = []
     for seed in range(repeats + 1):
         began = time.perf_counter()
@@ -326,7 +326,7 @@ def main() -> None:
     options.seeds = options.seeds or (2 if options.quick else 10)
     options.limit = options.limit or (2.0 if options.quick else 20.0)
     versions = ", ".join(f"{n} {importlib.metadata.version(n)}" for n in ("numpy", "scipy", "numba"))
-    kernels = core.experiment([core.record(DT, np.ones(20), np.ones(20), "rest", 0.0)], None).kernels
+    kernels = core.experiment([core.record(DT, np.ones(20), np.ones(20), "rest", 0.0)], None, DT).kernels
     print(f"gaident {ga.__version__} ({kernels}), {versions}; one thread")
     if options.table != "optimum":
         generation_table(options)

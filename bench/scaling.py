@@ -110,7 +110,7 @@ def measure(row: Row) -> dict[str, float]:
         assert (found[0].p, found[0].q) == (1, 2), "wrong answer: structure"
         return {"seconds": min(seconds), "peak": peak(), "before": before}
 
-    experiment = core.experiment([core.record(rec.dt, rec.command, rec.velocity, "rest", 0.0)], pi)
+    experiment = core.experiment([core.record(rec.dt, rec.command, rec.velocity, "rest", 0.0)], pi, rec.dt)
     ranges = ga.SearchSpace(p=row.p, q=row.q).ranges(paper=True)
 
     def search(generations: int) -> list[_core.Trial]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from gaident.axis import Text, say
 from gaident.checks import one_of
-from gaident.control.cascade import Cascade, Controller
+from gaident.control.controller import Controller
 from gaident.control.pi import LOOPS
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
@@ -64,7 +64,7 @@ def read_all(drive: Drive, logs: Sequence[str], controller: Controller | None, m
     """The logs, each with what drives its simulation; raises SettingsError where that is missing."""
     records = [drive.read(log, measured) for log in logs]
     for log, rec in zip(logs, records, strict=True):
-        if isinstance(controller, Cascade) and controller.position is not None:
+        if controller is not None and controller.driven_by == "position_command":
             if rec.position_command is None:
                 raise SettingsError(
                     f"{log}: there is no position_command, which drives the loop with a position controller: name its column "

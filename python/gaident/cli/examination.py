@@ -131,7 +131,7 @@ def _self_test() -> tuple[str, str, bool]:
     from gaident.identification.identify import identify
 
     rest = np.zeros(20)
-    chosen = core.experiment([core.record(1e-3, rest, rest, "rest", 0.0)], None).kernels
+    chosen = core.experiment([core.record(1e-3, rest, rest, "rest", 0.0)], None, 1e-3).kernels
     rec = demo.two_mass_record(0)
     began = time.perf_counter()
     idn = identify(rec, controller=demo.CONTROLLER, seed=0)

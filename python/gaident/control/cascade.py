@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident import _core
 from gaident.checks import known_keys, real_number
+from gaident.control import core
+from gaident.control.controller import Controller, Limiting, Signals
 from gaident.control.drive_parameters import position_gain
+from gaident.control.filtering import filtered, rate_limited
 from gaident.control.filters import LowPass, Notch, filter_of
 from gaident.control.pi import PI
+from gaident.control.ticks import Feedforward, Ticks, ticks_of
 from gaident.errors import ControllerError
 
-__all__ = ["Cascade", "Controller", "Filter", "P", "cascade_of", "controller_from_dict"]
+__all__ = ["Cascade", "Filter", "P", "controller_of"]
 
+Vector = NDArray[np.float64]
 Filter: TypeAlias = LowPass | Notch
 
 WHOLE = 1e-6  # no decision: rounding of two decimal numbers that divide; more is no whole multiple
@@ -83,7 +92,7 @@ class P:
 
 
 @dataclass(frozen=True)
-class Cascade:
+class Cascade(Controller):
     """The controller of a servo axis at its own clock T.
 
         r(n) = gain (q*(n) - q(n)) + velocity_feedforward v*(n)        every position_period, held between; without `position`
@@ -179,14 +188,23 @@ class Cascade:
         return "sampled"
 
     @property
-    def limited(self) -> bool:
-        """True if torque or integrator have a limit."""
-        return self.velocity.limited
+    def one_equation(self) -> bool:
+        """See `Controller`."""
+        return False
 
     @property
-    def limits(self) -> tuple[float, float]:
-        """(Torque limit, integrator limit) [N m], infinity for none."""
-        return self.velocity.limits
+    def gains(self) -> PI:
+        """See `Controller`: the velocity controller's."""
+        return self.velocity
+
+    @property
+    def driven_by(self) -> str:
+        """ "command", or "position_command" where it has a position controller."""
+        return "command" if self.position is None else "position_command"
+
+    def ahead(self, dt: float) -> int:
+        """See `Controller`."""
+        return 1 if self.position is None else 2 * self.position_every(dt)
 
     def log_every(self, dt: float) -> int:
         """Controller samples for each line of a log with the sample time dt [s]; ControllerError where it is no whole number."""
@@ -197,6 +215,86 @@ class Cascade:
         if self.position_period is None:
             return 1
         return _multiple(self.position_period, dt if self.period is None else self.period, "position_period", "period")
+
+    def line_equation(self, log: Signals, poles: int) -> bool:
+        """See `Controller`: with a position controller that samples at each line, and without acceleration feedforward there."""
+        source, every = self.command_of(log), self.log_every(log.dt)
+        if every == 1 or source is None or self.limited or self.friction_feedforward != 0.0:
+            return False
+        if self.position is not None:
+            fits = self.acceleration_feedforward == 0.0 and every % self.position_every(log.dt) == 0
+        else:
+            # What stood before a record is not known: a jump at its first line would be one of the command's slope.
+            fits = self.acceleration_feedforward == 0.0 or float(source[0]) == 0.0
+        return fits and core.is_one_equation(log.dt, self, poles)
+
+    def line_record(self, log: Signals) -> _core.Record:
+        """See `Controller`."""
+        source, placed = self.command_of(log), self.position is not None
+        assert source is not None
+        start = float(log.position[0]) if placed and log.position is not None else 0.0
+        feed = self.velocity_feedforward, self.acceleration_feedforward
+        return core.line_record(log.dt, source - start, log.velocity, self.log_every(log.dt), placed, *feed)
+
+    def at_lines(self) -> Cascade:
+        """See `Controller`."""
+        none: dict[str, Any] = dict.fromkeys(FILTERS, ())
+        return replace(self, period=None, position_period=None, delay=0.0, **none)
+
+    def asked(self, log: Signals) -> Vector:
+        """See `Controller`: behind position controller and command filters."""
+        source = self.command_of(log)
+        assert source is not None
+        command, period = source, log.dt / self.log_every(log.dt)
+        if self.position is not None:
+            assert log.position is not None
+            every, fed = self.position_every(log.dt), self.ticks(log.dt, source, log.position).velocity_feedforward
+            made = self.position.gain * (source - log.position) + (fed if len(fed) else 0.0)
+            command = np.repeat(made[::every], every)[: len(source)]
+        for one in self.command_filters:
+            digital = one.digital(period)
+            command = filtered(np.array(digital.b), np.array(digital.a), command[None, :], [len(command)])[0]
+        return command
+
+    def replayable(self, log: Signals) -> bool:
+        """See `Controller`."""
+        read = self.position is None or log.position is not None
+        return read and self.command_of(log) is not None and self.log_every(log.dt) == 1
+
+    def torque_of(self, log: Signals, also: Limiting | None = None) -> Vector:
+        """See `Controller`."""
+        source, dt = self.command_of(log), log.dt
+        assert source is not None
+        ticks, limited = self.ticks(dt, source, log.position), self
+        if also is not None:
+            limited = self.with_limits(self.limits[0], min(also.integrator, self.limits[1]))
+            if np.isfinite(also.slope):
+                followed = rate_limited(self.asked(log), also.slope, dt, 0.0)
+                ticks = replace(ticks, source=followed, velocity_feedforward=np.zeros(0), position=np.zeros(0))
+                limited = replace(limited, position=None, position_period=None, velocity_feedforward=0.0, command_filters=())
+        return core.servo_torque(dt, ticks, log.velocity, limited.core_loop(dt))
+
+    def with_limits(self, torque: float | None, integrator: float | None) -> Cascade:
+        """See `Controller`."""
+        return replace(self, velocity=self.velocity.with_limits(torque, integrator))
+
+    def ticks(self, dt: float, command: Vector, position: Vector | None) -> Ticks:
+        """See `Controller`."""
+        placed = 0 if self.position is None else self.position_every(dt)
+        feed = Feedforward(self.velocity_feedforward, self.acceleration_feedforward, self.friction_feedforward)
+        return ticks_of(command, position, dt, self.log_every(dt), placed, feed)
+
+    def core_loop(self, dt: float) -> _core.Loop:
+        """See `Controller`."""
+        period = dt / self.log_every(dt)
+        filters = {name: [f.digital(period) for f in getattr(self, name)] for name in FILTERS}
+        settings = self.velocity.servo_settings(
+            position_gain=0.0 if self.position is None else self.position.gain,
+            position_every=self.position_every(dt),
+            delay=self.delay,
+            **filters,
+        )
+        return _core.Loop(kind="servo", controller=core.core_controller(self.velocity), servo=settings)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON or TOML."""
@@ -217,19 +315,9 @@ class Cascade:
         return cls(position=None if gain is None else P(gain), **values)
 
 
-Controller: TypeAlias = PI | Cascade
-
-
-def controller_from_dict(data: Mapping[str, Any]) -> Controller:
-    """Return the controller of what `PI.to_dict` or `Cascade.to_dict` gave; raises ControllerError."""
+def controller_of(data: Mapping[str, Any]) -> Controller:
+    """The controller of what `to_dict` of a PI or a Cascade gave; raises ControllerError."""
     return Cascade.from_dict(data) if "velocity" in data else PI.from_dict(data)
-
-
-def cascade_of(controller: Controller) -> Cascade | None:
-    """The cascade that a controller is; None for a bare PI, which the faster recurrences simulate."""
-    if isinstance(controller, Cascade):
-        return controller
-    return None if controller.bare else Cascade(controller)
 
 
 def _filters(given: object, name: str) -> tuple[Filter, ...]:

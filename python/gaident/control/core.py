@@ -1,4 +1,4 @@
-"""The core's functions that take a controller: the only file that makes the core's controller, loop and clock of a PI and a dt.
+"""The core's functions that take a controller: the only file that calls them.
 
 controller: None for the open loop, where the torque drives the model.
 """
@@ -6,15 +6,14 @@ controller: None for the open loop, where the torque drives the model.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TypeGuard
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
-from gaident.control.cascade import Cascade, Controller, cascade_of
-from gaident.control.pi import PI, RULES
-from gaident.control.ticks import straight_part, ticks_of
+from gaident.control.controller import Controller, Gains
+from gaident.control.ticks import Ticks, of_lines, straight_part
 
 __all__ = [
     "clock",
@@ -27,7 +26,6 @@ __all__ = [
     "line_record",
     "loop",
     "loop_name",
-    "one_equation",
     "record",
     "recurrence",
     "servo_torque",
@@ -43,39 +41,39 @@ def loop_name(controller: Controller | None) -> str:
     return "open" if controller is None else controller.loop
 
 
-def one_equation(controller: Controller | None) -> TypeGuard[PI | None]:
-    """Whether one difference equation holds controller and plant, limits left out: of a bare PI, and in the open loop."""
-    return controller is None or cascade_of(controller) is None
-
-
 def clock(dt: float) -> _core.Clock:
     """The controller's clock of a record with the sample time dt [s]."""
     return _core.Clock(period=dt)
 
 
-def core_controller(controller: PI) -> _core.Controller:
+def core_controller(controller: Gains) -> _core.Controller:
     """The core's controller."""
     torque, integrator = controller.limits
     return _core.Controller(kp=controller.kp, ki=controller.ki, torque_limit=torque, integrator_limit=integrator)
 
 
-def loop(controller: PI | None) -> _core.Loop:
-    """The core's loop."""
-    if controller is None:
-        return _core.Loop(kind="open")
-    return _core.Loop(kind=controller.loop, controller=core_controller(controller))
+def loop(controller: Controller | None, dt: float) -> _core.Loop:
+    """The core's loop, in a log with the sample time dt [s]."""
+    return _core.Loop(kind="open") if controller is None else controller.core_loop(dt)
 
 
 def simulate(
-    gain: float, poles: Roots, zeros: Roots, dt: float, source: Vector, controller: PI | None, start: Vector, arithmetic: str
+    gain: float,
+    poles: Roots,
+    zeros: Roots,
+    dt: float,
+    source: Vector,
+    controller: Controller | None,
+    start: Vector,
+    arithmetic: str,
 ) -> tuple[Vector, Vector]:
     """(velocity [rad/s], torque [N m]) of a linear model in its loop; source: command [rad/s], in the open loop torque [N m]."""
-    return _core.simulate(gain, poles, zeros, clock(dt), source, loop(controller), start, arithmetic)
+    return _core.simulate(gain, poles, zeros, clock(dt), source, loop(controller, dt), start, arithmetic)
 
 
-def discrete(gain: float, poles: Roots, zeros: Roots, dt: float, controller: PI | None) -> tuple[Vector, Vector]:
+def discrete(gain: float, poles: Roots, zeros: Roots, dt: float, controller: Controller | None) -> tuple[Vector, Vector]:
     """(alpha, beta) of equation (7), without limits."""
-    return _core.discrete(gain, poles, zeros, clock(dt), loop(controller))
+    return _core.discrete(gain, poles, zeros, clock(dt), loop(controller, dt))
 
 
 def effect_record(
@@ -85,68 +83,32 @@ def effect_record(
 
     source: command [rad/s], in the open loop torque [N m], with a position controller position command [rad].
     """
-    cascade = None if controller is None else cascade_of(controller)
-    if cascade is not None:
-        return _servo_record(dt, source, position, velocity, start_angle, cascade)
-    assert not isinstance(controller, Cascade)
+    ticks = of_lines(source, position) if controller is None else controller.ticks(dt, source, position)
     return _core.EffectRecord(
-        clock=clock(dt),
-        input=source,
-        position=np.zeros(0) if position is None else position,
-        velocity=velocity,
-        start_angle=start_angle,
-        loop=loop(controller),
-    )
-
-
-def _servo_record(
-    dt: float, source: Vector, position: Vector | None, velocity: Vector, start_angle: float, cascade: Cascade
-) -> _core.EffectRecord:
-    ticks = ticks_of(cascade, dt, source, position)
-    period = dt / ticks.log_every
-    return _core.EffectRecord(
-        clock=_core.Clock(period=period, log_every=ticks.log_every),
+        clock=_core.Clock(period=dt / ticks.log_every, log_every=ticks.log_every),
         input=ticks.source,
         position=ticks.position,
         velocity=velocity,
         start_angle=start_angle,
-        loop=_servo(cascade, period, cascade.position_every(dt)),
+        loop=loop(controller, dt),
         velocity_feedforward=ticks.velocity_feedforward,
         torque_feedforward=ticks.torque_feedforward,
     )
 
 
-def servo_torque(dt: float, source: Vector, velocity: Vector, position: Vector | None, cascade: Cascade) -> Vector:
-    """Torque [N m] (n,) that a cascade makes of measured signals (n,), from rest; the log has a line for each of its samples."""
-    ticks = ticks_of(cascade, dt, source, position)
-    none = np.zeros(len(source))
-    fed, added = ticks.velocity_feedforward, ticks.torque_feedforward
+def servo_torque(dt: float, ticks: Ticks, velocity: Vector, servo: _core.Loop) -> Vector:
+    """Torque [N m] (n,) that a servo makes of measured signals (n,), from rest; the log has a line for each of its samples."""
+    none = np.zeros(len(velocity))
+    fed, added, position = ticks.velocity_feedforward, ticks.torque_feedforward, ticks.position
     return _core.servo_torque(
         clock=clock(dt),
-        loop=_servo(cascade, dt, cascade.position_every(dt)),
+        loop=servo,
         source=ticks.source,
         velocity=velocity,
-        position=none if position is None else position,
+        position=position if len(position) else none,
         velocity_feedforward=fed if len(fed) else none,
         torque_feedforward=added if len(added) else none,
     )
-
-
-def _servo(cascade: Cascade, period: float, position_every: int) -> _core.Loop:
-    pi = cascade.velocity
-    settings = _core.ServoSettings(
-        newest=RULES[pi.rule],
-        command_weight=pi.command_weight,
-        anti_windup=pi.anti_windup,
-        tracking_time=pi.tracking_time or 0.0,
-        command_filters=[f.digital(period) for f in cascade.command_filters],
-        velocity_filters=[f.digital(period) for f in cascade.velocity_filters],
-        torque_filters=[f.digital(period) for f in cascade.torque_filters],
-        position_gain=0.0 if cascade.position is None else cascade.position.gain,
-        position_every=position_every,
-        delay=cascade.delay,
-    )
-    return _core.Loop(kind="servo", controller=core_controller(pi), servo=settings)
 
 
 def record(dt: float, source: Vector, velocity: Vector, start: str, velocity0: float) -> _core.Record:
@@ -154,15 +116,14 @@ def record(dt: float, source: Vector, velocity: Vector, start: str, velocity0: f
     return _core.Record(clock=clock(dt), input=source, output=velocity, start=start, velocity0=velocity0)
 
 
-def line_record(dt: float, source: Vector, velocity: Vector, start_angle: float, cascade: Cascade) -> _core.Record:
-    """A record, from rest, of a loop whose controller is faster than the log.
+def line_record(
+    dt: float, command: Vector, velocity: Vector, every: int, placed: bool, velocity_feed: float, acceleration_feed: float
+) -> _core.Record:
+    """A record, from rest, of a loop whose controller takes `every` samples for each line of the log.
 
-    source: velocity command [rad/s], or with a position controller position command [rad], with the angle at the start [rad].
+    command: of the velocity [rad/s] or, with a position controller (`placed`), of the position [rad] from its start.
     """
-    is_position = cascade.position is not None
-    command = source - start_angle if is_position else source
-    between, straight = straight_part(command, is_position)
-    every = cascade.log_every(dt)
+    between, straight = straight_part(command, placed)
     return _core.Record(
         clock=_core.Clock(period=dt / every, log_every=every),
         input=command,
@@ -171,38 +132,33 @@ def line_record(dt: float, source: Vector, velocity: Vector, start_angle: float,
         velocity0=0.0,
         between=between,
         straight=straight,
-        velocity_feedforward=cascade.velocity_feedforward,
-        acceleration_feedforward=cascade.acceleration_feedforward,
+        velocity_feedforward=velocity_feed,
+        acceleration_feedforward=acceleration_feed,
     )
 
 
-def is_one_equation(dt: float, cascade: Cascade, poles: int) -> bool:
-    """Whether one difference equation holds a cascade and a plant with so many poles, from line to line of a log."""
-    every = cascade.log_every(dt)
-    period = dt / every
+def is_one_equation(dt: float, controller: Controller, poles: int) -> bool:
+    """Whether one difference equation holds a controller and a plant with so many poles, from line to line of a log."""
+    every = controller.log_every(dt)
     try:
-        at_the_clock = _core.Clock(period=period, log_every=every)
-        order = _core.servo_order(loop=_servo(cascade, period, cascade.position_every(dt)), clock=at_the_clock)
+        order = _core.servo_order(loop=loop(controller, dt), clock=_core.Clock(period=dt / every, log_every=every))
     except ValueError:
         return False
     return poles + order <= _core.MOST_STATES
 
 
-def experiment(records: Sequence[_core.Record], controller: Controller | None, kernels: str = "") -> _core.Experiment:
-    """Records and their loop, for the genetic search and the local fit; of a cascade each is a `line_record`."""
-    cascade = None if controller is None else cascade_of(controller)
-    if cascade is not None:
-        assert cascade.period is not None  # it is faster than the log
-        return _core.Experiment(records, _servo(cascade, cascade.period, cascade.position_every(cascade.period)), kernels)
-    assert not isinstance(controller, Cascade)
-    return _core.Experiment(records, loop(controller), kernels)
+def experiment(records: Sequence[_core.Record], controller: Controller | None, dt: float, kernels: str = "") -> _core.Experiment:
+    """Records and their loop, for the genetic search and the local fit; dt: sample time of the log [s]."""
+    return _core.Experiment(records, loop(controller, dt), kernels)
 
 
-def recurrence(model: _core.EffectModel, dt: float, controller: PI | None, substeps: int, top_speed: float) -> dict[str, Any]:
+def recurrence(
+    model: _core.EffectModel, dt: float, controller: Controller | None, substeps: int, top_speed: float
+) -> dict[str, Any]:
     """The numbers of the recurrence that simulates a model."""
-    return _core.recurrence(model, clock(dt), loop(controller), substeps, top_speed)
+    return _core.recurrence(model, clock(dt), loop(controller, dt), substeps, top_speed)
 
 
-def held_torque(error: Vector, controller: PI, newest: float, before: float, rule: str, integral: float) -> Vector:
+def held_torque(error: Vector, controller: Gains, newest: float, before: float, rule: str, integral: float) -> Vector:
     """Torque [N m] of a PI whose integrator does not wind up; it adds newest e(n) + before e(n-1)."""
     return _core.held_torque(error, core_controller(controller), newest, before, rule, integral)

@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident import _core
 from gaident.arguments import NO_CONTROLLER, arg
 from gaident.checks import known_keys, one_of, real_number
+from gaident.control import core
+from gaident.control.controller import Controller, Limiting, Signals, checked_controller
 from gaident.control.drive_parameters import kp_and_ki
-from gaident.errors import ControllerError
+from gaident.control.filtering import rate_limited
+from gaident.control.pi_torque import pi_torque
+from gaident.control.ticks import Ticks, of_lines
+from gaident.errors import ControllerError, SettingsError
+
+Vector = NDArray[np.float64]
 
 PI_OF_GAINS = arg("controller", "PI(kp=..., ki=...)", python="PI(kp=..., ki=...)")
 LOOPS = ("sampled", "continuous")
@@ -22,7 +33,7 @@ _NOT_GIVEN = float("nan")  # told from a given nan by identity
 
 
 @dataclass(frozen=True)
-class PI:
+class PI(Controller):
     """PI velocity controller, C(s) = kp + ki/s.
 
     Parameters
@@ -143,9 +154,19 @@ class PI:
         return self.rule == "trapezoidal" and self.command_weight == 1.0 and self.anti_windup == "none"
 
     @property
-    def limited(self) -> bool:
-        """True if torque or integrator have a limit: the loop is then linear only while no limit acts."""
-        return self.torque_limit is not None or self.integrator_limit is not None
+    def one_equation(self) -> bool:
+        """See `Controller`."""
+        return self.bare
+
+    @property
+    def gains(self) -> PI:
+        """See `Controller`: its own."""
+        return self
+
+    @property
+    def driven_by(self) -> str:
+        """ "command"."""
+        return "command"
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -153,6 +174,62 @@ class PI:
         torque = math.inf if self.torque_limit is None else self.torque_limit
         integrator = math.inf if self.integrator_limit is None else self.integrator_limit
         return torque, integrator
+
+    def log_every(self, dt: float) -> int:
+        """1: it runs at the log's sample time."""
+        return 1
+
+    def asked(self, log: Signals) -> Vector:
+        """The log's velocity command [rad/s]."""
+        assert log.command is not None
+        return log.command
+
+    def replayable(self, log: Signals) -> bool:
+        """See `Controller`."""
+        return log.command is not None
+
+    def torque_of(self, log: Signals, also: Limiting | None = None) -> Vector:
+        """See `Controller`."""
+        command, limited = self.asked(log), self
+        if also is not None:
+            command = command if math.isinf(also.slope) else rate_limited(command, also.slope, log.dt, 0.0)
+            limited = self.with_limits(self.torque_limit, min(also.integrator, self.limits[1]))
+        if self.bare:
+            return pi_torque(command, log.velocity, log.dt, limited)
+        return core.servo_torque(log.dt, of_lines(command, None), log.velocity, limited.core_loop(log.dt))
+
+    def with_limits(self, torque: float | None, integrator: float | None) -> PI:
+        """See `Controller`."""
+        torque, integrator = (None if x is None or math.isinf(x) else x for x in (torque, integrator))
+        return replace(self, torque_limit=torque, integrator_limit=integrator)
+
+    def ticks(self, dt: float, command: Vector, position: Vector | None) -> Ticks:
+        """See `Controller`."""
+        return of_lines(command, position)
+
+    def core_loop(self, dt: float) -> _core.Loop:
+        """See `Controller`."""
+        if self.bare:
+            return _core.Loop(kind=self.loop, controller=core.core_controller(self))
+        return _core.Loop(kind="servo", controller=core.core_controller(self), servo=self.servo_settings())
+
+    def servo_settings(self, **around: Any) -> _core.ServoSettings:
+        """The core's settings of what a digital controller has; around: what a cascade has beside it."""
+        settings: dict[str, Any] = {
+            "command_filters": [],
+            "velocity_filters": [],
+            "torque_filters": [],
+            "position_gain": 0.0,
+            "position_every": 1,
+            **around,
+        }
+        return _core.ServoSettings(
+            newest=RULES[self.rule],
+            command_weight=self.command_weight,
+            anti_windup=self.anti_windup,
+            tracking_time=self.tracking_time or 0.0,
+            **settings,
+        )
 
     @classmethod
     def from_drive(cls, drive: str, **parameters: Any) -> PI:
@@ -197,3 +274,19 @@ class PI:
         allowed = ("kp", "ki", "loop", "torque_limit", "integrator_limit", *DIGITAL)
         values: dict[str, Any] = known_keys(data, "the controller", allowed, ("kp", "ki"), ControllerError)
         return cls(**values)
+
+
+def bare_pi(controller: Controller | None) -> PI | None:
+    """The bare PI that a controller is, limits or not; None for every other, and for none."""
+    pi = None if controller is None or not controller.one_equation else controller.gains
+    assert pi is None or isinstance(pi, PI)
+    return pi
+
+
+def checked_pi(controller: object, what: str) -> PI | None:
+    """The bare PI that a public function was given as `controller=`; SettingsError for all else, because of `what` it does."""
+    given = checked_controller(controller)
+    pi = bare_pi(given)
+    if given is not None and pi is None:
+        raise SettingsError(f"controller is {given!r}: {what} of a bare PI only; give PI(kp, ki), or None for the drive alone")
+    return pi

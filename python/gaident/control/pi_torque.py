@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from gaident.axis import say
 from gaident.control import core
+from gaident.control.controller import Gains
 from gaident.control.filtering import clamped_sum
-from gaident.control.pi import PI
 
 __all__ = ["HOLDS", "held_torque", "pi_block", "pi_torque"]
 
 Vector = NDArray[np.float64]
 
 
-def pi_torque(command: Vector, velocity: Vector, dt: float, controller: PI, initial_integral: float = 0.0) -> Vector:
+def pi_torque(command: Vector, velocity: Vector, dt: float, controller: Gains, initial_integral: float = 0.0) -> Vector:
     """The torque [N m], shape (n,), that `controller` makes of command and measured velocity [rad/s], shape (n,) each.
 
     initial_integral: what the integrator held before sample 0 [N m]. Both loops of `PI` share this rule.
@@ -28,7 +28,7 @@ def pi_torque(command: Vector, velocity: Vector, dt: float, controller: PI, init
     return pi_block(command - velocity, dt, controller, 0.0, initial_integral)[0]
 
 
-def pi_block(e: Vector, dt: float, controller: PI, last: float, integral: float) -> tuple[Vector, float]:
+def pi_block(e: Vector, dt: float, controller: Gains, last: float, integral: float) -> tuple[Vector, float]:
     """(torque, integral after it) [N m] for a block of errors [rad/s], with the last error and the integral before it."""
     half = 0.5 * controller.ki * dt
     steps = half * (e + np.concatenate([[last], e[:-1]]))
@@ -49,7 +49,7 @@ HOLDS = {
 
 
 def held_torque(
-    command: Vector, velocity: Vector, dt: float, controller: PI, rule: str, initial_integral: float = 0.0, share: float = 0.0
+    command: Vector, velocity: Vector, dt: float, controller: Gains, rule: str, initial_integral: float = 0.0, share: float = 0.0
 ) -> Vector:
     """`pi_torque` of a controller with a torque limit U whose integrator does not wind up there, by a rule of `HOLDS`:
 

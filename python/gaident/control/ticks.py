@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.control.cascade import Cascade
 from gaident.policy.table import POLICY
 
-__all__ = ["Ticks", "at_the_clock", "between_lines", "straight_part", "ticks_of"]
+__all__ = ["Feedforward", "Ticks", "at_the_clock", "between_lines", "of_lines", "straight_part", "ticks_of"]
 
 Vector = NDArray[np.float64]
 
@@ -26,25 +25,41 @@ class Ticks:
     position: Vector  # measured [rad], or empty
 
 
-def ticks_of(controller: Cascade, dt: float, command: Vector, position: Vector | None) -> Ticks:
-    """command: velocity command [rad/s], or position command [rad] where the cascade has a position controller, shape (n,)."""
-    every = controller.log_every(dt)
+@dataclass(frozen=True)
+class Feedforward:
+    """velocity: share of the position command's slope; acceleration [N m s^2/rad]; friction [N m]."""
+
+    velocity: float
+    acceleration: float
+    friction: float
+
+
+def of_lines(command: Vector, position: Vector | None) -> Ticks:
+    """Of a log with a line for each of the controller's samples, without feedforward."""
+    none = np.zeros(0)
+    return Ticks(1, command, none, none, none if position is None else position)
+
+
+def ticks_of(command: Vector, position: Vector | None, dt: float, every: int, placed: int, feed: Feedforward) -> Ticks:
+    """dt: sample time of the log [s], which has a line for every `every`-th sample of the controller.
+
+    command: velocity command [rad/s], or with a position controller position command [rad], shape (n,).
+    placed: samples from one of the position controller's to the next; 0: there is none.
+    """
     period = dt / every
-    if controller.position is None:
+    if not placed:
         source = between_lines(command, every)
         velocity, step = source, 1
     else:
-        source, step = at_the_clock(command, every), controller.position_every(dt)
+        source, step = at_the_clock(command, every), placed
         velocity = _slope(source, step, period)
     fed = np.zeros(0)
-    if controller.acceleration_feedforward != 0.0 or controller.friction_feedforward != 0.0:
-        fed = controller.acceleration_feedforward * _slope(velocity, step, period) + controller.friction_feedforward * np.sign(
-            velocity
-        )
+    if feed.acceleration != 0.0 or feed.friction != 0.0:
+        fed = feed.acceleration * _slope(velocity, step, period) + feed.friction * np.sign(velocity)
     return Ticks(
         every,
         source,
-        controller.velocity_feedforward * velocity if controller.velocity_feedforward != 0.0 else np.zeros(0),
+        feed.velocity * velocity if feed.velocity != 0.0 else np.zeros(0),
         fed,
         np.zeros(0) if position is None else at_the_clock(position, every),
     )

@@ -5,18 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, called, say
-from gaident.control.cascade import Cascade, Controller
+from gaident.control.controller import Controller, checked_controller
+from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
-from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
-from gaident.diagnosis.controller.form_findings import driver_of
-from gaident.diagnosis.controller.log_shift import aligned
-from gaident.diagnosis.experiments.excitation import decided_by_the_angle, excitation
+from gaident.diagnosis.controller.controller_place import as_read, controller_findings
+from gaident.diagnosis.controller.driving import Driving, driving_of
+from gaident.diagnosis.experiments.candidates import IN_MOTION, candidates
+from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off
 from gaident.diagnosis.gains import Gains, measured_gains
 from gaident.diagnosis.library.equivalences import equivalents
@@ -24,9 +26,9 @@ from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, in_controller
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
 from gaident.diagnosis.note import Note
-from gaident.diagnosis.records.arguments import ProgressCallback, check_controller, checked, in_order, noise_std_of, records_of
-from gaident.diagnosis.records.folded import ADVICE, FOLDED, folded
-from gaident.diagnosis.records.hygiene import cleaned, outliers, quantisation
+from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_order, noise_std_of, records_of
+from gaident.diagnosis.records.folded import ADVICE, folded
+from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection.attribution import only_describes, simplified
 from gaident.diagnosis.selection.dependence import dependence
@@ -40,7 +42,6 @@ from gaident.estimation.uncertainty import estimates_of
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
 from gaident.models.drive_torque import torque_driven
-from gaident.models.simulate import simulate
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
@@ -49,8 +50,6 @@ from gaident.results.identification import Identification
 from gaident.version import version
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
-
-DIVERGED = 1e6  # no decision: of the velocity; a simulation that leaves so much has diverged
 
 
 def diagnose(
@@ -121,11 +120,12 @@ def diagnose(
     """
     began = time.perf_counter()
     note = Note(progress)
-    check_controller(controller)
-    records, loop, under, cascade = torque_driven(records_of(rec, "rec"), controller)
-    held = () if validation is None else torque_driven(records_of(validation, "validation"), controller).records
-    controller = loop
-    checked(records, held, controller, identification, bootstrap, seed, progress, axis)
+    given = records_of(rec, "rec")
+    driven = torque_driven(given, checked_controller(controller))
+    kept = () if validation is None else records_of(validation, "validation")
+    records, held = driven.records, torque_driven(kept, controller).records if kept else ()
+    checked(records, held, driven.loop, identification, bootstrap, seed, progress, axis)
+    origin = {r.digest: whole for r, whole in zip((*records, *held), (*given, *kept), strict=True)}
     records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
     import scipy.linalg  # noqa: F401  brings a BLAS of its own, to be limited too
@@ -134,28 +134,30 @@ def diagnose(
     # A sum that several threads share is rounded otherwise with each number of them, and a search follows the last digit.
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.01, "replaying the controller")
-        moved = aligned(records, held, controller)
-        driver = None if moved.shifts else driver_of(records, held, controller)
-        if driver is not None:
-            controller, under = None, (*under, *driver.notes)
-            moved = aligned(driver.records, driver.held, controller)
-        logged = as_logged(moved.records, controller)
-        controller = logged.controller
+        driving = driving_of(records, held, driven, origin)
         note(0.02, "identifying the linear model")
-        idn = identification if identification is not None else identify(list(moved.records), controller, seed=seed)
-        work = _Work(
-            moved.records, moved.held, logged, idn, noise_std, note, axis, cascade, () if driver is None else driver.findings
-        )
+        moved, pi = driving.moved, bare_pi(driving.controller)
+        idn = identification if identification is not None else identify(list(moved.records), pi, seed=seed)
+        work = _Work(moved.records, moved.held, driving, idn, noise_std, note, axis)
         work.search()
         result = moved.noted(replace(work.report(seed), noise=noise_std, bootstrap=bootstrap))
-        result = replace(result, notes=(*under, *result.notes)) if under else result
+        result = replace(result, notes=(*driving.notes, *(() if work.at_controller.decided else driving.doubts), *result.notes))
         if bootstrap:
             from gaident.diagnosis.selection.bootstrap import with_p_value
 
             space = work.found.space
             result = with_p_value(result, space, work.base, work.final, bootstrap, seed, lambda message: note(None, message))
-    object.__setattr__(result, "seconds", time.perf_counter() - began)
-    return result
+    return replace(result, seconds=time.perf_counter() - began)
+
+
+class _Judged(NamedTuple):
+    """What is reported of a search: figures, what the error that is left depends on, effects that count, all effects' numbers."""
+
+    gains: Gains
+    driver: str | None
+    causes: list[str]
+    estimates: dict[str, dict[str, Estimate]]
+    offset: Offset | None
 
 
 @dataclass
@@ -164,29 +166,29 @@ class _Work:
 
     records: tuple[Record, ...]
     held: tuple[Record, ...]
-    logged: AsLogged
+    driving: Driving
     idn: Identification
     noise: float | None
     note: Note
     axis: str
-    cascade: Cascade | None = None
-    form: tuple[Finding, ...] = ()  # of the controller
 
     def __post_init__(self) -> None:
-        self.controller = self.logged.controller
-        self.notes: list[Text] = list(self.logged.notes)
-        if self.cascade is None:
-            self.notes += open_loop_notes(self.records, self.controller)
-        hit = [self._spikes(r) for r in self.records]
+        self.controller = self.driving.controller
+        self.pi = bare_pi(self.controller)
+        self.notes: list[Text] = list(self.driving.logged.notes)
+        if self.controller is None or self.pi is not None:
+            self.notes += open_loop_notes(self.records, self.pi)
+        hit = [left_out(r, self.idn.model, self.pi) for r in self.records]
         clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
         self.clean = tuple(clean)
         self.step = quantisation(self.records)
-        read = as_read(self.records, clean, self.controller)
-        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis, self.cascade)
+        whole = self.driving.read
+        read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, hit, strict=True)], self.controller)
+        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis)
         self.scales = scales_of(data)
-        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.logged.replays)
+        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.driving.logged.replays)
         self.notes += notes
-        self.controller_steps += self.form
+        self.controller_steps += self.driving.findings
         # Limits that the log shows act in every loop that is closed for a fit.
         limits = self.at_controller.effects
         known: dict[Term, NDArray[np.float64]] = {
@@ -198,28 +200,13 @@ class _Work:
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
         self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
         self.spoiled = int(sum(len(h) for h in hit))
-        self.excited = excitation(self.clean, shown, axis=self.axis)
-
-    def _spikes(self, rec: Record) -> NDArray[np.intp]:
-        """Samples that stand out of the velocity, or out of the linear model's error: a slope of the velocity may hide them."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            error = rec.velocity - simulate(self.idn.model, rec, self.controller)
-        if np.all(np.abs(error) < DIVERGED * np.abs(rec.velocity).max()):
-            return outliers(rec.velocity, error)
-        return outliers(rec.velocity)
+        self.excited = excitation(self.clean, self.data.loop, axis=self.axis)
 
     def search(self) -> None:
         """The selected model, its rivals, what is left."""
-        not_testable = dict(self.excited.not_testable)
-        if any(folded(r) for r in self.records):
-            not_testable = dict.fromkeys(LIBRARY, FOLDED)
-            self.notes.append(ADVICE)
-        if self.data.torque_measured:
-            behind = say("the {torque} was measured behind the actuator, which it does not show")
-            not_testable |= {t.name: behind for t in LIBRARY.values() if t.place == "actuator"}
-        out = {*not_testable, *self.at_controller.decided, *decided_by_the_angle(self.clean)}
-        allowed = [t for t in LIBRARY.values() if t.name not in out and (self.controller is not None or not t.in_controller)]
-        self.not_testable = not_testable
+        allowed, self.not_testable = candidates(self.records, self.clean, self.data, self.excited, self.at_controller)
+        self.notes += [ADVICE] * any(folded(r) for r in self.records)
+        self.notes += [IN_MOTION] * (self.data.slower and any(self.data.moving))
         found = selected(self.objective, self.scales, self.idn.model, allowed, self._equivalent_here, self._say)
         self.note(0.85, "looking for what is left")
         self.take(found)
@@ -241,33 +228,36 @@ class _Work:
         self.adequate = self.found.space.is_noise(final)
         self.left = dependence(self.objective, final)
 
+    def judged(self) -> _Judged:
+        """What is shown, and what it gains; where no effect is, that of a search by whitened errors instead."""
+        while True:
+            said = list(self.notes)
+            self.notes += basis_of(self.found)
+            gains = self._accepted_gains()
+            driver = self.left.driver if self.adequate else self.left.strongest
+            after = gains.after
+            if driver is None and after.rmse > POLICY.free_run_ratio * after.noise_floor > 0.0:
+                # A noise filter removes a slow misfit completely; the free run shows it.
+                driver = self.left.strongest or "time"
+                self.notes.append(far_off(after.rmse / after.noise_floor))
+            space = self.found.space
+            causes = []
+            for e in self.final.effects:
+                of_class = bool(self._equivalent_here(e))
+                if not only_describes(space, self.final, e, self.rivals[e][0], driver, self.left, of_class):
+                    causes.append(e)
+            estimates = estimates_of(self.objective, self.final)
+            causes = [e for e in causes if self._determined(e, estimates[e])]
+            instead = None if causes else by_whitened_errors(self.found, self._equivalent_here, self._say)
+            if instead is None:
+                return _Judged(gains, driver, causes, estimates, offset_of(space, self.final))
+            self.notes = said
+            self.take(instead)
+
     def report(self, seed: int) -> Diagnosis:
         """Everything the user sees."""
         self.note(0.9, "measuring the gain")
-        said = list(self.notes)
-        self.notes += basis_of(self.found)
-        gains = self._accepted_gains()
-        driver = self.left.driver if self.adequate else self.left.strongest
-        after = gains.after
-        if driver is None and after.rmse > POLICY.free_run_ratio * after.noise_floor > 0.0:
-            # A noise filter removes a slow misfit completely; the free run shows it.
-            driver = self.left.strongest or "time"
-            self.notes.append(far_off(after.rmse / after.noise_floor))
-        space = self.found.space
-        causes = []
-        for e in self.final.effects:
-            of_class = bool(self._equivalent_here(e))
-            if not only_describes(space, self.final, e, self.rivals[e][0], driver, self.left, of_class):
-                causes.append(e)
-        offset = offset_of(space, self.final)
-        estimates = estimates_of(self.objective, self.final)
-        causes = [e for e in causes if self._determined(e, estimates[e])]
-        if not causes:
-            instead = by_whitened_errors(self.found, self._equivalent_here, self._say)
-            if instead is not None:
-                self.notes = said
-                self.take(instead)
-                return self.report(seed)
+        gains, driver, causes, estimates, offset = self.judged()
         findings = findings_of_the_record(self.spoiled, sum(len(r) for r in self.records), self.step)
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         for effect in causes:
@@ -281,6 +271,7 @@ class _Work:
                     gain=gains.of(effect),
                     delta_bic=gain,
                     evidence=evidence_of(effect, gain, alternatives, offset),
+                    place=LIBRARY[effect].place,
                 )
             )
         mechanics = mechanics_of(self.objective, self.final)
@@ -301,7 +292,7 @@ class _Work:
                 of_driver = say(" that depends on {}", called(driver)) if self.left.gains[driver] > self.left.needed else ""
                 text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
                 self.notes.append(say(text, " and ".join(dropped), of_driver))
-        check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None, self.axis)
+        check = by_second_method(self.clean, gains, model, mechanics, estimates, self.pi is None, self.axis)
         self.notes += check.notes
         if self.final.parameters.held and any(LIBRARY[e].constant for e in self.final.effects):
             self.notes.append(
@@ -360,7 +351,7 @@ class _Work:
             gains = measured_gains(
                 self.clean,
                 self.held,
-                self.cascade or self.controller,
+                self.controller,
                 self.idn.model,
                 self.final,
                 self.objective,

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.control.cascade import Cascade, Controller
+from gaident.control.controller import Controller
+from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.records.hygiene import quantisation
 from gaident.estimation.dataset import DataSet
@@ -26,7 +27,7 @@ from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
 from gaident.results.fitness import Fitness
 
-__all__ = ["Gains", "free_run_errors", "held_from", "measured_gains"]
+__all__ = ["Gains", "closed_over", "free_run_errors", "held_from", "measured_gains"]
 
 Vector = NDArray[np.float64]
 
@@ -71,7 +72,8 @@ def measured_gains(
     noise: float | None,
     at_controller: dict[str, dict[str, float]],
 ) -> Gains:
-    """Errors of the linear model, of each stage and of the extended model."""
+    """Errors of the linear model, of each stage and of the extended model, closed over the controller where they can be."""
+    controller = closed_over(controller, (*records, *held))
     part: tuple[int, ...] | None
     if held:
         scored, words, part = [(r, 0) for r in held], "validation records", None
@@ -87,7 +89,7 @@ def measured_gains(
     named = list(at_controller.items())
     bare = stages[0].parameters.model(stages[0].x)
     # What the torque did between the lines of a slower log is lost to the identification, not to a fit of the whole loop.
-    chain = [linear if objective.data.cascade is None else bare]
+    chain = [linear if not objective.data.slower else bare]
     chain += [_with(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
     chain += [_with(f.parameters.model(f.x), at_controller) for f in stages[1:]]
     errors = [free_run_errors(m, scored, controller) for m in chain]
@@ -137,6 +139,17 @@ def measured_gains(
     )
 
 
+def closed_over(controller: Controller | None, records: Sequence[Record]) -> Controller | None:
+    """What the free runs of these records are closed over; None: their torque drives them.
+
+    How a loop moved before a record is known of a bare PI only; any other is simulated from rest.
+    """
+    loop = None if controller is None else controller.simulated_with(records[0].dt)
+    if loop is not None and not loop.one_equation and any(starts_moving(r, None) for r in records):
+        return None
+    return loop
+
+
 def _turned(rec: Record, controller: Controller | None, final: Fit) -> Record:
     """The record with the angle that the model's effects turned with when it was selected.
 
@@ -145,8 +158,7 @@ def _turned(rec: Record, controller: Controller | None, final: Fit) -> Record:
     """
     if final.predictor.own_angle or rec.position is not None or not any(t.harmonic == "torque" for t in final.parameters.terms):
         return rec
-    # The torque of a cascade is in its record already.
-    (turned,) = DataSet.of([rec], None if isinstance(controller, Cascade) else controller).turned
+    (turned,) = DataSet.of([rec], controller).turned
     return turned
 
 
@@ -211,9 +223,7 @@ def start_state(model: Model, rec: Record, controller: Controller | None) -> Vec
 
     A model with effects is not linear in it: two steps of Gauss and Newton over the record's head, from the first velocity.
     """
-    if not starts_moving(rec, None if isinstance(controller, Cascade) else controller) or (
-        controller is not None and (controller.limited or model.effects)
-    ):
+    if not starts_moving(rec, bare_pi(controller)) or (controller is not None and (controller.limited or model.effects)):
         return None
     if not model.effects:
         return np.asarray(initial_state(model, rec, controller))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from gaident.control.cascade import FEEDFORWARDS, FILTERS, Cascade, Controller, P
+from gaident.control.cascade import FEEDFORWARDS, FILTERS, Cascade, P
+from gaident.control.controller import Controller
 from gaident.control.drive_parameters import CONSTANTS, DRIVES, drive_row
 from gaident.control.filters import LowPass, Notch, filter_of
 from gaident.control.pi import DIGITAL, PI

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gaident.checks import known_keys, one_of
-from gaident.control.cascade import Controller
+from gaident.control.controller import Controller
 from gaident.data.readers import read
 from gaident.data.record import CHANNELS, Record
 from gaident.drive import kinds

@@ -15,8 +15,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.control.cascade import Cascade, Controller
-from gaident.control.pi import PI
+from gaident.control.controller import Controller, Limiting
+from gaident.control.filtering import rate_limited
+from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.estimation.term import Term
@@ -35,16 +36,16 @@ FINEST = 0.125e-3  # no decision: s, of a substep: the accuracy that friction on
 class DataSet:
     """Records, each also as driven by its torque (`driven`), both with an angle, measured or integrated from the velocity.
 
+    controller: what closed the loop on the drive; None: unknown, the torque drives the model. `loop` is what a simulation closes.
     turned: the record itself with that angle; free: torque-driven, without an angle that was not measured; read: the records
     as the controller read them, which may hold samples that the fit leaves out. finest: no substep of a simulation is much
     shorter [s]; resolution: step of the lattice that all velocities lie on [rad/s], 0: none; known_noise: standard deviation
     of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
-    makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear";
-    cascade: the whole controller where the log has no line for each of its samples; the torque is then known on the lines only.
+    makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear".
     """
 
     records: tuple[Record, ...]
-    controller: PI | None
+    controller: Controller | None
     driven: tuple[Record, ...]
     turned: tuple[Record, ...]
     free: tuple[Record, ...]
@@ -57,28 +58,26 @@ class DataSet:
     loop_follows: bool = True
     torque_measured: bool = False
     axis: str = "rotary"
-    cascade: Cascade | None = None
 
     @classmethod
     def of(
         cls,
         records: Sequence[Record],
-        controller: PI | None,
+        controller: Controller | None,
         spoiled: bool = False,
         read: Sequence[Record] | None = None,
         resolution: float = 0.0,
         axis: str = "rotary",
-        cascade: Cascade | None = None,
     ) -> DataSet:
         """The records as driven by their torque; spoiled: some velocities are not what the controller read."""
-        driven = tuple(_driven(r, torque_of(r, controller)) for r in records)
+        driven = tuple(_driven(r, torque_of(r, bare_pi(controller))) for r in records)
         turned = tuple(with_angle(r, angle_of(a)) for r, a in zip(records, driven, strict=True))
         free = _freed(records, driven)
         moving = tuple(starts_moving(r, None) for r in driven)
         seen = tuple(records if read is None else read)
         measured = any(r.torque_is == MEASURED for r in records)
         found = cls(tuple(records), controller, driven, turned, free, moving, spoiled, seen, resolution=resolution)
-        return replace(found, torque_measured=measured, axis=axis, cascade=cascade)
+        return replace(found, torque_measured=measured, axis=axis)
 
     @property
     def dt(self) -> float:
@@ -102,7 +101,7 @@ class DataSet:
         A replayed one keeps the error that one wrong velocity adds to its integral; one that is logged now and then lacks what it
         did between the lines.
         """
-        lost = self.cascade is not None or (self.spoiled and not self.torque_logged)
+        lost = self.slower or (self.spoiled and not self.torque_logged)
         return lost and self.loopable
 
     @cached_property
@@ -110,13 +109,23 @@ class DataSet:
         """Whether command and controller can drive a model too."""
         if self.loop is None or any(self.moving):
             return False
-        placed = isinstance(self.loop, Cascade) and self.loop.position is not None
-        return all(r.position_command is not None for r in self.records) if placed else self.command is not None
+        loop = self.loop
+        return all(loop.command_of(r) is not None for r in self.records)
+
+    @cached_property
+    def loop(self) -> Controller | None:
+        """What a simulated loop is closed over; None: the torque drives the model."""
+        return None if self.controller is None else self.controller.simulated_with(self.dt)
 
     @property
-    def loop(self) -> Controller | None:
-        """What a simulated loop is closed over."""
-        return self.controller if self.cascade is None else self.cascade
+    def pi(self) -> PI | None:
+        """What a simulated loop is closed over, where it is a bare PI."""
+        return bare_pi(self.controller)
+
+    @property
+    def slower(self) -> bool:
+        """Whether the log has fewer lines than the controller samples: the torque is then known on the lines only."""
+        return self.loop is not None and self.pi is None
 
     @cached_property
     def lengths(self) -> tuple[int, ...]:
@@ -174,27 +183,41 @@ class DataSet:
 
     def replayed_error(self, effects: Mapping[Term, Vector]) -> Vector:
         """Logged torque minus the controller's replay with these effects, records one after the other [N m]."""
-        return np.concatenate([torque_in(r) - replayed(r, self.controller, effects) for r in self.read])
+        assert self.controller is not None
+        known = [len(r) - self.controller.ahead(r.dt) for r in self.read]
+        off = [(torque_in(r) - replayed(r, self.controller, effects))[:n] for r, n in zip(self.read, known, strict=True)]
+        return np.concatenate(off)
 
     def with_effects(self, effects: Mapping[Term, Vector]) -> DataSet:
-        """The same with records and controller as effects at the controller, which are known, make them."""
-
-        data = self
-        for term, values in effects.items():
-            assert term.replayed is not None and data.controller is not None
-            changed = [term.replayed(r, data.controller, values) for r in data.records]
-            turned = tuple(term.replayed(r, data.controller, values)[0] for r in data.turned)
-            data = replace(data, records=tuple(r for r, _ in changed), turned=turned, controller=changed[0][1])
-        return data
+        """The same with records and controller as effects at the controller, which are known, make them in the simulated loop."""
+        if not effects or self.pi is None:
+            return self
+        also, torque = _limiting(effects), self.pi.torque_limit
+        records, turned = (tuple(_followed(r, also.slope) for r in part) for part in (self.records, self.turned))
+        limited = self.pi.with_limits(torque, min(also.integrator, self.pi.limits[1]))
+        return replace(self, records=records, turned=turned, controller=limited)
 
 
-def replayed(rec: Record, controller: PI | None, effects: Mapping[Term, Vector]) -> Vector:
+def replayed(rec: Record, controller: Controller | None, effects: Mapping[Term, Vector]) -> Vector:
     """What the controller makes of command and measured velocity, with effects of its own [N m]."""
-    assert controller is not None and rec.command is not None
+    assert controller is not None and controller.replayable(rec)
+    return controller.torque_of(rec, _limiting(effects) if effects else None)
+
+
+def _limiting(effects: Mapping[Term, Vector]) -> Limiting:
+    """What all effects at the controller limit."""
+    also = Limiting()
     for term, values in effects.items():
-        assert term.replayed is not None
-        rec, controller = term.replayed(rec, controller, values)
-    return torque_of(rec.with_channels(torque=None, position=None), controller)
+        assert term.limiting is not None
+        also = also.and_also(term.limiting(values))
+    return also
+
+
+def _followed(rec: Record, slope: float) -> Record:
+    """The record with the command as a controller follows it, with at most this slope [rad/s^2]."""
+    if rec.command is None or not np.isfinite(slope):
+        return rec
+    return rec.with_channels(command=rate_limited(rec.command, slope, rec.dt, 0.0))
 
 
 def with_angle(rec: Record, angle: Vector | None) -> Record:

@@ -20,7 +20,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.control.cascade import Controller
+from gaident.control.controller import Controller
 from gaident.control.filtering import filtered
 from gaident.control.pi import PI
 from gaident.data.record import Record
@@ -137,8 +137,9 @@ class ClosedLoop:
         """
         linear = parameters.linear(x)
         open_loop = OpenLoop(self.data).torque_response(parameters, x, torques)
-        cascade = self.data.cascade
-        pi = self.data.controller if cascade is None else PI(kp=cascade.velocity.kp, ki=cascade.velocity.ki)
+        loop = self.data.loop
+        assert loop is not None
+        pi = self.data.pi or PI(kp=loop.gains.kp, ki=loop.gains.ki)
         d = linear.discrete(parameters.scales.dt, pi)
         return open_loop - filtered(d.alpha, np.append(1.0, -d.beta), open_loop, self.data.lengths)
 

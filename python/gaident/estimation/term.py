@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from gaident.control.pi import PI
-    from gaident.data.record import Record
+    from gaident.control.controller import Limiting
 
 __all__ = ["Scales", "Term"]
 
@@ -82,7 +81,7 @@ class Term:
     resonates: bool = False  # a pair of poles and zeros in series with the mechanism: a second mass in disguise
     poles: Callable[[Vector], tuple[complex, ...]] | None = None  # poles in series [rad/s] of natural parameters
     seen_angle: Callable[[Vector, Vector, Vector], Vector] | None = None  # (seen angle, velocity, parameters) -> true angle
-    replayed: Callable[[Record, PI, Vector], tuple[Record, PI]] | None = None  # an effect in the controller, in its replay
+    limiting: Callable[[Vector], Limiting] | None = None  # what an effect in the controller limits there
     curve: Callable[[Vector, Mapping[str, float]], Vector] | None = None  # static torque at velocities [rad/s], as friction
 
     @cached_property
@@ -107,7 +106,7 @@ class Term:
     @property
     def in_controller(self) -> bool:
         """Whether it changes what the controller makes of command and velocity."""
-        return self.replayed is not None
+        return self.limiting is not None
 
     @property
     def in_coupling(self) -> bool:

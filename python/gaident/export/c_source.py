@@ -22,7 +22,7 @@ from typing import Any
 from gaident.axis import Text, checked_axis, said, say, velocity_unit
 from gaident.checks import real_number
 from gaident.control import core
-from gaident.control.pi import PI
+from gaident.control.pi import PI, checked_pi
 from gaident.errors import ModelError
 from gaident.files import write_whole
 from gaident.models.model import Model, require_strictly_proper
@@ -75,8 +75,7 @@ def _checked(model: Model, dt: float, controller: PI | None, name: str, substeps
 
     if real_number(dt, "dt", ModelError, "give the sample time in s, > 0") <= 0.0:
         raise ModelError(f"dt is {dt:g}: give the sample time in s, > 0")
-    if controller is not None and not isinstance(controller, PI):
-        raise ModelError(f"controller is a {type(controller).__name__}: give gaident.PI(...), or None for the drive alone")
+    checked_pi(controller, "C source is written")
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
         raise ModelError(f"name is {name!r}: give what C takes as a name, letters, digits and _")
     own = [effect.name for effect in model.effects if effect.own]

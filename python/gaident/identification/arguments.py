@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from gaident.arguments import A_CONTROLLER, COMMAND, CONTINUOUS_LOOP, NO_CONTROLLER, TORQUE, arg
-from gaident.control.cascade import Cascade, Controller, cascade_of
-from gaident.control.pi import PI
+from gaident.control.controller import Controller, checked_controller
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError, SpaceError
 from gaident.models.search_space import SearchSpace
@@ -24,9 +23,8 @@ def checked_records(rec: Record | Sequence[Record], controller: Controller | Non
     records = [rec] if isinstance(rec, Record) else list(rec) if isinstance(rec, Sequence) else None
     if not records or not all(isinstance(r, Record) for r in records):
         raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record or a list of them, at least one")
-    if controller is not None and not isinstance(controller, PI | Cascade):
-        raise SettingsError(f"controller is {controller!r}: give a gaident.PI or a Cascade, or None for open loop")
-    if controller is not None and cascade_of(controller) is not None:
+    checked_controller(controller)
+    if controller is not None and not controller.one_equation:
         return records
     for i, r in enumerate(records):
         where = f"record {i} ({r.name})" if r.name else f"record {i}"

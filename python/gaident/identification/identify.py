@@ -6,7 +6,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from gaident import _core
 from gaident.control import core
-from gaident.control.cascade import Cascade, Controller
+from gaident.control.controller import Controller
+from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.errors import SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
 from gaident.identification.arguments import check_arithmetic, check_numbers, checked_records, checked_space, distinct
-from gaident.identification.closed_loop import input_of, line_record, looped_over, space_of
+from gaident.identification.closed_loop import input_of, looped_over, space_of
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.identification.notes import record_notes, warnings_of
 from gaident.identification.parts import search_parts
@@ -118,7 +119,7 @@ def identify(
     """
     began = time.perf_counter()
     looped = looped_over(checked_records(rec, controller), controller, space)
-    given, loop = list(looped.records), looped.controller
+    given, loop = looped.records, looped.controller
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
@@ -137,20 +138,18 @@ def identify(
     found = work.search(int(trials), int(seed), progress)
     best, scored = work.select(found)
     result = work.report(best, scored, found, int(seed))
+    warnings = [*looped.notes, *result.warnings]
     if derived and not settings.species:
-        warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
-        object.__setattr__(result, "warnings", (*result.warnings, warning))
-    if looped.notes:
-        object.__setattr__(result, "warnings", (*looped.notes, *result.warnings))
+        warnings.append(
+            "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
+        )
     overflows = sum(t.overflows for t in found)
     if overflows:
         evaluations = sum(t.evaluations for t in found)
-        warning = (
+        warnings.append(
             f"In {settings.arithmetic} {overflows} of {evaluations} candidates left its range or diverged; they count as worst."
         )
-        object.__setattr__(result, "warnings", (*result.warnings, warning))
-    object.__setattr__(result, "seconds", time.perf_counter() - began)
-    return result
+    return replace(result, warnings=tuple(warnings), seconds=time.perf_counter() - began)
 
 
 @dataclass(frozen=True)
@@ -187,8 +186,8 @@ class _Work:
         # The middle of a record has no start at rest, which a cascade needs.
         c = self.controller
         parts = whole
-        if self.settings.species and not isinstance(c, Cascade):
-            parts = search_parts(self.records, c, self.moving)
+        if self.settings.species and (c is None or c.one_equation):
+            parts = search_parts(self.records, bare_pi(c), self.moving)
         self.in_parts = sum(len(r) for r, _ in parts) < self.samples
         self.search_lengths = [len(r) for r, _ in parts]
         self.searched = self.experiment_of(parts) if self.in_parts else self.experiment
@@ -196,14 +195,15 @@ class _Work:
     def experiment_of(self, parts: Sequence[tuple[Record, bool]]) -> _core.Experiment:
         """The core's view of (record, whether it starts in motion)."""
         c = self.controller
-        if isinstance(c, Cascade):
-            return core.experiment([line_record(r, c) for r, _ in parts], c)
+        dt = parts[0][0].dt
+        if c is not None and not c.one_equation:
+            return core.experiment([c.line_record(r) for r, _ in parts], c, dt)
         rows = [
             # no decision: a start
             core.record(r.dt, input_of(r, c), r.velocity, "free" if moving else "rest", float(r.velocity[:3].mean()))
             for r, moving in parts
         ]
-        return core.experiment(rows, c)
+        return core.experiment(rows, c, dt)
 
     def search(self, trials: int, seed: int, progress: ProgressCallback | None) -> list[_core.Trial]:
         """The genetic runs."""

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import A_CONTROLLER, NO_CONTROLLER
-from gaident.control.pi import PI
+from gaident.control.pi import PI, checked_pi
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.identification.plant_of_discrete import plant_of_discrete
@@ -141,7 +141,7 @@ def least_squares(
     Raises
     ------
     SettingsError
-        For an order that is no whole number, or too low.
+        For an order that is no whole number, or too low, and a controller that is no bare PI.
     RecordError
         Where the record lacks the input, or is too short or too poor for the order.
 
@@ -162,6 +162,7 @@ def least_squares(
     """
     if not isinstance(rec, Record):
         raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record")
+    checked_pi(controller, "equation (7) is")
     lowest = 1 if controller is None else 2
     if isinstance(order, bool) or not isinstance(order, Integral) or order < lowest:
         more = "" if controller is None else " + 1"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gaident.axis import Text, say
-from gaident.control.cascade import Controller
+from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Model

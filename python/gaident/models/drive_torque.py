@@ -10,73 +10,68 @@ from numpy.typing import NDArray
 
 from gaident.arguments import TORQUE
 from gaident.axis import Text, say
-from gaident.control import core
-from gaident.control.cascade import Cascade, Controller, cascade_of
-from gaident.control.pi import PI
+from gaident.control.controller import Controller
+from gaident.control.pi import PI, bare_pi
 from gaident.control.pi_torque import pi_block
 from gaident.data.record import Record
 from gaident.errors import RecordError
 from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
 
-__all__ = ["Driven", "driven_by_cascade", "late", "made_by_cascade", "torque_blocks", "torque_driven", "torque_of"]
+__all__ = ["Driven", "driven_by", "late", "made_by", "torque_blocks", "torque_driven", "torque_of"]
 
 Vector = NDArray[np.float64]
 
 
 class Driven(NamedTuple):
-    """Records and the controller that an estimation closes the loop over; None: their torque drives the model. Notes on that.
+    """Records as an estimation takes them under their controller; notes on that.
 
-    cascade: the whole controller where the log has no line for each of its samples.
+    doubts: notes on logged torques that do not follow from the controller. slower: whether the log has fewer lines than the
+    controller samples.
     """
 
     records: tuple[Record, ...]
-    controller: PI | None
-    notes: tuple[Text, ...]
-    cascade: Cascade | None = None
+    controller: Controller | None
+    notes: tuple[Text, ...] = ()
+    doubts: tuple[Text, ...] = ()
+    slower: bool = False
+
+    @property
+    def loop(self) -> PI | None:
+        """What an identification closes the loop over; None: the torque drives the model."""
+        return bare_pi(self.controller)
 
 
 def torque_driven(records: Sequence[Record], controller: Controller | None) -> Driven:
     """The records as they are under a bare PI or in the open loop; under any other controller as driven by their torque."""
-    cascade = None if controller is None else cascade_of(controller)
-    if cascade is None:
-        assert not isinstance(controller, Cascade)
-        return Driven(tuple(records), controller, ())
-    every = max(cascade.log_every(r.dt) for r in records)
+    if controller is None or controller.one_equation:
+        return Driven(tuple(records), controller)
+    every = max(controller.log_every(r.dt) for r in records)
     if every == 1:
-        notes = [say("The controller is not a bare PI: its {torque} drives the model, and no loop is simulated.")]
+        note = say("The controller is not a bare PI: its {torque} drives the model, and no loop is simulated.")
     else:
         text = (
             "The log has a line for every {}th sample of the controller. The linear model is identified from a {torque} that "
             "goes straight from line to line; what the controller answered to noise between them is lost."
         )
-        notes = [say(text, every)]
+        note = say(text, every)
+    doubts = []
     for rec in records:
-        if every > 1 or rec.torque is None or not _replayable(rec, cascade):
+        if rec.torque is None or not controller.replayable(rec):
             continue
-        off = float(np.sqrt(np.mean((rec.torque - made_by_cascade(rec, cascade))[: -_ahead(rec, cascade)] ** 2)))
+        known = len(rec) - controller.ahead(rec.dt)
+        off = float(np.sqrt(np.mean((rec.torque - controller.torque_of(rec))[:known] ** 2)))
         size = float(np.sqrt(np.mean(rec.torque**2)))
         if off > POLICY.negligible * size:
             text = (
                 "{}The logged {torque} does not follow from command and velocity through this controller: by {:.2g} {N m} rms, "
                 "of {:.2g} {N m} rms. Is this the controller, and are these the signals it saw?"
             )
-            notes.append(say(text, f"{rec.name}: " if len(records) > 1 and rec.name else "", off, size))
-    return Driven(tuple(driven_by_cascade(r, cascade) for r in records), None, tuple(notes), cascade if every > 1 else None)
+            doubts.append(say(text, f"{rec.name}: " if len(records) > 1 and rec.name else "", off, size))
+    return Driven(tuple(driven_by(r, controller) for r in records), controller, (note,), tuple(doubts), every > 1)
 
 
-def _ahead(rec: Record, cascade: Cascade) -> int:
-    """Samples at the end of a record whose feedforward takes the command from behind it."""
-    return 1 if cascade.position is None else 2 * cascade.position_every(rec.dt)
-
-
-def _replayable(rec: Record, cascade: Cascade) -> bool:
-    if cascade.position is None:
-        return rec.command is not None
-    return rec.position_command is not None and rec.position is not None
-
-
-def driven_by_cascade(rec: Record, cascade: Cascade) -> Record:
+def driven_by(rec: Record, controller: Controller) -> Record:
     """The record with the torque that drove the motor, held over each line of the log [N m], and no more than drives it.
 
     Where the log has a line for each of the controller's samples, that is the logged torque, or the one that the controller
@@ -87,13 +82,13 @@ def driven_by_cascade(rec: Record, cascade: Cascade) -> Record:
 
     A known delay of the controller is part of it: `late`. Raises RecordError where a torque is neither logged nor can be made.
     """
-    every = cascade.log_every(rec.dt)
-    torque = made_by_cascade(rec, cascade) if rec.torque is None else rec.torque
+    every = controller.log_every(rec.dt)
+    torque = made_by(rec, controller) if rec.torque is None else rec.torque
     before = torque[0] if starts_moving(rec.with_channels(torque=torque), None) else 0.0
     if every == 1:
-        return rec.with_channels(torque=late(torque, cascade.delay / rec.dt, before), command=None, position_command=None)
+        return rec.with_channels(torque=late(torque, controller.delay / rec.dt, before), command=None, position_command=None)
     mean = torque + np.append(np.diff(torque), 0.0) * ((every - 1) / (2 * every))
-    return rec.with_channels(torque=late(mean, cascade.delay / rec.dt, before))
+    return rec.with_channels(torque=late(mean, controller.delay / rec.dt, before))
 
 
 def late(torque: Vector, delay: float, before: float) -> Vector:
@@ -107,19 +102,18 @@ def late(torque: Vector, delay: float, before: float) -> Vector:
     return f * padded[: len(torque)] + (1.0 - f) * padded[1 : 1 + len(torque)] if delay > 0.0 else torque
 
 
-def made_by_cascade(rec: Record, cascade: Cascade) -> Vector:
+def made_by(rec: Record, controller: Controller) -> Vector:
     """The torque [N m] (n,) that the controller makes of command and measured signals; RecordError where it cannot be made."""
-    every = cascade.log_every(rec.dt)
+    every = controller.log_every(rec.dt)
     if every > 1:
         raise RecordError(
             f"the record has no torque, and a line for every {every}th sample of the controller only: what it made between "
             f"the lines of the velocity is lost; give {TORQUE}"
         )
-    source = rec.command if cascade.position is None else rec.position_command
-    if source is None or (cascade.position is not None and rec.position is None):
-        needed = "a command" if cascade.position is None else "a position_command and a position"
+    if not controller.replayable(rec):
+        needed = "a command" if controller.driven_by == "command" else "a position_command and a position"
         raise RecordError(f"the record has no torque and nothing to make it from: give {TORQUE}, or {needed}")
-    return core.servo_torque(rec.dt, source, rec.velocity, rec.position, cascade)
+    return controller.torque_of(rec)
 
 
 def torque_of(rec: Record, controller: PI | None) -> Vector:

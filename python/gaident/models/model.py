@@ -15,8 +15,8 @@ from gaident import _core
 from gaident.arguments import CONTINUOUS_LOOP
 from gaident.checks import known_keys, real_number
 from gaident.control import core
-from gaident.control.cascade import Controller
-from gaident.control.pi import PI
+from gaident.control.controller import Controller
+from gaident.control.pi import PI, checked_pi
 from gaident.errors import ModelError
 from gaident.models.discrete import Discrete
 from gaident.models.effects import Effect, ordered
@@ -233,17 +233,17 @@ class Model:
 
         Raises
         ------
-        ModelError
-            For dt <= 0, p = 0 in a sampled loop, and a model with effects.
+        ModelError, SettingsError
+            For dt <= 0, p = 0 in a sampled loop, a model with effects, and a controller that is no bare PI.
         """
         self._require_linear("discrete")
         sample_time = real_number(dt, "dt", ModelError, "give the sample time in s, > 0")
         if sample_time <= 0.0:
             raise ModelError(f"dt is {sample_time:g}: give the sample time in s, > 0")
+        controller = checked_pi(controller, "equation (7) is")
         require_strictly_proper(self.p, controller)
         poles, zeros = (np.array(roots, dtype=np.complex128) for roots in (self.poles, self.zeros))
-        alpha, beta = core.discrete(self.gain, poles, zeros, sample_time, controller)
-        return Discrete(alpha, beta)
+        return Discrete(*core.discrete(self.gain, poles, zeros, sample_time, controller))
 
     def to_scipy(self, dt: float | None = None, *, pade: int | None = None) -> Any:
         """Return the same as a linear system of scipy.signal, torque [N m] to velocity [rad/s].

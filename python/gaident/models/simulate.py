@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident.checks import one_of
 from gaident.control import core
-from gaident.control.cascade import Controller
-from gaident.control.pi import PI
+from gaident.control.controller import Controller, checked_controller
 from gaident.data.record import Record
 from gaident.errors import ModelError
 from gaident.models.model import Model
@@ -189,6 +188,7 @@ def initial_state(model: AnyModel, rec: Record, controller: Controller | None = 
     [20.0]
     """
     plant = as_model(model).linear
+    checked_controller(controller)
     if controller is not None and controller.limited:
         raise ModelError(
             "the controller has a torque_limit or integrator_limit: with limits the response is "
@@ -196,7 +196,7 @@ def initial_state(model: AnyModel, rec: Record, controller: Controller | None = 
             "start at rest"
         )
     source, _ = input_of(plant, rec, controller)
-    if not core.one_equation(controller):
+    if controller is not None and not controller.one_equation:
         raise ModelError(
             f"controller is {controller!r}: the start of a loop is found under a bare PI only; use controller=None where the "
             "torque is logged, or start at rest"
@@ -232,7 +232,7 @@ def _simulated(
     steps = checked_substeps(substeps)
     if arithmetic not in ("double", "float") and not plant.effects:
         _check_drive(controller, state, arithmetic)
-    if not plant.effects and core.one_equation(controller):
+    if not plant.effects and (controller is None or controller.one_equation):
         return *_core_simulate(plant, rec.dt, source, controller, start, arithmetic), None
     if arithmetic != "double":
         raise ModelError(
@@ -254,7 +254,7 @@ def _check_drive(controller: Controller | None, state: ArrayLike | None, arithme
 
 
 def _core_simulate(
-    plant: Model, dt: float, source: Signal, controller: PI | None, start: Signal, arithmetic: str
+    plant: Model, dt: float, source: Signal, controller: Controller | None, start: Signal, arithmetic: str
 ) -> tuple[Signal, Signal]:
     return core.simulate(plant.gain, _roots(plant.poles), _roots(plant.zeros), dt, source, controller, start, arithmetic)
 

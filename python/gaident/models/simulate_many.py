@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gaident import _core
-from gaident.control.cascade import Controller
+from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import GaidentError, ModelError
 from gaident.models.effects import table as effect_table

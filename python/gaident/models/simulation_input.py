@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from gaident import _core
 from gaident.arguments import A_CONTROLLER, COMMAND, NO_CONTROLLER, TORQUE
 from gaident.control import core
-from gaident.control.cascade import Cascade, Controller
+from gaident.control.controller import Controller, checked_controller
 from gaident.data.record import Record
 from gaident.errors import ModelError, RecordError
 from gaident.models.mechanics import OneMass, TwoMass
@@ -35,8 +35,9 @@ def input_of(plant: Model, rec: Record, controller: Controller | None) -> tuple[
 def input_for(p: int, rec: Record, controller: Controller | None) -> tuple[Signal, str]:
     if not isinstance(rec, Record):
         raise RecordError(f"rec is {type(rec).__name__}: give a gaident.Record")
+    checked_controller(controller)
     require_strictly_proper(p, controller)
-    if isinstance(controller, Cascade) and controller.position is not None:
+    if controller is not None and controller.driven_by == "position_command":
         if rec.position_command is None:
             raise RecordError(
                 "the record has no position_command, which drives the loop with a position controller: give position_command=, "

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, say
-from gaident.control.cascade import Controller
+from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.policy.table import POLICY
 

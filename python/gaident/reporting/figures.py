@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from gaident.axis import checked_axis, said
-from gaident.control.pi import PI
+from gaident.control.controller import Controller
+from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.errors import GaidentError
@@ -55,8 +56,8 @@ def _title(dia: Diagnosis, rec: Record, records: Sequence[Record]) -> str:
     return f"{of}{dia.verdict}{f' - {found}' if found else ''}"
 
 
-def plot_bode(model: Model, controller: PI | None, records: Sequence[Record], hz: bool, axis: str) -> Figure:
+def plot_bode(model: Model, controller: Controller | None, records: Sequence[Record], hz: bool, axis: str) -> Figure:
     """A model against the frequency response of the longest record, or alone; see `Identification.plot_bode`."""
     if not records:
         return plots.plot_bode(model, axis=axis, hz=hz)
-    return response_plots.plot_response(response_of(max(records, key=len), model, controller), hz, axis)
+    return response_plots.plot_response(response_of(max(records, key=len), model, bare_pi(controller)), hz, axis)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import checked_axis, message_of
-from gaident.control.cascade import Cascade
+from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.explain.evidence import velocity_curve
 from gaident.errors import GaidentError
@@ -111,8 +111,7 @@ def view_of(result: Diagnosis | Identification, records: Records, validation: Re
                 curve = (*curve[:2], f"{curve[2]} (not told apart from others)")
         try:
             used = result.as_used(longest) if isinstance(result, Diagnosis) else longest
-            loop = result.controller
-            response = response_of(used, result.model, None if isinstance(loop, Cascade) else loop)
+            response = response_of(used, result.model, bare_pi(result.controller))
         except GaidentError as error:
             missing = message_of(error)
     own = result.axis if isinstance(result, Diagnosis) else "rotary"

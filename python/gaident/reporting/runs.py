@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import message_of, say
-from gaident.control.cascade import Cascade
-from gaident.control.pi import PI
+from gaident.control.controller import Controller
+from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.experiments.excitation import position_of
 from gaident.diagnosis.explain.missing_torque import missing_torque
-from gaident.diagnosis.gains import IN_SAMPLE, free_run_errors, held_from
+from gaident.diagnosis.gains import IN_SAMPLE, closed_over, free_run_errors, held_from
 from gaident.diagnosis.records.hygiene import cleaned, outliers
 from gaident.errors import GaidentError
 from gaident.models.drive_torque import torque_of
@@ -32,8 +32,7 @@ Vector = NDArray[np.float64]
 
 def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
     """One record and what the models make of it."""
-    controller = result.controller
-    loop = None if isinstance(controller, Cascade) else controller
+    loop = bare_pi(result.controller)
     linear: Model = result.model.linear if isinstance(result, Diagnosis) else result.model
     digest = rec.digest
     used = "fitted" if digest in result.digests else "new"
@@ -45,13 +44,14 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
             used, first_held = "held out", 0
         elif used == "fitted" and not result.validation_digests and result.held_out != IN_SAMPLE:
             first_held = held_from(rec)
-        before = _free_run(result.identification.model, rec, loop, "linear", notes)
+        closed = closed_over(result.controller, (rec,))
+        before = _free_run(result.identification.model, rec, closed, "linear", notes)
         if result.model.effects:
-            extended = _free_run(result.model, rec, loop, "extended", notes)
+            extended = _free_run(result.model, rec, closed, "extended", notes)
     else:
         before = _finite(result.simulate(rec), rec, "linear", notes)
-    simulated = rec.torque is None and isinstance(controller, Cascade)
-    torque = run(linear, rec, controller).torque if simulated else torque_of(rec, loop)
+    simulated = rec.torque is None and result.controller is not None and loop is None
+    torque = run(linear, rec, result.controller).torque if simulated else torque_of(rec, loop)
     dhat, std = None, 0.0
     try:
         hit = outliers(rec.velocity, rec.velocity - before if np.all(np.isfinite(before)) else None)
@@ -78,7 +78,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
     )
 
 
-def _free_run(model: Model, rec: Record, controller: PI | None, what: str, notes: list[str]) -> Vector:
+def _free_run(model: Model, rec: Record, controller: Controller | None, what: str, notes: list[str]) -> Vector:
     (error,) = free_run_errors(model, [(rec, 0)], controller)
     return _finite(rec.velocity - error, rec, what, notes)
 

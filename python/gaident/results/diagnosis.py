@@ -7,9 +7,12 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from gaident.axis import linear_sentences, restored
-from gaident.control.pi import PI
+from gaident.control.cascade import controller_of
+from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import check_schema
+from gaident.models.drive_torque import driven_by
+from gaident.models.effects import table
 from gaident.models.model import Model
 from gaident.providers import provided
 from gaident.results.estimate import Estimate
@@ -64,8 +67,8 @@ class Diagnosis(SavedResult):
         What to keep in mind, in plain sentences.
     identification : Identification
         The linear model that the diagnosis began with.
-    controller : PI or None
-        The controller as it was used: with the gains that the logged torque shows.
+    controller : PI, Cascade or None
+        The controller as it was used: with the gains, or of the form, that the logged torque shows.
     seed : int
         The seed.
     seconds : float
@@ -132,7 +135,7 @@ class Diagnosis(SavedResult):
     left: Mapping[str, float] = field(hash=False)
     notes: tuple[str, ...]
     identification: Identification
-    controller: PI | None
+    controller: Controller | None
     seed: int
     seconds: float = field(compare=False)
     simulations: int
@@ -167,7 +170,11 @@ class Diagnosis(SavedResult):
         return tuple(f for f in self.findings if not f.is_noise)
 
     def as_used(self, rec: Record) -> Record:
-        """Return a record as the diagnosis used it: without the shifts of its log, see `log_shifts`.
+        """Return a record as the diagnosis used it.
+
+        That is without the shifts of its log, see `log_shifts`.
+        Under a controller that is no bare PI its torque is then the one that drove the motor over each line, see
+        docs/controllers.md.
 
         Parameters
         ----------
@@ -177,9 +184,15 @@ class Diagnosis(SavedResult):
         Returns
         -------
         Record
-            The same, or one with its channels moved.
+            The same, or one with its channels moved and its torque changed.
+
+        Raises
+        ------
+        RecordError
+            Where no torque is logged and this controller makes none of what is.
         """
-        return rec.shifted(**moves) if (moves := self.log_shifts.get(rec.digest)) else rec
+        rec = rec.shifted(**moves) if (moves := self.log_shifts.get(rec.digest)) else rec
+        return rec if self.controller is None or self.controller.one_equation else driven_by(rec, self.controller)
 
     def summary(self, axis: str | None = None) -> str:
         """Return the result as text, in the units of its axis; axis="linear" for m and N, "rotary" for rad and N m."""
@@ -327,6 +340,7 @@ class Diagnosis(SavedResult):
                             "parameters": {n: Estimate(**e) for n, e in f["parameters"].items()},
                             "alternatives": tuple(f["alternatives"]),
                             "evidence": restored(f["evidence"], linear),
+                            "place": f.get("place") or _place_of(f["effect"]),
                         }
                     )
                     for f in data["findings"]
@@ -343,7 +357,7 @@ class Diagnosis(SavedResult):
                 left=data["left"],
                 notes=tuple(restored(note, linear) for note in data["notes"]),
                 identification=Identification.from_dict(data["identification"]),
-                controller=None if data["controller"] is None else PI.from_dict(data["controller"]),
+                controller=None if data["controller"] is None else controller_of(data["controller"]),
                 seed=data["seed"],
                 seconds=data["seconds"],
                 simulations=data["simulations"],
@@ -370,3 +384,8 @@ class Diagnosis(SavedResult):
                 left_needed=data.get("left_needed", 0.0),
                 axis=data.get("axis", "rotary"),
             )
+
+
+def _place_of(effect: str) -> str:
+    """The place of a finding in a file of gaident 0.1.0, which lacks it: what is no effect is a form of the controller."""
+    return next((row.place for row in table() if row.name == effect), "controller")

@@ -32,6 +32,9 @@ class Finding:
         What speaks for it, one sentence.
     is_noise : bool
         Whether it describes the record rather than the drive.
+    place : {"controller", "actuator", "shaft", "coupling", "plant", "sensor", "record"}
+        Where it is: the effect's place in `gaident.effects.table()`.
+        It is "controller" for all that the logged torque shows to differ from the given controller.
 
     Examples
     --------
@@ -50,6 +53,7 @@ class Finding:
     p_value: float | None = None
     evidence: str = ""
     is_noise: bool = False
+    place: str = ""
 
     @property
     def named(self) -> bool:

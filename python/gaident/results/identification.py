@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import linear_sentences, restored
-from gaident.control.cascade import Cascade, Controller, controller_from_dict
+from gaident.control.cascade import controller_of
+from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import GaidentError, check_schema
 from gaident.models.mechanics import Mechanics, mechanics_from_dict
@@ -148,7 +149,7 @@ class Identification(SavedResult):
         state: Sequence[float] | NDArray[np.float64] | None = self.initial_states.get(rec.digest)
         unseen = rec.digest not in self.digests and self.settings.initial_state != "rest"
         if state is None and unseen and starts_moving(rec, self.controller):
-            if isinstance(self.controller, Cascade):
+            if self.controller is not None and not self.controller.one_equation:
                 raise GaidentError(
                     "rec starts in motion, and the initial state of a cascade cannot be estimated; use a record from rest"
                 )
@@ -290,7 +291,7 @@ class Identification(SavedResult):
         with undamaged(cls.KIND):
             return cls(
                 model=Model.from_dict(data["model"]),
-                controller=None if data["controller"] is None else controller_from_dict(data["controller"]),
+                controller=None if data["controller"] is None else controller_of(data["controller"]),
                 parameters={name: Estimate(**e) for name, e in data["parameters"].items()},
                 mechanics=None if data["mechanics"] is None else mechanics_from_dict(data["mechanics"]),
                 fitness=data["fitness"],

@@ -133,7 +133,8 @@ def _causes(dia: Diagnosis, axis: str) -> list[str]:
     for f in dia.findings:
         if f.is_noise:
             continue
-        lines.append(words(f.effect) + "".join(f", or {words(a)}" for a in f.alternatives))
+        place = ", in the controller" if f.place == "controller" else ""
+        lines.append(words(f.effect) + place + "".join(f", or {words(a)}" for a in f.alternatives))
         lines += table([parameter_row(n, e, axis) for n, e in f.parameters.items()], "    ")
         lines += _wrapped(said(f.evidence, axis), "    ")
         if f.p_value is not None:
@@ -218,7 +219,7 @@ def fall_words(dia: Diagnosis) -> str:
     if fall < 1.0:
         if dia.before.rmse < 1.2 * dia.before.noise_floor:
             hidden = Text(": it is at the noise with and without")
-        elif dia.controller is None:
+        elif dia.controller is None or not dia.controller.one_equation:
             hidden = Text("")
         elif dia.torque_logged:
             hidden = say(": the loop's integrator hides this effect in the velocity, the {torque} shows it")

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Mapping
 
 from gaident.axis import identifier_words, said, unit, velocity_unit, word
-from gaident.control.cascade import Cascade, Controller
+from gaident.control.controller import Controller
 from gaident.models.mechanics import Mechanics, TwoMass
 from gaident.results.estimate import Estimate
 from gaident.results.identification import Identification
@@ -79,16 +79,16 @@ def _loop(controller: Controller | None, axis: str) -> str:
     torque = unit("N m", axis)
     if controller is None:
         return f"open loop, {word('torque', axis)} [{torque}] to velocity [{velocity_unit(axis)}]"
-    pi = controller.velocity if isinstance(controller, Cascade) else controller
+    gains = controller.gains
     parts = [
-        f"{pi.loop} loop, PI with kp {number(pi.kp)} {unit('N m s/rad', axis)}",
-        f"ki {number(pi.ki)} {unit('N m/rad', axis)}",
+        f"{controller.loop} loop, PI with kp {number(gains.kp)} {unit('N m s/rad', axis)}",
+        f"ki {number(gains.ki)} {unit('N m/rad', axis)}",
     ]
-    if isinstance(controller, Cascade) and controller.period is not None:
-        parts.append(f"in a cascade every {number(1e6 * controller.period)} us")
-    for name in ("torque_limit", "integrator_limit"):
-        limit = getattr(pi, name)
-        if limit is not None:
+    period = controller.to_dict().get("period")
+    if period is not None:
+        parts.append(f"in a cascade every {number(1e6 * period)} us")
+    for name, limit in zip(("torque_limit", "integrator_limit"), controller.limits, strict=True):
+        if math.isfinite(limit):
             parts.append(f"{identifier_words(name, axis)} {number(limit)} {torque}")
     return ", ".join(parts)
 

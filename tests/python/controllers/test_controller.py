@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
+import gaident as ga
 from gaident import _core
+from gaident.control.cascade import controller_of
 from gaident.control.pi import PI
 from gaident.errors import ControllerError
 
@@ -97,3 +101,46 @@ def test_the_core_clamps_a_sum_and_limits_a_rate_as_one_sample_after_the_other()
     np.testing.assert_array_equal(_core.clamped_sum(given, 1.5, 0.3), sums)
     np.testing.assert_array_equal(_core.rate_limited(given, 0.2, -1.0), followed)
     np.testing.assert_array_equal(given, steps)
+
+
+REC = ga.Record(1e-3, command=np.repeat([0.0, 5.0, -5.0], 40), velocity=np.arange(120.0), torque=np.repeat([0.1, -0.1, 0.0], 40))
+DRIVE = ga.OneMass(J=1e-3, D=0.01)
+TAKE_ANY: dict[str, Callable[[Any], object]] = {
+    "simulate": lambda c: ga.simulate(DRIVE, REC, c),
+    "run": lambda c: ga.run(DRIVE, REC, c),
+    "simulate_many": lambda c: ga.simulate_many([DRIVE], REC, c),
+    "initial_state": lambda c: ga.initial_state(DRIVE, REC, c),
+    "identify": lambda c: ga.identify(REC, c),
+    "diagnose": lambda c: ga.diagnose(REC, c),
+}
+TAKE_A_BARE_PI: dict[str, Callable[[Any], object]] = {
+    "discrete": lambda c: DRIVE.model().discrete(1e-3, c),
+    "to_c": lambda c: DRIVE.model().to_c("drive.c", 1e-3, c),
+    "least_squares": lambda c: ga.least_squares(REC, 2, c),
+}
+
+
+@pytest.mark.parametrize("name", [*TAKE_ANY, *TAKE_A_BARE_PI])
+def test_every_function_says_what_a_controller_is(name: str) -> None:
+    with pytest.raises(ga.errors.SettingsError, match=r"controller is 0\.5: give a gaident.PI or a Cascade, or None"):
+        {**TAKE_ANY, **TAKE_A_BARE_PI}[name](0.5)
+
+
+@pytest.mark.parametrize("controller", [ga.Cascade(ga.PI(0.1, 1.0)), ga.PI(0.1, 1.0, rule="backward")])
+@pytest.mark.parametrize("name", TAKE_A_BARE_PI)
+def test_what_holds_for_a_bare_pi_refuses_others(name: str, controller: ga.PI | ga.Cascade) -> None:
+    with pytest.raises(ga.errors.SettingsError, match="of a bare PI only"):
+        TAKE_A_BARE_PI[name](controller)
+
+
+def test_controllers_answer_for_themselves() -> None:
+    bare, other = ga.PI(0.1, 1.0, integrator_limit=0.2), ga.PI(0.1, 1.0, rule="backward")
+    cascade = ga.Cascade(other, period=1e-3, position=ga.P(20.0))
+    assert [c.one_equation for c in (bare, other, cascade)] == [True, False, False]
+    assert [c.driven_by for c in (bare, other, cascade)] == ["command", "command", "position_command"]
+    assert [c.simulated_with(1e-3) for c in (bare, other, cascade)] == [bare, None, None]
+    assert cascade.simulated_with(4e-3) is cascade
+    assert bare.limited and bare.limits == (np.inf, 0.2) and not cascade.limited
+    assert cascade.with_limits(None, 0.3).velocity.integrator_limit == 0.3
+    assert np.array_equal(other.torque_of(REC), ga.Cascade(other).torque_of(REC))
+    assert [controller_of(c.to_dict()) for c in (bare, other, cascade)] == [bare, other, cascade]

@@ -142,6 +142,8 @@ def test_a_diagnosis_names_the_controller_and_no_mechanics() -> None:
     rec = ga.Record(T, command=r, velocity=w + noise, torque=u)
     dia = ga.diagnose(rec, GIVEN)
     assert {f.effect for f in dia.causes} == {"command_weight", "torque_filter"}
-    assert dia.verdict == "explained" and dia.controller is None
+    assert {f.place for f in dia.causes} == {"controller"}
+    assert dia.verdict == "explained" and isinstance(dia.controller, ga.Cascade)  # as it was used
+    assert dia.controller.velocity.command_weight == 0.0 and len(dia.controller.torque_filters) == 1
     assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.01)
     assert "The controller is not the given PI" in dia.summary()

@@ -13,7 +13,7 @@ import pytest
 
 import gaident as ga
 from effect_sizes import SIZES
-from gaident.errors import ModelError
+from gaident.errors import ModelError, SettingsError
 
 DT = 1e-3
 N = 300
@@ -122,5 +122,5 @@ def test_what_c_refuses() -> None:
         ONE.to_c(None, DT, name="2x")
     with pytest.raises(ModelError, match="substeps is 0"):
         ONE.to_c(None, DT, substeps=0)
-    with pytest.raises(ModelError, match="controller is a str"):
+    with pytest.raises(SettingsError, match="controller is '"):
         ONE.to_c(None, DT, "PI")  # type: ignore[arg-type]

@@ -37,7 +37,8 @@ def members(kind: type) -> Iterator[tuple[str, bool]]:
     """The public methods and properties that a class defines, each with whether a summary will do."""
     for name, member in vars(kind).items():
         function = getattr(member, "__func__", member)
-        if not name.startswith("_") and (inspect.isfunction(function) or isinstance(member, property)):
+        elsewhere = (member.__doc__ or "").startswith("See `")  # it is what the class named there says of it
+        if not name.startswith("_") and not elsewhere and (inspect.isfunction(function) or isinstance(member, property)):
             yield name, not inspect.isfunction(function) or len(inspect.signature(function).parameters) <= 2
 
 

@@ -67,12 +67,14 @@ def simulate(axis: Axis, source: np.ndarray, T: float, every: int = 1, **c: Any)
     """(velocity, torque, position) at every `every`-th controller sample; source: command at the controller's samples.
 
     c: kp, ki, rule, weight, windup, tracking, torque_limit, integrator_limit, position_gain, position_every, kff, aff, fff,
-    filters as lists of Filter (torque_filters, velocity_filters, command_filters), delay in tenths of T: a line of past torques,
-    one each fine step, from whose end the motor takes its own.
+    rate_limit [rad/s^2] of the velocity command behind its filters, filters as lists of Filter (torque_filters,
+    velocity_filters, command_filters), delay in tenths of T: a line of past torques, one each fine step, from whose end the motor
+    takes its own.
     """
     A, B = axis.state_space()
     F, G, *_ = signal.cont2discrete((A, B, np.eye(len(A)), np.zeros((len(A), 1))), T / FINE, "zoh")
     x = np.zeros(len(A))
+    followed = 0.0
     I = last = r = ff = fu = 0.0
     limit, clamp = c.get("torque_limit", np.inf), c.get("integrator_limit", np.inf)
     every_q, N = c.get("position_every", 1), len(source)
@@ -98,6 +100,8 @@ def simulate(axis: Axis, source: np.ndarray, T: float, every: int = 1, **c: Any)
         ff = r
         for f in c.get("command_filters", ()):
             ff = f(ff)
+        farthest = c.get("rate_limit", np.inf) * T
+        ff = followed = min(max(ff, followed - farthest), followed + farthest)
         for f in c.get("velocity_filters", ()):
             w = f(w)
         e = ff - w

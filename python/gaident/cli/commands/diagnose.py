@@ -102,7 +102,7 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
         idn = loaded
     if idn is None:
         driven = torque_driven(records, controller)
-        derive_space(driven.records, driven.controller)  # wrong signs and units are found before anything is searched for
+        derive_space(driven.records, driven.loop)  # wrong signs and units are found before anything is searched for
     with Progress(None if args.quiet else sys.stderr) as progress:
         dia = diagnose(
             records,

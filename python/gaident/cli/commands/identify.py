@@ -11,8 +11,8 @@ from gaident.axis import say
 from gaident.cli.drive import drive_of, read_all, reading_notes
 from gaident.cli.output import print_json, summary_of
 from gaident.cli.result_files import ResultFiles
-from gaident.control.cascade import Controller
-from gaident.control.pi import PI
+from gaident.control.controller import Controller
+from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.controller.replay import Replay, replay
 from gaident.identification.identify import identify
@@ -59,16 +59,17 @@ def identify_command(args: argparse.Namespace) -> None:
 
 def _replayed(records: Sequence[Record], controller: Controller | None) -> list[tuple[str, Replay]]:
     """(name, what its replay says) of the records, long ones by their start, whose torque does not follow from the loop."""
-    if not isinstance(controller, PI) or not controller.bare:  # of any other, identify says itself whether the torque follows
+    loop = bare_pi(controller)
+    if loop is None:  # of any other, identify says itself whether the torque follows
         return []
-    said = [(rec.name, replay(rec[:_REPLAYED], controller)) for rec in records if rec.torque is not None]
+    said = [(rec.name, replay(rec[:_REPLAYED], loop)) for rec in records if rec.torque is not None]
     return [(name, r) for name, r in said if r.follows is False]
 
 
 def _instead(said: Replay, given: Controller | None) -> str:
     """The options of the controller that the log shows, where a PI with a trapezoidal integral has what differs."""
-    found = said.controller
-    if found is None or not isinstance(given, PI) or said.cause == "scale":  # a wrong unit is not to be mended by gains
+    found, loop = said.controller, bare_pi(given)
+    if found is None or loop is None or said.cause == "scale":  # a wrong unit is not to be mended by gains
         return ""
-    options = (("kp", found.kp, given.kp), ("ki", found.ki, given.ki), ("torque-limit", found.torque_limit, given.torque_limit))
+    options = (("kp", found.kp, loop.kp), ("ki", found.ki, loop.ki), ("torque-limit", found.torque_limit, loop.torque_limit))
     return f" Give {' '.join(f'--{name} {value:.6g}' for name, value, old in options if value is not None and value != old)}."

@@ -13,7 +13,8 @@ import numpy as np
 from gaident.axis import velocity_unit
 from gaident.cli.drive import drive_of, read_all
 from gaident.cli.output import csv_targets, csv_text, print_json, write
-from gaident.control.cascade import Cascade, Controller
+from gaident.control.controller import Controller
+from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.errors import GaidentError, SettingsError
 from gaident.models.mechanics import mechanics_from_dict
@@ -41,7 +42,7 @@ def simulate_command(args: argparse.Namespace) -> None:
     for rec in records:
         state: Any = states.get(rec.digest) if args.initial_state == "auto" else None
         limited = controller is not None and controller.limited
-        moving = bool(np.any(rec.velocity)) and starts_moving(rec, None if isinstance(controller, Cascade) else controller)
+        moving = bool(np.any(rec.velocity)) and starts_moving(rec, bare_pi(controller))
         if state is None and args.initial_state == "auto" and not limited and moving:
             state = initial_state(model, rec, controller)
         results.append(run(model, rec, controller, state))

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, say, unit_text
+from gaident.control.controller import Controller
 from gaident.control.pi import PI
 from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
 from gaident.data.record import Record
@@ -21,7 +21,7 @@ from gaident.diagnosis.controller.replay import Replay, replay
 from gaident.diagnosis.controller.replay_causes import white_noise
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.diagnosis.library.terms import in_controller
-from gaident.estimation.dataset import DataSet
+from gaident.estimation.dataset import DataSet, torque_in
 from gaident.estimation.term import Scales, Term
 from gaident.models.effects import table
 from gaident.policy.table import POLICY
@@ -52,7 +52,7 @@ class AtController:
 
     decided: tuple[str, ...] = ()
     effects: dict[str, dict[str, float]] = field(default_factory=dict)
-    controller: PI | None = None
+    controller: Controller | None = None
     follows: bool = True
 
 
@@ -100,9 +100,9 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
     return AsLogged(replace(controller, kp=kp, ki=ki), (off[0].sentence, used))
 
 
-def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: PI | None) -> tuple[Record, ...]:
+def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: Controller | None) -> tuple[Record, ...]:
     """The records as the controller read them: cleaned of outliers only where the logged torque follows better from that."""
-    if controller is None or any(r.torque is None or r.command is None for r in recorded):
+    if controller is None or any(r.torque is None or not controller.replayable(r) for r in recorded):
         return tuple(cleaned)
     pairs = [
         (r, c) if r is c else min((r, c), (c, r), key=lambda pair: _replay_error(pair[0], controller))
@@ -111,10 +111,10 @@ def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: P
     return tuple(best for best, _ in pairs)
 
 
-def _replay_error(rec: Record, controller: PI) -> float:
+def _replay_error(rec: Record, controller: Controller) -> float:
     """Mean square of logged minus replayed torque [(N m)^2]."""
-    assert rec.command is not None and rec.torque is not None
-    return float(np.mean((rec.torque - pi_torque(rec.command, rec.velocity, rec.dt, controller)) ** 2))
+    assert rec.torque is not None
+    return float(np.mean((rec.torque - controller.torque_of(rec)) ** 2))
 
 
 def controller_findings(
@@ -125,7 +125,7 @@ def controller_findings(
     known: digest of a record -> its replay with the controller of `data`; records that are not in it are replayed.
     """
     controller = data.controller
-    if controller is None or not data.torque_logged or data.command is None:
+    if controller is None or not data.torque_logged or not all(controller.replayable(r) for r in data.read):
         return [], AtController(), []
     replays = [known.get(r.digest) or replay(r, controller) for r in data.read]
     off = [r for r in replays if not r.follows]
@@ -135,16 +135,19 @@ def controller_findings(
     texts = (say("{}: {}", name, r.sentence) if len(said) > 1 else r.sentence for name, r in said if not r.follows)
     notes = list(dict.fromkeys(texts))
     plain = data.replayed_error({})
+    logged = np.concatenate([torque_in(r) for r in data.read])
     floor = len(plain) * max(max(r.resolution for r in replays), ROUNDING * scales.torque) ** 2
-    shown = _limits_shown(off, controller)
+    shown = None if data.pi is None else _limits_shown(off, data.pi)
     if shown is not None:
         return _limit_findings(data, shown, off, plain, floor, notes)
+    steps = (float(np.abs(np.diff(controller.asked(r), prepend=0.0)).max()) / r.dt for r in data.read)
+    scales = replace(scales, acceleration=max(steps) or float("inf"))
     best = min(((*_fitted(data, scales, term), term) for term in in_controller()), key=lambda found: found[1])
     value, cost, term = best
     effect = term.name
     n, before = len(plain), float(plain @ plain)
     left = data.replayed_error({term: np.array([value])})
-    if cost < POLICY.replay_left * before or cost < POLICY.replay_rms**2 * floor or white_noise(left, data.torque):
+    if cost < POLICY.replay_left * before or cost < POLICY.replay_rms**2 * floor or white_noise(left, logged):
         parameter = next(r for r in table() if r.name == effect).parameters[0]
         name, unit = parameter.name, parameter.unit
         text = say(
@@ -159,12 +162,13 @@ def controller_findings(
         )
         finding = _finding(effect, name, Estimate(value, _std(data, term, value, cost), unit), before, cost, floor, n, text)
         at = AtController(_decided(), {effect: {name: value}})
-        setting = next((s for s in SHOWN if OF_SETTING[s] == effect), None)
-        if setting is not None:
-            limit: dict[str, Any] = {setting: value}
-            at.controller = replace(controller, **limit)
+        limits = controller.limits
+        if effect == OF_SETTING["integrator_limit"]:
+            at.controller = controller.with_limits(limits[0], value)
+        elif effect == OF_SETTING["torque_limit"]:
+            at.controller = controller.with_limits(value, limits[1])
         return [finding], at, []
-    return [], AtController(_decided(), follows=False), notes
+    return [], AtController(_decided(), follows=data.loop is None), notes  # where no loop is simulated, none is wrong
 
 
 def _decided() -> tuple[str, ...]:
@@ -189,7 +193,7 @@ def _limit_findings(
     data: DataSet, shown: PI, off: Sequence[Replay], plain: Vector, floor: float, notes: list[Text]
 ) -> tuple[list[Finding], AtController, list[Text]]:
     """What the limits that the log shows are findings of; the note that the replay wrote is their evidence."""
-    given = data.controller
+    given = data.pi
     assert given is not None
     n, before, after = len(plain), float(plain @ plain), _left_with(data, shown)
     held = any(r.cause == "anti_windup" for r in off)
@@ -231,7 +235,8 @@ def _finding(
     effect: str, name: str, estimate: Estimate, before: float, after: float, floor: float, n: int, text: Text
 ) -> Finding:
     gain = float(n * np.log(before / max(after, floor, 1e-300)) - np.log(n))
-    return Finding(effect, {name: estimate}, (), 1.0 - float(np.sqrt(min(after / before, 1.0))), gain, None, text)
+    fall = 1.0 - float(np.sqrt(min(after / before, 1.0)))
+    return Finding(effect, {name: estimate}, (), fall, gain, None, text, place="controller")
 
 
 def _fitted(data: DataSet, scales: Scales, term: Term) -> tuple[float, float]:

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaident.axis import Text, joined, say, unit_text
-from gaident.control.cascade import Cascade, Controller
+from gaident.control.cascade import Cascade
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.replay import replay
-from gaident.models.drive_torque import driven_by_cascade
+from gaident.models.drive_torque import driven_by
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
@@ -46,9 +46,9 @@ class Driver:
     notes: tuple[Text, ...]
 
 
-def driver_of(records: Sequence[Record], held: Sequence[Record], given: Controller | None) -> Driver | None:
+def driver_of(records: Sequence[Record], held: Sequence[Record], given: PI | None) -> Driver | None:
     """The controller that the logged torques show where a PI does not make them and nothing simple explains that; else None."""
-    if not isinstance(given, PI) or given.loop != "sampled" or any(r.torque is None or r.command is None for r in records):
+    if given is None or given.loop != "sampled" or any(r.torque is None or r.command is None for r in records):
         return None
     replays = [replay(r, given) for r in records]
     if all(r.follows for r in replays) or any(r.cause not in ("", "initial_integral") for r in replays):
@@ -56,13 +56,13 @@ def driver_of(records: Sequence[Record], held: Sequence[Record], given: Controll
     shown = form_shown(records, given)
     if shown is None:
         return None
-    driven, held = (tuple(driven_by_cascade(r, shown.controller) for r in part) for part in (records, held))
+    driven, held = (tuple(driven_by(r, shown.controller) for r in part) for part in (records, held))
     return Driver(driven, held, shown.controller, _findings(shown), _notes(shown, records))
 
 
 def _findings(shown: Shown) -> tuple[Finding, ...]:
     return tuple(
-        Finding(name, _estimates(numbers), (), 0.0, shown.gains[name], None, _evidence(shown, name))
+        Finding(name, _estimates(numbers), (), 0.0, shown.gains[name], None, _evidence(shown, name), place="controller")
         for name, numbers in shown.numbers.items()
     )
 

@@ -6,7 +6,7 @@ feedforwards, filters. All forms are compared by one criterion, with n samples, 
     n ln(max(rss/n, floor^2)) + k ln n + 2 m ln 3
 
 floor: the root mean square of what the log's rounding makes of a replay, below which nothing is seen.
-The least counts, and only if the torque follows from it: `gaident.models.drive_torque.made_by_cascade` runs the controller on all
+The least counts, and only if the torque follows from it: `gaident.models.drive_torque.made_by` runs the controller on all
 measured signals.
 """
 
@@ -26,7 +26,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.form_regression import FILTER_SETS, Law, Shape, at_places, bounds_of, fitted_shape, law_of
 from gaident.diagnosis.controller.replay import rounding_of, tolerance_of
 from gaident.diagnosis.controller.replay_causes import white_noise
-from gaident.models.drive_torque import made_by_cascade
+from gaident.models.drive_torque import made_by
 from gaident.policy.table import POLICY
 
 __all__ = ["Form", "Shown", "form_shown"]
@@ -227,11 +227,11 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
     off = []
     for rec, start in zip(records, starts, strict=True):
         assert rec.torque is not None
-        left = rec.torque - made_by_cascade(rec.with_channels(torque=None), controller) - start
+        left = rec.torque - made_by(rec.with_channels(torque=None), controller) - start
         if float(np.abs(left).max()) > _allowed(rec, controller.velocity) and not white_noise(left, rec.torque):
             return None
         off.append(left)
-    before = [r.torque - made_by_cascade(r.with_channels(torque=None), Cascade(given)) for r in records if r.torque is not None]
+    before = [r.torque - made_by(r.with_channels(torque=None), Cascade(given)) for r in records if r.torque is not None]
     without = {name: [c.criterion for c in candidates if name not in c.names] for name in best.names}
     close = [c for c in candidates if c.criterion - best.criterion < POLICY.rival_margin and c.count <= best.count]
     return Shown(

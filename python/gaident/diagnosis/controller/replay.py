@@ -1,7 +1,7 @@
-"""Controller replay: the PI run again on the measured velocity; does the logged torque follow from it?
+"""Controller replay: run again on the measured velocity; does the logged torque follow from it?
 
-No plant is needed: what the controller does is decided before any mechanism is considered. The rule stands in `pi_torque`; where
-the logged torque does not follow, `replay_causes` looks for the simple reasons.
+No plant is needed: what the controller does is decided before any mechanism is considered. Where the
+logged torque does not follow from a bare PI, `replay_causes` looks for the simple reasons.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from gaident.arguments import TORQUE
 from gaident.axis import Text, say
-from gaident.control.pi import PI
-from gaident.control.pi_torque import pi_torque
+from gaident.control.controller import Controller, Gains
+from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.controller.replay_causes import explain, rounded_command, white_noise
 from gaident.diagnosis.records.lattice import lattice_step, rounding_step
@@ -63,23 +63,23 @@ class Replay:
     controller: PI | None = None
 
 
-def replay(rec: Record, controller: PI | None) -> Replay:
+def replay(rec: Record, controller: Controller | None) -> Replay:
     """Runs the controller again on the measured velocity and compares with the logged torque.
 
     controller: None for the open loop, where the record's torque is returned as it is. Raises RecordError where neither a
     torque nor what makes one is there.
     """
     logged = rec.torque
-    if controller is None or rec.command is None:
+    if controller is None or not controller.replayable(rec):
         if logged is None:
             raise RecordError(f"the record has no torque and nothing to make it from: give {TORQUE}, or a command and PI(...)")
-        why = "open loop, there is no controller" if controller is None else "the record has no command"
+        why = "open loop, there is no controller" if controller is None else "the record lacks a signal that it read"
         return _unchecked(logged, None, say("The logged {torque} cannot be checked: {}.", why))
-    replayed = pi_torque(rec.command, rec.velocity, rec.dt, controller)
+    replayed = controller.torque_of(rec)
     if logged is None:
         text = say("No {torque} is logged: it is replayed from command and velocity, unchecked.")
         return _unchecked(replayed, replayed, text)
-    return _compared(rec, rec.command, controller, logged, replayed)
+    return _compared(rec, controller.asked(rec), controller, logged, replayed)
 
 
 def _unchecked(torque: Vector, replayed: Vector | None, sentence: Text) -> Replay:
@@ -87,24 +87,25 @@ def _unchecked(torque: Vector, replayed: Vector | None, sentence: Text) -> Repla
     return Replay(torque, replayed, np.nan, np.nan, resolution, None, "", np.nan, None, sentence)
 
 
-def _compared(rec: Record, command: Vector, controller: PI, logged: Vector, replayed: Vector) -> Replay:
+def _compared(rec: Record, command: Vector, controller: Controller, logged: Vector, replayed: Vector) -> Replay:
     resolution = lattice_step(logged)
-    tolerance = tolerance_of(rec, command, controller, logged)
-    off = logged - replayed
+    tolerance = tolerance_of(rec, command, controller.gains, logged)
+    off = (logged - replayed)[: len(rec) - controller.ahead(rec.dt)]
+    pi = bare_pi(controller)
     rms, maximum = float(np.sqrt(np.mean(off**2))), float(np.abs(off).max())
     figures = (logged, replayed, rms, maximum, resolution)
     head = say("The logged {torque} follows from command and velocity through this controller")
     if maximum <= tolerance:
         known = say(" (its resolution is {:.2g} {N m})", resolution) if resolution > 0.0 else ""
         return Replay(*figures, True, "", np.nan, None, say("{}, to {:.1g} {N m}{}.", head, maximum, known))
-    if rounded_command(off, command, rec.dt, controller):
+    if pi is not None and rounded_command(off, command, rec.dt, pi):
         text = say("{}, to {:.1g} {N m}, which is the rounding of the log.", head, maximum)
         return Replay(*figures, True, "", np.nan, None, text)
-    if noise := white_noise(off, logged):
+    if noise := white_noise(off, logged[: len(off)]):
         measured = "{} up to white noise of {:.2g} {N m} rms: it is a measured {torque}, or a coarsely rounded one."
         text = say(measured, head, noise)
         return Replay(*figures, True, "", np.nan, None, text)
-    found = explain(command, rec.velocity, rec.dt, controller, logged, tolerance)
+    found = None if pi is None else explain(command, rec.velocity, rec.dt, pi, logged, tolerance)
     if found is not None and found.cause == "initial_integral":
         return Replay(*figures, True, found.cause, found.value, None, say("{}, {}", head, found.sentence))
     departs = int(np.argmax(np.abs(off) > tolerance))
@@ -118,6 +119,9 @@ def _compared(rec: Record, command: Vector, controller: PI, logged: Vector, repl
     )
     if found is not None:
         return Replay(*figures, False, found.cause, found.value, departs, say("{}. {}", head, found.sentence), found.controller)
+    if pi is None:
+        text = say("{}. Is this the controller, and are these the signals it saw?", head)
+        return Replay(*figures, False, "", np.nan, departs, text)
     text = say(
         "{}, and none of the simple reasons explains it (start of the integrator, gains, scale, sign, rule of integration, "
         "shift by samples, limits). Is this the controller, and are these the signals it saw?",
@@ -126,7 +130,7 @@ def _compared(rec: Record, command: Vector, controller: PI, logged: Vector, repl
     return Replay(*figures, False, "", np.nan, departs, text)
 
 
-def tolerance_of(rec: Record, command: Vector, controller: PI, logged: Vector) -> float:
+def tolerance_of(rec: Record, command: Vector, controller: Gains, logged: Vector) -> float:
     """Steps of the torque's rounding, and what rounded decimals of velocity and command do to P part and integral [N m].
 
     A coarse lattice of the velocity is the encoder's, and the controller read the same numbers; a fine one is the text log's,
@@ -140,7 +144,7 @@ def tolerance_of(rec: Record, command: Vector, controller: PI, logged: Vector) -
     return own + at_once + DEVIATIONS * drift
 
 
-def _of_signals(rec: Record, command: Vector, controller: PI) -> tuple[float, float]:
+def _of_signals(rec: Record, command: Vector, controller: Gains) -> tuple[float, float]:
     """What rounded decimals make of P part, at most, and integral, as deviation [N m]."""
     q = rounding_step(rec.velocity)
     q_w = q if q < POLICY.negligible * float(np.ptp(rec.velocity)) else 0.0

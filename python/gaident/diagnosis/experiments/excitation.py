@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import TURN, Text, say, turns
-from gaident.control.pi import PI
+from gaident.control.controller import Controller
+from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.diagnosis.library.terms import LIBRARY, not_testable, one_sided
@@ -92,7 +93,7 @@ class Excitation:
 
 
 def excitation(
-    records: Record | Sequence[Record], controller: PI | None = None, model: Model | None = None, axis: str = "rotary"
+    records: Record | Sequence[Record], controller: Controller | None = None, model: Model | None = None, axis: str = "rotary"
 ) -> Excitation:
     """Looks at one record or several; with `model`, its structure too decides what can be judged. axis: rotary or linear.
 
@@ -106,7 +107,7 @@ def excitation(
     seen = Motions(tuple(motions), controller, model, axis)
     speeds = _distinct([v for m in motions for v in m.held], POLICY.apart * top)
     torque = max(float(np.abs(m.torque).max()) for m in motions)
-    limit = None if controller is None else controller.torque_limit
+    limit = math.inf if controller is None else controller.limits[0]
     moving = sum(int(np.sum(m.moving)) for m in motions)
     opposed = sum(int(np.sum(m.moving & (np.sign(m.torque) * np.sign(m.velocity) < 0.0))) for m in motions)
     return Excitation(
@@ -117,7 +118,7 @@ def excitation(
         slow=sum(m.dt * int(np.sum(m.moving & (np.abs(m.velocity) < POLICY.slow * top))) for m in motions),
         standstill=sum(m.dt * int(np.sum(~m.moving)) for m in motions),
         highest_torque=torque,
-        torque_share=math.nan if limit is None else torque / limit,
+        torque_share=torque / limit if math.isfinite(limit) else math.nan,
         torque_reversals=sum(_changes(m.torque, m.torque_floor) for m in motions),
         opposed=opposed / moving if moving else 0.0,
         revolutions=max(float(np.ptp(m.position)) for m in motions) / TURN,
@@ -136,9 +137,9 @@ def position_of(rec: Record) -> Vector:
     return np.concatenate([[0.0], np.cumsum(0.5 * rec.dt * (w[1:] + w[:-1]))])
 
 
-def _motion(rec: Record, controller: PI | None, top: float) -> Motion:
+def _motion(rec: Record, controller: Controller | None, top: float) -> Motion:
     w = rec.velocity
-    u = torque_of(rec, controller)
+    u = torque_of(rec, bare_pi(controller))
     floor = max(POLICY.above_noise * noise_std(w), POLICY.negligible * top, TINY)
     smooth = _smoothed(w, max(SMOOTHED, len(w) // WINDOWS))
     moving = np.abs(smooth) > floor

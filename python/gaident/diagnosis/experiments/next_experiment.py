@@ -112,14 +112,14 @@ def propose(
     if not pairs:
         return None, notes
     names = tuple(dict.fromkeys(name for effect, rival in pairs for name in (effect, rival.effect)))
-    if data.controller is None or data.command is None:
+    if data.pi is None or data.command is None:
         text = (
             "Without a controller no command can be worked out that tells {} apart: give the controller, and a log with the "
             "velocity command."
         )
         return None, [*notes, say(text, _listed(names))]
     kind = None if not data.torque_logged else MEASURED if data.torque_measured else COMMANDED
-    bench = _Bench(data.controller, final.noise, max(final.cost / count, 1e-300), kind, elsewhere)
+    bench = _Bench(data.pi, final.noise, max(final.cost / count, 1e-300), kind, elsewhere)
     items = menu(data, final)
     # A generalisation that was fitted as its neutral case is the same drive: such a pair no command separates.
     table = [
@@ -160,10 +160,10 @@ def menu(data: DataSet, fit: Fit) -> list[MenuItem]:
     """The menu within the limits that the records show, for the mechanism that was found."""
     dt = data.dt
     try:
-        limits = Limits.of(data.records, data.controller, data.axis)
+        limits = Limits.of(data.records, data.pi, data.axis)
         limits = replace(limits, duration=max(limits.duration, POLICY.proposed_samples * dt))
-        assert data.controller is not None
-        return candidate_commands(dt, limits, inertia_of(fit), data.controller.kp or None)
+        assert data.pi is not None
+        return candidate_commands(dt, limits, inertia_of(fit), data.pi.kp or None)
     except GaidentError:
         return []  # nothing moves, or nothing may
 

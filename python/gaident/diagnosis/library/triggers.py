@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import TURN, Text, joined, order, say, turns
-from gaident.control.pi import PI
+from gaident.control.controller import Controller
 from gaident.diagnosis.library.coordinates import HIGHEST_ORDER
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
@@ -51,7 +51,7 @@ class Motions:
     """The records of a diagnosis; controller, model: None where not known; axis: rotary or linear."""
 
     records: tuple[Motion, ...]
-    controller: PI | None = None
+    controller: Controller | None = None
     model: Model | None = None
     axis: str = "rotary"
 
@@ -177,19 +177,26 @@ def torque_changes(s: Motions) -> Text | None:
 
 def in_a_loop(s: Motions) -> Text | None:
     """A command drives the model through a controller."""
-    if s.controller is None or all(m.command is None for m in s.records):
+    if s.controller is None or (_unseen(s) and s.controller.one_equation):
         return say("the {torque} drives the model: no controller is simulated from a command")
     return None
 
 
+def _unseen(s: Motions) -> bool:
+    """Whether no velocity command is logged."""
+    return all(m.command is None for m in s.records)
+
+
 def integrates(s: Motions) -> Text | None:
     """The controller has an integral part."""
-    none = s.controller is not None and s.controller.ki == 0.0
+    none = s.controller is not None and s.controller.gains.ki == 0.0
     return Text("the controller has no integral part") if none else None
 
 
 def command_changes(s: Motions) -> Text | None:
-    """The command is not one number throughout."""
+    """The velocity command is logged, and not one number throughout."""
+    if _unseen(s):
+        return say("the velocity command is not logged")
     if any(m.jumps or (m.command is not None and np.any(np.diff(m.command) != 0.0)) for m in s.records):
         return None
     return Text("the command never changes")
@@ -225,12 +232,12 @@ def integral_beyond(s: Motions) -> Text | None:
     return say("a clamp above {:.3g} {N m} would not have shown: {}", integral, why)
 
 
-def _integral(m: Motion, controller: PI) -> float:
-    """Highest |u - kp (r - w)| [N m] while the controller's limit does not cut its torque u; 0 without a command."""
-    if m.command is None:
+def _integral(m: Motion, controller: Controller) -> float:
+    """Highest |u - kp (r - w)| [N m] of a bare PI while its limit does not cut its torque u; 0 without a command."""
+    if m.command is None or not controller.one_equation:
         return 0.0
     free = np.abs(m.torque) <= POLICY.at_limit * controller.limits[0]
-    held = np.abs(m.torque - controller.kp * (m.command - m.velocity))[free]
+    held = np.abs(m.torque - controller.gains.kp * (m.command - m.velocity))[free]
     return float(held.max(initial=0.0))
 
 

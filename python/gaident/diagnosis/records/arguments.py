@@ -8,14 +8,13 @@ import numpy as np
 
 from gaident.arguments import NO_CONTROLLER
 from gaident.axis import checked_axis
-from gaident.control.cascade import Cascade
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.policy.table import POLICY
 from gaident.results.identification import Identification
 
-__all__ = ["ProgressCallback", "check_controller", "checked", "in_order", "noise_std_of", "records_of"]
+__all__ = ["ProgressCallback", "checked", "in_order", "noise_std_of", "records_of"]
 
 ProgressCallback = Callable[[float, str], None]
 
@@ -26,12 +25,6 @@ def records_of(rec: Record | Sequence[Record], name: str) -> tuple[Record, ...]:
     if not given or not all(isinstance(r, Record) for r in given):
         raise RecordError(f"{name} is {type(rec).__name__}: give a gaident.Record or a list of them, at least one")
     return given
-
-
-def check_controller(controller: object) -> None:
-    """Raises SettingsError for what is neither a controller nor None."""
-    if controller is not None and not isinstance(controller, PI | Cascade):
-        raise SettingsError(f"controller is {controller!r}: give a gaident.PI or a Cascade, or None for a record in open loop")
 
 
 def checked(

@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.records.lattice import lattice_step
+from gaident.models.model import Model
+from gaident.models.simulate import simulate
 from gaident.policy.table import POLICY
 
-__all__ = ["cleaned", "outliers", "quantisation"]
+__all__ = ["cleaned", "left_out", "outliers", "quantisation"]
 
 Vector = NDArray[np.float64]
 
@@ -17,7 +20,17 @@ ROBUST = 1.4826  # no decision: median absolute deviation of normal noise -> sta
 SECOND = 1.5  # no decision: sqrt(14/6), noise of the line through two samples before over that through the two next ones
 NEAR = 8  # no decision: samples on either side that an outlier stands out of, the reach of a filter's ringing
 SHORTEST = 7  # no decision: samples that all these differences need
+DIVERGED = 1e6  # no decision: of the velocity; a simulation that leaves so much has diverged
 PASSES = 4  # no decision: neighbours hide each other, no more than four in a row
+
+
+def left_out(rec: Record, model: Model, controller: PI | None) -> NDArray[np.intp]:
+    """Samples that stand out of the velocity, or out of the linear model's error: a slope of the velocity may hide them."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = rec.velocity - simulate(model, rec, controller)
+    if np.all(np.abs(error) < DIVERGED * np.abs(rec.velocity).max()):
+        return outliers(rec.velocity, error)
+    return outliers(rec.velocity)
 
 
 def outliers(velocity: Vector, error: Vector | None = None) -> NDArray[np.intp]:

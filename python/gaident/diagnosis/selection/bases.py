@@ -102,7 +102,7 @@ def linear_bases(task: Task) -> tuple[Task, list[Fit]]:
     two = min((space.refitted(f.hypothesis, f.x, POLICY.long) for f in chosen), key=lambda f: f.bic)
     best = min((one, two), key=lambda f: f.bic)
     family = task.objective.family
-    shaft = ShaftNoise(best.parameters.linear(best.x), task.scales.dt, task.data.controller)
+    shaft = ShaftNoise(best.parameters.linear(best.x), task.scales.dt, task.data.pi)
     task = task.under(Innovations(shaft, family.floor))
     one, two = (ls.reestimated(task.objective, f) for f in (one, two))
     if one.bic < two.bic or not swings(two) or task.scales.blocks > 1:

@@ -52,7 +52,7 @@ def blocks_of(data: DataSet, error: Vector) -> int:
     error: of a linear model, records one after the other. A controller that is simulated cannot be coarsened: it samples as it
     does.
     """
-    if data.cascade is not None or (data.controller is not None and not data.torque_logged):
+    if data.slower or (data.pi is not None and not data.torque_logged):
         return 1
     if not np.all(np.isfinite(error)):
         return 1

@@ -257,7 +257,7 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
         coarse = 0.5 * data.dt  # no decision: the step of a simulation
         data = replace(data, finest=max(data.finest, coarse))
     if isinstance(found, Innovations) and found.shaft is not None:
-        shaft = ShaftNoise(outline.base.parameters.linear(outline.base.x), data.dt, data.controller)
+        shaft = ShaftNoise(outline.base.parameters.linear(outline.base.x), data.dt, data.pi)
         family = Innovations(shaft, found.floor)
     task = replace(
         task, objective=Objective(data, task.objective.weight, family, task.objective.measured, task.objective.counter)

@@ -10,6 +10,7 @@ from gaident.axis import said, unit, velocity_unit, word
 from gaident.models.factors import gain_unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
+from gaident.show.controller_words import controller_words
 from gaident.show.diagnosis_summary import (
     DRIVERS,
     TESTED_UP_TO,
@@ -32,7 +33,6 @@ from gaident.show.report.parts import (
     Head,
     Section,
     box,
-    controller_words,
     estimate,
     facts,
     measured_section,
@@ -141,7 +141,8 @@ def _causes(dia: Diagnosis, view: View) -> Section:
             (n, typeset(value), typeset(u), remark) for n, value, u, remark in map(_row(axis), f.parameters.items())
         ]
         held = "in-sample" if dia.held_out == "in-sample" else "held-out"
-        figures = f"{f.delta_bic:.0f} BIC units; the {held} error falls by {percent(f.gain)} % of what was left before it."
+        place = f"Place: {f.place}. " if f.place else ""
+        figures = f"{place}{f.delta_bic:.0f} BIC units; the {held} error falls by {percent(f.gain)} % of what was left before it."
         parts.append(
             box(
                 tag("h3", name, " ", tag("small", "cannot be told apart" if f.alternatives else "named")),

@@ -9,13 +9,13 @@ from gaident.axis import unit, velocity_unit, word
 from gaident.models.mechanics import TwoMass
 from gaident.results.estimate import Estimate
 from gaident.results.identification import Identification
+from gaident.show.controller_words import controller_words
 from gaident.show.html import Html, Row, joined, number, table, tag, typeset
 from gaident.show.report.parts import (
     Charts,
     Head,
     Section,
     box,
-    controller_words,
     estimate,
     facts,
     measured_section,

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gaident.axis import identifier_words, said, unit, velocity_unit, word
-from gaident.control.cascade import Cascade, Controller
+from gaident.axis import said, word
 from gaident.show.chart import Chart
 from gaident.show.diagnosis_charts import missing_over_velocity, missing_reversals, residual_spectrum
 from gaident.show.draw import picture
@@ -17,7 +16,6 @@ from gaident.show.html import Html, Row, joined, number, png_uri, table, tag, ty
 from gaident.show.report import charts
 from gaident.show.report.views import Run, View
 from gaident.show.response_plots import response_chart
-from gaident.show.wording import number as plain_number
 from gaident.show.wording import with_std
 
 __all__ = [
@@ -25,7 +23,6 @@ __all__ = [
     "Head",
     "Section",
     "box",
-    "controller_words",
     "estimate",
     "facts",
     "measured_section",
@@ -194,24 +191,6 @@ def _record_row(run: Run) -> Row:
 
 def _hash(digest: str) -> Html:
     return tag("code", digest, class_="hash")
-
-
-def controller_words(controller: Controller | None, axis: str) -> str:
-    """The loop that was simulated."""
-    if controller is None:
-        kind = word("torque", axis)
-        return f"none: open loop, {kind} [{unit('N m', axis)}] to velocity [{velocity_unit(axis)}]"
-    pi = controller.velocity if isinstance(controller, Cascade) else controller
-    parts = [
-        f"{pi.loop} PI, kp {plain_number(pi.kp)} {unit('N m s/rad', axis)}",
-        f"ki {plain_number(pi.ki)} {unit('N m/rad', axis)}",
-    ]
-    if isinstance(controller, Cascade) and controller.period is not None:
-        parts.append(f"in a cascade every {plain_number(1e6 * controller.period)} us")
-    for name in ("torque_limit", "integrator_limit"):
-        if getattr(pi, name) is not None:
-            parts.append(f"{identifier_words(name, axis)} {plain_number(getattr(pi, name))} {unit('N m', axis)}")
-    return ", ".join(parts)
 
 
 def roots_table(roots: Sequence[tuple[str, complex, str]]) -> Html:

@@ -1,0 +1,172 @@
+"""What every controller answers, so that nobody has to ask for its class."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident import _core
+from gaident.control.ticks import Ticks
+from gaident.errors import ControllerError, SettingsError
+
+__all__ = ["Controller", "Gains", "Limiting", "Signals", "checked_controller"]
+
+Vector = NDArray[np.float64]
+
+
+class Signals(Protocol):
+    """What a log holds of a controller's signals; a `gaident.Record` is one."""
+
+    @property
+    def dt(self) -> float: ...
+    @property
+    def command(self) -> Vector | None: ...
+    @property
+    def position_command(self) -> Vector | None: ...
+    @property
+    def velocity(self) -> Vector: ...
+    @property
+    def position(self) -> Vector | None: ...
+
+
+class Gains(Protocol):
+    """Gains of a velocity controller, and its limits."""
+
+    @property
+    def kp(self) -> float: ...
+    @property
+    def ki(self) -> float: ...
+    @property
+    def limits(self) -> tuple[float, float]: ...
+
+
+@dataclass(frozen=True)
+class Limiting:
+    """Limits beyond a controller's settings: of its integrator [N m], and of the velocity command's slope [rad/s^2]."""
+
+    integrator: float = math.inf
+    slope: float = math.inf
+
+    def and_also(self, other: Limiting) -> Limiting:
+        """Both."""
+        return Limiting(min(self.integrator, other.integrator), min(self.slope, other.slope))
+
+
+class Controller(ABC):
+    """A controller of a servo axis: a `PI`, or the `Cascade` around one."""
+
+    @property
+    @abstractmethod
+    def loop(self) -> str:
+        """ "sampled" or "continuous"."""
+
+    @property
+    @abstractmethod
+    def one_equation(self) -> bool:
+        """Whether one difference equation holds controller and plant, limits left out: of the bare PI."""
+
+    @property
+    @abstractmethod
+    def gains(self) -> Gains:
+        """kp, ki and the limits of the velocity controller."""
+
+    @property
+    @abstractmethod
+    def driven_by(self) -> str:
+        """The channel that drives it: "command" or "position_command"."""
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """(Torque limit, integrator limit) [N m], infinity for none."""
+        return self.gains.limits
+
+    @property
+    def limited(self) -> bool:
+        """True if torque or integrator have a limit: the loop is then linear only while no limit acts."""
+        return any(map(math.isfinite, self.limits))
+
+    @property
+    def delay(self) -> float:
+        """Time from a sample to its torque at the motor [s]."""
+        return 0.0
+
+    def ahead(self, dt: float) -> int:
+        """Lines at the end of a log with the sample time dt [s] that a feedforward makes of what would come behind them."""
+        return 0
+
+    @abstractmethod
+    def log_every(self, dt: float) -> int:
+        """Controller samples for each line of a log with the sample time dt [s]; ControllerError where it is no whole number."""
+
+    def command_of(self, log: Signals) -> Vector | None:
+        """The signal that drives it (n,): velocity command [rad/s] or position command [rad]; None where it is not logged."""
+        signal: Vector | None = getattr(log, self.driven_by)
+        return signal
+
+    def simulated_with(self, dt: float) -> Controller | None:
+        """What an estimation closes a simulated loop over, the log's sample time dt [s]; None: the torque drives the model.
+
+        Where the log has a line for each sample of what is no bare PI, its torque says all that this controller did.
+        """
+        return self if self.one_equation or self.log_every(dt) > 1 else None
+
+    def line_equation(self, log: Signals, poles: int) -> bool:
+        """Whether one difference equation takes a log that starts at rest from line to line, although it samples faster.
+
+        poles: of the plant beside it. Its commands are logged, and controller and plant together are linear and of an order that
+        the core holds.
+        """
+        return False
+
+    def line_record(self, log: Signals) -> _core.Record:
+        """The core's record of that equation; the log has a `line_equation`."""
+        raise ControllerError(f"controller is {self!r}: it has a sample for each line of the log and no equation between them")
+
+    def at_lines(self) -> Controller:
+        """About the same with a sample for each line of a log: without filters and delay."""
+        return self
+
+    @abstractmethod
+    def asked(self, log: Signals) -> Vector:
+        """The velocity command that reaches its velocity controller (n,) [rad/s]. The log is `replayable`."""
+
+    @abstractmethod
+    def replayable(self, log: Signals) -> bool:
+        """Whether the log holds every signal that it makes its torque of, at each of its samples."""
+
+    @abstractmethod
+    def torque_of(self, log: Signals, also: Limiting | None = None) -> Vector:
+        """The torque [N m] (n,) that it makes of the measured signals, from rest; `also`: with further limits.
+
+        The log is `replayable`.
+        """
+
+    @abstractmethod
+    def with_limits(self, torque: float | None, integrator: float | None) -> Controller:
+        """The same with these limits [N m]; None: no limit."""
+
+    @abstractmethod
+    def ticks(self, dt: float, command: Vector, position: Vector | None) -> Ticks:
+        """What it is given at its own clock, in a log with the sample time dt [s]; command: of `command_of`."""
+
+    @abstractmethod
+    def core_loop(self, dt: float) -> _core.Loop:
+        """The core's loop over it, in a log with the sample time dt [s]."""
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON or TOML."""
+
+
+def checked_controller(controller: object) -> Controller | None:
+    """What a public function was given as `controller=`; raises SettingsError for what is none."""
+    if controller is None or isinstance(controller, Controller):
+        return controller
+    raise SettingsError(
+        f"controller is {controller!r}: give a gaident.PI or a Cascade, or None for open loop, where the torque drives the model"
+    )

@@ -1,0 +1,57 @@
+"""The records as their controller drove them: what it is, by the log, and the torque that a model is driven by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from gaident.axis import Text
+from gaident.control.controller import Controller
+from gaident.control.pi import bare_pi
+from gaident.data.record import Record
+from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
+from gaident.diagnosis.controller.form_findings import driver_of
+from gaident.diagnosis.controller.log_shift import Aligned, aligned
+from gaident.models.drive_torque import Driven
+from gaident.results.finding import Finding
+
+__all__ = ["Driving", "driving_of"]
+
+
+@dataclass(frozen=True)
+class Driving:
+    """The records, without shifts of their logs and as their torque drives a model, and the controller as it is used.
+
+    logged: the bare PI with the gains that the torques show. findings: of the controller's form. notes: what to keep in mind.
+    doubts: notes on torques that do not follow from a controller that is no bare PI.
+    """
+
+    moved: Aligned
+    controller: Controller | None
+    logged: AsLogged
+    findings: tuple[Finding, ...] = ()
+    notes: tuple[Text, ...] = ()
+    doubts: tuple[Text, ...] = ()
+
+    @property
+    def read(self) -> tuple[Record, ...]:
+        """The records with every signal that the controller read, beside the torque as logged."""
+        if self.controller is None or self.controller.one_equation:
+            return self.moved.records
+        return tuple(self.moved.given[r.digest] for r in self.moved.records)
+
+
+def driving_of(records: Sequence[Record], held: Sequence[Record], driven: Driven, origin: Mapping[str, Record]) -> Driving:
+    """records, held: as `driven` has them; origin: digest of a record -> the same as it was given."""
+    controller, pi, notes = driven.controller, driven.loop, driven.notes
+    moved = aligned(records, held, pi)
+    form = None if moved.shifts else driver_of(records, held, pi)
+    if form is not None:
+        controller, pi, notes = form.controller, None, (*notes, *form.notes)
+        pairs = zip((*form.records, *form.held), (*records, *held), strict=True)
+        origin = {changed.digest: origin.get(given.digest, given) for changed, given in pairs}
+        moved = aligned(form.records, form.held, None)
+    moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
+    logged = as_logged(moved.records, pi)
+    used = controller if bare_pi(controller) is None else logged.controller
+    return Driving(moved, used, logged, () if form is None else form.findings, notes, driven.doubts)

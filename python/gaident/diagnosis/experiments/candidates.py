@@ -1,0 +1,43 @@
+"""Which effects a search may take, and why not the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from gaident.axis import Text, say
+from gaident.data.record import Record
+from gaident.diagnosis.controller.controller_place import AtController
+from gaident.diagnosis.experiments.excitation import Excitation, decided_by_the_angle
+from gaident.diagnosis.library.terms import LIBRARY
+from gaident.diagnosis.records.folded import FOLDED, folded
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.term import Term
+
+__all__ = ["IN_MOTION", "candidates"]
+
+IN_MOTION = say(
+    "A record starts in motion, and the loop of this controller is simulated from rest only: the {torque}, taken straight from "
+    "line to line of the log, drives the models. What that misses can look like a short lag or delay; give a record that starts "
+    "at rest."
+)
+"""Of a log with fewer lines than the controller samples."""
+
+
+def candidates(
+    records: Sequence[Record], clean: Sequence[Record], data: DataSet, excited: Excitation, at: AtController
+) -> tuple[list[Term], dict[str, Text]]:
+    """(effects, name of an effect -> why the records say nothing about it); clean: the records without outliers."""
+    why: dict[str, Text] = dict(excited.not_testable)
+    if any(folded(r) for r in records):
+        why = dict.fromkeys(LIBRARY, FOLDED)
+    if data.torque_measured:
+        behind = say("the {torque} was measured behind the actuator, which it does not show")
+        why |= {t.name: behind for t in LIBRARY.values() if t.place == "actuator"}
+    inside = [t.name for t in LIBRARY.values() if t.in_controller]
+    if data.loop is None:  # of a controller whose loop is not simulated the replay has decided
+        why = {name: reason for name, reason in why.items() if name not in at.decided}
+    elif data.slower and not data.loopable:
+        still = Text("a record starts in motion, and the loop of this controller is simulated from rest only")
+        why |= dict.fromkeys(inside, still)
+    out = {*why, *at.decided, *decided_by_the_angle(clean), *(inside if data.loop is None else ())}
+    return [t for t in LIBRARY.values() if t.name not in out], why
