@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from gaident.checks import known_keys, real_number
 from gaident.control.drive_parameters import position_gain
@@ -30,7 +30,7 @@ class P:
     Parameters
     ----------
     gain : float
-        Kv [1/s], > 0.
+        Kv [1/s], > 0; None: not known, and estimated by `identify` and `diagnose` where the torque is logged.
 
     Raises
     ------
@@ -46,7 +46,13 @@ class P:
 
     gain: float
 
+    if TYPE_CHECKING:
+
+        def __init__(self, gain: float | None) -> None: ...
+
     def __post_init__(self) -> None:
+        if self.gain is None:
+            return
         gain = real_number(self.gain, "gain", ControllerError)
         if gain <= 0.0:
             raise ControllerError(f"gain is {gain:g}: give a number > 0 [1/s]")
@@ -109,7 +115,7 @@ class Cascade:
     acceleration_feedforward : float
         [N m s^2/rad], an inertia.
     friction_feedforward : float
-        [N m].
+        [N m]. Each feedforward may be None: not known, and estimated by `identify` and `diagnose` where the torque is logged.
     torque_filters, velocity_filters, command_filters : sequence of LowPass and Notch
         At most eight each; they act in their order.
     delay : float
@@ -144,6 +150,23 @@ class Cascade:
     command_filters: Sequence[Filter] = ()
     delay: float = 0.0
 
+    if TYPE_CHECKING:  # None is what is not known; whoever simulates has asked for numbers before (`gaident.control.unknown`)
+
+        def __init__(
+            self,
+            velocity: PI,
+            period: float | None = ...,
+            position: P | None = ...,
+            position_period: float | None = ...,
+            velocity_feedforward: float | None = ...,
+            acceleration_feedforward: float | None = ...,
+            friction_feedforward: float | None = ...,
+            torque_filters: Sequence[Filter] = ...,
+            velocity_filters: Sequence[Filter] = ...,
+            command_filters: Sequence[Filter] = ...,
+            delay: float = ...,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         if not isinstance(self.velocity, PI) or self.velocity.loop != "sampled":
             raise ControllerError(f'velocity is {self.velocity!r}: give a PI with loop="sampled", the digital controller')
@@ -158,6 +181,8 @@ class Cascade:
                 raise ControllerError(f"{name} is {time:g}: give seconds, > 0")
             object.__setattr__(self, name, time)
         for name in FEEDFORWARDS:
+            if getattr(self, name) is None:
+                continue
             object.__setattr__(self, name, real_number(getattr(self, name), name, ControllerError))
         delay = real_number(self.delay, "delay", ControllerError, "give seconds")
         if not 0.0 <= delay <= LONGEST_DELAY:

@@ -15,6 +15,7 @@ from gaident import _core
 from gaident.control.cascade import Cascade, Controller, cascade_of
 from gaident.control.pi import PI, RULES
 from gaident.control.ticks import ticks_of
+from gaident.control.unknown import known
 
 __all__ = [
     "clock",
@@ -52,7 +53,8 @@ def clock(dt: float) -> _core.Clock:
 
 
 def core_controller(controller: PI) -> _core.Controller:
-    """The core's controller."""
+    """The core's controller; ControllerError where a gain is None."""
+    known(controller)
     torque, integrator = controller.limits
     return _core.Controller(kp=controller.kp, ki=controller.ki, torque_limit=torque, integrator_limit=integrator)
 
@@ -100,6 +102,7 @@ def effect_record(
 def _servo_record(
     dt: float, source: Vector, position: Vector | None, velocity: Vector, start_angle: float, cascade: Cascade
 ) -> _core.EffectRecord:
+    known(cascade)
     ticks = ticks_of(cascade, dt, source, position)
     period = dt / ticks.log_every
     return _core.EffectRecord(
@@ -115,16 +118,22 @@ def _servo_record(
 
 
 def servo_torque(dt: float, source: Vector, velocity: Vector, position: Vector | None, cascade: Cascade) -> Vector:
-    """Torque [N m] (n,) that a cascade makes of measured signals (n,), from rest; the log has a line for each of its samples."""
+    """Torque [N m] that a cascade makes of measured signals, from rest, at each of its samples: (n r,), r to a line of the log.
+
+    source, position: at the n lines of the log; velocity: at the controller's samples (n r,). Raises ControllerError where
+    something of the cascade is None.
+    """
+    known(cascade)
     ticks = ticks_of(cascade, dt, source, position)
-    none = np.zeros(len(source))
+    none = np.zeros(len(ticks.source))
     fed, added = ticks.velocity_feedforward, ticks.torque_feedforward
+    period = dt / ticks.log_every
     return _core.servo_torque(
-        clock=clock(dt),
-        loop=_servo(cascade, dt, cascade.position_every(dt)),
+        clock=clock(period),
+        loop=_servo(cascade, period, cascade.position_every(dt)),
         source=ticks.source,
         velocity=velocity,
-        position=none if position is None else position,
+        position=ticks.position if len(ticks.position) else none,
         velocity_feedforward=fed if len(fed) else none,
         torque_feedforward=added if len(added) else none,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gaident.arguments import NO_CONTROLLER, arg
 from gaident.checks import known_keys, one_of, real_number
@@ -24,6 +24,8 @@ _NOT_GIVEN = float("nan")  # told from a given nan by identity
 @dataclass(frozen=True)
 class PI:
     """PI velocity controller, C(s) = kp + ki/s.
+
+    kp, ki and command_weight may be None: not known, and estimated by `identify` and `diagnose` where the torque is logged.
 
     Parameters
     ----------
@@ -68,6 +70,8 @@ class PI:
     >>> controller = ga.PI(kp=0.0232, ki=1.367, torque_limit=2.4)
     >>> controller.limited
     True
+    >>> ga.PI(kp=None, ki=None).kp is None
+    True
     """
 
     kp: float = _NOT_GIVEN
@@ -80,6 +84,21 @@ class PI:
     anti_windup: str = "none"
     tracking_time: float | None = None
 
+    if TYPE_CHECKING:  # None is what is not known; whoever simulates has asked for numbers before (`gaident.control.unknown`)
+
+        def __init__(
+            self,
+            kp: float | None = ...,
+            ki: float | None = ...,
+            loop: str = ...,
+            torque_limit: float | None = ...,
+            integrator_limit: float | None = ...,
+            rule: str = ...,
+            command_weight: float | None = ...,
+            anti_windup: str = ...,
+            tracking_time: float | None = ...,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         missing = [name for name in ("kp", "ki") if getattr(self, name) is _NOT_GIVEN]
         if missing:
@@ -87,6 +106,8 @@ class PI:
                 f"PI lacks {' and '.join(missing)}: give {PI_OF_GAINS}, {arg('ki', '0')} for a proportional controller"
             )
         for name in ("kp", "ki"):
+            if getattr(self, name) is None:
+                continue
             gain = real_number(getattr(self, name), name, ControllerError)
             if gain < 0.0:
                 raise ControllerError(
@@ -113,10 +134,11 @@ class PI:
     def _check_digital(self) -> None:
         object.__setattr__(self, "rule", one_of(self.rule, "rule", tuple(RULES), ControllerError))
         object.__setattr__(self, "anti_windup", one_of(self.anti_windup, "anti_windup", ANTI_WINDUP, ControllerError))
-        weight = real_number(self.command_weight, "command_weight", ControllerError)
-        if weight < 0.0:
-            raise ControllerError(f"command_weight is {weight:g}: give a number >= 0; 1 is a PI, 0 an IP controller")
-        object.__setattr__(self, "command_weight", weight)
+        if self.command_weight is not None:
+            weight = real_number(self.command_weight, "command_weight", ControllerError)
+            if weight < 0.0:
+                raise ControllerError(f"command_weight is {weight:g}: give a number >= 0; 1 is a PI, 0 an IP controller")
+            object.__setattr__(self, "command_weight", weight)
         if self.anti_windup != "none" and self.torque_limit is None:
             raise ControllerError(
                 f'anti_windup is "{self.anti_windup}" without a torque_limit, at which it would act: give torque_limit='

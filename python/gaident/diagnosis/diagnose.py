@@ -34,6 +34,7 @@ from gaident.diagnosis.selection.select import Selection, by_whitened_errors, co
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.uncertainty import estimates_of
+from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
 from gaident.models.drive_torque import torque_driven
@@ -63,24 +64,21 @@ def diagnose(
 ) -> Diagnosis:
     """Show what the model of an axis gets wrong, name the physical cause where the data allow it, and measure the gain.
 
-    A beam search over mechanisms with effects of `gaident.effects.table()`, all refitted together and decided by BIC.
-    The errors are whitened ones of a torque-driven simulation, or plain ones where these are no stationary noise.
-    Rivals within 10 units and equivalent effects make a finding ambiguous.
-    What no effect explains is reported by its driver and not named.
-    See docs/diagnosis.md.
+    A beam search over mechanisms with effects of `gaident.effects.table()`, all refitted together and decided by BIC, of whitened
+    errors of a torque-driven simulation, or of plain ones where these are no stationary noise. See docs/diagnosis.md.
+    Rivals within 10 units and equivalent effects make a finding ambiguous; what no effect explains is reported by its driver.
 
     Parameters
     ----------
     rec : Record or sequence of Record
         The data.
     controller : PI or Cascade, optional
-        The velocity loop; None: open loop, the record's torque drives the model.
-        Under what is no bare PI at the log's rate the torque drives the model too: as logged, or as this controller makes it.
+        The velocity loop; None: open loop, the record's torque drives the model. Numbers that are None are estimated.
+        Under what is no bare PI at the log's rate the torque drives the model: as logged, or as this controller makes it.
     identification : Identification, optional
         What `identify` found; None: it is run first.
     validation : Record or sequence of Record, optional
-        Records that no fit sees.
-        None: the last 30 % of each record are held out where they are long enough, see `Diagnosis.held_out`.
+        Records that no fit sees; None: the last 30 % of each long record are held out, see `Diagnosis.held_out`.
     noise : float or Record, optional
         Standard deviation of the velocity noise [rad/s], or a Record at standstill; None: from the record itself.
     bootstrap : int
@@ -119,9 +117,10 @@ def diagnose(
     began = time.perf_counter()
     note = Note(progress)
     check_controller(controller)
-    records, loop, under, cascade = torque_driven(records_of(rec, "rec"), controller)
-    held = () if validation is None else torque_driven(records_of(validation, "validation"), controller).records
-    controller = loop
+    numbers = with_estimates(records_of(rec, "rec"), controller)
+    records, loop, under, cascade = torque_driven(records_of(rec, "rec"), numbers.controller)
+    held = () if validation is None else torque_driven(records_of(validation, "validation"), numbers.controller).records
+    controller, estimates = loop, numbers.estimates
     checked(records, held, controller, identification, bootstrap, seed, progress, axis)
     records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
@@ -132,9 +131,11 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.01, "replaying the controller")
         moved = aligned(records, held, controller)
-        driver = None if moved.shifts else driver_of(records, held, controller)
-        if driver is not None:
-            controller, under = None, (*under, *driver.notes)
+        driver = None if moved.shifts else driver_of(records, held, controller, tuple(estimates))
+        if driver is None:
+            under = (*numbers.trusted().notes, *under)
+        else:
+            controller, under, estimates = None, (*under, *driver.notes), driver.estimates
             moved = aligned(driver.records, driver.held, controller)
         logged = as_logged(moved.records, controller)
         controller = logged.controller
@@ -144,7 +145,8 @@ def diagnose(
             moved.records, moved.held, logged, idn, noise_std, note, axis, cascade, () if driver is None else driver.findings
         )
         work.search()
-        result = moved.noted(replace(work.report(seed), noise=noise_std, bootstrap=bootstrap))
+        result = work.report(seed)
+        result = moved.noted(replace(result, noise=noise_std, bootstrap=bootstrap, controller_numbers=estimates))
         result = replace(result, notes=(*under, *result.notes)) if under else result
         if bootstrap:
             from gaident.diagnosis.selection.bootstrap import with_p_value

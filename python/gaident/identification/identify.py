@@ -20,6 +20,7 @@ from gaident.data.record import Record
 from gaident.errors import SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
 from gaident.identification.arguments import check_arithmetic, check_numbers, checked_records, checked_space, distinct
+from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.identification.notes import record_notes, warnings_of
 from gaident.identification.parts import search_parts
@@ -71,6 +72,7 @@ def identify(
     controller : PI or Cascade, optional
         The velocity loop, driven by the record's command; None: open loop, the record's torque drives the model.
         Under what is no bare PI at the log's rate the torque drives the model too: as logged, or as this controller makes it.
+        Its numbers that are None are estimated first, from the logged torque.
     space : SearchSpace, optional
         Search ranges; None: derived from the data, see `Identification.space`.
     settings : Settings, optional
@@ -118,7 +120,9 @@ def identify(
     (1, 0, 0.01, 0.05, False)
     """
     began = time.perf_counter()
-    driven = torque_driven(checked_records(rec, controller), controller)
+    checked = checked_records(rec, controller)
+    numbers = with_estimates(checked, controller).trusted()
+    driven = torque_driven(checked, numbers.controller)
     loop = driven.controller
     given = [r.with_channels(command=None) for r in driven.records] if driven.cascade is not None else list(driven.records)
     settings = Settings() if settings is None else settings
@@ -142,8 +146,9 @@ def identify(
     if derived and not settings.species:
         warning = "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
         object.__setattr__(result, "warnings", (*result.warnings, warning))
-    if driven.notes:
-        object.__setattr__(result, "warnings", (*driven.notes, *result.warnings))
+    if driven.notes or numbers.notes:
+        object.__setattr__(result, "warnings", (*numbers.notes, *driven.notes, *result.warnings))
+    object.__setattr__(result, "controller_numbers", numbers.estimates)
     overflows = sum(t.overflows for t in found)
     if overflows:
         evaluations = sum(t.evaluations for t in found)

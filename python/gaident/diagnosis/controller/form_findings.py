@@ -44,20 +44,26 @@ class Driver:
     controller: Cascade
     findings: tuple[Finding, ...]
     notes: tuple[Text, ...]
+    estimates: Mapping[str, Estimate]  # of gains that were not given
 
 
-def driver_of(records: Sequence[Record], held: Sequence[Record], given: Controller | None) -> Driver | None:
-    """The controller that the logged torques show where a PI does not make them and nothing simple explains that; else None."""
+def driver_of(
+    records: Sequence[Record], held: Sequence[Record], given: Controller | None, unknown: tuple[str, ...] = ()
+) -> Driver | None:
+    """The controller that the logged torques show where a PI does not make them and nothing simple explains that; else None.
+
+    unknown: gains of the PI that were not given but estimated.
+    """
     if not isinstance(given, PI) or given.loop != "sampled" or any(r.torque is None or r.command is None for r in records):
         return None
     replays = [replay(r, given) for r in records]
     if all(r.follows for r in replays) or any(r.cause not in ("", "initial_integral") for r in replays):
         return None
-    shown = form_shown(records, given)
+    shown = form_shown(records, given, tuple(name for name in unknown if name in ("kp", "ki")))
     if shown is None:
         return None
     driven, held = (tuple(driven_by_cascade(r, shown.controller) for r in part) for part in (records, held))
-    return Driver(driven, held, shown.controller, _findings(shown), _notes(shown, records))
+    return Driver(driven, held, shown.controller, _findings(shown), _notes(shown, records), _estimates(shown.estimated))
 
 
 def _findings(shown: Shown) -> tuple[Finding, ...]:

@@ -49,6 +49,7 @@ FILTER_NAMES = {
 }
 """Argument of `Cascade` -> name of the finding."""
 KP_W, KP_R, KI, FIRST_FEED = 0, 1, 2, 3  # no decision: places in (kp, kp b, ki, a_ff, f_ff, starts)
+GAINS = {"kp": KP_W, "ki": KI}
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ class Form:
     weight: str = "one"
     feeds: tuple[str, ...] = ()
     starts: bool = False
+    unknown: tuple[str, ...] = ()  # gains that were not given: free, and no finding
 
     @property
     def chosen(self) -> int:
@@ -68,7 +70,7 @@ class Form:
 
     def names(self, shape: Shape) -> tuple[str, ...]:
         """What differs from the bare PI with the given gains, in words of the findings."""
-        names = ["integration_rule"] * (self.rule != "trapezoidal") + ["other_gains"] * bool(self.free)
+        names = ["integration_rule"] * (self.rule != "trapezoidal") + ["other_gains"] * bool(set(self.free) - set(self.unknown))
         names += ["command_weight"] * (self.weight != "one")
         return (*names, *self.feeds, *dict.fromkeys(FILTER_NAMES[place] for place, _ in shape.places))
 
@@ -110,6 +112,7 @@ class Shown:
     rivals      what differs in forms with no more free numbers that the logs do not tell from it
     before, rms of logged minus replayed torque, bare PI and this one [N m]
     starts      the highest integral before a record's begin [N m]; 0: none
+    estimated   gains that were not given -> (value, standard deviation)
     """
 
     controller: Cascade
@@ -119,6 +122,7 @@ class Shown:
     before: float
     rms: float
     starts: float
+    estimated: dict[str, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +138,11 @@ class _Candidate:
         return self.form.names(self.shape)
 
 
-def form_shown(records: Sequence[Record], given: PI) -> Shown | None:
-    """The simplest controller that makes the logged torques; None where none does, or the bare PI needs none."""
+def form_shown(records: Sequence[Record], given: PI, unknown: tuple[str, ...] = ()) -> Shown | None:
+    """The simplest controller that makes the logged torques; None where none does, or the bare PI needs none.
+
+    unknown: gains of `given` that were not given but estimated.
+    """
     law = law_of(records, given.limits[0])
     if law is None or given.loop != "sampled" or any(r.dt != records[0].dt for r in records):
         return None
@@ -148,7 +155,7 @@ def form_shown(records: Sequence[Record], given: PI) -> Shown | None:
         shape = fitted_shape(law, places, floor)
         if shape.rms <= NEAR * floor or white_noise(shape.left, law.logged):
             followed = len(places)
-        candidates += _candidates(law, shape, given, floor)
+        candidates += _candidates(law, shape, given, floor, unknown)
     candidates.sort(key=lambda c: c.criterion)
     if not candidates or not candidates[0].names:
         return None
@@ -160,24 +167,25 @@ def _allowed(rec: Record, controller: PI) -> float:
     return tolerance_of(rec, rec.command, controller, rec.torque)
 
 
-def _forms(given: PI) -> Iterator[Form]:
+def _forms(given: PI, unknown: tuple[str, ...]) -> Iterator[Form]:
     """Every form; but a rule that other free gains make up for, which no log shows."""
     gains: tuple[tuple[str, ...], ...] = ((), ("kp",), ("ki",), ("kp", "ki")) if given.ki else ((), ("kp",))
+    gains = tuple(free for free in gains if set(unknown) <= set(free))
     feeds = ((), FEEDS[:1], FEEDS[1:], FEEDS)
     for rule, free, weight, feed, starts in product(RULES, gains, WEIGHTS, feeds, (False, True)):
         if rule != "trapezoidal" and (not given.ki or ("kp" in free and weight != "none")):
             continue
-        yield Form(rule, free, weight, feed, starts)
+        yield Form(rule, free, weight, feed, starts, unknown)
 
 
-def _candidates(law: Law, shape: Shape, given: PI, floor: float) -> Iterator[_Candidate]:
+def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[str, ...]) -> Iterator[_Candidate]:
     """Every form with these filters: one small least squares each, linear in the filters' numbers around those of `shape`."""
     table = law.columns(shape.places, shape.numbers)
     around = np.column_stack([table, _slopes(law, shape), law.logged])
     R: Matrix = np.linalg.qr(around)[1]
     p, n = table.shape[1], len(law.logged)
     linear, slopes, logged = R[:, :p], R[:, p:-1], R[:, -1]
-    for form in _forms(given):
+    for form in _forms(given, unknown):
         fixed, moved = form.constraints(given, len(law.lengths))
         B = form.of_columns(p, law.period)
         M = np.column_stack([linear @ B @ moved, slopes])
@@ -242,6 +250,9 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
         before=_rms(before),
         rms=_rms(off),
         starts=float(np.abs(starts).max()),
+        estimated={
+            name: (float(numbers[at]), float(np.sqrt(cov[at, at]))) for name, at in GAINS.items() if name in best.form.unknown
+        },
     )
 
 
@@ -316,7 +327,7 @@ def _named(
     named: dict[str, dict[str, tuple[float, float]]] = {name: {} for name in best.names}
     if "other_gains" in named:
         gains = {"kp": (kp, float(std[KP_W])), "ki": (float(numbers[KI]), float(std[KI]))}
-        named["other_gains"] = {name: gains[name] for name in best.form.free}
+        named["other_gains"] = {name: gains[name] for name in best.form.free if name not in best.form.unknown}
     if "command_weight" in named and kp > 0.0:
         slope = np.array([-kp_b / kp**2, 1.0 / kp])
         named["command_weight"] = {"weight": (kp_b / kp, float(np.sqrt(max(slope @ cov[:2, :2] @ slope, 0.0))))}
