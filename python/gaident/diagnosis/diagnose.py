@@ -14,7 +14,7 @@ from gaident.control.cascade import Cascade, Controller
 from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, as_read, controller_findings
-from gaident.diagnosis.controller.form_findings import driver_of
+from gaident.diagnosis.controller.form_findings import driver_of, loop_of
 from gaident.diagnosis.controller.log_shift import aligned
 from gaident.diagnosis.experiments.excitation import decided_by_the_angle, excitation
 from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off, noise_findings
@@ -34,7 +34,6 @@ from gaident.diagnosis.selection.select import Selection, by_whitened_errors, co
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.uncertainty import estimates_of
-from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
 from gaident.models.drive_torque import torque_driven
@@ -117,10 +116,10 @@ def diagnose(
     began = time.perf_counter()
     note = Note(progress)
     check_controller(controller)
-    numbers = with_estimates(records_of(rec, "rec"), controller)
-    records, loop, under, cascade = torque_driven(records_of(rec, "rec"), numbers.controller)
-    held = () if validation is None else torque_driven(records_of(validation, "validation"), numbers.controller).records
-    controller, estimates = loop, numbers.estimates
+    asked = loop_of(records_of(rec, "rec"), controller)
+    records, loop, under, cascade = torque_driven(records_of(rec, "rec"), asked.controller)
+    held = () if validation is None else torque_driven(records_of(validation, "validation"), asked.controller).records
+    controller, estimates, form = loop, asked.estimates, asked.findings
     checked(records, held, controller, identification, bootstrap, seed, progress, axis)
     records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
@@ -133,17 +132,16 @@ def diagnose(
         moved = aligned(records, held, controller)
         driver = None if moved.shifts else driver_of(records, held, controller, tuple(estimates))
         if driver is None:
-            under = (*numbers.trusted().notes, *under)
+            under = (*(asked.notes or asked.numbers.trusted().notes), *under)
         else:
-            controller, under, estimates = None, (*under, *driver.notes), driver.estimates
+            controller, under = None, (*under, *driver.notes)
+            estimates, form = driver.estimates, driver.findings
             moved = aligned(driver.records, driver.held, controller)
         logged = as_logged(moved.records, controller)
         controller = logged.controller
         note(0.02, "identifying the linear model")
         idn = identification if identification is not None else identify(list(moved.records), controller, seed=seed)
-        work = _Work(
-            moved.records, moved.held, logged, idn, noise_std, note, axis, cascade, () if driver is None else driver.findings
-        )
+        work = _Work(moved.records, moved.held, logged, idn, noise_std, note, axis, cascade, form)
         work.search()
         result = work.report(seed)
         result = moved.noted(replace(result, noise=noise_std, bootstrap=bootstrap, controller_numbers=estimates))

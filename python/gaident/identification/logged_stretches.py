@@ -18,7 +18,7 @@ from gaident.control.ticks import at_the_clock, smooth_between
 from gaident.data.record import Record
 from gaident.policy.table import POLICY
 
-__all__ = ["Log", "centred", "correlation", "log_of", "numbered", "plateau_of", "unlimited", "whitened"]
+__all__ = ["Log", "centred", "correlation", "correlation_of", "log_of", "numbered", "plateau_of", "unlimited", "whitened"]
 
 Vector = NDArray[np.float64]
 
@@ -102,9 +102,13 @@ def centred(c: Vector, stretch: NDArray[np.intp], whole: bool) -> Vector:
 
 
 def correlation(left: Vector, stretch: NDArray[np.intp]) -> float:
-    """rho of what is left, from 0 to just below 1."""
-    d = centred(left[stretch >= 0], stretch[stretch >= 0], False)
-    own = stretch[stretch >= 0]
+    """rho of what is left at every line, from 0 to just below 1; stretch: of each line."""
+    return correlation_of(left[stretch >= 0], stretch[stretch >= 0])
+
+
+def correlation_of(left: Vector, own: NDArray[np.intp]) -> float:
+    """The same of lines in stretches; own: the stretch of each."""
+    d = centred(left, own, False)
     pairs = own[1:] == own[:-1]
     power = float(np.sum(d**2))
     together = float(np.sum((d[1:] * d[:-1])[pairs]))

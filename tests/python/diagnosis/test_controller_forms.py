@@ -10,8 +10,10 @@ from threadpoolctl import threadpool_limits
 
 import gaident as ga
 import servo_referee as referee
-from gaident.diagnosis.controller.form_findings import driver_of
+from gaident.control.ticks import between_lines
+from gaident.diagnosis.controller.form_findings import driver_of, loop_of
 from gaident.diagnosis.controller.forms import Shown, form_shown
+from gaident.diagnosis.controller.slow_forms import limited
 
 T = 250e-6
 KP, KI = 0.05, 2.0
@@ -145,3 +147,48 @@ def test_a_diagnosis_names_the_controller_and_no_mechanics() -> None:
     assert dia.verdict == "explained" and dia.controller is None
     assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.01)
     assert "The controller is not the given PI" in dia.summary()
+
+
+def slower(every: int = 4, **c: Any) -> ga.Record:
+    """A log with a line for every so many of the controller's samples, with noise that the controller reads."""
+    lines = command(1600)
+    r = between_lines(lines, every)
+    noise = 0.02 * np.random.default_rng(2).standard_normal(len(r))
+    reads = iter(noise)
+    filters = [lambda w: w + next(reads), *c.pop("velocity_filters", [])]
+    w, u, _ = referee.simulate(AXIS, r, T, every, **{"kp": KP, "ki": KI, "velocity_filters": filters, **c})
+    return ga.Record(every * T, command=lines, velocity=w + noise[::every], torque=u)
+
+
+@pytest.mark.parametrize(
+    ("made", "named"),
+    [
+        ({}, {}),
+        ({"weight": 0.0}, {"command_weight": {"weight": 0.0}}),
+        ({"torque_filters": [low(2e-3)]}, {"torque_filter": {"time_constant": 2e-3}}),
+    ],
+)
+def test_a_slower_log_shows_the_form_too(made: dict[str, Any], named: dict[str, dict[str, float]]) -> None:
+    with threadpool_limits(1, user_api="blas"):
+        loop = loop_of([slower(**made)], ga.Cascade(GIVEN, T))
+    assert {f.effect for f in loop.findings} == set(named)
+    for finding in loop.findings:
+        for key, true in named[finding.effect].items():
+            assert finding.parameters[key].value == pytest.approx(true, rel=0.05, abs=1e-3)
+    assert isinstance(loop.controller, ga.Cascade) and loop.controller.period == T
+
+
+@pytest.mark.parametrize("windup", ["none", "hold"])
+def test_what_the_integrator_does_at_a_limit_is_told_by_the_whole_run(windup: str) -> None:
+    found = limited([slower(torque_limit=0.6, windup=windup)], ga.Cascade(GIVEN, T))
+    assert found.limit == 0.6 and found.controller.velocity == ga.PI(KP, KI, torque_limit=0.6, anti_windup=windup)
+    assert found.gain > 100.0
+    free = limited([slower()], ga.Cascade(GIVEN, T))
+    assert free.limit is None and free.controller == ga.Cascade(GIVEN, T)
+
+
+def test_a_slower_log_whose_torque_no_form_makes_names_none() -> None:
+    rec = slower()
+    assert rec.torque is not None
+    loop = loop_of([rec.with_channels(torque=rec.torque * (1.0 + 0.2 * np.sign(rec.torque)))], ga.Cascade(GIVEN, T))
+    assert loop.findings == () and loop.controller == ga.Cascade(GIVEN, T)
