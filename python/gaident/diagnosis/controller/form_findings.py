@@ -13,6 +13,7 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.replay import replay
+from gaident.diagnosis.library.names import SATURATION
 from gaident.identification.controller_numbers import Numbers, with_estimates
 from gaident.models.drive_torque import driven_by_cascade
 from gaident.policy.table import POLICY
@@ -152,7 +153,7 @@ def _notes(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
         )
     ]
     scheme = shown.controller.velocity.anti_windup
-    if "torque_saturation" in shown.numbers and scheme != "none":
+    if SATURATION in shown.numbers and scheme != "none":
         held = {"hold": "is held", "tracking": "is set back"}[scheme]
         notes.append(Text(f"At its limit the integrator {held} (anti-windup {scheme!r}): so the controller comes closest."))
     if shown.rivals:

@@ -10,23 +10,12 @@ import pytest
 
 import gaident as ga
 import servo_referee as referee
-from gaident.control.ticks import between_lines
 from gaident.control.unknown import unknown_of, with_numbers
 from gaident.errors import ControllerError, RecordError
 from gaident.identification.controller_numbers import with_estimates
-from test_controller_forms import AXIS, KI, KP, NOTCH, T, command, dip, log, low
+from referee_logs import AXIS, KI, KP, NOTCH, T, command, dip, log, low, slower
 
 UNKNOWN = ga.PI(kp=None, ki=None)
-
-
-def slower(every: int, noise: float = 0.0, **c: Any) -> ga.Record:
-    """A log with a line for every so many of the controller's samples; noise of the velocity that the controller reads."""
-    r = between_lines(command(3000)[::every], every)
-    sensor = noise * np.random.default_rng(1).standard_normal(len(r))
-    reads = iter(sensor)
-    filters = [lambda w: w + next(reads), *c.pop("velocity_filters", [])]
-    w, u, _ = referee.simulate(AXIS, r, T, every, **{"kp": KP, "ki": KI, "velocity_filters": filters, **c})
-    return ga.Record(every * T, command=r[::every], velocity=w + sensor[::every], torque=u)
 
 
 def test_the_names_of_what_is_unknown() -> None:
@@ -87,7 +76,8 @@ def test_each_number_is_found(name: str, every: int) -> None:
         estimate = found.estimates[key]
         off = abs(estimate.value - value)
         exact = every == 1 and name != "a limit that is not given"  # the samples around it are not explained
-        assert off < (1e-4 * value if exact else 5.0 * estimate.std), (key, estimate)
+        # A limit that acts between two lines of a slower log is no part of the deviation.
+        assert off < (1e-4 * value if exact else max(5.0 * estimate.std, 0.01 * value)), (key, estimate)
         assert exact or estimate.std < (0.2 if key != "friction_feedforward" else 2.0) * value, (key, estimate)
 
 
