@@ -77,9 +77,9 @@ def test_each_number_is_found(name: str, every: int) -> None:
     for key, value in true.items():
         estimate = found.estimates[key]
         off = abs(estimate.value - value)
-        exact = every == 1 and name != "a limit that is not given"  # the samples around it are not explained
-        # A limit that acts between two lines of a slower log is no part of the deviation.
-        assert off < (1e-3 * value if exact else max(5.0 * estimate.std, 0.01 * value)), (key, estimate)
+        exact = every == 1 and "limit" not in name  # an integrator that is held now and then, beside the limit, spoils a stretch
+        # What a limit does between two lines, or beside it, is no part of the deviation.
+        assert off < (1e-6 * value if exact else max(5.0 * estimate.std, 0.01 * value)), (key, estimate)
         assert exact or estimate.std < (0.2 if key != "friction_feedforward" else 2.0) * value, (key, estimate)
 
 
