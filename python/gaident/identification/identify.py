@@ -20,6 +20,7 @@ from gaident.data.record import Record
 from gaident.errors import SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
 from gaident.identification.arguments import check_arithmetic, check_numbers, checked_records, checked_space, distinct
+from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.identification.notes import record_notes, warnings_of
 from gaident.identification.parts import search_parts
@@ -71,6 +72,7 @@ def identify(
     controller : PI or Cascade, optional
         The velocity loop, driven by the record's command; None: open loop, the record's torque drives the model.
         Under what is no bare PI at the log's rate the torque drives the model too: as logged, or as this controller makes it.
+        Its numbers that are None are estimated first, from the logged torque.
     space : SearchSpace, optional
         Search ranges; None: derived from the data, see `Identification.space`.
     settings : Settings, optional
@@ -118,7 +120,9 @@ def identify(
     (1, 0, 0.01, 0.05, False)
     """
     began = time.perf_counter()
-    driven = torque_driven(checked_records(rec, controller), controller)
+    checked = checked_records(rec, controller)
+    numbers = with_estimates(checked, controller).trusted()
+    driven = torque_driven(checked, numbers.controller)
     loop = driven.loop
     given = [r.with_channels(command=None) for r in driven.records] if driven.slower else list(driven.records)
     settings = Settings() if settings is None else settings
@@ -139,7 +143,7 @@ def identify(
     found = work.search(int(trials), int(seed), progress)
     best, scored = work.select(found)
     result = work.report(best, scored, found, int(seed))
-    warnings = [*driven.notes, *driven.doubts, *result.warnings]
+    warnings = [*numbers.notes, *driven.notes, *driven.doubts, *result.warnings]
     if derived and not settings.species:
         warnings.append(
             "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
@@ -150,7 +154,8 @@ def identify(
         warnings.append(
             f"In {settings.arithmetic} {overflows} of {evaluations} candidates left its range or diverged; they count as worst."
         )
-    return replace(result, warnings=tuple(warnings), seconds=time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    return replace(result, warnings=tuple(warnings), controller_numbers=numbers.estimates, seconds=seconds)
 
 
 @dataclass(frozen=True)
