@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,10 @@ from gaident.control.filtering import filtered, rate_limited
 from gaident.control.filters import LowPass, Notch, filter_of
 from gaident.control.pi import PI
 from gaident.control.ticks import Feedforward, Ticks, ticks_of
+from gaident.control.unknown import known, with_own
 from gaident.errors import ControllerError
 
-__all__ = ["Cascade", "Filter", "P", "controller_of"]
+__all__ = ["Cascade", "Filter", "P", "cascade_of", "controller_of"]
 
 Vector = NDArray[np.float64]
 Filter: TypeAlias = LowPass | Notch
@@ -39,7 +40,7 @@ class P:
     Parameters
     ----------
     gain : float
-        Kv [1/s], > 0.
+        Kv [1/s], > 0; None: not known, and estimated by `identify` and `diagnose` where the torque is logged.
 
     Raises
     ------
@@ -55,7 +56,13 @@ class P:
 
     gain: float
 
+    if TYPE_CHECKING:
+
+        def __init__(self, gain: float | None) -> None: ...
+
     def __post_init__(self) -> None:
+        if self.gain is None:
+            return
         gain = real_number(self.gain, "gain", ControllerError)
         if gain <= 0.0:
             raise ControllerError(f"gain is {gain:g}: give a number > 0 [1/s]")
@@ -118,7 +125,7 @@ class Cascade(Controller):
     acceleration_feedforward : float
         [N m s^2/rad], an inertia.
     friction_feedforward : float
-        [N m].
+        [N m]. Each feedforward may be None: not known, and estimated by `identify` and `diagnose` where the torque is logged.
     torque_filters, velocity_filters, command_filters : sequence of LowPass and Notch
         At most eight each; they act in their order.
     delay : float
@@ -153,6 +160,23 @@ class Cascade(Controller):
     command_filters: Sequence[Filter] = ()
     delay: float = 0.0
 
+    if TYPE_CHECKING:  # None is what is not known; whoever simulates has asked for numbers before (`gaident.control.unknown`)
+
+        def __init__(
+            self,
+            velocity: PI,
+            period: float | None = ...,
+            position: P | None = ...,
+            position_period: float | None = ...,
+            velocity_feedforward: float | None = ...,
+            acceleration_feedforward: float | None = ...,
+            friction_feedforward: float | None = ...,
+            torque_filters: Sequence[Filter] = ...,
+            velocity_filters: Sequence[Filter] = ...,
+            command_filters: Sequence[Filter] = ...,
+            delay: float = ...,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         if not isinstance(self.velocity, PI) or self.velocity.loop != "sampled":
             raise ControllerError(f'velocity is {self.velocity!r}: give a PI with loop="sampled", the digital controller')
@@ -167,6 +191,8 @@ class Cascade(Controller):
                 raise ControllerError(f"{name} is {time:g}: give seconds, > 0")
             object.__setattr__(self, name, time)
         for name in FEEDFORWARDS:
+            if getattr(self, name) is None:
+                continue
             object.__setattr__(self, name, real_number(getattr(self, name), name, ControllerError))
         delay = real_number(self.delay, "delay", ControllerError, "give seconds")
         if not 0.0 <= delay <= LONGEST_DELAY:
@@ -202,9 +228,30 @@ class Cascade(Controller):
         """ "command", or "position_command" where it has a position controller."""
         return "command" if self.position is None else "position_command"
 
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """See `Controller`: the command, or position command and position."""
+        return ("command",) if self.position is None else ("position_command", "position")
+
+    @property
+    def parts(self) -> tuple[tuple[str, object], ...]:
+        """See `Controller`: itself for the feedforward, the two controllers, the filters."""
+        placed = () if self.position is None else (("position.", self.position),)
+        filters = ((f"{name}[{i}].", one) for name in FILTERS for i, one in enumerate(getattr(self, name)))
+        return ("", self), ("velocity.", self.velocity), *placed, *filters
+
+    def with_numbers(self, numbers: Mapping[str, float]) -> Cascade:
+        """See `Controller`."""
+        filters: dict[str, Any] = {
+            name: tuple(with_own(one, f"{name}[{i}].", numbers) for i, one in enumerate(getattr(self, name))) for name in FILTERS
+        }
+        position = None if self.position is None else with_own(self.position, "position.", numbers)
+        velocity = with_own(self.velocity, "velocity.", numbers)
+        return replace(with_own(self, "", numbers), velocity=velocity, position=position, **filters)
+
     def ahead(self, dt: float) -> int:
         """See `Controller`."""
-        return 1 if self.position is None else 2 * self.position_every(dt)
+        return 1 if self.position is None else -(-2 * self.position_every(dt) // self.log_every(dt))
 
     def log_every(self, dt: float) -> int:
         """Controller samples for each line of a log with the sample time dt [s]; ControllerError where it is no whole number."""
@@ -279,13 +326,15 @@ class Cascade(Controller):
         return replace(self, velocity=self.velocity.with_limits(torque, integrator))
 
     def ticks(self, dt: float, command: Vector, position: Vector | None) -> Ticks:
-        """See `Controller`."""
+        """See `Controller`; ControllerError where a number is None."""
+        known(self)
         placed = 0 if self.position is None else self.position_every(dt)
         feed = Feedforward(self.velocity_feedforward, self.acceleration_feedforward, self.friction_feedforward)
         return ticks_of(command, position, dt, self.log_every(dt), placed, feed)
 
     def core_loop(self, dt: float) -> _core.Loop:
-        """See `Controller`."""
+        """See `Controller`; ControllerError where a number is None."""
+        known(self)
         period = dt / self.log_every(dt)
         filters = {name: [f.digital(period) for f in getattr(self, name)] for name in FILTERS}
         settings = self.velocity.servo_settings(
@@ -313,6 +362,14 @@ class Cascade(Controller):
         for name in FILTERS:
             values[name] = tuple(filter_of(one) for one in values.get(name, ()))
         return cls(position=None if gain is None else P(gain), **values)
+
+
+def cascade_of(controller: Controller) -> Cascade:
+    """The controller as a digital servo: a Cascade is one, a PI stands in one with nothing around it."""
+    if isinstance(controller, Cascade):
+        return controller
+    assert isinstance(controller, PI)
+    return Cascade(replace(controller, loop="sampled"))
 
 
 def controller_of(data: Mapping[str, Any]) -> Controller:

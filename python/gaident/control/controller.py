@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from gaident import _core
 from gaident.control.ticks import Ticks
+from gaident.control.unknown import unknown_in
 from gaident.errors import ControllerError, SettingsError
 
 __all__ = ["Controller", "Gains", "Limiting", "Signals", "checked_controller"]
@@ -43,6 +45,8 @@ class Gains(Protocol):
     def ki(self) -> float: ...
     @property
     def limits(self) -> tuple[float, float]: ...
+    @property
+    def unknown(self) -> tuple[str, ...]: ...
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,25 @@ class Controller(ABC):
     @abstractmethod
     def driven_by(self) -> str:
         """The channel that drives it: "command" or "position_command"."""
+
+    @property
+    @abstractmethod
+    def reads(self) -> tuple[str, ...]:
+        """The channels that it reads beside the velocity."""
+
+    @property
+    @abstractmethod
+    def parts(self) -> Sequence[tuple[str, object]]:
+        """(beginning of the names, part whose numbers have them), itself first with ""."""
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """The names of what is None: "kp" of a PI; "velocity.kp", "torque_filters[0].frequency", ... of a Cascade."""
+        return unknown_in(self.parts)
+
+    @abstractmethod
+    def with_numbers(self, numbers: Mapping[str, float]) -> Controller:
+        """The same with numbers by the names of `unknown`. Raises ControllerError where a part refuses its number."""
 
     @property
     def limits(self) -> tuple[float, float]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gaident import _core
 from gaident.control.controller import Controller, Gains
 from gaident.control.ticks import Ticks, of_lines, straight_part
+from gaident.control.unknown import known
 
 __all__ = [
     "clock",
@@ -47,7 +48,8 @@ def clock(dt: float) -> _core.Clock:
 
 
 def core_controller(controller: Gains) -> _core.Controller:
-    """The core's controller."""
+    """The core's controller; ControllerError where a gain is None."""
+    known(controller)
     torque, integrator = controller.limits
     return _core.Controller(kp=controller.kp, ki=controller.ki, torque_limit=torque, integrator_limit=integrator)
 
@@ -97,11 +99,14 @@ def effect_record(
 
 
 def servo_torque(dt: float, ticks: Ticks, velocity: Vector, servo: _core.Loop) -> Vector:
-    """Torque [N m] (n,) that a servo makes of measured signals (n,), from rest; the log has a line for each of its samples."""
+    """Torque [N m] that a servo makes of measured signals, from rest, at each of its samples: (n r,), r to a line of the log.
+
+    dt: sample time of the log [s]; velocity (n r,) [rad/s]: at the controller's samples, as everything in `ticks`.
+    """
     none = np.zeros(len(velocity))
     fed, added, position = ticks.velocity_feedforward, ticks.torque_feedforward, ticks.position
     return _core.servo_torque(
-        clock=clock(dt),
+        clock=clock(dt / ticks.log_every),
         loop=servo,
         source=ticks.source,
         velocity=velocity,

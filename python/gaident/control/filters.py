@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gaident import _core
 from gaident.checks import known_keys, real_number
@@ -13,7 +13,10 @@ from gaident.errors import ControllerError
 __all__ = ["LowPass", "Notch", "filter_of"]
 
 
-def _above_zero(value: object, name: str) -> float:
+def _above_zero(value: object, name: str) -> float | None:
+    """A number above 0, or None: not known."""
+    if value is None:
+        return None
     number = real_number(value, name, ControllerError)
     if number <= 0.0:
         raise ControllerError(f"{name} is {number:g}: give a number > 0")
@@ -29,7 +32,7 @@ class LowPass:
     Parameters
     ----------
     time_constant : float
-        tau [s], > 0.
+        tau [s], > 0; None: not known, and estimated by `identify` and `diagnose` where the torque is logged.
 
     Raises
     ------
@@ -44,6 +47,10 @@ class LowPass:
     """
 
     time_constant: float
+
+    if TYPE_CHECKING:
+
+        def __init__(self, time_constant: float | None) -> None: ...
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "time_constant", _above_zero(self.time_constant, "time_constant"))
@@ -71,6 +78,7 @@ class Notch:
         Of the notch [Hz], > 0 and below half the controller's sampling frequency.
     numerator_damping, denominator_damping : float
         zn >= 0 and zd > 0; at the frequency the filter lets zn/zd pass.
+        Each of the three may be None: not known, and estimated as that of a `LowPass`.
 
     Raises
     ------
@@ -88,9 +96,17 @@ class Notch:
     numerator_damping: float
     denominator_damping: float
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, frequency: float | None, numerator_damping: float | None, denominator_damping: float | None
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "frequency", _above_zero(self.frequency, "frequency"))
         object.__setattr__(self, "denominator_damping", _above_zero(self.denominator_damping, "denominator_damping"))
+        if self.numerator_damping is None:
+            return
         damping = real_number(self.numerator_damping, "numerator_damping", ControllerError)
         if damping < 0.0:
             raise ControllerError(f"numerator_damping is {damping:g}: give a number >= 0")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from gaident.control.drive_parameters import kp_and_ki
 from gaident.control.filtering import rate_limited
 from gaident.control.pi_torque import pi_torque
 from gaident.control.ticks import Ticks, of_lines
+from gaident.control.unknown import known, with_own
 from gaident.errors import ControllerError, SettingsError
 
 Vector = NDArray[np.float64]
@@ -35,6 +36,8 @@ _NOT_GIVEN = float("nan")  # told from a given nan by identity
 @dataclass(frozen=True)
 class PI(Controller):
     """PI velocity controller, C(s) = kp + ki/s.
+
+    kp, ki and command_weight may be None: not known, and estimated by `identify` and `diagnose` where the torque is logged.
 
     Parameters
     ----------
@@ -79,6 +82,8 @@ class PI(Controller):
     >>> controller = ga.PI(kp=0.0232, ki=1.367, torque_limit=2.4)
     >>> controller.limited
     True
+    >>> ga.PI(kp=None, ki=None).kp is None
+    True
     """
 
     kp: float = _NOT_GIVEN
@@ -91,6 +96,21 @@ class PI(Controller):
     anti_windup: str = "none"
     tracking_time: float | None = None
 
+    if TYPE_CHECKING:  # None is what is not known; whoever simulates has asked for numbers before (`gaident.control.unknown`)
+
+        def __init__(
+            self,
+            kp: float | None = ...,
+            ki: float | None = ...,
+            loop: str = ...,
+            torque_limit: float | None = ...,
+            integrator_limit: float | None = ...,
+            rule: str = ...,
+            command_weight: float | None = ...,
+            anti_windup: str = ...,
+            tracking_time: float | None = ...,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         missing = [name for name in ("kp", "ki") if getattr(self, name) is _NOT_GIVEN]
         if missing:
@@ -98,6 +118,8 @@ class PI(Controller):
                 f"PI lacks {' and '.join(missing)}: give {PI_OF_GAINS}, {arg('ki', '0')} for a proportional controller"
             )
         for name in ("kp", "ki"):
+            if getattr(self, name) is None:
+                continue
             gain = real_number(getattr(self, name), name, ControllerError)
             if gain < 0.0:
                 raise ControllerError(
@@ -124,10 +146,11 @@ class PI(Controller):
     def _check_digital(self) -> None:
         object.__setattr__(self, "rule", one_of(self.rule, "rule", tuple(RULES), ControllerError))
         object.__setattr__(self, "anti_windup", one_of(self.anti_windup, "anti_windup", ANTI_WINDUP, ControllerError))
-        weight = real_number(self.command_weight, "command_weight", ControllerError)
-        if weight < 0.0:
-            raise ControllerError(f"command_weight is {weight:g}: give a number >= 0; 1 is a PI, 0 an IP controller")
-        object.__setattr__(self, "command_weight", weight)
+        if self.command_weight is not None:
+            weight = real_number(self.command_weight, "command_weight", ControllerError)
+            if weight < 0.0:
+                raise ControllerError(f"command_weight is {weight:g}: give a number >= 0; 1 is a PI, 0 an IP controller")
+            object.__setattr__(self, "command_weight", weight)
         if self.anti_windup != "none" and self.torque_limit is None:
             raise ControllerError(
                 f'anti_windup is "{self.anti_windup}" without a torque_limit, at which it would act: give torque_limit='
@@ -169,6 +192,20 @@ class PI(Controller):
         return "command"
 
     @property
+    def reads(self) -> tuple[str, ...]:
+        """See `Controller`: the command."""
+        return ("command",)
+
+    @property
+    def parts(self) -> tuple[tuple[str, object], ...]:
+        """See `Controller`: itself alone."""
+        return (("", self),)
+
+    def with_numbers(self, numbers: Mapping[str, float]) -> PI:
+        """See `Controller`."""
+        return with_own(self, "", numbers)
+
+    @property
     def limits(self) -> tuple[float, float]:
         """(Torque limit, integrator limit) [N m], infinity for none: as the core takes them."""
         torque = math.inf if self.torque_limit is None else self.torque_limit
@@ -208,7 +245,8 @@ class PI(Controller):
         return of_lines(command, position)
 
     def core_loop(self, dt: float) -> _core.Loop:
-        """See `Controller`."""
+        """See `Controller`; ControllerError where a number is None."""
+        known(self)
         if self.bare:
             return _core.Loop(kind=self.loop, controller=core.core_controller(self))
         return _core.Loop(kind="servo", controller=core.core_controller(self), servo=self.servo_settings())

@@ -14,6 +14,7 @@ from gaident.axis import say
 from gaident.control import core
 from gaident.control.controller import Gains
 from gaident.control.filtering import clamped_sum
+from gaident.control.unknown import known
 
 __all__ = ["HOLDS", "held_torque", "pi_block", "pi_torque"]
 
@@ -30,6 +31,7 @@ def pi_torque(command: Vector, velocity: Vector, dt: float, controller: Gains, i
 
 def pi_block(e: Vector, dt: float, controller: Gains, last: float, integral: float) -> tuple[Vector, float]:
     """(torque, integral after it) [N m] for a block of errors [rad/s], with the last error and the integral before it."""
+    known(controller)
     half = 0.5 * controller.ki * dt
     steps = half * (e + np.concatenate([[last], e[:-1]]))
     torque_limit, integrator_limit = controller.limits

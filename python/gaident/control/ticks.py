@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gaident.policy.table import POLICY
 
-__all__ = ["Feedforward", "Ticks", "at_the_clock", "between_lines", "of_lines", "straight_part", "ticks_of"]
+__all__ = ["Feedforward", "Ticks", "at_the_clock", "between_lines", "of_lines", "smooth_between", "straight_part", "ticks_of"]
 
 Vector = NDArray[np.float64]
 
@@ -113,3 +113,15 @@ def _slope(signal: Vector, step: int, period: float) -> Vector:
     slopes = np.diff(made) / (step * period)
     slopes = np.append(slopes, slopes[-1:] if len(slopes) else 0.0)
     return np.repeat(slopes, step)[: len(signal)]
+
+
+def smooth_between(line: Vector, every: int) -> Vector:
+    """A velocity at the controller's samples: a cubic spline through the lines of its log, which goes on behind the last."""
+    if every == 1:
+        return np.ascontiguousarray(line, dtype=np.float64)
+    from scipy.interpolate import make_interp_spline
+
+    n = len(line)
+    spline = make_interp_spline(np.arange(n), line, k=3)
+    at = np.minimum(np.arange(n * every) / every, n - 1.0)
+    return np.asarray(spline(at), dtype=np.float64)

@@ -17,6 +17,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import as_read, controller_findings
 from gaident.diagnosis.controller.driving import Driving, driving_of
+from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.experiments.candidates import IN_MOTION, candidates
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off
@@ -65,24 +66,21 @@ def diagnose(
 ) -> Diagnosis:
     """Show what the model of an axis gets wrong, name the physical cause where the data allow it, and measure the gain.
 
-    A beam search over mechanisms with effects of `gaident.effects.table()`, all refitted together and decided by BIC.
-    The errors are whitened ones of a torque-driven simulation, or plain ones where these are no stationary noise.
-    Rivals within 10 units and equivalent effects make a finding ambiguous.
-    What no effect explains is reported by its driver and not named.
-    See docs/diagnosis.md.
+    A beam search over mechanisms with effects of `gaident.effects.table()`, all refitted together and decided by BIC, of whitened
+    errors of a torque-driven simulation, or of plain ones where these are no stationary noise. See docs/diagnosis.md.
+    Rivals within 10 units and equivalent effects make a finding ambiguous; what no effect explains is reported by its driver.
 
     Parameters
     ----------
     rec : Record or sequence of Record
         The data.
     controller : PI or Cascade, optional
-        The velocity loop; None: open loop, the record's torque drives the model.
-        Under what is no bare PI at the log's rate the torque drives the model too: as logged, or as this controller makes it.
+        The velocity loop; None: open loop, the record's torque drives the model. Numbers that are None are estimated.
+        Under what is no bare PI at the log's rate the torque drives the model: as logged, or as this controller makes it.
     identification : Identification, optional
         What `identify` found; None: it is run first.
     validation : Record or sequence of Record, optional
-        Records that no fit sees.
-        None: the last 30 % of each record are held out where they are long enough, see `Diagnosis.held_out`.
+        Records that no fit sees; None: the last 30 % of each long record are held out, see `Diagnosis.held_out`.
     noise : float or Record, optional
         Standard deviation of the velocity noise [rad/s], or a Record at standstill; None: from the record itself.
     bootstrap : int
@@ -121,9 +119,10 @@ def diagnose(
     began = time.perf_counter()
     note = Note(progress)
     given = records_of(rec, "rec")
-    driven = torque_driven(given, checked_controller(controller))
+    asked = loop_of(given, checked_controller(controller))
+    driven = torque_driven(given, asked.controller)
     kept = () if validation is None else records_of(validation, "validation")
-    records, held = driven.records, torque_driven(kept, controller).records if kept else ()
+    records, held = driven.records, torque_driven(kept, asked.controller).records if kept else ()
     checked(records, held, driven.loop, identification, bootstrap, seed, progress, axis)
     origin = {r.digest: whole for r, whole in zip((*records, *held), (*given, *kept), strict=True)}
     records, held = in_order(records), in_order(held)
@@ -134,13 +133,14 @@ def diagnose(
     # A sum that several threads share is rounded otherwise with each number of them, and a search follows the last digit.
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.01, "replaying the controller")
-        driving = driving_of(records, held, driven, origin)
+        driving = driving_of(records, held, asked, driven, origin)
         note(0.02, "identifying the linear model")
         moved, pi = driving.moved, bare_pi(driving.controller)
         idn = identification if identification is not None else identify(list(moved.records), pi, seed=seed)
         work = _Work(moved.records, moved.held, driving, idn, noise_std, note, axis)
         work.search()
-        result = moved.noted(replace(work.report(seed), noise=noise_std, bootstrap=bootstrap))
+        result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
+        result = moved.noted(result)
         result = replace(result, notes=(*driving.notes, *(() if work.at_controller.decided else driving.doubts), *result.notes))
         if bootstrap:
             from gaident.diagnosis.selection.bootstrap import with_p_value

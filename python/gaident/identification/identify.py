@@ -21,6 +21,7 @@ from gaident.errors import SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
 from gaident.identification.arguments import check_arithmetic, check_numbers, checked_records, checked_space, distinct
 from gaident.identification.closed_loop import input_of, looped_over, space_of
+from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.identification.notes import record_notes, warnings_of
 from gaident.identification.parts import search_parts
@@ -71,6 +72,7 @@ def identify(
         The velocity loop, driven by the record's command; None: open loop, the record's torque drives the model.
         Under a linear Cascade that is faster than the log, and starts at rest, the command drives the loop as well.
         Under any other Cascade the torque drives the model: as logged, or as this controller makes it.
+        Its numbers that are None are estimated first, from the logged torque.
     space : SearchSpace, optional
         Search ranges; None: derived from the data, see `Identification.space`.
     settings : Settings, optional
@@ -118,7 +120,9 @@ def identify(
     (1, 0, 0.01, 0.05, False)
     """
     began = time.perf_counter()
-    looped = looped_over(checked_records(rec, controller), controller, space)
+    checked = checked_records(rec, controller)
+    numbers = with_estimates(checked, controller).trusted()
+    looped = looped_over(checked, numbers.controller, space)
     given, loop = looped.records, looped.controller
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
@@ -138,7 +142,7 @@ def identify(
     found = work.search(int(trials), int(seed), progress)
     best, scored = work.select(found)
     result = work.report(best, scored, found, int(seed))
-    warnings = [*looped.notes, *result.warnings]
+    warnings = [*numbers.notes, *looped.notes, *result.warnings]
     if derived and not settings.species:
         warnings.append(
             "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
@@ -149,7 +153,8 @@ def identify(
         warnings.append(
             f"In {settings.arithmetic} {overflows} of {evaluations} candidates left its range or diverged; they count as worst."
         )
-    return replace(result, warnings=tuple(warnings), seconds=time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    return replace(result, warnings=tuple(warnings), controller_numbers=numbers.estimates, seconds=seconds)
 
 
 @dataclass(frozen=True)

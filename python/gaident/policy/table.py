@@ -206,6 +206,18 @@ class Policy:
     ramp: float = loop(
         2.0, "1", "times the change over the interval before or after: a command changes faster where it jumps", SHIFTED
     )
+    course: float = loop(
+        4.0,
+        "1",
+        "times what another course of the velocity between a slow log's lines makes of the torque: no less is seen",
+        SHIFTED,
+    )
+    each_number: float = loop(
+        0.8,
+        "1",
+        "of the rms, that each number of a form may leave at most in a slow log, where the BIC would count what is no noise",
+        SHIFTED,
+    )
     lag_said: float = loop(
         0.75, "samples", "from which a lag of an open loop's log is said; a sampled torque stands at 0.5", SHIFTED
     )

@@ -109,6 +109,8 @@ class Diagnosis(SavedResult):
         What both methods say of the same quantity; a contradiction is one of the notes, too.
     force_reason : str
         Why the force error is the figure to go by here, in words; empty where the free run is as good a figure.
+    controller_numbers : mapping of str to Estimate
+        What was None of the controller, as the logged torque shows it; names as "kp" or "torque_filters[0].frequency".
     axis : {"rotary", "linear"}
         Kind of the axis, as it was given to `diagnose`.
     records, validation_records : tuple of Record
@@ -157,6 +159,7 @@ class Diagnosis(SavedResult):
     force_reason: str = ""
     left_needed: float = 0.0
     axis: str = "rotary"
+    controller_numbers: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
@@ -314,6 +317,7 @@ class Diagnosis(SavedResult):
             "force_reason": self.force_reason,
             "left_needed": self.left_needed,
             "axis": self.axis,
+            "controller_numbers": {name: asdict(e) for name, e in self.controller_numbers.items()},
             "linear_axis": linear_sentences(self._sentences()),
         }
 
@@ -383,6 +387,7 @@ class Diagnosis(SavedResult):
                 force_reason=restored(data.get("force_reason", ""), linear),
                 left_needed=data.get("left_needed", 0.0),
                 axis=data.get("axis", "rotary"),
+                controller_numbers={name: Estimate(**e) for name, e in data.get("controller_numbers", {}).items()},
             )
 
 

@@ -79,6 +79,8 @@ class Identification(SavedResult):
         Digests of the records, see `Record.digest`.
     initial_states : mapping of str to tuple of float
         Digest -> initial state of a record that did not start at rest.
+    controller_numbers : mapping of str to Estimate
+        What was None of the controller, as the logged torque shows it; names as "kp" or "torque_filters[0].frequency".
     version : str
         Version of gaident.
     records : tuple of Record
@@ -111,6 +113,7 @@ class Identification(SavedResult):
     digests: tuple[str, ...]
     initial_states: Mapping[str, tuple[float, ...]] = field(hash=False)
     version: str = ""
+    controller_numbers: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
     def __repr__(self) -> str:
@@ -278,6 +281,7 @@ class Identification(SavedResult):
             "samples": self.samples,
             "digests": list(self.digests),
             "initial_states": {d: list(s) for d, s in self.initial_states.items()},
+            "controller_numbers": {name: asdict(e) for name, e in self.controller_numbers.items()},
             "linear_axis": linear_sentences(self.warnings),
         }
 
@@ -310,4 +314,5 @@ class Identification(SavedResult):
                 digests=tuple(data["digests"]),
                 initial_states={d: tuple(s) for d, s in data["initial_states"].items()},
                 version=data["gaident_version"],
+                controller_numbers={name: Estimate(**e) for name, e in data.get("controller_numbers", {}).items()},
             )

@@ -11,7 +11,7 @@ from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
-from gaident.show.wording import certainty, number, table, with_std
+from gaident.show.wording import certainty, controller_lines, number, table, with_std
 
 __all__ = [
     "TESTED_UP_TO",
@@ -55,6 +55,7 @@ def diagnosis_summary(dia: Diagnosis, axis: str = "rotary") -> str:
         _second_method(dia, axis),
         _next(dia, axis),
         _mechanics(dia, axis),
+        controller_lines(dia.controller_numbers, axis),
         _base(dia, axis),
         _record(dia, axis),
         _untested(dia, axis),

@@ -11,7 +11,7 @@ from gaident.control.controller import Controller
 from gaident.models.mechanics import Mechanics, TwoMass
 from gaident.results.estimate import Estimate
 from gaident.results.identification import Identification
-from gaident.show.wording import number, structure_words, table, with_std
+from gaident.show.wording import controller_lines, number, structure_words, table, with_std
 
 __all__ = [
     "flags_of",
@@ -35,6 +35,7 @@ def identification_summary(idn: Identification, axis: str = "rotary") -> str:
         _verdict(idn, axis),
         _warnings(idn, axis),
         _mechanics(idn, axis),
+        controller_lines(idn.controller_numbers, axis),
         _model(idn, axis),
         _structures(idn),
         _search(idn, axis),

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-__all__ = ["certainty", "number", "structure_words", "table", "with_std"]
+from gaident.axis import unit, word
+from gaident.results.estimate import Estimate
+
+__all__ = ["certainty", "controller_lines", "number", "structure_words", "table", "with_std"]
 
 
 def certainty(bic: float) -> str:
@@ -50,3 +53,9 @@ def table(rows: Sequence[Sequence[str]], indent: str = "  ") -> list[str]:
     widths = [max(map(len, column)) for column in kept]
     lines = zip(*kept, strict=True)
     return [(indent + "  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True))).rstrip() for line in lines]
+
+
+def controller_lines(numbers: Mapping[str, Estimate], axis: str) -> list[str]:
+    """What was not known of the controller and follows from the logged torque; empty where all was given."""
+    rows = [(name, with_std(e.value, e.std), "" if e.unit == "1" else unit(e.unit, axis)) for name, e in numbers.items()]
+    return ["Of the controller, from the logged " + word("torque", axis), *table(rows)] if rows else []

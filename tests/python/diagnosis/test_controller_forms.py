@@ -10,39 +10,10 @@ from threadpoolctl import threadpool_limits
 
 import gaident as ga
 import servo_referee as referee
-from gaident.diagnosis.controller.form_findings import driver_of
+from gaident.diagnosis.controller.form_findings import driver_of, loop_of
 from gaident.diagnosis.controller.forms import Shown, form_shown
-
-T = 250e-6
-KP, KI = 0.05, 2.0
-GIVEN = ga.PI(KP, KI)
-AXIS = referee.Axis(4e-4, 0.004, 9e-4, 0.006, 60.0, 0.02)
-NOTCH = {"frequency": 80.0, "numerator_damping": 0.1, "denominator_damping": 0.7}
-
-
-def command(samples: int = 2400, seed: int = 0) -> np.ndarray:
-    """Steps and ramps between random speeds of both signs [rad/s]."""
-    n = np.arange(samples)
-    held = np.repeat(np.random.default_rng(seed).uniform(-30.0, 30.0, samples // 300 + 1), 300)[:samples]
-    return np.where((n // 600) % 2 == 0, held, np.interp(n, n[::300], held[::300]))
-
-
-def low(tau: float) -> referee.Filter:
-    return referee.low_pass(tau, T)
-
-
-def dip() -> referee.Filter:
-    return referee.notch(*NOTCH.values(), T)
-
-
-def log(seed: int = 0, digits: int = 0, noise: float = 0.0, **c: Any) -> ga.Record:
-    """What the referee logs; digits of the torque, 0: all; noise: of a measured torque, share of its deviation."""
-    r = command(seed=seed)
-    w, u, _ = referee.simulate(AXIS, r, T, **{"kp": KP, "ki": KI, **c})
-    u = u + noise * np.std(u) * np.random.default_rng(seed).standard_normal(len(u))
-    if digits:
-        u = np.array([float(f"{x:.{digits}g}") for x in u])
-    return ga.Record(T, command=r, velocity=w, torque=u)
+from gaident.diagnosis.controller.slow_forms import limited
+from referee_logs import GIVEN, KI, KP, NOTCH, T, command, dip, log, low, slower
 
 
 def shown_by(*records: ga.Record, given: ga.PI = GIVEN) -> Shown | None:
@@ -147,3 +118,38 @@ def test_a_diagnosis_names_the_controller_and_no_mechanics() -> None:
     assert dia.controller.velocity.command_weight == 0.0 and len(dia.controller.torque_filters) == 1
     assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.01)
     assert "The controller is not the given PI" in dia.summary()
+
+
+@pytest.mark.parametrize(
+    ("made", "named"),
+    [
+        ({}, {}),
+        ({"weight": 0.0}, {"command_weight": {"weight": 0.0}}),
+        ({"torque_filters": [low(2e-3)]}, {"torque_filter": {"time_constant": 2e-3}}),
+    ],
+)
+def test_a_slower_log_shows_the_form_too(made: dict[str, Any], named: dict[str, dict[str, float]]) -> None:
+    with threadpool_limits(1, user_api="blas"):
+        loop = loop_of([slower(**made)], ga.Cascade(GIVEN, T))
+    assert {f.effect for f in loop.findings} == set(named)
+    assert {f.place for f in loop.findings} <= {"controller"}
+    for finding in loop.findings:
+        for key, true in named[finding.effect].items():
+            assert finding.parameters[key].value == pytest.approx(true, rel=0.05, abs=1e-3)
+    assert isinstance(loop.controller, ga.Cascade) and loop.controller.period == T
+
+
+@pytest.mark.parametrize("windup", ["none", "hold"])
+def test_what_the_integrator_does_at_a_limit_is_told_by_the_whole_run(windup: str) -> None:
+    found = limited([slower(torque_limit=0.6, windup=windup)], ga.Cascade(GIVEN, T))
+    assert found.limit == 0.6 and found.controller.velocity == ga.PI(KP, KI, torque_limit=0.6, anti_windup=windup)
+    assert found.gain > 100.0
+    free = limited([slower()], ga.Cascade(GIVEN, T))
+    assert free.limit is None and free.controller == ga.Cascade(GIVEN, T)
+
+
+def test_a_slower_log_whose_torque_no_form_makes_names_none() -> None:
+    rec = slower()
+    assert rec.torque is not None
+    loop = loop_of([rec.with_channels(torque=rec.torque * (1.0 + 0.2 * np.sign(rec.torque)))], ga.Cascade(GIVEN, T))
+    assert loop.findings == () and loop.controller == ga.Cascade(GIVEN, T)

@@ -93,6 +93,7 @@ def fake() -> Any:
         next_experiment=ga.Proposal(np.zeros(2000), DT, ("cogging", "velocity_ripple"), 412.3, "Slow speeds: several turns."),
         gain_interval=(0.55, 0.64),
         held_out="validation records",
+        controller_numbers={},
         base_shift={
             "gain": (9000.0, 9790.0),
             "inertia": (7.4935e-4, 6.88e-4),

@@ -64,6 +64,7 @@ class Fake:
             ),
         )
     )  # fmt: skip
+    controller_numbers: dict[str, Estimate] = field(default_factory=dict)
     rivals: tuple[Any, ...] = (SimpleNamespace(p=1, q=3, delta_bic=6.71),)
     structures: tuple[Any, ...] = tuple(
         SimpleNamespace(p=p, q=q, delta_bic=bic, error_sum=cost)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from gaident.axis import Text
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
-from gaident.diagnosis.controller.form_findings import driver_of
+from gaident.diagnosis.controller.form_findings import Loop, driver_of
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.models.drive_torque import Driven
+from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
 __all__ = ["Driving", "driving_of"]
@@ -23,7 +24,7 @@ class Driving:
     """The records, without shifts of their logs and as their torque drives a model, and the controller as it is used.
 
     logged: the bare PI with the gains that the torques show. findings: of the controller's form. notes: what to keep in mind.
-    doubts: notes on torques that do not follow from a controller that is no bare PI.
+    doubts: notes on torques that do not follow from a controller that is no bare PI. numbers: those that were not given.
     """
 
     moved: Aligned
@@ -32,6 +33,7 @@ class Driving:
     findings: tuple[Finding, ...] = ()
     notes: tuple[Text, ...] = ()
     doubts: tuple[Text, ...] = ()
+    numbers: Mapping[str, Estimate] = field(default_factory=dict)
 
     @property
     def read(self) -> tuple[Record, ...]:
@@ -41,17 +43,26 @@ class Driving:
         return tuple(self.moved.given[r.digest] for r in self.moved.records)
 
 
-def driving_of(records: Sequence[Record], held: Sequence[Record], driven: Driven, origin: Mapping[str, Record]) -> Driving:
-    """records, held: as `driven` has them; origin: digest of a record -> the same as it was given."""
+def driving_of(
+    records: Sequence[Record], held: Sequence[Record], asked: Loop, driven: Driven, origin: Mapping[str, Record]
+) -> Driving:
+    """records, held: as `driven` has them, under the controller of `asked`; origin: digest of a record -> the same as given.
+
+    Raises ControllerError where unknown numbers of the controller do not make the torque, and no other form of it does.
+    """
     controller, pi, notes = driven.controller, driven.loop, driven.notes
     moved = aligned(records, held, pi)
-    form = None if moved.shifts else driver_of(records, held, pi)
-    if form is not None:
+    form = None if moved.shifts else driver_of(records, held, pi, tuple(asked.estimates))
+    findings, numbers = asked.findings, asked.estimates
+    if form is None:
+        notes = (*(asked.notes or asked.numbers.trusted().notes), *notes)
+    else:
         controller, pi, notes = form.controller, None, (*notes, *form.notes)
+        findings, numbers = form.findings, form.estimates
         pairs = zip((*form.records, *form.held), (*records, *held), strict=True)
         origin = {changed.digest: origin.get(given.digest, given) for changed, given in pairs}
         moved = aligned(form.records, form.held, None)
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
     used = controller if bare_pi(controller) is None else logged.controller
-    return Driving(moved, used, logged, () if form is None else form.findings, notes, driven.doubts)
+    return Driving(moved, used, logged, findings, notes, driven.doubts, numbers)

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from gaident.axis import Text, joined, say, unit_text
-from gaident.control.cascade import Cascade
+from gaident.control.cascade import Cascade, cascade_of
+from gaident.control.controller import Controller
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.replay import replay
+from gaident.diagnosis.library.settings import OF_SETTING
+from gaident.identification.controller_numbers import Numbers, with_estimates
 from gaident.models.drive_torque import driven_by
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
-__all__ = ["Driver", "driver_of"]
+__all__ = ["Driver", "Loop", "driver_of", "loop_of"]
 
 UNITS = {
     "kp": "N m s/rad",
@@ -27,6 +30,7 @@ UNITS = {
     "torque": "N m",
     "time_constant": "s",
     "frequency": "Hz",
+    "limit": "N m",
 }
 """Of the findings' parameters; the others are numbers."""
 RULES = {
@@ -44,20 +48,63 @@ class Driver:
     controller: Cascade
     findings: tuple[Finding, ...]
     notes: tuple[Text, ...]
+    estimates: Mapping[str, Estimate]  # of gains that were not given
 
 
-def driver_of(records: Sequence[Record], held: Sequence[Record], given: PI | None) -> Driver | None:
-    """The controller that the logged torques show where a PI does not make them and nothing simple explains that; else None."""
+def driver_of(
+    records: Sequence[Record], held: Sequence[Record], given: PI | None, unknown: tuple[str, ...] = ()
+) -> Driver | None:
+    """The controller that the logged torques show where a PI does not make them and nothing simple explains that; else None.
+
+    unknown: gains of the PI that were not given but estimated.
+    """
     if given is None or given.loop != "sampled" or any(r.torque is None or r.command is None for r in records):
         return None
     replays = [replay(r, given) for r in records]
     if all(r.follows for r in replays) or any(r.cause not in ("", "initial_integral") for r in replays):
         return None
-    shown = form_shown(records, given)
+    shown = form_shown(records, given, tuple(name for name in unknown if name in ("kp", "ki")))
     if shown is None:
         return None
     driven, held = (tuple(driven_by(r, shown.controller) for r in part) for part in (records, held))
-    return Driver(driven, held, shown.controller, _findings(shown), _notes(shown, records))
+    return Driver(driven, held, shown.controller, _findings(shown), _notes(shown, records), _estimates(shown.estimated))
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The controller that a diagnosis works with: the given one, with its numbers, or the one that a slower log shows."""
+
+    controller: Controller | None
+    numbers: Numbers
+    findings: tuple[Finding, ...] = ()
+    notes: tuple[Text, ...] = ()
+    estimates: Mapping[str, Estimate] = field(default_factory=dict)
+
+
+def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
+    """The controller with estimates for what is None and, where a log has fewer lines than a bare PI in a Cascade has samples,
+    in the form that the logged torque shows."""
+    numbers = with_estimates(records, given)
+    as_given = Loop(numbers.controller, numbers, (), (), numbers.estimates)
+    pi, every = _alone(numbers.controller, records)
+    if pi is None or every == 1 or any(r.torque is None or r.command is None for r in records):
+        return as_given
+    unknown = {f"velocity.{name}": name for name in ("kp", "ki")}
+    shown = form_shown(records, pi, tuple(unknown[n] for n in numbers.estimates if n in unknown), every)
+    if shown is None:
+        return replace(as_given, numbers=numbers.trusted())
+    estimates = {f"velocity.{name}": e for name, e in _estimates(shown.estimated).items()}
+    return Loop(shown.controller, replace(numbers, doubt=""), _findings(shown), _notes(shown, records), estimates)
+
+
+def _alone(controller: Controller | None, records: Sequence[Record]) -> tuple[PI | None, int]:
+    """(the PI of a cascade that has nothing else and no anti-windup, controller samples to a line of the log)."""
+    if controller is None or len({r.dt for r in records}) > 1:
+        return None, 1
+    cascade = cascade_of(controller)
+    pi = cascade.velocity
+    bare = pi.bare and pi.integrator_limit is None and cascade == Cascade(pi, cascade.period)
+    return (pi if bare else None), controller.log_every(records[0].dt)
 
 
 def _findings(shown: Shown) -> tuple[Finding, ...]:
@@ -100,12 +147,17 @@ def _notes(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
     notes = [
         say(
             "The controller is not the given PI, which does not make the logged {torque} (rms {:.2g} {N m}). One with {} does, "
-            "to {:.1g} {N m} rms: its {torque} drives the model, and no loop is simulated.",
+            "to {:.1g} {N m} rms{}.",
             shown.before,
             _words(shown),
             shown.rms,
+            say(": its {torque} drives the model, and no loop is simulated") if shown.controller.period is None else "",
         )
     ]
+    scheme = shown.controller.velocity.anti_windup
+    if OF_SETTING["torque_limit"] in shown.numbers and scheme != "none":
+        held = {"hold": "is held", "tracking": "is set back"}[scheme]
+        notes.append(Text(f"At its limit the integrator {held} (anti-windup {scheme!r}): so the controller comes closest."))
     if shown.rivals:
         others = "; ".join(" and ".join(name.replace("_", " ") for name in names) for names in shown.rivals)
         notes.append(Text(f"The log does not tell this from a controller with, instead: {others}."))

@@ -9,27 +9,43 @@ u0 is what the integrator held before the record began.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.control.cascade import Filter
+from gaident.control.cascade import Cascade, Filter
 from gaident.control.filtering import filtered
 from gaident.control.filters import LowPass, Notch
+from gaident.control.pi import PI
+from gaident.control.ticks import at_the_clock, between_lines
 from gaident.data.record import Record
+from gaident.diagnosis.controller.replay import rounding_of
+from gaident.identification.logged_stretches import centred, correlation_of, log_of, numbered, whitened
 from gaident.policy.table import POLICY
 
-__all__ = ["FILTER_SETS", "Law", "Place", "Shape", "at_places", "bounds_of", "fitted_shape", "law_of"]
+__all__ = [
+    "FILTER_SETS",
+    "FILTER_SETS_OF_ONE",
+    "Law",
+    "Place",
+    "Shape",
+    "at_places",
+    "bounds_of",
+    "fitted_shape",
+    "law_of",
+    "least",
+]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Place: TypeAlias = tuple[str, type[LowPass] | type[Notch]]
 """(argument of `Cascade`, kind of filter)."""
 
+STEP = 1e-5  # no decision: of a filter's number, for a slope
 LONGEST = 1 << 13  # no decision: work; samples that a form is fitted to; all of them decide whether it follows
 PLACES: tuple[Place, ...] = (
     ("torque_filters", LowPass),
@@ -39,6 +55,8 @@ PLACES: tuple[Place, ...] = (
 )
 FILTER_SETS: tuple[tuple[Place, ...], ...] = tuple(s for k in range(3) for s in combinations(PLACES, k))
 """None, one, and two filters, the fewer first."""
+FILTER_SETS_OF_ONE = FILTER_SETS[: 1 + len(PLACES)]
+"""What a slower log is searched for: between its lines two filters look like one."""
 
 # Starts of the search: a low pass in samples, a notch as share of the sampling frequency, and its dampings.
 TAUS = np.geomspace(0.3, 100.0, 8)  # no decision: starts of a search
@@ -52,17 +70,27 @@ BOUNDS = {
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """Records one after the other: command, velocity [rad/s] and logged torque [N m] (n,); used: where no limit acts."""
+    """Records one after the other, r controller samples to a line of the log.
+
+    command, velocity: at the controller's samples [rad/s] (n r,); torque: as logged [N m] (n,); used (n,): where no limit acts;
+    lengths: lines of each record; period: of the controller [s].
+    Of a log with r = 1 all used lines count alike, and a start of the integrator is one of the numbers. Of a slower one, what is
+    fitted is x(k) - rho x(k-1) of each signal without its mean in each stretch between two limits, see `logged_stretches`.
+    """
 
     command: Vector
     velocity: Vector
     torque: Vector
     used: NDArray[np.bool_]
     lengths: tuple[int, ...]
-    period: float  # s
+    period: float
+    every: int = 1
+    stretch: NDArray[np.intp] | None = None
+    rho: float = 0.0
 
     def columns(self, places: Sequence[Place], numbers: Vector) -> Matrix:
         """(n used, 5 + records) [-w, r, integral of e by the trapezoidal rule, slope of r, sign of r, starts], filtered."""
+        ticks = [length * self.every for length in self.lengths]
         seen = {"command_filters": self.command, "velocity_filters": self.velocity}
         torque: list[tuple[Vector, Vector]] = []
         for (place, _), f in zip(places, filters(places, numbers, self.period), strict=True):
@@ -70,23 +98,37 @@ class Law:
             if place == "torque_filters":
                 torque.append((b, a))
             else:
-                seen[place] = filtered(b, a, seen[place][None, :], self.lengths)[0]
+                seen[place] = filtered(b, a, seen[place][None, :], ticks)[0]
         r, w = seen["command_filters"], seen["velocity_filters"]
         half = 0.5 * self.period * np.ones(2)  # no decision: the trapezoidal rule
-        integral = filtered(half, np.array([1.0, -1.0]), (r - w)[None, :], self.lengths)[0]
-        ends = np.cumsum(self.lengths) - 1
+        integral = filtered(half, np.array([1.0, -1.0]), (r - w)[None, :], ticks)[0]
+        ends = np.cumsum(ticks) - 1
         slope = np.append(np.diff(self.command), 0.0) / self.period
         slope[ends] = 0.0
         rows: Matrix = np.stack([-w, r, integral, slope, np.sign(self.command)])
         for b, a in torque:
-            rows = filtered(b, a, rows, self.lengths)
+            rows = filtered(b, a, rows, ticks)
         starts = np.repeat(np.eye(len(self.lengths)), self.lengths, axis=1)
-        return np.concatenate([rows, starts]).T[self.used]
+        return self._fitted(np.concatenate([rows[:, :: self.every], starts]))
 
     @property
     def logged(self) -> Vector:
         """The torque [N m] (n used,)."""
-        return self.torque[self.used]
+        return self._fitted(self.torque[None, :])[:, 0]
+
+    def _fitted(self, rows: Matrix) -> Matrix:
+        """(n used, signals) of signals at the lines (signals, n)."""
+        if self.stretch is None:
+            return rows.T[self.used]
+        stretch, rho = self.stretch, self.rho
+        return np.array([centred(*whitened(row, stretch, rho), False) for row in rows]).T
+
+    def of_course(self, other: Law, coefficients: Vector) -> tuple[Vector, NDArray[np.intp]]:
+        """(what another course of the velocity between the lines makes of the torque [N m], stretch of each line)."""
+        assert self.stretch is not None
+        none = np.zeros(0)
+        off = (replace(self, rho=0.0).columns((), none) - replace(other, rho=0.0).columns((), none)) @ coefficients
+        return off, self.stretch[self.stretch >= 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,19 +146,47 @@ class Shape:
         return float(np.sqrt(np.mean(self.left**2)))
 
 
-def law_of(records: Sequence[Record], torque_limit: float) -> Law | None:
-    """The regression's data; torque_limit [N m]: samples at it are left out. None where a signal or too much is missing."""
+def law_of(records: Sequence[Record], given: PI, every: int = 1) -> tuple[Law, float] | None:
+    """(the regression's data, root mean square that the log's rounding, or a course between its lines, makes of a replay [N m]).
+
+    given: its torque limit and gains. None where a signal or too much is missing.
+    """
     share = max(LONGEST // len(records), 1)
-    parts = []
-    for rec in records:
-        if rec.command is None or rec.torque is None:
-            return None
-        parts.append((rec.command[:share], rec.velocity[:share], rec.torque[:share]))
-    command, velocity, torque = (np.concatenate(signal) for signal in zip(*parts, strict=True))
-    used = np.abs(torque) < POLICY.at_limit * torque_limit
-    lengths = tuple(len(c) for c, _, _ in parts)
+    parts = [rec[:share] for rec in records]
+    if any(r.command is None or r.torque is None for r in parts):
+        return None
+    lengths = tuple(len(r) for r in parts)
+    period = records[0].dt / every
+    torque = np.concatenate([r.torque for r in parts if r.torque is not None])
+    limit = given.limits[0]
+    if every == 1:
+        command, velocity = (np.concatenate([getattr(r, name) for r in parts]) for name in ("command", "velocity"))
+        used = np.abs(torque) < POLICY.at_limit * limit
+        law = Law(command, velocity, torque, used, lengths, period)
+        floor = max(rounding_of(r, r.command, given, r.torque) for r in records if r.command is not None and r.torque is not None)
+    else:
+        cascade = Cascade(given, period)
+        logs = [log_of(r, share, cascade, False) for r in records]
+        stretch = numbered([log.stretch for log in logs])
+        command = np.concatenate([between_lines(log.source, every) for log in logs])
+        smooth = np.concatenate([log.velocity for log in logs])
+        straight = np.concatenate([at_the_clock(log.velocity[::every], every) for log in logs])
+        used = stretch >= 0
+        law = Law(command, smooth, torque, used, lengths, period, every, stretch)
+        coefficients = np.array([given.kp, given.kp, given.ki, *np.zeros(2 + len(records))])
+        off, own = law.of_course(replace(law, velocity=straight), coefficients)
+        law = replace(law, rho=correlation_of(off, own))
+        d, _ = whitened(_at(used, off), stretch, law.rho)
+        floor = POLICY.course * float(np.sqrt(np.mean(d**2)))
     enough = int(np.sum(used)) >= POLICY.least_samples and bool(np.any(torque[used]))
-    return Law(command, velocity, torque, used, lengths, records[0].dt) if enough else None
+    return (law, floor) if enough else None
+
+
+def _at(used: NDArray[np.bool_], values: Vector) -> Vector:
+    """Values where they are used, 0 elsewhere."""
+    whole = np.zeros(len(used))
+    whole[used] = values
+    return whole
 
 
 def filters(places: Sequence[Place], numbers: Vector, period: float) -> list[Filter]:
@@ -210,3 +280,20 @@ def _scaled(table: Matrix) -> tuple[Matrix, Vector]:
     sizes = np.linalg.norm(table, axis=0)
     sizes[sizes == 0.0] = 1.0
     return table / sizes, sizes
+
+
+def least(M: Matrix, wanted: Vector) -> tuple[Vector, float]:
+    """(solution, sum of squares left)."""
+    if M.shape[1] == 0:
+        return np.zeros(0), float(wanted @ wanted)
+    sizes = np.linalg.norm(M, axis=0)
+    sizes[sizes == 0.0] = 1.0
+    solved = np.linalg.lstsq(M / sizes, wanted, rcond=1e-12)[0] / sizes
+    left = wanted - M @ solved
+    return solved, float(left @ left)
+
+
+def slope(f: Callable[[Vector], Vector], x: Vector, k: int) -> Vector:
+    step = STEP * max(abs(float(x[k])), 1.0)
+    moved = step * np.eye(len(x))[k]
+    return (f(x + moved) - f(x - moved)) / (2.0 * step)

@@ -12,8 +12,8 @@ measured signals.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -23,9 +23,22 @@ from gaident.control.cascade import Cascade
 from gaident.control.filters import LowPass
 from gaident.control.pi import PI, RULES
 from gaident.data.record import Record
-from gaident.diagnosis.controller.form_regression import FILTER_SETS, Law, Shape, at_places, bounds_of, fitted_shape, law_of
-from gaident.diagnosis.controller.replay import rounding_of, tolerance_of
+from gaident.diagnosis.controller.form_regression import (
+    FILTER_SETS,
+    FILTER_SETS_OF_ONE,
+    Law,
+    Shape,
+    at_places,
+    bounds_of,
+    fitted_shape,
+    law_of,
+    least,
+    slope,
+)
+from gaident.diagnosis.controller.replay import tolerance_of
 from gaident.diagnosis.controller.replay_causes import white_noise
+from gaident.diagnosis.controller.slow_forms import limited, run_error, too_fast
+from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.models.drive_torque import made_by
 from gaident.policy.table import POLICY
 
@@ -38,7 +51,6 @@ FARTHEST = 0.3  # no decision: how far a filter's number moves along its slope
 CHOICE = 2.0 * np.log(3.0)  # no decision: what the choice of one of three settings costs
 NEAR = 1.1  # no decision: of the floor, an estimate of it
 INSIDE = 1e-9  # no decision: of a bound, where a search starts
-STEP = 1e-5  # no decision: of a filter's number, for a slope
 ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
 WEIGHTS = ("one", "none", "free")
 FEEDS = ("acceleration_feedforward", "friction_feedforward")
@@ -49,6 +61,7 @@ FILTER_NAMES = {
 }
 """Argument of `Cascade` -> name of the finding."""
 KP_W, KP_R, KI, FIRST_FEED = 0, 1, 2, 3  # no decision: places in (kp, kp b, ki, a_ff, f_ff, starts)
+GAINS = {"kp": KP_W, "ki": KI}
 
 
 @dataclass(frozen=True)
@@ -60,6 +73,7 @@ class Form:
     weight: str = "one"
     feeds: tuple[str, ...] = ()
     starts: bool = False
+    unknown: tuple[str, ...] = ()  # gains that were not given: free, and no finding
 
     @property
     def chosen(self) -> int:
@@ -68,7 +82,7 @@ class Form:
 
     def names(self, shape: Shape) -> tuple[str, ...]:
         """What differs from the bare PI with the given gains, in words of the findings."""
-        names = ["integration_rule"] * (self.rule != "trapezoidal") + ["other_gains"] * bool(self.free)
+        names = ["integration_rule"] * (self.rule != "trapezoidal") + ["other_gains"] * bool(set(self.free) - set(self.unknown))
         names += ["command_weight"] * (self.weight != "one")
         return (*names, *self.feeds, *dict.fromkeys(FILTER_NAMES[place] for place, _ in shape.places))
 
@@ -110,6 +124,7 @@ class Shown:
     rivals      what differs in forms with no more free numbers that the logs do not tell from it
     before, rms of logged minus replayed torque, bare PI and this one [N m]
     starts      the highest integral before a record's begin [N m]; 0: none
+    estimated   gains that were not given -> (value, standard deviation)
     """
 
     controller: Cascade
@@ -119,6 +134,7 @@ class Shown:
     before: float
     rms: float
     starts: float
+    estimated: dict[str, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,25 +150,30 @@ class _Candidate:
         return self.form.names(self.shape)
 
 
-def form_shown(records: Sequence[Record], given: PI) -> Shown | None:
-    """The simplest controller that makes the logged torques; None where none does, or the bare PI needs none."""
-    law = law_of(records, given.limits[0])
-    if law is None or given.loop != "sampled" or any(r.dt != records[0].dt for r in records):
+def form_shown(records: Sequence[Record], given: PI, unknown: tuple[str, ...] = (), every: int = 1) -> Shown | None:
+    """The simplest controller that makes the logged torques; None where none does, or the bare PI needs none.
+
+    unknown: gains of `given` that were not given but estimated. every: controller samples to a line of the log.
+    """
+    regression = law_of(records, given, every)
+    if regression is None or given.loop != "sampled" or any(r.dt != records[0].dt for r in records):
         return None
-    floor = max(rounding_of(r, r.command, given, r.torque) for r in records if r.command is not None and r.torque is not None)
+    law, floor = regression
     candidates: list[_Candidate] = []
     followed: int | None = None
-    for places in FILTER_SETS:
+    for places in FILTER_SETS if every == 1 else FILTER_SETS_OF_ONE:
         if followed is not None and len(places) > followed:
             break  # what leaves no more than rounding or white noise is not improved by another filter
         shape = fitted_shape(law, places, floor)
         if shape.rms <= NEAR * floor or white_noise(shape.left, law.logged):
             followed = len(places)
-        candidates += _candidates(law, shape, given, floor)
+        candidates += _candidates(law, shape, given, floor, unknown)
     candidates.sort(key=lambda c: c.criterion)
-    if not candidates or not candidates[0].names:
+    if not candidates:
         return None
-    return _shown(records, law, given, candidates)
+    if every > 1:
+        return _shown_slowly(records, law, given, candidates, floor)
+    return _shown(records, law, given, candidates) if candidates[0].names else None
 
 
 def _allowed(rec: Record, controller: PI) -> float:
@@ -160,62 +181,53 @@ def _allowed(rec: Record, controller: PI) -> float:
     return tolerance_of(rec, rec.command, controller, rec.torque)
 
 
-def _forms(given: PI) -> Iterator[Form]:
+def _forms(given: PI, unknown: tuple[str, ...]) -> Iterator[Form]:
     """Every form; but a rule that other free gains make up for, which no log shows."""
     gains: tuple[tuple[str, ...], ...] = ((), ("kp",), ("ki",), ("kp", "ki")) if given.ki else ((), ("kp",))
+    gains = tuple(free for free in gains if set(unknown) <= set(free))
     feeds = ((), FEEDS[:1], FEEDS[1:], FEEDS)
     for rule, free, weight, feed, starts in product(RULES, gains, WEIGHTS, feeds, (False, True)):
         if rule != "trapezoidal" and (not given.ki or ("kp" in free and weight != "none")):
             continue
-        yield Form(rule, free, weight, feed, starts)
+        yield Form(rule, free, weight, feed, starts, unknown)
 
 
-def _candidates(law: Law, shape: Shape, given: PI, floor: float) -> Iterator[_Candidate]:
+def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[str, ...]) -> Iterator[_Candidate]:
     """Every form with these filters: one small least squares each, linear in the filters' numbers around those of `shape`."""
     table = law.columns(shape.places, shape.numbers)
     around = np.column_stack([table, _slopes(law, shape), law.logged])
     R: Matrix = np.linalg.qr(around)[1]
     p, n = table.shape[1], len(law.logged)
     linear, slopes, logged = R[:, :p], R[:, p:-1], R[:, -1]
-    for form in _forms(given):
+    for form in _forms(given, unknown):
         fixed, moved = form.constraints(given, len(law.lengths))
         B = form.of_columns(p, law.period)
         M = np.column_stack([linear @ B @ moved, slopes])
         wanted = logged - linear @ B @ fixed
-        free, left = _least(M, wanted)
+        free, left = least(M, wanted)
         if np.any(np.abs(free[moved.shape[1] :]) > FARTHEST):  # the slope holds no longer
-            free, left = _least(M[:, : moved.shape[1]], wanted)
+            free, left = least(M[:, : moved.shape[1]], wanted)
         numbers = fixed + moved @ free[: moved.shape[1]]
         if min(numbers[KP_W], numbers[KP_R], numbers[KI]) < -POLICY.negligible * float(np.abs(numbers[:FIRST_FEED]).max()):
             continue
         k = M.shape[1]
-        criterion = n * np.log(max(left / n, floor**2)) + k * np.log(n) + CHOICE * form.chosen
+        criterion = n * np.log(max(left / n, floor**2)) + _price(law, k, form.chosen)
         yield _Candidate(form, shape, free, k, float(criterion))
 
 
-def _least(M: Matrix, wanted: Vector) -> tuple[Vector, float]:
-    """(solution, sum of squares left)."""
-    if M.shape[1] == 0:
-        return np.zeros(0), float(wanted @ wanted)
-    sizes = np.linalg.norm(M, axis=0)
-    sizes[sizes == 0.0] = 1.0
-    solved = np.linalg.lstsq(M / sizes, wanted, rcond=1e-12)[0] / sizes
-    left = wanted - M @ solved
-    return solved, float(left @ left)
+def _price(law: Law, count: int, chosen: int) -> float:
+    """What numbers and settings cost: by the BIC, in a slower log by the share of the error that each has to take away."""
+    n = len(law.logged)
+    own = count * np.log(n) + CHOICE * chosen if law.every == 1 else -2.0 * n * np.log(POLICY.each_number) * (count + chosen)
+    return float(own)
 
 
 def _slopes(law: Law, shape: Shape) -> Matrix:
     """(n, filters' numbers) of the torque over each number."""
     slopes = [
-        _slope(lambda x: law.columns(shape.places, x) @ shape.coefficients, shape.numbers, k) for k in range(len(shape.numbers))
+        slope(lambda x: law.columns(shape.places, x) @ shape.coefficients, shape.numbers, k) for k in range(len(shape.numbers))
     ]
     return np.array(slopes).reshape(len(slopes), len(law.logged)).T
-
-
-def _slope(f: Callable[[Vector], Vector], x: Vector, k: int) -> Vector:
-    step = STEP * max(abs(float(x[k])), 1.0)
-    moved = step * np.eye(len(x))[k]
-    return (f(x + moved) - f(x - moved)) / (2.0 * step)
 
 
 def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[_Candidate]) -> Shown | None:
@@ -232,17 +244,62 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
             return None
         off.append(left)
     before = [r.torque - made_by(r.with_channels(torque=None), Cascade(given)) for r in records if r.torque is not None]
-    without = {name: [c.criterion for c in candidates if name not in c.names] for name in best.names}
-    close = [c for c in candidates if c.criterion - best.criterion < POLICY.rival_margin and c.count <= best.count]
     return Shown(
         controller=controller,
         numbers=_named(best, numbers, filters, cov, law.period),
-        gains={name: min(others) - best.criterion if others else np.inf for name, others in without.items()},
-        rivals=tuple(dict.fromkeys(c.names for c in close if c.names and set(c.names) != set(best.names))),
+        gains=_gains(candidates),
+        rivals=_rivals(candidates),
         before=_rms(before),
         rms=_rms(off),
         starts=float(np.abs(starts).max()),
+        estimated=_estimated(best, numbers, cov),
     )
+
+
+def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[_Candidate], floor: float) -> Shown | None:
+    """The same of a log with fewer lines: None where it leaves more than another course between the lines could make."""
+    best = candidates[0]
+    numbers, filters, cov = _fitted(law, best, given)
+    left = law.logged - law.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
+    if not _rms([left]) <= max(NEAR * floor, POLICY.negligible * float(np.abs(law.torque).max())):
+        return None
+    free = replace(_controller(best, numbers, filters, given, law.period), period=law.period)
+    if too_fast(free, records[0].dt):
+        return None
+    at_limit = limited(records, free)
+    if not best.names and at_limit.limit is None:
+        return None
+    named, gains = _named(best, numbers, filters, cov, law.period), _gains(candidates)
+    if at_limit.limit is not None:
+        named[OF_SETTING["torque_limit"]] = {"limit": (at_limit.limit, 0.0)}
+        gains[OF_SETTING["torque_limit"]] = at_limit.gain
+    return Shown(
+        controller=at_limit.controller,
+        numbers=named,
+        gains=gains,
+        rivals=_rivals(candidates),
+        before=run_error(records, Cascade(given, law.period)),
+        rms=run_error(records, at_limit.controller),
+        starts=0.0,
+        estimated=_estimated(best, numbers, cov),
+    )
+
+
+def _gains(candidates: Sequence[_Candidate]) -> dict[str, float]:
+    best = candidates[0]
+    without = {name: [c.criterion for c in candidates if name not in c.names] for name in best.names}
+    return {name: min(others) - best.criterion if others else np.inf for name, others in without.items()}
+
+
+def _rivals(candidates: Sequence[_Candidate]) -> tuple[tuple[str, ...], ...]:
+    close = [
+        c for c in candidates if c.criterion - candidates[0].criterion < POLICY.rival_margin and c.count <= candidates[0].count
+    ]
+    return tuple(dict.fromkeys(c.names for c in close if c.names and set(c.names) != set(candidates[0].names)))
+
+
+def _estimated(best: _Candidate, numbers: Vector, cov: Matrix) -> dict[str, tuple[float, float]]:
+    return {name: (float(numbers[at]), float(np.sqrt(cov[at, at]))) for name, at in GAINS.items() if name in best.form.unknown}
 
 
 def _rms(parts: Sequence[Vector]) -> float:
@@ -316,7 +373,7 @@ def _named(
     named: dict[str, dict[str, tuple[float, float]]] = {name: {} for name in best.names}
     if "other_gains" in named:
         gains = {"kp": (kp, float(std[KP_W])), "ki": (float(numbers[KI]), float(std[KI]))}
-        named["other_gains"] = {name: gains[name] for name in best.form.free}
+        named["other_gains"] = {name: gains[name] for name in best.form.free if name not in best.form.unknown}
     if "command_weight" in named and kp > 0.0:
         slope = np.array([-kp_b / kp**2, 1.0 / kp])
         named["command_weight"] = {"weight": (kp_b / kp, float(np.sqrt(max(slope @ cov[:2, :2] @ slope, 0.0))))}

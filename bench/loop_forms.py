@@ -1,0 +1,165 @@
+"""Which form of controller a diagnosis finds, where only a bare PI is given and the drive's loop is another.
+
+    python bench/loop_forms.py --out forms.jsonl [--cases 1] [--seed 1] [--loops NAME ...] [--every 1 2 4 8] [--effects NAME ...]
+    python bench/loop_forms.py --out forms.jsonl --report
+
+Drives as in industry (tests/python/loop_cases.py): 60 to 500 Hz, inertia ratio 0.3 to 10, a current loop of 0.1 to 0.5 ms, an
+encoder of 17 to 24 bits, a torque limit reached in a third; a log line for every 1, 2, 4 and 8 samples of the controller.
+The controller that is given is PI(kp, ki), in a Cascade of the right period where the log is slower.
+--bare gives the PI alone there too; --unknown gives None for both gains.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+import zlib
+from pathlib import Path
+from typing import Any
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+# ruff: noqa: E402
+import sys
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "python" / "support"))
+
+import numpy as np
+from json_lines import read, work
+
+import gaident as ga
+from drive_cases import random_case
+from drive_rig import Noise
+from loop_cases import CURRENT_LOOP, EVERY, INDUSTRY_BITS, LOOPS, industrial_plant, loop_kind
+
+FORMS = {
+    "integration_rule", "other_gains", "command_weight", "torque_filter", "velocity_feedback_filter", "command_filter",
+    "acceleration_feedforward", "friction_feedforward", "anti_windup", "integrator_clamp", "torque_saturation",
+}  # fmt: skip
+"""Findings about the controller; a plateau of the logged torque is called torque_saturation."""
+EXPECTED: dict[str, set[str]] = {
+    "bare": set(),
+    "backward": {"integration_rule"},
+    "ip": {"command_weight"},
+    "torque low pass": {"torque_filter"},
+    "notch": {"torque_filter"},
+    "hold": {"torque_saturation", "anti_windup"},
+    "tracking": {"torque_saturation", "anti_windup"},
+    "command filter": {"command_filter"},
+    "velocity filter": {"velocity_feedback_filter"},
+    "together": {"integration_rule", "command_weight", "torque_filter", "velocity_feedback_filter", "command_filter",
+                 "torque_saturation", "anti_windup"},
+}  # fmt: skip
+LAGS = {"torque_lag", "velocity_filter", "transport_delay"}
+"""What a current loop and a differenced angle are called; they are there in every case."""
+
+
+def run(loop: str, every: int, effect: str, number: int, given: str) -> dict[str, Any]:
+    """One diagnosis, judged."""
+    line: dict[str, Any] = {"key": f"{loop}/{every}/{effect}/{number}/{given}", "loop": loop, "every": every, "effect": effect}
+    rng = np.random.default_rng([number, zlib.crc32(f"{loop} {every} {effect}".encode())])
+    try:
+        plant = industrial_plant(loop, every, rng)
+        factor = float(rng.uniform(*CURRENT_LOOP)) / 1e-3
+        noise = Noise(white=0.0, encoder=2 * np.pi / 2.0 ** int(rng.integers(*INDUSTRY_BITS)), differenced=True)
+        hidden = ("torque_lag", effect) if effect else ("torque_lag",)
+        record, validation, whole, truth = random_case(number, hidden, loop_kind(loop), noise, factor=factor, plant=plant)
+    except RuntimeError as none:
+        return line | {"impossible": str(none)}
+    pi = ga.PI(plant.kp, plant.ki)
+    if given == "unknown":
+        pi = ga.PI(kp=None, ki=None)
+    controller = pi if every == 1 or given == "bare" else ga.Cascade(pi, period=plant.dt / every)
+    assert isinstance(whole, ga.Cascade)
+    expected = EXPECTED[loop] | ({"torque_saturation"} if whole.velocity.torque_limit is not None else set())
+    started = time.perf_counter()
+    try:
+        dia = ga.diagnose(record, controller=controller, validation=validation)
+    except Exception as failure:
+        return line | {"crash": f"{type(failure).__name__}: {failure}", "seconds": time.perf_counter() - started}
+    real = [f for f in dia.findings if not f.is_noise]
+    form = sorted({f.effect for f in real if f.effect in FORMS})
+    named = [f.effect for f in real if f.effect not in FORMS and not f.alternatives]
+    sets = [[f.effect, *f.alternatives] for f in real if f.effect not in FORMS]
+    true = {*truth.effects}
+    total = truth.plant.J + truth.plant.JL
+    found = dia.mechanics.get("inertia") or dia.mechanics.get("total_inertia")
+    motor, load = dia.mechanics.get("motor_inertia"), dia.mechanics.get("load_inertia")
+    inertia = found.value if found is not None else motor.value + load.value if motor and load else np.nan
+    return line | {
+        "limit": whole.velocity.torque_limit is not None,
+        "expected": sorted(expected),
+        "form": form,
+        "form_right": set(form) - {"anti_windup"} == expected - {"anti_windup"},
+        "false_form": sorted(set(form) - expected),
+        "mechanical": named,
+        "sets": sets,
+        "wrong": [name for name in named if name not in true | LAGS],
+        "missing": [name for name in true - LAGS if not any(name in s for s in sets)],
+        "verdict": dia.verdict,
+        "inertia_off": inertia / total - 1.0,
+        "before": dia.before.rmse,
+        "after": dia.after.rmse,
+        "seconds": time.perf_counter() - started,
+        "notes": [str(n)[:300] for n in dia.notes],
+    }
+
+
+def report(lines: list[dict[str, Any]]) -> str:
+    """Shares of each log clock, and each case that is not right."""
+    said = []
+    judged = [x for x in lines if "verdict" in x]
+    for every in EVERY:
+        part = [x for x in judged if x["every"] == every]
+        if part:
+            n = len(part)
+            counts = {
+                "form right": sum(x["form_right"] for x in part),
+                "false form": sum(bool(x["false_form"]) for x in part),
+                "wrong mechanical name": sum(bool(x["wrong"]) for x in part),
+                "exact": sum(x["form_right"] and not x["wrong"] and not x["missing"] for x in part),
+            }
+            said.append(f"every {every}: {n} cases, " + ", ".join(f"{k} {v}" for k, v in counts.items()))
+    for x in judged:
+        if not x["form_right"] or x["wrong"] or x["missing"]:
+            said.append(
+                f"  {x['key']}: {x['verdict']}, form {x['form']} of {x['expected']}, mechanics {x['sets']}, "
+                f"inertia {100 * x['inertia_off']:+.1f} %"
+            )
+    said += [f"  {x['key']}: {x.get('crash') or x.get('impossible')}" for x in lines if "verdict" not in x]
+    return "\n".join(said)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=Path("build/loop_forms.jsonl"))
+    parser.add_argument("--cases", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--loops", nargs="+", choices=list(EXPECTED), default=list(EXPECTED))
+    parser.add_argument("--every", nargs="+", type=int, choices=EVERY, default=list(EVERY))
+    parser.add_argument("--effects", nargs="+", default=[""], help="hidden beside the current loop; default: none")
+    parser.add_argument("--bare", action="store_true", help="give the PI alone where the log is slower, too")
+    parser.add_argument("--unknown", action="store_true", help="give PI(kp=None, ki=None)")
+    parser.add_argument("--report", action="store_true")
+    options = parser.parse_args()
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    given = "unknown" if options.unknown else "bare" if options.bare else "period"
+    if not options.report:
+        there = read(options.out)
+        jobs = [
+            (run, loop, every, effect, options.seed * 1000 + k, given)
+            for k in range(options.cases)
+            for loop in options.loops
+            for every in options.every
+            for effect in options.effects
+        ]
+        jobs = [job for job in jobs if f"{job[1]}/{job[2]}/{job[3]}/{job[4]}/{job[5]}" not in there]
+        work(options.out, jobs, options.workers)
+    print(report(list(read(options.out).values())))
+
+
+if __name__ == "__main__":
+    assert set(EXPECTED) | {"position"} == set(LOOPS)
+    main()

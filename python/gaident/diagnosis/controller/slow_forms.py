@@ -1,0 +1,69 @@
+"""A controller that a log of fewer lines shows, run whole on the logged signals: what it does at its torque limit.
+
+The regression of the form leaves out the lines at a limit. What the integrator does there is told by running the controller, with
+each of the schemes that `PI` knows, over the whole record: the scheme with the least squares of what is left of the torque.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.cascade import Cascade
+from gaident.control.filters import Notch
+from gaident.data.record import Record
+from gaident.identification.logged_stretches import log_of, plateau_of
+
+__all__ = ["Limited", "limited", "run_error", "too_fast"]
+
+Vector = NDArray[np.float64]
+
+TIMES = np.geomspace(0.3e-3, 0.3, 16)  # no decision: starts; s, tracking times
+
+
+@dataclass(frozen=True)
+class Limited:
+    """The controller with the limit that the logs show, if any; limit [N m] None: none, or the given one.
+
+    gain: BIC units by which the whole run is better than without the limit.
+    """
+
+    controller: Cascade
+    limit: float | None
+    gain: float
+
+
+def run_error(records: Sequence[Record], controller: Cascade) -> float:
+    """Root mean square of logged minus made torque [N m] over whole records, the controller at its own clock."""
+    off = [log.torque - log.made(controller) for log in (log_of(r, len(r), controller, True) for r in records)]
+    return float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
+
+
+def too_fast(controller: Cascade, dt: float) -> bool:
+    """Whether a notch of the controller lies where a log with the sample time dt [s] shows nothing."""
+    return any(isinstance(f, Notch) and f.frequency > 0.5 / dt for f in controller.torque_filters)  # no decision: Nyquist
+
+
+def limited(records: Sequence[Record], controller: Cascade) -> Limited:
+    """The controller with the plateau of the logged torques as its limit, and the anti-windup that comes closest."""
+    if controller.velocity.torque_limit is not None or controller.torque_filters:
+        return Limited(controller, None, 0.0)
+    limits = [plateau_of(np.abs(r.torque)) for r in records if r.torque is not None]
+    limit = min(limits)
+    if not np.isfinite(limit):
+        return Limited(controller, None, 0.0)
+    tried = [(run_error(records, one), k, one) for k, one in enumerate(_schemes(controller, limit))]
+    least, _, best = min(tried)
+    n = sum(len(r) for r in records)
+    return Limited(best, limit, float(2 * n * np.log(run_error(records, controller) / least) - np.log(n)))
+
+
+def _schemes(controller: Cascade, limit: float) -> Iterator[Cascade]:
+    pi = replace(controller.velocity, torque_limit=limit)
+    yield replace(controller, velocity=pi)
+    yield replace(controller, velocity=replace(pi, anti_windup="hold"))
+    for time in TIMES:
+        yield replace(controller, velocity=replace(pi, anti_windup="tracking", tracking_time=float(time)))

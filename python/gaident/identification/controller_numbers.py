@@ -1,0 +1,375 @@
+"""The numbers of a controller that are given as None, from the logged torque.
+
+The controller runs at its own clock on the logged command and velocity; what it makes at the lines of the log is compared with
+the logged torque, and the numbers are those with the least squares of what is left. No plant is involved.
+
+    d(k) = u_logged(k) - u(k; numbers),   k where no limit acts;   c(k) = d(k) - rho d(k-1),   sum (c - mean c)^2 -> min
+
+The mean is taken of each stretch between two limits: what the integrator held before it is free.
+Between the lines of a slower log the velocity follows a cubic spline. What it really did there is lost and adds up in the
+integrator: d is then a random walk, and rho, its correlation from line to line, says how far (Cochrane and Orcutt 1949).
+The gains are linear in u: for given filters and position gain they start from a linear least squares (`_linear_start`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.arguments import TORQUE, arg
+from gaident.axis import Text, joined, say, unit_text
+from gaident.control.cascade import Cascade, cascade_of
+from gaident.control.controller import Controller
+from gaident.control.unknown import UNITS, field_of
+from gaident.data.record import Record
+from gaident.errors import ControllerError, RecordError
+from gaident.identification.logged_stretches import centred, correlation, log_of, numbered, unlimited, whitened
+from gaident.identification.number_ranges import grid_of, range_of
+from gaident.policy.table import POLICY
+from gaident.results.estimate import Estimate
+
+__all__ = ["Numbers", "with_estimates"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+LONGEST = 1 << 13  # no decision: work; lines of all records that the numbers are fitted to
+ROUNDS = 3  # no decision: effort; fits, each with the correlation that the one before left
+STARTS = 8  # no decision: effort; best points of the grid, from which a search starts
+MOST_STARTS = 500  # no decision: effort; points of the grid
+GAINS = ("kp", "ki", "command_weight", "acceleration_feedforward", "friction_feedforward")
+"""Linear in the torque; the others are searched by their logarithm, but a numerator's damping and a share."""
+LOGARITHMIC = ("gain", "time_constant", "frequency", "denominator_damping")
+FIRST, WHOLE = 12, 60  # no decision: effort; evaluations of a search from the grid, and of the best of them
+STEP = 1e-5  # no decision: of a number, for a slope
+ROUNDING = 1e-12  # no decision: of the torque's deviation, what a sum is exact to
+SMALLEST = 1e-300  # no decision: no division by 0
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A controller with all its numbers, those that were estimated by their names (`Controller.unknown`), and a note on them.
+
+    doubt: why these are no numbers of it, as an error; empty where they are.
+    """
+
+    controller: Controller | None
+    estimates: Mapping[str, Estimate]
+    notes: tuple[Text, ...] = ()
+    doubt: str = ""
+
+    def trusted(self) -> Numbers:
+        """These; raises ControllerError where they are not to be trusted."""
+        if self.doubt:
+            raise ControllerError(self.doubt)
+        return self
+
+
+def with_estimates(records: Sequence[Record], controller: Controller | None) -> Numbers:
+    """The controller with numbers for what is None, estimated from the records.
+
+    Raises RecordError where a record lacks the torque or what the controller reads.
+    """
+    if controller is None or not controller.unknown:
+        return Numbers(controller, {})
+    unknown = controller.unknown
+    for rec in records:
+        _check(rec, controller, unknown[0])
+    records = sorted(records, key=lambda r: (r.digest, r.name))  # no sum depends on the order in which they were given
+    numbers = _solved(controller, unknown, records)
+    values = {name: float(x) for name, x in zip(unknown, numbers.values, strict=True)}
+    estimates = {
+        name: Estimate(value, std, UNITS[field_of(name)], at_bound, std < abs(value))
+        for (name, value), std, at_bound in zip(values.items(), numbers.stds, numbers.at_bound, strict=True)
+    }
+    doubt = ""
+    hidden = [name for name, seen in zip(unknown, numbers.seen, strict=True) if not seen or estimates[name].at_bound]
+    if not numbers.rms < POLICY.replay_noise * numbers.size:
+        doubt = _not_followed(unknown, numbers)
+    elif hidden:
+        doubt = _not_shown(hidden[0], estimates[hidden[0]])
+    return Numbers(controller.with_numbers(values), estimates, (_note(estimates, numbers.rms, numbers.size),), doubt)
+
+
+def _check(rec: Record, controller: Controller, name: str) -> None:
+    name_of = f"record {rec.name or '(without a name)'}"
+    if rec.torque is None:
+        raise RecordError(
+            f"{name} of the controller is None, not known, and {name_of} has no torque that would show it: give {TORQUE}, or "
+            f"the number of {name}"
+        )
+    for channel in controller.reads:
+        if getattr(rec, channel) is None:
+            raise RecordError(
+                f"{name} of the controller is None, not known, and {name_of} has no {channel}, from which it follows: give "
+                f"{arg(channel)}, or the number of {name}"
+            )
+
+
+def _not_shown(name: str, estimate: Estimate) -> str:
+    return (
+        f"{name} of the controller is None, not known, and the records do not show it ({estimate.value:.3g} "
+        f"+- {estimate.std:.2g} {estimate.unit}): give its number, leave out what has no effect, or log a motion in which it acts"
+    )
+
+
+def _not_followed(unknown: Sequence[str], numbers: _Solved) -> str:
+    return (
+        f"{unknown[0]} of the controller is None, not known, and whatever it is, the logged torque does not follow from command "
+        f"and velocity through this controller (by {numbers.rms:.2g} of {numbers.size:.2g} rms): the drive's has another form. "
+        "Give its filters, command_weight, feedforward and limits, with None for unknown numbers, or leave the controller out "
+        "and let the torque drive the model"
+    )
+
+
+def _note(estimates: Mapping[str, Estimate], rms: float, size: float) -> Text:
+    numbers = (
+        say("{} = {:.5g} +- {:.2g}{}", name, e.value, e.std, "" if e.unit == "1" else joined("", (" ", unit_text(e.unit))))
+        for name, e in estimates.items()
+    )
+    text = (
+        "Of the controller, {}: as the logged {torque} shows, which follows from command and velocity to {:.2g} {N m} rms, "
+        "of {:.2g} {N m} rms."
+    )
+    return say(text, joined(", ", numbers), rms, size)
+
+
+def _solved(controller: Controller, unknown: tuple[str, ...], records: Sequence[Record]) -> _Solved:
+    """The numbers by the stretches between two limits, and where a limit is given by the controller with it, from rest: what
+    leaves less. A limit inside of filters, or of the integral, cannot be cut out."""
+    cascade = cascade_of(controller)
+    pi, filtered = cascade.velocity, len(cascade.torque_filters) > 0
+    inside = pi.integrator_limit is not None or (pi.torque_limit is not None and filtered)
+    cut = None if inside else _Fit(controller, unknown, records, whole=False).solved()
+    if pi.torque_limit is None and cut is not None:
+        return cut
+    run = _Fit(controller, unknown, records, whole=True).solved(None if cut is None else cut.x)
+    return run if cut is None or run.rms < cut.rms else cut
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """x, values, stds, at_bound, seen: one of each unknown; x as the search moves it.
+
+    rms, size: of what is left, and of the torque where no limit acts [N m].
+    """
+
+    x: Vector
+    values: Vector
+    stds: list[float]
+    at_bound: list[bool]
+    seen: list[bool]
+    rms: float
+    size: float
+
+
+class _Fit:
+    """One estimation: the numbers x, one of each unknown, as the search moves them (`values`).
+
+    whole: the controller runs with its limits; else without, on the stretches between them.
+    """
+
+    def __init__(self, controller: Controller, unknown: tuple[str, ...], records: Sequence[Record], whole: bool) -> None:
+        self.given = controller
+        self.unknown = unknown
+        self.fields = [field_of(name) for name in unknown]
+        share = max(LONGEST // len(records), 1)
+        cascade = cascade_of(controller)
+        self.period = records[0].dt / cascade.log_every(records[0].dt)
+        self.whole = whole
+        self.logs = [log_of(rec, share, cascade, self.whole) for rec in records]
+        self.logged = np.concatenate([log.torque for log in self.logs])
+        self.stretch = numbered([log.stretch for log in self.logs])
+        self.used = self.stretch >= 0
+        if np.sum(self.used) < POLICY.least_samples:
+            raise RecordError(
+                f"{unknown[0]} of the controller is None, not known, and the torque is at its limit in all but "
+                f"{int(np.sum(self.used))} lines: log a motion that asks for less, or give the number"
+            )
+
+    def solved(self, start: Vector | None = None) -> _Solved:
+        """Grid, or a start; local searches, deviations."""
+        low, high = np.array([range_of(field, self.period) for field in self.fields]).T
+        free = self.free(0.0)
+        points = self._starts() if start is None else [start]
+        grid = sorted((float(np.sum(free(x) ** 2)), tuple(x)) for x in (np.clip(x, low, high) for x in points))
+        rho = 0.0
+        off = self.free(rho)
+        enough = ROUNDING * float(np.sum(self.logged[self.used] ** 2))
+        tried: list[tuple[float, tuple[float, ...]]] = []
+        for _, point in grid[:STARTS]:
+            tried.append(self.searched(off, np.array(point), low, high, FIRST))
+            if min(tried)[0] <= enough:
+                break
+        best = np.array(min(tried)[1])
+        for _ in range(ROUNDS):
+            best = np.array(self.searched(self.free(rho), best, low, high, WHOLE)[1])
+            rho = correlation(self.left(best), self.stretch)
+        return self._judged(best, rho, low, high)
+
+    def searched(
+        self, off: Callable[[Vector], Vector], start: Vector, low: Vector, high: Vector, evaluations: int
+    ) -> tuple[float, tuple[float, ...]]:
+        """(sum of squares, x) of a local search."""
+        from scipy.optimize import least_squares
+
+        inside = _off_bound(start, low, high)
+        size = max(float(np.sqrt(np.mean(off(inside) ** 2))), SMALLEST)
+        found = least_squares(
+            lambda x: off(x) / size, inside, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-10, gtol=1e-14,
+            max_nfev=evaluations,
+        )  # fmt: skip
+        return float(np.sum(off(found.x) ** 2)), tuple(found.x)
+
+    def values(self, x: Vector) -> Vector:
+        """The numbers of what the search moves."""
+        return np.array([np.exp(v) if field in LOGARITHMIC else v for v, field in zip(x, self.fields, strict=True)])
+
+    def controller(self, x: Vector) -> Cascade:
+        """The controller with these numbers; without limits where the stretches between them are fitted."""
+        numbers = {
+            name: max(float(v), 0.0) if field != "friction_feedforward" and not field.endswith("feedforward") else float(v)
+            for name, field, v in zip(self.unknown, self.fields, self.values(x), strict=True)
+        }
+        cascade = cascade_of(self.given.with_numbers(numbers))
+        return cascade if self.whole else replace(cascade, velocity=unlimited(cascade.velocity))
+
+    def left(self, x: Vector, straight: bool = False) -> Vector:
+        """Logged minus made torque [N m] at every line; straight: the velocity goes straight between the lines."""
+        cascade = self.controller(x)
+        left: Vector = self.logged - np.concatenate([log.made(cascade, straight) for log in self.logs])
+        return left
+
+    def free(self, rho: float, straight: bool = False) -> Callable[[Vector], Vector]:
+        """x -> c without the mean of each stretch."""
+        return lambda x: centred(*whitened(self.left(x, straight), self.stretch, rho), self.whole)
+
+    def _starts(self) -> list[Vector]:
+        """Points of the grid of what is not linear, each with the gains of a linear least squares."""
+        lists = [grid_of(field, self.period) if field not in GAINS else [np.nan] for field in self.fields]
+        points = list(product(*lists))
+        if len(points) > MOST_STARTS:
+            points = [points[i] for i in np.random.default_rng(0).permutation(len(points))[:MOST_STARTS]]
+        return [self._linear_start(np.array(point)) for point in points]
+
+    def _linear_start(self, x: Vector) -> Vector:
+        """The gains that are nan, by linear least squares of the torque on what each makes alone."""
+        gains = [i for i, field in enumerate(self.fields) if field in GAINS]
+        if not gains:
+            return x
+        fields = [self.fields[i] for i in gains]
+        rest = {n: float(v) for n, f, v in zip(self.unknown, self.fields, self.values(x), strict=True) if f not in GAINS}
+        cascade = cascade_of(self.given.with_numbers({**rest, **{self.unknown[i]: 1.0 for i in gains}}))
+        fed, given = cascade_of(self.given), cascade_of(self.given).velocity
+
+        def made(**numbers: float) -> Vector:
+            known: dict[str, Any] = {"kp": 0.0, "ki": 0.0, "command_weight": 0.0, **numbers}
+            feeds: dict[str, Any] = {name: known.pop(name) for name in list(known) if name in GAINS[3:]}
+            pi = replace(unlimited(cascade.velocity), **known)
+            one = replace(cascade, velocity=pi, **{"acceleration_feedforward": 0.0, "friction_feedforward": 0.0, **feeds})
+            return np.concatenate([log.made(one) for log in self.logs])
+
+        minus_w = made(kp=1.0)
+        parts = {
+            "kp": minus_w,
+            "command_weight": made(kp=1.0, command_weight=1.0) - minus_w,
+            "ki": made(ki=1.0),
+            **{name: made(kp=1.0, **{name: 1.0}) - minus_w for name in GAINS[3:]},
+        }
+        fixed = np.zeros(len(self.logged))
+        columns: list[Vector] = []
+        kp, weight = given.kp, 0.0 if given.command_weight is None else given.command_weight
+        proportional = parts["kp"] + weight * parts["command_weight"]
+        if "kp" in fields:
+            columns.append(proportional)
+        else:
+            fixed += kp * proportional
+        if "ki" in fields:
+            columns.append(parts["ki"])
+        else:
+            fixed += given.ki * parts["ki"]
+        if "command_weight" in fields:
+            columns.append(parts["command_weight"])
+        for name in GAINS[3:]:
+            if name in fields:
+                columns.append(parts[name])
+            else:
+                fixed += getattr(fed, name) * parts[name]
+        order = [f for f in GAINS if f in fields]
+        table = np.array([centred(*whitened(c, self.stretch, 0.0), False) for c in columns]).T
+        wanted = centred(*whitened(self.logged - fixed, self.stretch, 0.0), False)
+        sizes = np.linalg.norm(table, axis=0)
+        sizes[sizes == 0.0] = 1.0
+        solved = dict(zip(order, np.linalg.lstsq(table / sizes, wanted, rcond=1e-12)[0] / sizes, strict=True))
+        if "command_weight" in solved:
+            by = solved.get("kp", kp)
+            solved["command_weight"] = solved["command_weight"] / by if by > 0.0 else 1.0
+        started = x.copy()
+        for i in gains:
+            started[i] = solved[self.fields[i]]
+        if "kp" in solved and "ki" in solved and solved["kp"] <= 0.0 and solved["ki"] <= 0.0:
+            started[self.fields.index("kp")] = 1e-3 * float(np.std(self.logged))  # no decision: a start
+        return started
+
+    def slopes(self, off: Callable[[Vector], Vector], x: Vector, low: Vector) -> Matrix:
+        """(lines, numbers): how `off` changes with each number."""
+        slopes = []
+        for k in range(len(x)):
+            moved = STEP * max(abs(float(x[k])), STEP) * np.eye(len(x))[k]
+            up, down = x + moved, x - moved if x[k] - moved[k] >= low[k] else x
+            slopes.append((off(up) - off(down)) / (up[k] - down[k]))
+        table: Matrix = np.array(slopes).T
+        return table
+
+    def _judged(self, x: Vector, rho: float, low: Vector, high: Vector) -> _Solved:
+        off = self.free(rho)
+        at = off(x)
+        J = self.slopes(off, x, low)
+        count = int(len(at) - len(x) - len(np.unique(self.stretch[self.used])))
+        free_left = self.free(0.0)(x)
+        size = float(np.std(self.logged[self.used]))
+        sigma = max(float(np.sqrt(np.sum(at**2) / max(count, 1))), ROUNDING * size)
+        spread, back = _inverse(J)
+        # Where another course between the lines, or another correlation, would have put the numbers.
+        course = back @ (self.free(rho, straight=True)(x) - at)
+        uncorrelated = _inverse(self.slopes(self.free(0.0), x, low))[1] @ free_left
+        stds = np.sqrt(sigma**2 * np.diag(spread) + course**2 + uncorrelated**2)
+        values = self.values(x)
+        natural = [
+            float(std * v) if f in LOGARITHMIC else float(std) for std, v, f in zip(stds, values, self.fields, strict=True)
+        ]
+        own = [float(np.sqrt(np.mean(column**2))) for column in J.T]
+        seen = [
+            bool(np.isfinite(std)) and (std < abs(v) or std_x * rms < POLICY.negligible * size)
+            for std, std_x, v, rms in zip(natural, stds, values, own, strict=True)
+        ]
+        near = 1e-6  # no decision: of a range, within which a search stands at its end
+        bound = [
+            f not in GAINS and bool(np.isfinite(b - a) and (v - a < near * (b - a) or b - v < near * (b - a)))
+            for v, a, b, f in zip(x, low, high, self.fields, strict=True)
+        ]
+        bound = [b and f != "numerator_damping" for b, f in zip(bound, self.fields, strict=True)]
+        return _Solved(x, values, natural, bound, seen, float(np.sqrt(np.mean(free_left**2))), size)
+
+
+def _inverse(J: Matrix) -> tuple[Matrix, Matrix]:
+    """((J'J)^-1, (J'J)^-1 J'); infinite where a column is 0, very large where it is made of the others."""
+    sizes = np.linalg.norm(J, axis=0)
+    used = np.where(sizes > 0.0, sizes, 1.0)
+    u, s, vt = np.linalg.svd(J / used, full_matrices=False)
+    s = np.maximum(s, 1e-9)  # no decision: rounding
+    back = ((vt.T / s) @ u.T) / used[:, None]
+    spread = ((vt.T / s**2) @ vt) / np.outer(used, used)
+    spread[np.diag_indices_from(spread)] += np.where(sizes > 0.0, 0.0, np.inf)
+    return spread, back
+
+
+def _off_bound(x: Vector, low: Vector, high: Vector) -> Vector:
+    """A start strictly inside of its bounds."""
+    margin = np.maximum(np.abs(x), 1.0) * 1e-12  # no decision: rounding
+    return np.clip(x, np.where(np.isfinite(low), low + margin, low), np.where(np.isfinite(high), high - margin, high))

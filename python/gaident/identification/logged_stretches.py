@@ -1,0 +1,111 @@
+"""Logs of a controller, cut where a limit acts: what it makes of the logged signals, and what is left of the logged torque.
+
+A stretch is what lies between two limits: what the integrator held before it is free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control import core
+from gaident.control.cascade import Cascade
+from gaident.control.pi import PI
+from gaident.control.ticks import at_the_clock, smooth_between
+from gaident.data.record import Record
+from gaident.policy.table import POLICY
+
+__all__ = ["Log", "centred", "correlation", "correlation_of", "log_of", "numbered", "plateau_of", "unlimited", "whitened"]
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """Lines of a record; velocity: at the controller's samples. stretch (n,): number of the line's stretch; -1: none."""
+
+    dt: float
+    source: Vector
+    velocity: Vector
+    position: Vector | None
+    torque: Vector
+    stretch: NDArray[np.intp]
+
+    def made(self, cascade: Cascade, straight: bool = False) -> Vector:
+        """What the controller makes at the lines of the log [N m] (n,); straight: of a velocity straight between the lines."""
+        every = len(self.velocity) // len(self.source)
+        velocity = at_the_clock(self.velocity[::every], every) if straight else self.velocity
+        ticks = cascade.ticks(self.dt, self.source, self.position)
+        torque = core.servo_torque(self.dt, ticks, velocity, cascade.core_loop(self.dt))
+        return torque[:: len(torque) // len(self.source)]
+
+
+def log_of(rec: Record, share: int, cascade: Cascade, whole: bool) -> Log:
+    part = rec[:share]
+    every = cascade.log_every(rec.dt)
+    source = cascade.command_of(part)
+    assert source is not None and part.torque is not None
+    size = np.abs(part.torque)
+    limit = cascade.velocity.torque_limit or plateau_of(size)
+    free = size < POLICY.at_limit * limit if not whole else np.ones(len(size), bool)
+    begins = free & ~np.append(False, free[:-1])
+    stretch = np.where(free, np.cumsum(begins) - 1, -1)
+    stretch[len(stretch) - cascade.ahead(rec.dt) :] = -1
+    velocity = smooth_between(part.velocity, every)
+    position = part.position if cascade.position is not None else None
+    return Log(rec.dt, source, velocity, position, part.torque, stretch)
+
+
+def plateau_of(size: Vector) -> float:
+    """A limit that was not given: the highest torque, where as many lines stand at it as a plateau has; else infinity."""
+    highest = float(size.max())
+    return highest if np.sum(size >= POLICY.at_limit * highest) >= POLICY.plateau else np.inf
+
+
+def unlimited(pi: PI) -> PI:
+    return replace(pi, torque_limit=None, integrator_limit=None, anti_windup="none", tracking_time=None)
+
+
+def numbered(parts: Sequence[NDArray[np.intp]]) -> NDArray[np.intp]:
+    """The stretches of all records, numbered through."""
+    parts_numbered, first = [], 0
+    for part in parts:
+        parts_numbered.append(np.where(part >= 0, part + first, -1))
+        first = max(first, int(part.max(initial=-1)) + first + 1)
+    return np.concatenate(parts_numbered)
+
+
+def whitened(d: Vector, stretch: NDArray[np.intp], rho: float) -> tuple[Vector, NDArray[np.intp]]:
+    """(c, stretch of each): d(k) - rho d(k-1) where both lie in one stretch; with rho = 0 every d in a stretch."""
+    if rho == 0.0:
+        used = stretch >= 0
+        return d[used], stretch[used]
+    used = (stretch[1:] >= 0) & (stretch[1:] == stretch[:-1])
+    return (d[1:] - rho * d[:-1])[used], stretch[1:][used]
+
+
+def centred(c: Vector, stretch: NDArray[np.intp], whole: bool) -> Vector:
+    """c without the mean of its stretch; `whole`: as it is."""
+    if whole or not len(c):
+        return c
+    _, own = np.unique(stretch, return_inverse=True)
+    means = np.bincount(own, c) / np.bincount(own)
+    left: Vector = c - means[own]
+    return left
+
+
+def correlation(left: Vector, stretch: NDArray[np.intp]) -> float:
+    """rho of what is left at every line, from 0 to just below 1; stretch: of each line."""
+    return correlation_of(left[stretch >= 0], stretch[stretch >= 0])
+
+
+def correlation_of(left: Vector, own: NDArray[np.intp]) -> float:
+    """The same of lines in stretches; own: the stretch of each."""
+    d = centred(left, own, False)
+    pairs = own[1:] == own[:-1]
+    power = float(np.sum(d**2))
+    together = float(np.sum((d[1:] * d[:-1])[pairs]))
+    return float(np.clip(together / power, 0.0, 0.999)) if power > 0.0 else 0.0  # no decision: what a sum can be divided by

@@ -1,0 +1,34 @@
+"""Where the numbers of a controller are searched: as the search moves them, logarithms of what is above 0."""
+
+from __future__ import annotations
+
+import numpy as np
+
+__all__ = ["grid_of", "range_of"]
+
+
+def grid_of(field: str, period: float) -> list[float]:
+    """Starts of a number, as the search moves it."""
+    grids = {
+        "time_constant": np.log(np.geomspace(0.3, 100.0, 8) * period),  # no decision: starts
+        "frequency": np.log(np.geomspace(2e-3, 0.4, 14) / period),
+        "numerator_damping": np.array([0.1, 0.4]),
+        "denominator_damping": np.log(np.array([0.7, 1.5])),
+        "gain": np.log(np.geomspace(1.0, 300.0, 8)),
+        "velocity_feedforward": np.array([0.0, 1.0]),
+    }
+    return list(grids[field])
+
+
+def range_of(field: str, period: float) -> tuple[float, float]:
+    """(lowest, highest) of a number, as the search moves it."""
+    return {
+        "time_constant": (float(np.log(0.05 * period)), float(np.log(1e5 * period))),
+        "frequency": (float(np.log(1e-4 / period)), float(np.log(0.495 / period))),
+        "numerator_damping": (0.0, 5.0),
+        "denominator_damping": (float(np.log(5e-3)), float(np.log(10.0))),
+        "gain": (float(np.log(1e-3)), float(np.log(1e5))),
+        "kp": (0.0, np.inf),
+        "ki": (0.0, np.inf),
+        "command_weight": (0.0, np.inf),
+    }.get(field, (-np.inf, np.inf))
