@@ -241,6 +241,7 @@ class _Work:
         self.final = final
         self.adequate = self.found.space.is_noise(final)
         self.left = dependence(self.objective, final)
+        self.under, self.estimate = self.found.estimated()
 
     def report(self, seed: int) -> Diagnosis:
         """Everything the user sees."""
@@ -261,10 +262,10 @@ class _Work:
             if not only_describes(space, self.final, e, self.rivals[e][0], driver, self.left, of_class):
                 causes.append(e)
         offset = offset_of(space, self.final)
-        estimates = estimates_of(self.objective, self.final)
+        estimates = estimates_of(self.under, self.estimate)
         causes = [e for e in causes if self._determined(e, estimates[e])]
-        mechanics = mechanics_of(self.objective, self.final)
-        model = with_effects(self.final.parameters.model(self.final.x), self.at_controller.effects)
+        mechanics = mechanics_of(self.under, self.estimate)
+        model = with_effects(self.estimate.parameters.model(self.estimate.x), self.at_controller.effects)
         check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None, self.axis)
         causes, why = standing(causes, gains, check)
         if why:
@@ -322,7 +323,7 @@ class _Work:
             next_experiment=proposal,
             gain_interval=gains.interval,
             held_out=gains.held_out,
-            base_shift=base_shift(self.base, self.final),
+            base_shift=base_shift(self.base, self.estimate),
             left=self.left.gains,
             left_needed=self.left.needed,
             line=self.left.line if driver == "time" else None,
@@ -357,8 +358,8 @@ class _Work:
                 self.held,
                 self.cascade or self.controller,
                 self.idn.model,
-                self.final,
-                self.objective,
+                self.estimate,
+                self.under,
                 self.noise,
                 self.at_controller.effects,
             )

@@ -208,7 +208,8 @@ class ByOutputErrors:
 def _by_output_errors(task: Task) -> ByOutputErrors:
     """The task under output errors.
 
-    Their corner is where the velocity is so much of the error of the regressed axis (`velocity_part`), and the torque the rest.
+    Their corner is where the error of the regressed axis has as much power in its slope as in itself: free run and torque then
+    count alike, and a cause that only the torque shows is found. Parameters are estimated otherwise, see `Selection.estimated`.
     Of a measured torque an inertia is free up to `heavier` deviations above that of the regression.
     """
     axis = _axis(task.data)
@@ -221,9 +222,9 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
     axis, objective = raw.axis, raw.objective
     inertia = axis.parameters["inertia"]
     weight = Prefilter(axis.dt, 0.0, axis.cutoff_hz, axis.order)
-    balanced = weight.balance(objective.bridged(objective.error(fit)[None, :])[0], objective.lengths)
-    ratio = float(np.sqrt(POLICY.velocity_part / (1.0 - POLICY.velocity_part)))
-    weight = replace(weight, corner=max(ratio * balanced, _corner(axis)))
+    weight = replace(
+        weight, corner=max(weight.balance(objective.bridged(objective.error(fit)[None, :])[0], objective.lengths), _corner(axis))
+    )
     heaviest = inertia.value + POLICY.heavier * inertia.std if task.data.torque_measured else None
     rigid = axis.force_error**2 < POLICY.rigid_left
     below = 2.0 * np.pi * POLICY.rigid_band * axis.cutoff_hz if rigid else 0.0  # no decision: rad/s of Hz
@@ -239,9 +240,11 @@ def _axis(data: DataSet) -> InverseDynamics | None:
     if not data.torque_logged:
         return None
     records, highest = list(data.records), BAND / data.records[0].dt
-    cutoff = min(cutoff_of(r, ORDER) for r in records)
+    cutoffs = [min(cutoff_of(r, ORDER) for r in records)]
+    while 2.0 * cutoffs[-1] <= highest:  # no decision: steps of a search
+        cutoffs.append(2.0 * cutoffs[-1])
     doubtful: InverseDynamics | None = None
-    while cutoff <= highest:
+    for cutoff in cutoffs:
         try:
             found = inverse_dynamics(records, cutoff_hz=cutoff, axis=data.axis)
         except RecordError:
@@ -253,7 +256,6 @@ def _axis(data: DataSet) -> InverseDynamics | None:
             if inertia.value > POLICY.heavier * inertia.std:
                 return found
             doubtful = found if inertia.value > 0.0 and doubtful is None else doubtful
-        cutoff *= 2.0  # no decision: steps of a search
     return doubtful
 
 
