@@ -17,8 +17,9 @@ from gaident.diagnosis.controller.controller_place import AsLogged, as_logged, a
 from gaident.diagnosis.controller.form_findings import driver_of
 from gaident.diagnosis.controller.log_shift import aligned
 from gaident.diagnosis.experiments.excitation import decided_by_the_angle, excitation
+from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off
-from gaident.diagnosis.gains import Gains, measured_gains
+from gaident.diagnosis.gains import Gains, measured_gains, with_effects
 from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, in_controller
@@ -28,7 +29,7 @@ from gaident.diagnosis.records.arguments import ProgressCallback, check_controll
 from gaident.diagnosis.records.folded import ADVICE, FOLDED, folded
 from gaident.diagnosis.records.hygiene import cleaned, outliers, quantisation
 from gaident.diagnosis.records.sizes import scales_of
-from gaident.diagnosis.selection.attribution import only_describes, simplified
+from gaident.diagnosis.selection.attribution import only_describes, shown_by_the_records, simplified
 from gaident.diagnosis.selection.dependence import dependence
 from gaident.diagnosis.selection.offset import Offset, offset_of
 from gaident.diagnosis.selection.rivals import Replacement
@@ -240,6 +241,7 @@ class _Work:
         self.final = final
         self.adequate = self.found.space.is_noise(final)
         self.left = dependence(self.objective, final)
+        self.under, self.estimate = self.found.estimated()
 
     def report(self, seed: int) -> Diagnosis:
         """Everything the user sees."""
@@ -260,8 +262,15 @@ class _Work:
             if not only_describes(space, self.final, e, self.rivals[e][0], driver, self.left, of_class):
                 causes.append(e)
         offset = offset_of(space, self.final)
-        estimates = estimates_of(self.objective, self.final)
+        estimates = estimates_of(self.under, self.estimate)
         causes = [e for e in causes if self._determined(e, estimates[e])]
+        mechanics = mechanics_of(self.under, self.estimate)
+        model = with_effects(self.estimate.parameters.model(self.estimate.x), self.at_controller.effects)
+        check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None, self.axis)
+        causes, why = standing(causes, gains, check)
+        if why:
+            driver = driver or self.left.strongest or "time"
+            self.notes += why
         if not causes:
             instead = by_whitened_errors(self.found, self._equivalent_here, self._say)
             if instead is not None:
@@ -273,23 +282,11 @@ class _Work:
         for effect in causes:
             gain, rivals = self.rivals[effect]
             alternatives = self._alternatives(effect, rivals, offset)
-            findings.append(
-                Finding(
-                    effect=effect,
-                    parameters=estimates[effect],
-                    alternatives=alternatives,
-                    gain=gains.of(effect),
-                    delta_bic=gain,
-                    evidence=evidence_of(effect, gain, alternatives, offset),
-                )
-            )
-        mechanics = mechanics_of(self.objective, self.final)
+            said_by = evidence_of(effect, gain, alternatives, offset)
+            findings.append(Finding(effect, estimates[effect], alternatives, gains.of(effect), gain, evidence=said_by))
         if driver is None and (damping := negative_damping(mechanics)) is not None:
             driver = "velocity"
             self.notes.append(drives_itself(damping))
-        model = self.final.parameters.model(self.final.x)
-        for name, values in self.at_controller.effects.items():
-            model = model.with_effect(name, **values)
         real = [f for f in findings if not f.is_noise]
         answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
         if driver is None:
@@ -301,7 +298,6 @@ class _Work:
                 of_driver = say(" that depends on {}", called(driver)) if self.left.gains[driver] > self.left.needed else ""
                 text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
                 self.notes.append(say(text, " and ".join(dropped), of_driver))
-        check = by_second_method(self.clean, gains, model, mechanics, estimates, self.controller is None, self.axis)
         self.notes += check.notes
         if self.final.parameters.held and any(LIBRARY[e].constant for e in self.final.effects):
             self.notes.append(
@@ -327,7 +323,7 @@ class _Work:
             next_experiment=proposal,
             gain_interval=gains.interval,
             held_out=gains.held_out,
-            base_shift=base_shift(self.base, self.final),
+            base_shift=base_shift(self.base, self.estimate),
             left=self.left.gains,
             left_needed=self.left.needed,
             line=self.left.line if driver == "time" else None,
@@ -362,8 +358,8 @@ class _Work:
                 self.held,
                 self.cascade or self.controller,
                 self.idn.model,
-                self.final,
-                self.objective,
+                self.estimate,
+                self.under,
                 self.noise,
                 self.at_controller.effects,
             )
@@ -377,7 +373,9 @@ class _Work:
 
     def _alternatives(self, effect: str, rivals: Sequence[Replacement], offset: Offset | None) -> tuple[str, ...]:
         """Statistical rivals and equivalent effects, no untestable ones; offset: what an effect is not the same as."""
-        names = [r.effect for r in rivals]
+        # Where the records show the torque's jump by themselves, nothing without such a jump stands for it.
+        shown = shown_by_the_records(self.found.space, self.final, effect)
+        names = [r.effect for r in rivals if not shown or LIBRARY[r.effect].levels]
         names += sorted(self._equivalent_here(effect))
         if offset is None or effect != offset.effect:
             names += equivalents(effect)

@@ -171,6 +171,12 @@ class Policy:
     check_deviations: float = check(3.0, "1", "deviations of both: 0.3 % of a normal distribution are beyond", DRIVES)
     check_share: float = check(0.1, "1", "of the larger value: a smaller difference does not matter", DRIVES)
     check_torque: float = check(0.05, "1", "of the torque's rms: the same, of friction and gravity", DRIVES)
+    velocity_part: float = check(
+        0.95,
+        "1",
+        "of the weighed error of the regressed axis, that its velocity is, the rest its torque: a free run adds up small torques",
+        REAL,
+    )
     heavier: float = check(
         2.0,
         "1",

@@ -22,7 +22,8 @@ from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
 from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.projection import WORST
-from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
+from gaident.estimation.regression.inverse_dynamics import ORDER, inverse_dynamics
+from gaident.estimation.regression.motion import BAND, cutoff_of
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
@@ -208,10 +209,13 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
     """The task under output errors.
 
     Their corner is where the error of the regressed axis has as much power in its slope as in itself: free run and torque then
-    count alike. Of a measured torque an inertia is free up to `heavier` deviations above that of the regression.
+    count alike, and a cause that only the torque shows is found. Parameters are estimated otherwise, see `Selection.estimated`.
+    Of a measured torque an inertia is free up to `heavier` deviations above that of the regression.
     """
-    shown = frozenset(t.family for t in task.allowed if t.levels) if friction_shown(task.data, task.model) else frozenset()
-    raw = ByOutputErrors(replace(task.under(OutputErrors(1.0)), shown=shown), _axis(task.data))
+    axis = _axis(task.data)
+    seen = friction_shown(task.data, task.model, axis)
+    shown = frozenset(t.family for t in task.allowed if t.levels) if seen else frozenset()
+    raw = ByOutputErrors(replace(task.under(OutputErrors(1.0)), shown=shown), axis)
     fit = raw.regressed(task.predictor())
     if raw.axis is None or fit is None:
         return ByOutputErrors(raw.task, None)
@@ -228,13 +232,31 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
 
 
 def _axis(data: DataSet) -> InverseDynamics | None:
+    """The regressed axis; None where the records show none.
+
+    Records of held speeds hold no acceleration beyond its noise, and the cutoff that leaves only the acceleration leaves no rows:
+    they show friction all the same, behind the lowest cutoff that leaves some, and an inertia beyond its deviations.
+    """
     if not data.torque_logged:
         return None
-    try:
-        found = inverse_dynamics(list(data.records), axis=data.axis)
-    except (RecordError, SettingsError):
-        return None
-    return found if found.parameters["inertia"].value > 0.0 else None
+    records, highest = list(data.records), BAND / data.records[0].dt
+    cutoffs = [min(cutoff_of(r, ORDER) for r in records)]
+    while 2.0 * cutoffs[-1] <= highest:  # no decision: steps of a search
+        cutoffs.append(2.0 * cutoffs[-1])
+    doubtful: InverseDynamics | None = None
+    for cutoff in cutoffs:
+        try:
+            found = inverse_dynamics(records, cutoff_hz=cutoff, axis=data.axis)
+        except RecordError:
+            pass
+        except SettingsError:
+            return None
+        else:
+            inertia = found.parameters["inertia"]
+            if inertia.value > POLICY.heavier * inertia.std:
+                return found
+            doubtful = found if inertia.value > 0.0 and doubtful is None else doubtful
+    return doubtful
 
 
 def _corner(axis: InverseDynamics) -> float:

@@ -18,7 +18,7 @@ from gaident.estimation.regression.torque_terms import CHOICES, TERMS, estimates
 from gaident.policy.table import POLICY
 from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["inverse_dynamics"]
+__all__ = ["ORDER", "inverse_dynamics"]
 
 Vector = NDArray[np.float64]
 
