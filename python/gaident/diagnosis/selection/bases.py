@@ -173,10 +173,15 @@ class ByOutputErrors:
         return self.task.objective
 
     def informed(self, samples: float) -> Task:
-        """The task with so many independent samples."""
-        family = self.objective.family
+        """The task of a search: so many independent samples, and what the records show by themselves.
+
+        Both are found out here, since the specification test, which is made of most records, needs neither.
+        """
+        task, family = self.task, self.objective.family
         assert isinstance(family, OutputErrors)
-        return self.task.under(replace(family, samples=samples))
+        shows = friction_shown(task.data, task.model)
+        shown = frozenset(t.family for t in task.allowed if t.levels) if shows else frozenset()
+        return replace(task.under(replace(family, samples=samples)), shown=shown)
 
     def regressed(self, predictor: Predictor) -> Fit | None:
         """The regressed axis, fitted by output errors; None where there is none.
@@ -210,8 +215,7 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
     Their corner is where the error of the regressed axis has as much power in its slope as in itself: free run and torque then
     count alike. Of a measured torque an inertia is free up to `heavier` deviations above that of the regression.
     """
-    shown = frozenset(t.family for t in task.allowed if t.levels) if friction_shown(task.data, task.model) else frozenset()
-    raw = ByOutputErrors(replace(task.under(OutputErrors(1.0)), shown=shown), _axis(task.data))
+    raw = ByOutputErrors(task.under(OutputErrors(1.0)), _axis(task.data))
     fit = raw.regressed(task.predictor())
     if raw.axis is None or fit is None:
         return ByOutputErrors(raw.task, None)
