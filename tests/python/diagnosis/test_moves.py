@@ -525,6 +525,21 @@ def test_resettled_puts_the_resonance_into_the_two_masses_alone_and_with_a_simpl
 # The same model again.
 
 
+def test_only_a_resonance_that_leads_is_resettled(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[str, ...]] = []
+
+    def resettled(space: moves.Moves, fit: Fit) -> list[Fit]:
+        asked.append(fit.effects)
+        return []
+
+    monkeypatch.setattr(moves.Moves, "resettled", resettled)
+    other = Bench({"a": (0.5,)}, masses=2, allowed=(A, RESONANCE))
+    assert {("a",), ("resonance",)} <= set(names(other.space.add(other.fit())))
+    resonance = Bench({"resonance": (70.0, 0.3, 40.0, 0.1)}, masses=2, allowed=(A, RESONANCE))
+    resonance.space.add(resonance.fit())
+    assert asked == [("a",), ("resonance",)]
+
+
 def test_restarted_leaves_a_start_that_led_nowhere() -> None:
     """The pulse stands at 0.52, and a fit from 0.1 does not feel it."""
     bench = Bench({"placed": (0.52,)})

@@ -174,10 +174,15 @@ class ByOutputErrors:
         return self.task.objective
 
     def informed(self, samples: float) -> Task:
-        """The task with so many independent samples."""
-        family = self.objective.family
+        """The task of a search: so many independent samples, and what the records show by themselves.
+
+        Both are found out here, since the specification test, which is made of most records, needs neither.
+        """
+        task, family = self.task, self.objective.family
         assert isinstance(family, OutputErrors)
-        return self.task.under(replace(family, samples=samples))
+        shows = friction_shown(task.data, task.model, self.axis)
+        shown = frozenset(t.family for t in task.allowed if t.levels) if shows else frozenset()
+        return replace(task.under(replace(family, samples=samples)), shown=shown)
 
     def regressed(self, predictor: Predictor) -> Fit | None:
         """The regressed axis, fitted by output errors; None where there is none.
@@ -212,10 +217,7 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
     count alike, and a cause that only the torque shows is found. Parameters are estimated otherwise, see `Selection.estimated`.
     Of a measured torque an inertia is free up to `heavier` deviations above that of the regression.
     """
-    axis = _axis(task.data)
-    seen = friction_shown(task.data, task.model, axis)
-    shown = frozenset(t.family for t in task.allowed if t.levels) if seen else frozenset()
-    raw = ByOutputErrors(replace(task.under(OutputErrors(1.0)), shown=shown), axis)
+    raw = ByOutputErrors(task.under(OutputErrors(1.0)), _axis(task.data))
     fit = raw.regressed(task.predictor())
     if raw.axis is None or fit is None:
         return ByOutputErrors(raw.task, None)

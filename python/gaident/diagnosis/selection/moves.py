@@ -120,7 +120,8 @@ class Moves(ModelSpace):
         best = sorted((self.completed(f) for f in best), key=self.score)
         reach = self.policy.beam_reach * self.penalty
         fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
-        fits += [f for fit in fits for f in self.resettled(fit)]
+        if fits:
+            fits += self.resettled(min(fits, key=self.score))
         return self._best(now, fits)
 
     def _best(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
@@ -185,13 +186,15 @@ class Moves(ModelSpace):
         """The two masses with the resonance that was found as their own, alone or with a simple effect beside it.
 
         What delays the torque or blocks the shaft biases the resonance of two masses so far that a local fit does not return.
-        The true one is then found as an extra resonance.
+        The true one is then found as an extra resonance, which explains more than any other effect.
+        Of the effects beside it the few best short fits are fitted to the end: they begin at the resonance already.
         """
         if fit.parameters.masses == 1 or not fit.parameters.terms[-1:] or not fit.parameters.terms[-1].resonates:
             return []
         shorter, y = as_two_masses(fit)
         shorter = shorter.driven_by(OpenLoop(self.data, fit.predictor.own_angle)) if self.whitens else shorter
         tries = [self.refitted(shorter, y, self.policy.long)]
+        short: list[Fit] = []
         for t in self.candidates(tries[0]):
             if t.size > 1 or t.place == "shaft":
                 continue
@@ -202,8 +205,10 @@ class Moves(ModelSpace):
             if t.multimodal and self.data.loopable:
                 longer = longer.driven_by(self.closed(longer.predictor))
             X = np.array([shorter.parameters.inserted(y, np.array(row)) for row in rows])
-            tries.append(self.refitted(longer, X[int(np.argmin(self.objective.costs(longer, X, WHITE)))], self.policy.long))
-        return tries
+            x = X[int(np.argmin(self.objective.costs(longer, X, WHITE)))]
+            short.append(ls.scored(self.objective, ls.fit(self.objective, longer, x, WHITE, self.policy.short)))
+        best = sorted(short, key=lambda f: f.bic)[: self.policy.starts]
+        return tries + [self.refitted(f.hypothesis, f.x, self.policy.long) for f in best]
 
     # Moves that reduce.
 
