@@ -32,7 +32,7 @@ Matrix = NDArray[np.float64]
 LINEAR = ("extra_resonance", "transport_delay", "torque_lag", "velocity_filter")
 """The effects that a linear system can hold."""
 
-HIGHEST_PADE = 10  # beyond, the approximation's own poles are lost in rounding
+HIGHEST_PADE = 10  # no decision: beyond, the approximation's own poles are lost in rounding; what an argument may be
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from gaident.diagnosis.library.terms import EQUIVALENT, LIBRARY
 from gaident.diagnosis.selection.mechanisms import as_two_masses, resonance, swings
 from gaident.estimation import least_squares as ls
-from gaident.estimation.criterion import effective_samples
+from gaident.estimation.criterion import cost_of, effective_samples
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
@@ -226,7 +226,7 @@ class ModelSpace:
         x = bare.inserted(base, neutral)
         as_fuller = ls.scored(self.objective, Fit(hypothesis, x, fuller.noise, 0.0, np.inf))
         freedom = term.size - inner.size
-        return as_fuller.bic - freedom * float(np.log(self.objective.information)) + self.score(simpler) - simpler.bic
+        return as_fuller.bic - cost_of(freedom, self.objective.information) + self.score(simpler) - simpler.bic
 
     # Fits.
 
