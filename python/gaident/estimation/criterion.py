@@ -1,4 +1,4 @@
-"""The two places where "is the gain enough?" and "is this noise?" are decided.
+"""The formulas by which "is the gain enough?" and "is this noise?" are decided; `diagnosis/selection/model_space.py` asks them.
 
 **The information criterion.** A hypothesis with k fitted numbers, its noise model included, leaves the variance V/N of its
 errors. With the information I, the number of independent samples,
@@ -25,8 +25,14 @@ model leaves is no stationary noise (a friction that changes with load, angle an
 the noise model has taken a misfit for noise, and trusts the frequencies where that happens to be small. H is defined for two
 estimates of one model; two models are compared by the information criterion.
 
-**The variance ratio.** A model leaves noise where the variance of its whitened errors is that of the sensor's noise, up to a
-ratio that the policy states.
+**The variance ratio.** With sigma the standard deviation of the noise that the measured velocity itself shows,
+
+    ratio = sqrt(V/N) / sigma
+
+is held against the level that records without effects pass, by the errors that V is of. Whitened errors (`noise_ratio`) are the
+innovations, and may be smaller than the noise where that is slow. Errors before whitening (`free_run_ratio`), in the loop where
+there is one, hold all that disturbs the axis beside the sensor's noise: their ratio is larger, and a misfit that the noise model
+has taken shows in them alone.
 """
 
 from __future__ import annotations

@@ -141,12 +141,6 @@ class Policy:
     free_run_ratio: float = calibrated(
         NOISE, "free_run_ratio", "1", "rms of the free run over the noise: more is a misfit that whitening took"
     )
-    unwhitened_ratio: float = noise(
-        2.0,
-        "1",
-        "rms before whitening over the noise: below, no noise model took a cause, and output errors are not searched",
-        DRIVES,
-    )
     noise_level: float = noise(
         1e-6,
         "probability",
@@ -160,9 +154,6 @@ class Policy:
         "1",
         "rms of whitened errors over the noise: below, nothing more is looked for, and what explains so much is enough",
         DRIVES,
-    )
-    misfit_ratio: float = noise(
-        2.0, "1", "rms of the whitened errors of the linear model over the noise: above, output errors are searched first", REAL
     )
     immaterial: float = noise(
         0.02, "1", "of the linear mechanism's rms error: counts as noise, however little noise there is", DRIVES
