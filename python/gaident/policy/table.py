@@ -290,9 +290,9 @@ class Policy:
     material_column: float = linear(
         0.05, "1", "of the squared torque, that a spring or friction by direction takes at least", REGRESSION
     )
-    lag_left: float = linear(0.05, "1", "of the squared torque, that the regression behind a lag leaves at most", REGRESSION)
+    lag_left: float = linear(0.05, "1", "of the squared torque, that the regression behind a lag leaves at most", SHIFTED)
     lag_curvature: float = linear(
-        1e-3, "1", "of the squared torque per squared sample: below, the motion shows no lag", REGRESSION
+        1e-3, "1", "of the squared torque per squared sample: below, the motion shows no lag", SHIFTED
     )
     winding_sure: float = linear(5.0, "1", "standard deviations from 0, from which a resistance or inductance is shown", WINDING)
     least_rows: int = linear(
@@ -303,7 +303,7 @@ class Policy:
     )
     spring_turns: float = linear(10.0, "turns", "of travel: beyond, no spring is fixed to the ground", REGRESSION)
     another_mass: float = linear(
-        2.0, "1", "fall of the whitened error sum for a mass more, where no linear structure holds", SUCCESS
+        2.0, "1", "fall of the whitened error sum for a mass more, where no linear structure holds", DRIVES
     )
     below_zero: float = linear(
         2.0,
