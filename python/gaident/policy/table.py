@@ -291,9 +291,7 @@ class Policy:
         0.05, "1", "of the squared torque, that a spring or friction by direction takes at least", REGRESSION
     )
     lag_left: float = linear(0.05, "1", "of the squared torque, that the regression behind a lag leaves at most", SHIFTED)
-    lag_curvature: float = linear(
-        1e-3, "1", "of the squared torque per squared sample: below, the motion shows no lag", SHIFTED
-    )
+    lag_curvature: float = linear(1e-3, "1", "of the squared torque per squared sample: below, the motion shows no lag", SHIFTED)
     winding_sure: float = linear(5.0, "1", "standard deviations from 0, from which a resistance or inductance is shown", WINDING)
     least_rows: int = linear(
         20, "1", "rows of a regression at least, half of them in each direction for dry friction", REGRESSION
