@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gaident.control.cascade import Cascade, Controller
 from gaident.data.record import Record
 from gaident.diagnosis.records.hygiene import quantisation
+from gaident.estimation.criterion import effective_samples
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit
 from gaident.estimation.objective import Fit, Objective
@@ -30,11 +31,6 @@ __all__ = ["IN_SAMPLE", "Gains", "free_run_errors", "held_from", "interval_of_fa
 
 Vector = NDArray[np.float64]
 
-LEVELS = 0.025, 0.975  # no decision: of the interval that is reported
-MEMORY = 3  # no decision: times the memory of an error that a block of its bootstrap is long
-BLOCKS = 8  # no decision: parts of a record, of which a bootstrap draws at least so many
-LEAST = 4  # no decision: parts of a record, of which one at least is fitted
-DEAD = 0.2  # no decision: of an autocorrelation, below which an error has forgotten
 IN_SAMPLE = "in-sample"
 
 
@@ -159,7 +155,7 @@ def held_from(rec: Record) -> int:
     before, after = (float(np.sqrt(np.mean(w**2))) for w in (rec.velocity[:at], rec.velocity[at:]))
     if after < POLICY.held_motion * before:
         path = np.cumsum(np.abs(rec.velocity))
-        at = int(np.clip(np.searchsorted(path, POLICY.fitted_share * path[-1]), len(rec) // LEAST, at))
+        at = int(np.clip(np.searchsorted(path, POLICY.fitted_share * path[-1]), POLICY.least_fitted * len(rec), at))
     return at
 
 
@@ -231,10 +227,14 @@ def start_state(model: Model, rec: Record, controller: Controller | None) -> Vec
 
 
 def interval_of_fall(before: list[Vector], after: list[Vector]) -> tuple[float, float]:
-    """95 % interval of 1 - rmse_after/rmse_before by a paired block bootstrap (blocks longer than the errors stay correlated)."""
+    """95 % interval of 1 - rmse_after/rmse_before by a paired block bootstrap.
+
+    Blocks are longer than the errors stay correlated: `block_memory` times samples over independent samples.
+    """
     b, a = np.concatenate(before), np.concatenate(after)
     n = len(b)
-    block = max(min(n // BLOCKS, MEMORY * _memory(a)), 1)
+    memory = n / effective_samples(a)
+    block = max(min(n // POLICY.least_blocks, round(POLICY.block_memory * memory)), 1)
     count = n // block
     if count < 2:
         return (float("-inf"), 1.0)
@@ -242,14 +242,6 @@ def interval_of_fall(before: list[Vector], after: list[Vector]) -> tuple[float, 
     rng = np.random.default_rng(0)
     drawn = sums[rng.integers(0, count, (POLICY.draws, count))].sum(axis=1)
     falls = 1.0 - np.sqrt(drawn[:, 1] / np.maximum(drawn[:, 0], 1e-300))
-    low, high = np.quantile(falls, LEVELS)
+    tail = 0.5 * POLICY.interval_level
+    low, high = np.quantile(falls, (tail, 1.0 - tail))
     return float(low), float(high)
-
-
-def _memory(e: Vector) -> int:
-    """Samples until the autocorrelation of e first falls below DEAD."""
-    size = 1 << (2 * len(e) - 1).bit_length()
-    spectrum = np.abs(np.fft.rfft(e - e.mean(), size)) ** 2
-    r = np.fft.irfft(spectrum, size)[: len(e)]
-    below = np.flatnonzero(r < DEAD * r[0])
-    return int(below[0]) if len(below) else len(e)

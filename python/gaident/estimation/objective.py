@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from gaident.estimation.criterion import bic
 from gaident.estimation.dataset import DataSet
+from gaident.estimation.masked import Bridges
 from gaident.estimation.noise_model import HIGHEST, ON_TOP, WHITE, NoiseFilter, ShaftNoise, autoregression
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import Predictor
@@ -39,7 +40,6 @@ __all__ = ["Fit", "Hypothesis", "Innovations", "NoiseFamily", "Objective", "Outp
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-Index = NDArray[np.intp]
 T = TypeVar("T")
 
 HEAD = 12  # no decision: parts of the shortest record, of which a filter's start takes one at most
@@ -276,39 +276,12 @@ class Objective:
         return use
 
     def bridged(self, E: Matrix) -> Matrix:
-        """Errors with a straight line over the masked samples of each record, so that a filter does not see them.
-
-        At a record's ends its nearest sample that counts goes on; a record of which none counts is 0.
-        """
-        gaps, before, after, share, blank = self._bridges
-        if len(gaps) == 0 and len(blank) == 0:
-            return E
-        E = E.copy()
-        E[:, gaps] = E[:, before] + share * (E[:, after] - E[:, before])
-        E[:, blank] = 0.0
-        return E
+        """Errors with a straight line over the masked samples of each record, so that a filter does not see them."""
+        return self._bridges.over(E)
 
     @cached_property
-    def _bridges(self) -> tuple[Index, Index, Index, Vector, Index]:
-        """Masked samples, those of their record that count before and after each, its place between them from 0 to 1; samples
-        of records in which none counts."""
-        gaps, before, after, blank = ([np.zeros(0, dtype=np.intp)] for _ in range(4))
-        first = 0
-        for n in self.lengths:
-            counts = self.weight[first : first + n] > 0.0
-            known, masked = first + np.flatnonzero(counts), first + np.flatnonzero(~counts)
-            first += n
-            if len(known) == 0:
-                blank.append(masked)
-                continue
-            right = np.searchsorted(known, masked)
-            gaps.append(masked)
-            before.append(known[np.maximum(right - 1, 0)])
-            after.append(known[np.minimum(right, len(known) - 1)])
-        left, right = np.concatenate(before), np.concatenate(after)
-        masked = np.concatenate(gaps)
-        share = np.clip((masked - left) / np.maximum(right - left, 1), 0.0, 1.0)
-        return masked, left, right, share, np.concatenate(blank)
+    def _bridges(self) -> Bridges:
+        return Bridges.of(self.weight, self.lengths)
 
     @property
     def head(self) -> int:

@@ -17,8 +17,9 @@ RNG = np.random.default_rng(1)
 
 
 def gains(low: float, high: float, held_out: str = "the rest") -> Gains:
-    fitness = Fitness(1.0, 0.0, 0.1)
-    return Gains(fitness, fitness, (low, high), held_out, {}, (), MODEL, MODEL)
+    """Gains of this interval, the error of the model behind being in the middle of it."""
+    before, after = Fitness(1.0, 0.0, 0.1), Fitness(1.0 - 0.5 * (low + high), 0.0, 0.1)
+    return Gains(before, after, (low, high), held_out, {}, (), MODEL, MODEL)
 
 
 def check(before: float | None, after: float | None, better: bool = False, terms: tuple[str, ...] = ()) -> Check:
@@ -39,6 +40,7 @@ def check(before: float | None, after: float | None, better: bool = False, terms
         (-0.5, -0.1, 0.2, 0.3, False, False),  # both figures are worse
         (-0.5, -0.1, 0.2, 0.1, False, True),  # speeds that are only held: the torque is explained, the free run drifts
         (-0.5, -0.1, None, None, False, False),  # no torque to go by
+        (-0.02, -0.01, 0.2, 0.3, False, True),  # surely worse, by less than matters
         (-0.5, 0.1, 0.2, 0.3, False, True),  # a lower error within its variation decides nothing
         (-0.5, 0.1, 0.2, 0.3, True, False),  # no gain, and the regression leaves less
     ],

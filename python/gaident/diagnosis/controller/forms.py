@@ -26,6 +26,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.form_regression import FILTER_SETS, Law, Shape, at_places, bounds_of, fitted_shape, law_of
 from gaident.diagnosis.controller.replay import rounding_of, tolerance_of
 from gaident.diagnosis.controller.replay_causes import white_noise
+from gaident.estimation.criterion import bic
 from gaident.models.drive_torque import made_by_cascade
 from gaident.policy.table import POLICY
 
@@ -34,9 +35,6 @@ __all__ = ["Form", "Shown", "form_shown"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-FARTHEST = 0.3  # no decision: how far a filter's number moves along its slope
-CHOICE = 2.0 * np.log(3.0)  # no decision: what the choice of one of three settings costs
-NEAR = 1.1  # no decision: of the floor, an estimate of it
 INSIDE = 1e-9  # no decision: of a bound, where a search starts
 STEP = 1e-5  # no decision: of a filter's number, for a slope
 ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
@@ -146,7 +144,7 @@ def form_shown(records: Sequence[Record], given: PI) -> Shown | None:
         if followed is not None and len(places) > followed:
             break  # what leaves no more than rounding or white noise is not improved by another filter
         shape = fitted_shape(law, places, floor)
-        if shape.rms <= NEAR * floor or white_noise(shape.left, law.logged):
+        if shape.rms <= POLICY.near_rounding * floor or white_noise(shape.left, law.logged):
             followed = len(places)
         candidates += _candidates(law, shape, given, floor)
     candidates.sort(key=lambda c: c.criterion)
@@ -183,13 +181,13 @@ def _candidates(law: Law, shape: Shape, given: PI, floor: float) -> Iterator[_Ca
         M = np.column_stack([linear @ B @ moved, slopes])
         wanted = logged - linear @ B @ fixed
         free, left = _least(M, wanted)
-        if np.any(np.abs(free[moved.shape[1] :]) > FARTHEST):  # the slope holds no longer
+        if np.any(np.abs(free[moved.shape[1] :]) > POLICY.slope_reach):  # the slope holds no longer
             free, left = _least(M[:, : moved.shape[1]], wanted)
         numbers = fixed + moved @ free[: moved.shape[1]]
         if min(numbers[KP_W], numbers[KP_R], numbers[KI]) < -POLICY.negligible * float(np.abs(numbers[:FIRST_FEED]).max()):
             continue
         k = M.shape[1]
-        criterion = n * np.log(max(left / n, floor**2)) + k * np.log(n) + CHOICE * form.chosen
+        criterion = bic(max(left / n, floor**2), n, k) + POLICY.form_choice * form.chosen
         yield _Candidate(form, shape, free, k, float(criterion))
 
 

@@ -6,7 +6,8 @@ A name rests on the records that were fitted. Data that no parameter has seen sp
     its free run is no better than that of the linear model, and its force error larger than that of the regression.
 
 "Worse", "better" and "larger" are beyond the variation over blocks of the held-out data (95 % of a paired bootstrap): a lower
-error alone decides nothing. A cause that the inverse-dynamics regression holds too has a second witness and stands: a free run
+error alone decides nothing. "Worse" is also by more than an effect may add to the error (`harm`): of two models that leave
+little more than the noise, one is surely the worse, by less than matters. A cause that the inverse-dynamics regression holds too has a second witness and stands: a free run
 may miss where the data cannot show a motion, as speeds that are only held.
 """
 
@@ -18,6 +19,7 @@ from gaident.axis import Text, say
 from gaident.diagnosis.check import Check
 from gaident.diagnosis.gains import IN_SAMPLE, Gains
 from gaident.diagnosis.library.terms import LIBRARY, of_inverse_dynamics
+from gaident.policy.table import POLICY
 
 __all__ = ["standing"]
 
@@ -35,7 +37,8 @@ def _lost(gains: Gains, check: Check) -> Text | None:
         return None
     low, high = gains.interval
     before, after = check.before.force_error, check.after.force_error
-    if high < 0.0 and not (before is not None and after is not None and after < before):
+    worse = high < 0.0 and gains.before.rmse < (1.0 - POLICY.harm) * gains.after.rmse
+    if worse and not (before is not None and after is not None and after < before):
         return say(
             "On the held-out data the free run of the extended model is worse than that of the linear model ({:.3g} to {:.3g} "
             "{rad/s}, beyond its variation over the record): what it names is no explanation.",

@@ -116,7 +116,7 @@ def linear_bases(task: Task) -> tuple[Task, list[Fit]]:
         for s in test.ranked(noise)[: POLICY.starts]:
             if s.term.name not in tried:
                 short = ls.scored(task.objective, ls.fit(task.objective, s.hypothesis, s.starts[0], noise, POLICY.short))
-                if short.bic - two.bic < POLICY.near_mass * task.objective.count:
+                if space.score(short) < space.score(two) + POLICY.beam_reach * space.penalty:
                     return task, [one, two]
             tried.add(s.term.name)
     return task, [two]

@@ -36,6 +36,7 @@ from gaident.diagnosis.selection.mechanisms import (
 from gaident.diagnosis.selection.model_space import ModelSpace, words
 from gaident.diagnosis.selection.score_test import ScoreTest
 from gaident.estimation import least_squares as ls
+from gaident.estimation.criterion import gained
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis
 from gaident.estimation.prediction import OpenLoop
@@ -114,9 +115,7 @@ class Moves(ModelSpace):
                     fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, self.policy.glance))
                     if s.term not in short or fit.bic < short[s.term].bic:
                         short[s.term] = fit
-        reach = self.policy.hopeless * self.objective.information
-        near = [f for f in short.values() if f.bic < now.bic + reach]
-        best = sorted(near, key=lambda f: f.bic)[: self.policy.finished]
+        best = sorted((f for f in short.values() if f.cost < WORST), key=lambda f: f.bic)[: self.policy.finished]
         best = sorted((self.completed(f) for f in best), key=self.score)
         reach = self.policy.beam_reach * self.penalty
         fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
@@ -173,7 +172,7 @@ class Moves(ModelSpace):
             size, slope = float(column @ column), float(column @ rest)
             if size > 0.0 and slope != 0.0:
                 power = float(rest @ rest)
-                fall = -self.objective.information * float(np.log(max(1.0 - slope**2 / (size * power), 1e-300)))
+                fall = gained(power, power - slope**2 / size, self.objective.information)
                 if fall > best:
                     best, stiffness = fall, slope / size
         starts = [as_held(fit, stiffness, data)] if stiffness > 0.0 and best > self.policy.hope * self.penalty else []

@@ -129,7 +129,7 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
         # Noise on the input makes a whitened inertia too large, whatever the noise model; at the slow end there is little of it.
         return _by_output_errors(task.by_output_errors, bases, note)
     by_output: _Found | None = None
-    if min(space.ratio(b) for b in bases) > POLICY.misfit_ratio:
+    if min(space.ratio(b) for b in bases) > POLICY.noise_ratio:
         by_output = _by_output_errors(task.by_output_errors, bases, note)
         test = specification(space, task, _as_innovations(space, by_output.final))
         if test.contradicts:
