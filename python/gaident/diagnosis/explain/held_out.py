@@ -7,8 +7,9 @@ A name rests on the records that were fitted. Data that no parameter has seen sp
 
 "Worse", "better" and "larger" are beyond the variation over blocks of the held-out data (95 % of a paired bootstrap): a lower
 error alone decides nothing. "Worse" is also by more than an effect may add to the error (`harm`): of two models that leave
-little more than the noise, one is surely the worse, by less than matters. A cause that the inverse-dynamics regression holds too has a second witness and stands: a free run
-may miss where the data cannot show a motion, as speeds that are only held.
+little more than the noise, one is surely the worse, by less than matters.
+A cause that the inverse-dynamics regression holds too has a second witness and stands: a free run may miss where the data cannot
+show a motion, as speeds that are only held.
 """
 
 from __future__ import annotations
