@@ -153,12 +153,13 @@ def run(cell: Cell, with_oracle: bool) -> dict[str, Any]:
     except RuntimeError as none:  # this effect does not act there
         return line | {"impossible": str(none)}
     line |= {"plant": truth.plant.name, "factor": truth.factor, "effects": truth.effects}
-    started = time.perf_counter()
+    started, processor = time.perf_counter(), time.process_time()
     try:
         dia = ga.diagnose(record, controller=controller, validation=validation)  # type: ignore[attr-defined]
     except Exception as failure:  # a crash is a result, too
         return line | {"crash": f"{type(failure).__name__}: {failure}", "seconds": time.perf_counter() - started}
     line |= {"seconds": time.perf_counter() - started, "judged": judge(dia, truth.effects).as_dict()}
+    line |= {"processor": time.process_time() - processor, "simulations": dia.simulations}
     line |= {"before": dia.before.rmse, "after": dia.after.rmse}
     inside = cell.effects and not set(cell.effects) & set(OUTSIDE) and not describes_noise(cell.effects)
     if with_oracle and validation is not None and inside and not cell.settle and not cell.loop:

@@ -17,7 +17,8 @@ RANK = {"missed": 0, "in set": 1, "right": 2}
 LEAST: Mapping[str, str] = {
     **dict.fromkeys(("emps", "emps window", "emps pulses", "joint 1", "joint 2", "joint 6"), "right"),
     **dict.fromkeys(("hsm150 measured", "actuator 2", "actuator 3", "actuator 4"), "right"),
-    **dict.fromkeys(("joint 2/first half", "hsm150 commanded", "actuator 1"), "in set"),
+    **dict.fromkeys(("epos 1", "epos 2", "epos 3"), "right"),
+    **dict.fromkeys(("hsm150 commanded", "actuator 1"), "in set"),
     "joint 2/decimated 4": "missed",  # found, and withdrawn: 40 ms show no jump
     **dict.fromkeys(("ced 11", "ced 12", "rack and pinion"), "right"),  # no single name where the record decides nothing
 }

@@ -9,6 +9,8 @@
     regression  the same records, `ga.inverse_dynamics` alone
     success     linear plants of bench/success.py, `ga.identify`
     winding     currents of motors from weak to strong inductance, `ga.estimate_winding`
+    forms       servo controllers of another form than the bare PI that is given, the form's search alone (rows/forms.py)
+    logs        clocks, counters, units and stamps of logs, read (rows/logs.py)
 
 A result has three parts: an outcome, what is said (verdict and findings; the structure; the terms), and a digest of the rest that
 a user reads: parameters to three digits, notes, comparisons, the next experiment.
@@ -23,16 +25,16 @@ a user reads: parameters to three digits, notes, comparisons, the next experimen
 
 from __future__ import annotations
 
-import hashlib
-import json
 import zlib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import blind
 import numpy as np
 import success
+from rows.case import Case, Result, digest
+from rows.forms import forms, shown
+from rows.logs import logs, read_log
 
 import gaident as ga
 from blind_judge import judge
@@ -42,23 +44,6 @@ LOOP = ("torque_saturation", "integrator_clamp", "command_rate_limit", "outliers
 LENGTHS = (80, 200, 400)  # samples of a short record
 STRIDE = 7  # has no divisor in common with the count of effects: neighbours in their list are of one family
 OUTCOMES = ("right", "in set", "missed", "wrong", "false alarm", "refused", "crash")
-
-
-@dataclass(frozen=True)
-class Case:
-    """One case, complete: the same case is the same record. `key` names it in the file; `what` is its cell, name or number."""
-
-    kind: str
-    key: str
-    what: Any
-    number: int = 0
-
-
-@dataclass(frozen=True)
-class Result:
-    outcome: str
-    said: str
-    detail: str
 
 
 def cases(kind: str, count: int, seed: int) -> list[Case]:
@@ -72,10 +57,6 @@ def run(case: Case) -> Result:
         return KINDS[case.kind][1](case)
     except ga.GaidentError as refusal:
         return Result("refused", type(refusal).__name__, digest(str(refusal)))
-
-
-def digest(what: Any) -> str:
-    return hashlib.sha1(json.dumps(what, default=str).encode()).hexdigest()[:10]
 
 
 def _cells(groups: tuple[str, ...], count: int, seed: int) -> Iterator[blind.Cell]:
@@ -238,5 +219,7 @@ KINDS: dict[str, tuple[Callable[[int, int], list[Case]], Callable[[Case], Result
     "regression": (lambda count, seed: [replace(c, kind="regression") for c in real(count, seed)], regressed),
     "success": (plants, identified),
     "winding": (windings, wound),
+    "forms": (forms, shown),
+    "logs": (logs, read_log),
 }
 """Kind -> what makes its cases (count, seed), and what runs one."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import groupby
@@ -26,6 +27,8 @@ What each one is for, the pages [estimation](estimation.md), [search](search.md)
 Other numbers decide nothing: the tolerance of a solver, the step of a difference, the start of a fit.
 They stand where they are used, with a name and the remark `no decision`, which says why.
 The bounds and starts of each effect's parameters stand in the effect's row of `diagnosis/library/`.
+The core (`csrc/gaident`) decides about no model, but into how many substeps it cuts a sample (`substeps_for` in
+`nonlinear/effect_prepare.cpp`) sets how exact a simulation is: [what was measured](../effects.md#how-exact-it-is).
 
 "Measured by" names the command that measures this one number: a calibration, or the same cases with the number at its value, at
 half of it and at twice.
@@ -53,9 +56,38 @@ The value is the level that the share p = `noise_level` of such records exceeds.
 an exponential tail through the upper tenth (peaks over a threshold; Pickands, J. (1975): Statistical inference using extreme
 order statistics. Annals of Statistics 3, 119-131). Its uncertainty is that of b, 1/sqrt(m) of it.
 
-| statistic | value | largest measured |
-|---|---|---|
+**These values are extrapolated.** Of {records} records the largest statistic is exceeded by one in {records}, and the level asks
+for one in {chance}: {decades:.1f} decades beyond all that was measured, along a tail that is supposed to stay exponential.
+No bench of this project could show such a level.
+The factor ln(m/(n p)) = {factor:.1f} multiplies the uncertainty of b, {uncertain:.0f} %, too; so a value is known to about that
+share of what it stands above x_m.
+What was measured is the third column: at that value none of the {records} records would have been mistaken.
+
+| statistic | value | largest measured | value over largest |
+|---|---|---|---|
 {measured}
+## Is this noise: one test, and what stands beside it
+
+The test is a variance ratio: the rms of errors over the noise sigma that the measured velocity itself shows, against the level
+that records without effects pass (`estimation/criterion.py`).
+It is asked of two errors, because they hold different things.
+
+- `noise_ratio`, of whitened errors: what a model leaves that its own past does not foretell. It decides whether a model is
+  adequate, and, of the linear model, whether output errors are searched first.
+- `free_run_ratio`, of errors before whitening, in the loop where it is the drive's: what a free run misses. A noise model takes
+  a slow misfit for noise, and then it shows here alone. It decides whether output errors are searched beside, whether a cause
+  was hidden, and whether the free run is noted as far off.
+
+Four numbers ask something else, and no level of that test answers it:
+
+- `effort_ratio` is about power, not size: the test may pass and an effect still be there that is a fraction of the noise.
+  Below this ratio what is left beside the noise is less than half of it (sqrt(1.1^2 - 1) = 0.46), and nothing is looked for.
+- `immaterial` has another scale, that of the motion: with a noise near 0 every simulation is off by more than noise,
+  and no user asks for the difference.
+- `grid_loss` compares two grids of time, and no noise with an error.
+- `undecided_ratio` stands in identify(), which searches no effects: above it the answer is "undecided", a wish for more data,
+  and not a finding. So it may be stricter than a level that one record in a million passes.
+
 """
 
 DECIDING = """\
@@ -159,8 +191,20 @@ def _names(names: Sequence[str]) -> str:
 
 def _head() -> str:
     numbers = CALIBRATED["numbers"].items()
-    lines = [f"| `{name}` | {found['value']:g} | {found['largest']:.3g} |\n" for name, found in numbers]
-    return HEAD.format(command=CALIBRATED["command"], records=CALIBRATED["records"], measured="".join(lines))
+    lines = [
+        f"| `{name}` | {found['value']:g} | {found['largest']:.3g} | {found['value'] / found['largest']:.1f} |\n"
+        for name, found in numbers
+    ]
+    n, level, share = CALIBRATED["records"], CALIBRATED["level"], 0.1
+    return HEAD.format(
+        command=CALIBRATED["command"],
+        records=n,
+        chance=f"{round(1.0 / level):,}".replace(",", " "),
+        decades=math.log10(1.0 / n / level),
+        factor=math.log(share / level),
+        uncertain=100.0 / math.sqrt(share * n),
+        measured="".join(lines),
+    )
 
 
 def _line(row: Row, *more: str) -> str:

@@ -40,7 +40,7 @@ __all__ = [
 ]
 
 AXES = ("rotary", "linear")
-TURN = math.tau  # rad, and on a linear axis the same number of m
+TURN = math.tau  # no decision: rad, and on a linear axis the same number of m; rad
 
 UNITS: dict[str, str] = {
     "rad": "m",

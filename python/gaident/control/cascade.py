@@ -29,8 +29,8 @@ Filter: TypeAlias = LowPass | Notch
 WHOLE = 1e-6  # no decision: rounding of two decimal numbers that divide; more is no whole multiple
 FEEDFORWARDS = ("velocity_feedforward", "acceleration_feedforward", "friction_feedforward")
 FILTERS = ("torque_filters", "velocity_filters", "command_filters")
-MOST_FILTERS = 8
-LONGEST_DELAY = 1.0  # s, as of the effect transport_delay
+MOST_FILTERS = 8  # no decision: what an argument may be
+LONGEST_DELAY = 1.0  # no decision: s, as of the effect transport_delay; what an argument may be
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ TORQUE_CONSTANT = Parameter("torque_constant", "N m/A", "of the motor, for the a
 CONSTANTS = (TORQUE_CONSTANT.name,)
 """Parameters that are the motor's and not of a drive; a drive file gives them above its first section."""
 
-_PER_TURN = math.tau
+_PER_TURN = math.tau  # no decision: rad
 
 DRIVES: dict[str, DriveRow] = {
     "sinamics": DriveRow(

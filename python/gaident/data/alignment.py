@@ -22,14 +22,13 @@ from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_numbe
 from gaident.data.signals.decimation import low_passed
 from gaident.data.signals.lags import Fit, coarse_lags, refine
 from gaident.errors import RecordError
+from gaident.estimation.criterion import gained
+from gaident.policy.table import POLICY
 
 __all__ = ["Alignment", "align"]
 
-_LEAST_CORRELATION = 0.5
-_SURE = 3.0  # standard deviations from which a difference of the rates is one
-_RIVAL = 10.0  # units of n ln J: what a second offset, or another rate, must be worse by
-_WIDER = 2.0  # times max_rate: bound of the rate in the fit
-_ANY = 50.0  # times max_rate: the bound of a second fit, where the first one ends at its bound
+_WIDER = 2.0  # no decision: times max_rate: bound of the rate in the fit; bounds of a fit
+_ANY = 50.0  # no decision: times max_rate: the bound of a second fit, where the first one ends at its bound; bounds of a fit
 _ORDER = ("velocity", "position", "command", "torque")
 
 
@@ -75,14 +74,15 @@ class Alignment:
 
     def summary(self) -> str:
         """Return the result as text, a few lines."""
-        rate = f"{self.rate * 1e6:+.1f} +- {self.rate_std * 1e6:.1f} ppm"
+        rate = f"{self.rate * 1e6:+.1f} +- {self.rate_std * 1e6:.1f} ppm"  # no decision: how a number is printed
         if not self.rate_seen:
-            rate = f"no difference seen (to +- {2e6 * self.rate_std:.3g} ppm)"
+            rate = f"no difference seen (to +- {2e6 * self.rate_std:.3g} ppm)"  # no decision: how a number is printed
         samples = self.uncertainty / self.record.dt
+        # no decision: how a number is printed
         worst = "" if samples < 0.5 else "; too much for phase: log both with one clock where that matters"
         return (
             f"the second log begins {self.offset:.6g} +- {self.offset_std:.2g} s after the first (its clock's zero)\n"
-            f"rate of its clock: {rate}\n"
+            f"rate of its clock: {rate}\n"  # no decision: how a number is printed
             f"correlation {self.correlation:.4f}, scale {self.gain:.4g}\n"
             f"time axis right to {self.uncertainty:.2g} s ({samples:.2g} samples){worst}\n"
             f"{len(self.record)} samples in common"
@@ -97,7 +97,7 @@ def align(
     on: str | tuple[str, str] | None = None,
     take: Sequence[str] | None = None,
     within: tuple[float, float] | None = None,
-    max_rate: float = 1e-3,
+    max_rate: float = 1e-3,  # no decision: an argument
 ) -> Alignment:
     """Bring the channels of a second log, which has a clock of its own, onto the first record's time axis.
 
@@ -161,12 +161,12 @@ def align(
     fit = _best(x, rec.dt, y, their_dt, within, limit, (first, second))
     if abs(fit.rate) >= _WIDER * limit:
         free = refine(x, rec.dt, y, their_dt, fit.offset, fit.rate, _ANY * limit)
-        if free is not None and free.independent * np.log(fit.variance / free.variance) > _RIVAL:
+        if free is not None and gained(fit.variance, free.variance, free.independent) > POLICY.rival_margin:
             raise RecordError(
                 f"the clocks' rates differ by about {free.rate:.2g}, which is beyond max_rate={max_rate!r}; check the sample "
                 "times of both logs, or give a larger max_rate"
             )
-    seen = abs(fit.rate) > _SURE * fit.std[1]
+    seen = abs(fit.rate) > POLICY.rate_seen * fit.std[1]
     if not seen:
         equal = refine(x, rec.dt, y, their_dt, fit.offset + fit.rate * fit.centre, 0.0, limit, free_rate=False)
         fit = (equal or fit).with_rate_std(fit.std[1])
@@ -224,14 +224,14 @@ def _best(
         raise RecordError(f"within={within!r} leaves no offset at which the logs overlap; give a wider one")
     best = min(fits, key=lambda fit: fit.variance)
     what = names[0] if names[0] == names[1] else f"rec's {names[0]} and other's {names[1]}"
-    if best.correlation < _LEAST_CORRELATION:
+    if best.correlation < POLICY.aligned:
         raise RecordError(
             f"the logs cannot be aligned by {what}: the best correlation is {best.correlation:.2f}; are they of the same run? "
             "give on= with channels that show the same motion; where the logs last many minutes, cut both to a part first"
         )
     for fit in fits:
         apart = abs(fit.offset - best.offset)
-        if apart > best.width and best.independent * np.log(fit.variance / best.variance) < _RIVAL:
+        if apart > best.width and gained(fit.variance, best.variance, best.independent) < POLICY.rival_margin:
             raise RecordError(
                 f"the logs cannot be aligned by {what} alone: the motion repeats itself, and offsets of {best.offset:.6g} s and "
                 f"{fit.offset:.6g} s fit equally well; give within=(lowest, highest), or a run with one edge of its own"

@@ -13,12 +13,13 @@ from gaident.data.formats.units import Constants, factor
 from gaident.data.listing import ColumnInfo, Listing
 from gaident.data.record import CHANNELS
 from gaident.errors import ReadError
+from gaident.policy.table import POLICY
 
 __all__ = ["Guess", "guess_channels", "position_and_velocity", "unit_from_position", "unit_from_velocity"]
 
 COMMANDED_QUANTITY = {"command": "velocity", "position_command": "position"}
 """Channel that is a command -> the quantity that it commands."""
-_LEAST = 2
+_LEAST = 2  # no decision: words that speak for a column
 
 
 @dataclass(frozen=True)
@@ -109,8 +110,6 @@ def _converts(unit: str, quantity: str) -> bool:
 
 
 _VELOCITY_UNITS = ("rad/s", "rpm", "deg/s", "rps", "m/s", "mm/s", "m/min", "mm/min")
-_ALIKE = 0.9
-_SURELY = 0.98
 
 
 def slope_between(position: NDArray[np.float64], velocity: NDArray[np.float64], dt: float) -> tuple[float, float]:
@@ -127,10 +126,10 @@ def slope_between(position: NDArray[np.float64], velocity: NDArray[np.float64], 
 def unit_from_position(velocity: NDArray[np.float64], position: NDArray[np.float64], dt: float, linear: bool) -> str | None:
     """The unit of a velocity, from the slope of a position in SI; None where none fits to within 2 %."""
     size, correlation = slope_between(position, velocity, dt)
-    if correlation < _ALIKE:
+    if correlation < POLICY.one_course:
         return None
     for unit in _VELOCITY_UNITS:
-        if unit.startswith("m") == linear and abs(size / factor("velocity", unit) - 1.0) < 0.02:
+        if unit.startswith("m") == linear and abs(size / factor("velocity", unit) - 1.0) < POLICY.unit_shown:
             return unit
     return None
 
@@ -139,15 +138,17 @@ def unit_from_velocity(command: NDArray[np.float64], velocity: NDArray[np.float6
     """The unit of a velocity command, from a velocity in SI that follows it; None where it does not to within 25 %."""
     power = float(command @ command)
     size = float(command @ velocity) / power if power > 0.0 else 0.0
-    if size <= 0.0 or float(command @ velocity) < _ALIKE * np.sqrt(power * float(velocity @ velocity)):
+    if size <= 0.0 or float(command @ velocity) < POLICY.one_course * np.sqrt(power * float(velocity @ velocity)):
         return None
     for unit in _VELOCITY_UNITS:
-        if unit.startswith("m") == linear and abs(np.log(size / factor("velocity", unit))) < np.log(1.25):
+        if unit.startswith("m") == linear and abs(np.log(size / factor("velocity", unit))) < np.log(POLICY.near_rpm):
             return unit
     return None
 
 
 def position_and_velocity(values: Mapping[str, NDArray[np.float64]], dt: float) -> tuple[str, str] | None:
     """The two columns of which one is the derivative of the other, beyond doubt; None where no pair or several are."""
-    found = [(a, b) for a in values for b in values if a != b and abs(slope_between(values[a], values[b], dt)[1]) > _SURELY]
+    found = [
+        (a, b) for a in values for b in values if a != b and abs(slope_between(values[a], values[b], dt)[1]) > POLICY.derivative
+    ]
     return found[0] if len(found) == 1 else None

@@ -17,6 +17,7 @@ from gaident.data.readers import open_log
 from gaident.data.timeaxis import TimeAxis, stamp_unit, time_column
 from gaident.data.torque_kind import kind_of_column
 from gaident.errors import ReadError
+from gaident.policy.table import POLICY
 
 __all__ = ["ColumnInfo", "Listing", "columns", "printable"]
 
@@ -106,9 +107,10 @@ class Listing:
             rows.append(
                 (printable(c.name), printable(c.unit or "-"), str(c.samples), _number(c.lowest), _number(c.highest), step, remark)
             )
-        widths = [max(len(row[k]) for row in rows) for k in range(6)]
+        widths = [max(len(row[k]) for row in rows) for k in range(6)]  # no decision: the columns of the table that is printed
         lines = [f"{self.path}: {self.form}"]
         for row in rows:
+            # no decision: columns of the table that is printed
             cells = [cell.ljust(w) if k < 2 else cell.rjust(w) for k, (cell, w) in enumerate(zip(row[:6], widths, strict=True))]
             lines.append("  ".join([*cells, row[6]]).rstrip())
         if self.others:
@@ -205,6 +207,7 @@ class _Gathered:
         if not self.bad and finite.size < len(values):
             row = int(np.argmin(np.isfinite(values)))
             text = column.bad[1] if column.bad is not None else str(values[row])
+            # no decision: how much of a cell a message quotes
             self.bad = f"{'empty' if not text else f'no number: {text[:20]!r}'} at {block.place(row)}"
         if self.is_time and not self.irregular:
             self._pass_time(block, values)
@@ -215,7 +218,7 @@ class _Gathered:
         if self.samples == 0:
             self.first, self.rise = float(values[0]), float(values[-1] - values[0]) / (len(values) - 1)
         expected = self.first + self.rise * (self.samples + np.arange(len(values)))
-        self.even = self.rise > 0.0 and bool(np.all(np.abs(values - expected) <= 0.02 * self.rise))
+        self.even = self.rise > 0.0 and bool(np.all(np.abs(values - expected) <= POLICY.even_rise * self.rise))
 
     def _pass_time(self, block: Table, values: NDArray[np.float64]) -> None:
         if not len(values):

@@ -27,7 +27,7 @@ from gaident.errors import ReadError
 
 __all__ = ["READERS", "Reader", "open_log", "read", "read_columns"]
 
-_HEAD = 4096
+_HEAD = 4096  # no decision: bytes that tell a format
 
 
 @dataclass(frozen=True)

@@ -7,22 +7,14 @@ from numpy.typing import NDArray
 
 from gaident.arguments import NO_TIME, arg
 from gaident.data.formats.table import Column, Table
-from gaident.data.signals.resampling import GAP
 from gaident.errors import ReadError
+from gaident.policy.table import POLICY
 
 __all__ = ["TimeAxis", "stamp_unit", "time_column"]
 
-_JITTER = 0.01
-"""Of one sample time: what a logger's clock may wander from sample to sample."""
-
-_COARSE = 0.25
-"""Of one sample time: a coarser print of the time hides a lost sample."""
-
-_FEW = 0.1
-_CONTRADICTION = 0.01
-_BLOCK = 64
-_DIGITS = 16
-_SINGLE_PRINTED = 6e-9
+_BLOCK = 64  # no decision: work; stamps of a block
+_DIGITS = 16  # no decision: decimals of a double
+_SINGLE_PRINTED = 6e-9  # no decision: rounding
 """Relative error of a single-precision number printed with its nine digits."""
 
 
@@ -80,17 +72,19 @@ class TimeAxis:
             )
         usual = self.step or median  # of the first block
         deviation = np.abs(steps - usual)
-        unequal = deviation > _JITTER * usual
+        unequal = deviation > POLICY.clock_jitter * usual
         if unequal.any():
             printed = _printed_step(t)
             rounding = np.maximum(printed[1:], printed[:-1])
             self.rounding = max(self.rounding, float(rounding.max()))
-            irregular = deviation > _JITTER * usual + np.maximum(rounding, abs(self.step and self.rounding)) * (1.0 + 1e-9)
+            irregular = deviation > POLICY.clock_jitter * usual + np.maximum(rounding, abs(self.step and self.rounding)) * (
+                1.0 + 1e-9
+            )
             if irregular.any():
                 _refuse(table, self.column, t, int(np.argmax(irregular)), usual * self.second, shift)
-            if rounding.max() > _COARSE * usual:
+            if rounding.max() > POLICY.coarse_stamps * usual:
                 # Where the digits suit the sample time, nearly all steps are equal and the few others are real.
-                if unequal.mean() < _FEW:
+                if unequal.mean() < POLICY.few_unequal:
                     _refuse(table, self.column, t, int(np.argmax(unequal)), usual * self.second, shift)
                 _too_coarse(table, self.column, float(rounding.max()))
         self.step = usual
@@ -98,9 +92,10 @@ class TimeAxis:
 
 def _check_given(table: Table, column: Column, found: float, second: float, dt: float) -> None:
     """Raise ReadError where the dt that the user gave [s] and the steps that were found [s] differ by more than 1 %."""
-    if abs(found - dt) <= _CONTRADICTION * dt:
+    if abs(found - dt) <= POLICY.clock_jitter * dt:
         return
     unit = next(
+        # no decision: a hint in a message
         (name for name, size in (("ms", 1e-3), ("us", 1e-6), ("min", 60.0)) if abs(found * size / dt - 1) < 0.01),
         None,
     )
@@ -112,7 +107,13 @@ def _check_given(table: Table, column: Column, found: float, second: float, dt: 
 
 
 # Stamps since 1970 name their unit by their size, and so do those of Windows since 1601: the years 1990 to 2100.
-_EPOCHS = ((6.3e8, 4.2e9, 1.0), (6.3e11, 4.2e12, 1e-3), (6.3e14, 4.2e15, 1e-6), (6.3e17, 4.2e18, 1e-9), (1.22e17, 1.58e17, 1e-7))
+_EPOCHS = (
+    (6.3e8, 4.2e9, 1.0),
+    (6.3e11, 4.2e12, 1e-3),
+    (6.3e14, 4.2e15, 1e-6),
+    (6.3e17, 4.2e18, 1e-9),
+    (1.22e17, 1.58e17, 1e-7),
+)  # no decision: dates
 
 
 def stamp_unit(first: float) -> float:
@@ -160,7 +161,7 @@ def _too_coarse(table: Table, column: Column, printed: float) -> None:
 
 def _refuse(table: Table, column: Column, t: NDArray[np.float64], step: int, dt: float, shift: int) -> None:
     usual = float(np.median(np.diff(t)))
-    bridged = t[step + 1] - t[step] <= GAP * usual
+    bridged = t[step + 1] - t[step] <= POLICY.pause * usual
     even = (
         f"cut the log there, or put it on an even axis with {arg('resample', format(dt, '.6g'))}"
         if bridged
@@ -198,6 +199,6 @@ def _printed_step(t: NDArray[np.float64]) -> NDArray[np.float64]:
     exact = (np.abs(single - padded) <= _SINGLE_PRINTED * np.abs(padded)).all(axis=1)
     # Stamps of a date look like it too, but differ by less than single precision could tell.
     steps = np.abs(np.diff(padded, axis=1))
-    exact &= np.where(steps > 0.0, steps, np.inf).min(axis=1) >= 0.5 * spacing
+    exact &= np.where(steps > 0.0, steps, np.inf).min(axis=1) >= 0.5 * spacing  # no decision: rounding
     step = np.where(exact, np.maximum(step, spacing), step)
     return np.repeat(step, _BLOCK)[: t.size]

@@ -18,10 +18,10 @@ from dataclasses import dataclass, replace
 
 from gaident.axis import Text, joined, say, unit_text
 from gaident.data.record import Record
-from gaident.diagnosis.gains import Gains
+from gaident.diagnosis.gains import Gains, interval_of_fall
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.errors import GaidentError
-from gaident.estimation.regression.force_error import ForceError, band_of, effects_before_the_shaft, force_error
+from gaident.estimation.regression.force_error import ForceError, band_of, effects_before_the_shaft, force_error, force_errors
 from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
 from gaident.estimation.term import Term
 from gaident.models.model import Model
@@ -49,6 +49,7 @@ LIKELY = {
 class Check:
     """The second method's answer: what it found, its force error [N m], the comparison, before and after with their force errors.
 
+    regression_better: whether the regression leaves less torque, beyond the variation over blocks of the held-out data.
     notes: contradictions, in words. reason: why the force error is the figure to go by on this axis, in words; empty where the
     free run is as good a figure.
     """
@@ -60,6 +61,7 @@ class Check:
     after: Fitness
     notes: tuple[Text, ...]
     reason: Text
+    regression_better: bool = False
 
 
 def checked(
@@ -80,14 +82,14 @@ def checked(
     if not all(r.torque is not None for r in records):
         return nothing
     found = _regression(records, model, axis)
-    before, after, second = _forces(records, gains, found)
+    before, after, second, better = _forces(records, gains, found)
     if found is None:
         return replace(nothing, before=before, after=after, reason=_reason(effects, driven))
     comparisons = tuple(_compared(found, mechanics, effects, after.torque_rms or 0.0, bool(effects_before_the_shaft(model))))
     verdict = _verdict(after.force_error, second)
     notes = tuple(_sentence(c) for c in comparisons if c.differs)
     notes = (*notes[:-1], joined("", (notes[-1], verdict))) if notes else _lost(after, second)
-    return Check(found, second, comparisons, before, after, notes, _reason(effects, driven))
+    return Check(found, second, comparisons, before, after, notes, _reason(effects, driven), better)
 
 
 def _regression(records: Sequence[Record], model: Model, axis: str) -> InverseDynamics | None:
@@ -98,11 +100,16 @@ def _regression(records: Sequence[Record], model: Model, axis: str) -> InverseDy
         return None
 
 
-def _forces(records: Sequence[Record], gains: Gains, found: InverseDynamics | None) -> tuple[Fitness, Fitness, float | None]:
-    """(before, after, force error of the regression), all over the same samples of the held-out data, through the same filter."""
+def _forces(
+    records: Sequence[Record], gains: Gains, found: InverseDynamics | None
+) -> tuple[Fitness, Fitness, float | None, bool]:
+    """(before, after, force error of the regression, whether that is less beyond its variation over blocks).
+
+    All over the same samples of the held-out data, through the same filter.
+    """
     scored = [(r, first) for r, first in gains.scored if r.torque is not None]
     if len(scored) < len(gains.scored):
-        return gains.before, gains.after, None
+        return gains.before, gains.after, None, False
     rows, firsts = [r for r, _ in scored], [first for _, first in scored]
     cutoff = band_of(gains.extended, rows)
 
@@ -113,20 +120,24 @@ def _forces(records: Sequence[Record], gains: Gains, found: InverseDynamics | No
             return None
         return error if math.isfinite(error.rms) else None
 
-    def fitness(plain: Fitness, model: Model) -> Fitness:
-        error = of(model)
+    def fitness(plain: Fitness, error: ForceError | None) -> Fitness:
         if error is None:
             return plain
         return replace(plain, force_error=error.rms, torque_rms=error.torque_rms, force_floor=error.noise_floor)
 
-    second = None
+    second = fitted = None
     if found is not None:
         try:
             part = [r[:first] for r, first in scored] if any(firsts) else list(records)
-            second = of(inverse_dynamics(part, terms=found.terms, cutoff_hz=found.cutoff_hz, axis=found.axis))
+            fitted = inverse_dynamics(part, terms=found.terms, cutoff_hz=found.cutoff_hz, axis=found.axis)
+            second = of(fitted)
         except GaidentError:
             second = None
-    return fitness(gains.before, gains.mechanism), fitness(gains.after, gains.extended), None if second is None else second.rms
+    own, better = of(gains.extended), False
+    if own is not None and second is not None and fitted is not None and second.rms < own.rms:
+        series = [[e for e, _ in force_errors(m, rows, cutoff, own.order, firsts)] for m in (gains.extended, fitted)]
+        better = interval_of_fall(series[0], series[1])[0] > 0.0
+    return fitness(gains.before, of(gains.mechanism)), fitness(gains.after, own), None if second is None else second.rms, better
 
 
 def _compared(

@@ -14,14 +14,16 @@ from gaident.axis import Text, called, say
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
+from gaident.diagnosis.check import Check
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import as_read, controller_findings
 from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.experiments.candidates import IN_MOTION, candidates
 from gaident.diagnosis.experiments.excitation import excitation
+from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off
-from gaident.diagnosis.gains import Gains, measured_gains
+from gaident.diagnosis.gains import Gains, measured_gains, with_effects
 from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, in_controller
@@ -31,7 +33,7 @@ from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_or
 from gaident.diagnosis.records.folded import ADVICE, folded
 from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation
 from gaident.diagnosis.records.sizes import scales_of
-from gaident.diagnosis.selection.attribution import only_describes, simplified
+from gaident.diagnosis.selection.attribution import only_describes, shown_by_the_records, simplified
 from gaident.diagnosis.selection.dependence import dependence
 from gaident.diagnosis.selection.offset import Offset, offset_of
 from gaident.diagnosis.selection.rivals import Replacement
@@ -43,6 +45,7 @@ from gaident.estimation.uncertainty import estimates_of
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
 from gaident.models.drive_torque import torque_driven
+from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
@@ -151,13 +154,16 @@ def diagnose(
 
 
 class _Judged(NamedTuple):
-    """What is reported of a search: figures, what the error that is left depends on, effects that count, all effects' numbers."""
+    """What is reported of a search: figures, what the error that is left depends on, effects that count, all numbers."""
 
     gains: Gains
     driver: str | None
     causes: list[str]
     estimates: dict[str, dict[str, Estimate]]
     offset: Offset | None
+    mechanics: dict[str, Estimate]
+    model: Model
+    check: Check
 
 
 @dataclass
@@ -227,6 +233,7 @@ class _Work:
         self.final = final
         self.adequate = self.found.space.is_noise(final)
         self.left = dependence(self.objective, final)
+        self.under, self.estimate = self.found.estimated()
 
     def judged(self) -> _Judged:
         """What is shown, and what it gains; where no effect is, that of a search by whitened errors instead."""
@@ -246,41 +253,39 @@ class _Work:
                 of_class = bool(self._equivalent_here(e))
                 if not only_describes(space, self.final, e, self.rivals[e][0], driver, self.left, of_class):
                     causes.append(e)
-            estimates = estimates_of(self.objective, self.final)
+            estimates = estimates_of(self.under, self.estimate)
             causes = [e for e in causes if self._determined(e, estimates[e])]
+            mechanics = mechanics_of(self.under, self.estimate)
+            model = with_effects(self.estimate.parameters.model(self.estimate.x), self.at_controller.effects)
+            check = by_second_method(self.clean, gains, model, mechanics, estimates, self.pi is None, self.axis)
+            causes, why = standing(causes, gains, check)
+            if why:
+                driver = driver or self.left.strongest or "time"
+                self.notes += why
             instead = None if causes else by_whitened_errors(self.found, self._equivalent_here, self._say)
             if instead is None:
-                return _Judged(gains, driver, causes, estimates, offset_of(space, self.final))
+                return _Judged(gains, driver, causes, estimates, offset_of(space, self.final), mechanics, model, check)
             self.notes = said
             self.take(instead)
 
     def report(self, seed: int) -> Diagnosis:
         """Everything the user sees."""
         self.note(0.9, "measuring the gain")
-        gains, driver, causes, estimates, offset = self.judged()
+        gains, driver, causes, estimates, offset, mechanics, model, check = self.judged()
         findings = findings_of_the_record(self.spoiled, sum(len(r) for r in self.records), self.step)
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         for effect in causes:
             gain, rivals = self.rivals[effect]
             alternatives = self._alternatives(effect, rivals, offset)
+            said_by = evidence_of(effect, gain, alternatives, offset)
             findings.append(
                 Finding(
-                    effect=effect,
-                    parameters=estimates[effect],
-                    alternatives=alternatives,
-                    gain=gains.of(effect),
-                    delta_bic=gain,
-                    evidence=evidence_of(effect, gain, alternatives, offset),
-                    place=LIBRARY[effect].place,
+                    effect, estimates[effect], alternatives, gains.of(effect), gain, None, said_by, place=LIBRARY[effect].place
                 )
             )
-        mechanics = mechanics_of(self.objective, self.final)
         if driver is None and (damping := negative_damping(mechanics)) is not None:
             driver = "velocity"
             self.notes.append(drives_itself(damping))
-        model = self.final.parameters.model(self.final.x)
-        for name, values in self.at_controller.effects.items():
-            model = model.with_effect(name, **values)
         real = [f for f in findings if not f.is_noise]
         answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
         if driver is None:
@@ -292,7 +297,6 @@ class _Work:
                 of_driver = say(" that depends on {}", called(driver)) if self.left.gains[driver] > self.left.needed else ""
                 text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
                 self.notes.append(say(text, " and ".join(dropped), of_driver))
-        check = by_second_method(self.clean, gains, model, mechanics, estimates, self.pi is None, self.axis)
         self.notes += check.notes
         if self.final.parameters.held and any(LIBRARY[e].constant for e in self.final.effects):
             self.notes.append(
@@ -318,7 +322,7 @@ class _Work:
             next_experiment=proposal,
             gain_interval=gains.interval,
             held_out=gains.held_out,
-            base_shift=base_shift(self.base, self.final),
+            base_shift=base_shift(self.base, self.estimate),
             left=self.left.gains,
             left_needed=self.left.needed,
             line=self.left.line if driver == "time" else None,
@@ -353,8 +357,8 @@ class _Work:
                 self.held,
                 self.controller,
                 self.idn.model,
-                self.final,
-                self.objective,
+                self.estimate,
+                self.under,
                 self.noise,
                 self.at_controller.effects,
             )
@@ -368,7 +372,9 @@ class _Work:
 
     def _alternatives(self, effect: str, rivals: Sequence[Replacement], offset: Offset | None) -> tuple[str, ...]:
         """Statistical rivals and equivalent effects, no untestable ones; offset: what an effect is not the same as."""
-        names = [r.effect for r in rivals]
+        # Where the records show the torque's jump by themselves, nothing without such a jump stands for it.
+        shown = shown_by_the_records(self.found.space, self.final, effect)
+        names = [r.effect for r in rivals if not shown or LIBRARY[r.effect].levels]
         names += sorted(self._equivalent_here(effect))
         if offset is None or effect != offset.effect:
             names += equivalents(effect)

@@ -17,6 +17,7 @@ from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.records.hygiene import quantisation
+from gaident.estimation.criterion import effective_samples
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit
 from gaident.estimation.objective import Fit, Objective
@@ -27,15 +28,19 @@ from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
 from gaident.results.fitness import Fitness
 
-__all__ = ["Gains", "closed_over", "free_run_errors", "held_from", "measured_gains"]
+__all__ = [
+    "IN_SAMPLE",
+    "Gains",
+    "closed_over",
+    "free_run_errors",
+    "held_from",
+    "interval_of_fall",
+    "measured_gains",
+    "with_effects",
+]
 
 Vector = NDArray[np.float64]
 
-LEVELS = 0.025, 0.975  # no decision: of the interval that is reported
-MEMORY = 3  # no decision: times the memory of an error that a block of its bootstrap is long
-BLOCKS = 8  # no decision: parts of a record, of which a bootstrap draws at least so many
-LEAST = 4  # no decision: parts of a record, of which one at least is fitted
-DEAD = 0.2  # no decision: of an autocorrelation, below which an error has forgotten
 IN_SAMPLE = "in-sample"
 
 
@@ -90,11 +95,13 @@ def measured_gains(
     bare = stages[0].parameters.model(stages[0].x)
     # What the torque did between the lines of a slower log is lost to the identification, not to a fit of the whole loop.
     chain = [linear if not objective.data.slower else bare]
-    chain += [_with(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
-    chain += [_with(f.parameters.model(f.x), at_controller) for f in stages[1:]]
-    errors = [free_run_errors(m, scored, controller) for m in chain]
+    chain += [with_effects(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
+    chain += [with_effects(f.parameters.model(f.x), at_controller) for f in stages[1:]]
+    # Where the simulated loop is known not to be the drive's, the torque drives the models that are compared and printed.
+    driver = controller if objective.data.loop_follows or not objective.data.torque_logged else None
+    errors = [free_run_errors(m, scored, driver) for m in chain]
     levels = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in errors]
-    base = free_run_errors(stages[0].parameters.model(stages[0].x), scored, controller)
+    base = free_run_errors(stages[0].parameters.model(stages[0].x), scored, driver)
     level0 = float(np.sqrt(np.mean(np.concatenate(base) ** 2)))
     # The linear mechanism, refitted, may be better than the identified model already.
     previous = min(levels[0], level0) if np.isfinite(level0) else levels[0]
@@ -115,21 +122,18 @@ def measured_gains(
         rmse = float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
         return Fitness(rmse, 100.0 * (1.0 - rmse / size) if size > 0.0 else float("nan"), floor)
 
-    # Where the simulated loop is known not to be the drive's, the torque drives the models that are compared.
-    driver = controller if objective.data.loop_follows or not objective.data.torque_logged else None
-    extended = errors[-1] if driver is controller else free_run_errors(chain[-1], scored, None)
-    extended_level = float(np.sqrt(np.mean(np.concatenate(extended) ** 2)))
+    extended_level = float(np.sqrt(np.mean(np.concatenate(errors[-1]) ** 2)))
     harmful = []
     for effect in final.effects if words != IN_SAMPLE else ():
         less = stages[0] if len(final.effects) == 1 else _without(stages[-1], effect, _part(objective, part))
-        spared = free_run_errors(_with(less.parameters.model(less.x), at_controller), scored, driver)
+        spared = free_run_errors(with_effects(less.parameters.model(less.x), at_controller), scored, driver)
         level = float(np.sqrt(np.mean(np.concatenate(spared) ** 2)))
-        if level < (1.0 - POLICY.harm) * extended_level and _interval(spared, extended)[1] < 0.0:
+        if level < (1.0 - POLICY.harm) * extended_level and interval_of_fall(spared, errors[-1])[1] < 0.0:
             harmful.append(effect)
     return Gains(
         before=fitness(errors[0]),
         after=fitness(errors[-1]),
-        interval=_interval(errors[0], errors[-1]),
+        interval=interval_of_fall(errors[0], errors[-1]),
         held_out=words,
         steps=steps,
         scored=tuple(scored),
@@ -172,7 +176,7 @@ def held_from(rec: Record) -> int:
     before, after = (float(np.sqrt(np.mean(w**2))) for w in (rec.velocity[:at], rec.velocity[at:]))
     if after < POLICY.held_motion * before:
         path = np.cumsum(np.abs(rec.velocity))
-        at = int(np.clip(np.searchsorted(path, POLICY.fitted_share * path[-1]), len(rec) // LEAST, at))
+        at = int(np.clip(np.searchsorted(path, POLICY.fitted_share * path[-1]), POLICY.least_fitted * len(rec), at))
     return at
 
 
@@ -188,7 +192,7 @@ def _part(objective: Objective, part: tuple[int, ...] | None) -> Objective:
     return objective.weighted(weight)
 
 
-def _with(model: Model, effects: dict[str, dict[str, float]]) -> Model:
+def with_effects(model: Model, effects: dict[str, dict[str, float]]) -> Model:
     for name, values in effects.items():
         model = model.with_effect(name, **values)
     return model
@@ -241,11 +245,15 @@ def start_state(model: Model, rec: Record, controller: Controller | None) -> Vec
     return state
 
 
-def _interval(before: list[Vector], after: list[Vector]) -> tuple[float, float]:
-    """95 % interval of 1 - rmse_after/rmse_before by a paired block bootstrap (blocks longer than the errors stay correlated)."""
+def interval_of_fall(before: list[Vector], after: list[Vector]) -> tuple[float, float]:
+    """95 % interval of 1 - rmse_after/rmse_before by a paired block bootstrap.
+
+    Blocks are longer than the errors stay correlated: `block_memory` times samples over independent samples.
+    """
     b, a = np.concatenate(before), np.concatenate(after)
     n = len(b)
-    block = max(min(n // BLOCKS, MEMORY * _memory(a)), 1)
+    memory = n / effective_samples(a)
+    block = max(min(n // POLICY.least_blocks, round(POLICY.block_memory * memory)), 1)
     count = n // block
     if count < 2:
         return (float("-inf"), 1.0)
@@ -253,14 +261,6 @@ def _interval(before: list[Vector], after: list[Vector]) -> tuple[float, float]:
     rng = np.random.default_rng(0)
     drawn = sums[rng.integers(0, count, (POLICY.draws, count))].sum(axis=1)
     falls = 1.0 - np.sqrt(drawn[:, 1] / np.maximum(drawn[:, 0], 1e-300))
-    low, high = np.quantile(falls, LEVELS)
+    tail = 0.5 * POLICY.interval_level
+    low, high = np.quantile(falls, (tail, 1.0 - tail))
     return float(low), float(high)
-
-
-def _memory(e: Vector) -> int:
-    """Samples until the autocorrelation of e first falls below DEAD."""
-    size = 1 << (2 * len(e) - 1).bit_length()
-    spectrum = np.abs(np.fft.rfft(e - e.mean(), size)) ** 2
-    r = np.fft.irfft(spectrum, size)[: len(e)]
-    below = np.flatnonzero(r < DEAD * r[0])
-    return int(below[0]) if len(below) else len(e)

@@ -28,7 +28,7 @@ _CONSTANTS = {
     "torque_per_volt": ("0.24", say("{N m/V}")),
     "counts_per_turn": ("4096", Text("encoder counts per turn of the motor")),
 }
-_COMMENT = 26  # column where comments begin
+_COMMENT = 26  # no decision: column where comments begin; column of a page
 
 
 @dataclass(frozen=True)
@@ -60,10 +60,11 @@ def _with_content(listing: Listing, guess: Guess, values: Mapping[str, NDArray[n
     if "velocity" in guess.channels:
         return guess
     taken = {c.name for channel, c in guess.channels.items() if channel != "position"} | {guess.time.name if guess.time else ""}
+    # no decision: a shorter one shows no derivative
     moving = [c for c in listing.columns if c.samples > 20 and c.lowest != c.highest and not c.note and not c.rises_evenly]
     longest = max((c.samples for c in moving), default=0)
     candidates = {c.name: values[c.name] for c in moving if c.samples == longest and c.name not in taken and c.name in values}
-    pair = position_and_velocity(candidates, 1.0) if len(candidates) <= 30 else None
+    pair = position_and_velocity(candidates, 1.0) if len(candidates) <= 30 else None  # no decision: work; pairs of columns
     if pair is None or ("position" in guess.channels and pair[0] != guess.channels["position"].name):
         return guess
     by_name = {c.name: c for c in listing.columns}
@@ -198,6 +199,7 @@ class _Draft:
             and c.samples > 1
             and c.lowest != c.highest
         ]
+        # no decision: how many columns a remark names
         others = f"; the log also holds {', '.join(map(_quoted, rest[:8]))}" if rest else ""
         either = " or ".join(_quoted(c.name) for c in self.guess.undecided.get("velocity", ()))
         if "velocity" not in self.guess.channels and either:

@@ -1,4 +1,4 @@
-"""The two places where "is the gain enough?" and "is this noise?" are decided.
+"""The formulas by which "is the gain enough?" and "is this noise?" are decided; `diagnosis/selection/model_space.py` asks them.
 
 **The information criterion.** A hypothesis with k fitted numbers, its noise model included, leaves the variance V/N of its
 errors. With the information I, the number of independent samples,
@@ -10,7 +10,9 @@ exact are slow: neighbouring samples say the same, and
 
     I = N / (1 + 2 sum_k rho(k))              (effective sample size; Bartlett 1946)
 
-with rho the autocorrelation of the errors about their mean, up to its first fall below a twentieth.
+with rho the autocorrelation of the errors about their mean, up to the first pair rho(2m-1) + rho(2m) that is not positive
+(Geyer 1992): from there on it is its own error.
+Every comparison of two models and every count of independent samples in the package is one of these formulas.
 
 **The specification test** (Hausman 1978). Least squares of whitened errors and of output errors estimate the same parameters
 where the errors are stationary noise; whitened, they are only more precise. With x_W and x_O the two estimates and V_O the sum
@@ -23,33 +25,48 @@ model leaves is no stationary noise (a friction that changes with load, angle an
 the noise model has taken a misfit for noise, and trusts the frequencies where that happens to be small. H is defined for two
 estimates of one model; two models are compared by the information criterion.
 
-**The variance ratio.** A model leaves noise where the variance of its whitened errors is that of the sensor's noise, up to a
-ratio that the policy states.
+**The variance ratio.** With sigma the standard deviation of the noise that the measured velocity itself shows,
+
+    ratio = sqrt(V/N) / sigma
+
+is held against the level that records without effects pass, by the errors that V is of. Whitened errors (`noise_ratio`) are the
+innovations, and may be smaller than the noise where that is slow. Errors before whitening (`free_run_ratio`), in the loop where
+there is one, hold all that disturbs the axis beside the sensor's noise: their ratio is larger, and a misfit that the noise model
+has taken shows in them alone.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Specification", "bic", "chi_square_bound", "effective_samples", "specification_statistic"]
+__all__ = ["Specification", "bic", "chi_square_bound", "cost_of", "effective_samples", "gained", "specification_statistic"]
 
 Vector = NDArray[np.float64]
-
-DEAD = 0.05  # no decision: of the autocorrelation; from there on its own error is larger
 
 
 def bic(variance: float, information: float, numbers: int) -> float:
     """I ln(variance) + k ln I."""
-    return float(information * np.log(max(variance, 1e-300)) + numbers * np.log(max(information, 1.0)))
+    return float(information * np.log(max(variance, 1e-300))) + cost_of(numbers, information)
 
 
-def effective_samples(error: Vector) -> float:
-    """Independent samples in an error of colour, 1 at least.
+def cost_of(numbers: int, information: float) -> float:
+    """What so many fitted numbers cost: k ln I."""
+    return numbers * math.log(max(information, 1.0))
 
-    error: (N,), samples that do not count being 0.
+
+def gained(before: float, after: float, information: float, numbers: int = 0) -> float:
+    """By how much BIC falls from a variance, or a sum of squares, to another of the same errors, for so many numbers more."""
+    return bic(before, information, 0) - bic(after, information, numbers)
+
+
+def effective_samples(*errors: Vector) -> float:
+    """Independent samples in errors of colour, 1 at least and all of them at most.
+
+    errors: of one record each, (n_i,), samples that do not count being 0; no pair of samples of two records is a neighbour.
 
     >>> import numpy as np
     >>> white = np.random.default_rng(1).normal(size=4000)
@@ -58,17 +75,18 @@ def effective_samples(error: Vector) -> float:
     >>> effective_samples(np.repeat(white[:400], 10)) < 800
     True
     """
-    count = len(error)
-    error = error - float(error.mean())
-    power = float(error @ error)
-    if not 0.0 < power < np.inf:
+    count, longest = sum(map(len, errors)), max(map(len, errors))
+    mean = sum(float(e.sum()) for e in errors) / count
+    size = 1 << (2 * longest - 1).bit_length()
+    products = np.zeros(longest)
+    for e in errors:
+        products[: len(e)] += np.fft.irfft(np.abs(np.fft.rfft(e - mean, size)) ** 2, size)[: len(e)]
+    if not 0.0 < products[0] < np.inf:
         return float(max(count, 1))
-    size = 1 << (2 * count - 1).bit_length()
-    rho = np.fft.irfft(np.abs(np.fft.rfft(error, size)) ** 2, size)[:count] / power
-    dead = np.flatnonzero(rho < DEAD)
-    memory = int(dead[0]) if len(dead) else count
-    # no decision: the variance of a mean of correlated samples
-    return float(max(count / (1.0 + 2.0 * float(rho[1:memory].sum())), 1.0))
+    pairs = (products[1:] / products[0])[: (longest - 1) // 2 * 2].reshape(-1, 2).sum(axis=1)
+    negative = np.flatnonzero(~(pairs > 0.0))
+    memory = float(pairs[: negative[0]].sum()) if len(negative) else float(pairs.sum())
+    return float(np.clip(count / (1.0 + 2.0 * memory), 1.0, count))  # no decision: the variance of a mean of correlated samples
 
 
 class Specification(NamedTuple):

@@ -29,12 +29,17 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
     limits, steps = hypothesis.parameters.limits(), hypothesis.parameters.steps()
     x = np.clip(x, *limits)
     damping, converged = 1e-2, False  # no decision: a start
-    v, J = objective.linearised(hypothesis, x, noise)
+    v, J = objective.linearised(hypothesis, x, noise, objective.known_error(hypothesis, x))
     cost = min(float(v @ v), WORST) if np.all(np.isfinite(v)) else WORST
     count = max(objective.count, 1.0)
+    last: Vector | None = None  # the raw error at x
+    moved = False  # since the model was linearised
     for _ in range(iterations):
         if cost >= WORST:
             break
+        if moved:
+            v, J = objective.linearised(hypothesis, x, noise, last)
+            moved = False
         A, g = J @ J.T, J @ v
         diagonal = np.diag(A).copy()
         usable = (diagonal > 0.0) & (steps > 0.0) & (diagonal < WORST)
@@ -48,7 +53,7 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
         X = np.repeat(x[None, :], len(factors), axis=0)
         X[:, index] -= damped_steps(sub, gradient, factors[:, None] * scale + 1e-18 * scale.max())
         X = np.clip(X, *limits)
-        costs = objective.costs(hypothesis, X, noise)
+        costs, errors = objective.costs_and_errors(hypothesis, X, noise)
         best = int(np.argmin(costs))
         if not costs[best] < cost:
             if damping > 1e5:  # no decision: nothing is gained by smaller steps
@@ -57,12 +62,13 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
             damping *= 1e5
             continue
         fall = cost - float(costs[best])
-        x, cost = X[best], float(costs[best])
+        x, cost, last, moved = X[best], float(costs[best]), errors[best], True
         damping = float(np.clip(damping * 10.0 ** (best - 3.0), 1e-9, 1e9))  # no decision: the grid of a solver
         if fall < SETTLED * cost / count:
             converged = True
             break
-        v, J = objective.linearised(hypothesis, x, noise)
+    if last is not None:
+        objective.remember_error(hypothesis, x, last)
     return objective.fitted(hypothesis, x, noise, cost, converged)
 
 

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from gaident.estimation.criterion import bic
 from gaident.estimation.dataset import DataSet
+from gaident.estimation.masked import Bridges
 from gaident.estimation.noise_model import HIGHEST, ON_TOP, WHITE, NoiseFilter, ShaftNoise, autoregression
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import Predictor
@@ -39,7 +40,6 @@ __all__ = ["Fit", "Hypothesis", "Innovations", "NoiseFamily", "Objective", "Outp
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-Index = NDArray[np.intp]
 T = TypeVar("T")
 
 HEAD = 12  # no decision: parts of the shortest record, of which a filter's start takes one at most
@@ -195,6 +195,11 @@ class Counter:
         self.simulations = 0
 
 
+def _of_error(hypothesis: Hypothesis, x: Vector) -> Hashable:
+    """The key of a raw error."""
+    return "error", hypothesis, x.tobytes()
+
+
 @dataclass(frozen=True, eq=False)
 class Objective:
     """Errors over one data set.
@@ -235,7 +240,15 @@ class Objective:
 
     def error(self, fit: Fit) -> Vector:
         """The raw error of a fit."""
-        return self.once(("error", fit.hypothesis, fit.x.tobytes()), lambda: self.errors(fit.hypothesis, fit.x[None, :])[0])
+        return self.once(_of_error(fit.hypothesis, fit.x), lambda: self.errors(fit.hypothesis, fit.x[None, :])[0])
+
+    def known_error(self, hypothesis: Hypothesis, x: Vector) -> Vector | None:
+        """The raw error at x where it was asked for before; None where it was not."""
+        return self._memory.get(_of_error(hypothesis, x))  # type: ignore[return-value]
+
+    def remember_error(self, hypothesis: Hypothesis, x: Vector, error: Vector) -> None:
+        """The raw error at x, which is not simulated again."""
+        self._memory.setdefault(_of_error(hypothesis, x), error.copy())
 
     def unwhitened_errors(self, fit: Fit) -> Vector:
         """The errors of a fit under no noise filter, 0 where samples do not count: raw, or weighed by the family's prefilter."""
@@ -263,39 +276,12 @@ class Objective:
         return use
 
     def bridged(self, E: Matrix) -> Matrix:
-        """Errors with a straight line over the masked samples of each record, so that a filter does not see them.
-
-        At a record's ends its nearest sample that counts goes on; a record of which none counts is 0.
-        """
-        gaps, before, after, share, blank = self._bridges
-        if len(gaps) == 0 and len(blank) == 0:
-            return E
-        E = E.copy()
-        E[:, gaps] = E[:, before] + share * (E[:, after] - E[:, before])
-        E[:, blank] = 0.0
-        return E
+        """Errors with a straight line over the masked samples of each record, so that a filter does not see them."""
+        return self._bridges.over(E)
 
     @cached_property
-    def _bridges(self) -> tuple[Index, Index, Index, Vector, Index]:
-        """Masked samples, those of their record that count before and after each, its place between them from 0 to 1; samples
-        of records in which none counts."""
-        gaps, before, after, blank = ([np.zeros(0, dtype=np.intp)] for _ in range(4))
-        first = 0
-        for n in self.lengths:
-            counts = self.weight[first : first + n] > 0.0
-            known, masked = first + np.flatnonzero(counts), first + np.flatnonzero(~counts)
-            first += n
-            if len(known) == 0:
-                blank.append(masked)
-                continue
-            right = np.searchsorted(known, masked)
-            gaps.append(masked)
-            before.append(known[np.maximum(right - 1, 0)])
-            after.append(known[np.minimum(right, len(known) - 1)])
-        left, right = np.concatenate(before), np.concatenate(after)
-        masked = np.concatenate(gaps)
-        share = np.clip((masked - left) / np.maximum(right - left, 1), 0.0, 1.0)
-        return masked, left, right, share, np.concatenate(blank)
+    def _bridges(self) -> Bridges:
+        return Bridges.of(self.weight, self.lengths)
 
     @property
     def head(self) -> int:
@@ -329,20 +315,36 @@ class Objective:
 
     def costs(self, hypothesis: Hypothesis, X: Matrix, noise: NoiseFilter) -> Vector:
         """V of each row; WORST where a model diverges."""
-        V = self.whitened(self.errors(hypothesis, X), noise, hypothesis.parameters.inertias(X))
-        return sums_of_squares(V)
+        return self.costs_and_errors(hypothesis, X, noise)[0]
 
-    def linearised(self, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter) -> tuple[Vector, Matrix]:
-        """(v, J) at x: J[j] = dv/dx_j, forward differences; rows of entries that are not moved are 0."""
+    def costs_and_errors(self, hypothesis: Hypothesis, X: Matrix, noise: NoiseFilter) -> tuple[Vector, Matrix]:
+        """(V of each row, WORST where a model diverges; rows of raw errors)."""
+        E = self.errors(hypothesis, X)
+        return sums_of_squares(self.whitened(E, noise, hypothesis.parameters.inertias(X))), E
+
+    def linearised(
+        self, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, error: Vector | None = None
+    ) -> tuple[Vector, Matrix]:
+        """(v, J) at x: J[j] = dv/dx_j, forward differences; rows of entries that are not moved are 0.
+
+        error: the raw error at x where it is known, which is then not simulated again.
+        """
         X, h = self._neighbours(hypothesis, x)
-        V = self.whitened(self.errors(hypothesis, X), noise, hypothesis.parameters.inertias(X))
+        E = self._errors_around(hypothesis, X, error)
+        V = self.whitened(E, noise, hypothesis.parameters.inertias(X))
         return V[0], slopes(V, h)
 
     def sensitivities(self, hypothesis: Hypothesis, x: Vector) -> tuple[Matrix, Vector]:
         """(J, e) at x: J[j] = de/dx_j of the errors before all filters, 0 for samples that do not count; e as it is."""
         X, h = self._neighbours(hypothesis, x)
-        E = self.errors(hypothesis, X)
+        E = self._errors_around(hypothesis, X, self.known_error(hypothesis, x))
         return slopes(self.bridged(E) * self.counted, h), E[0]
+
+    def _errors_around(self, hypothesis: Hypothesis, X: Matrix, error: Vector | None) -> Matrix:
+        """Rows of raw errors; error: that of the first row where it is known."""
+        if error is None:
+            return self.errors(hypothesis, X)
+        return np.vstack([error, self.errors(hypothesis, X[1:])]) if len(X) > 1 else error[None, :]
 
     def _neighbours(self, hypothesis: Hypothesis, x: Vector) -> tuple[Matrix, Vector]:
         """(rows: x, and x with each entry moved that is moved, steps: 0 for entries that are not)."""

@@ -12,7 +12,8 @@ record holds few of them that are independent. With
 
 and c = B/J, e_L is the lacking torque d over the inertia, as in the inverse-dynamics regression, but of a simulation: every
 effect, several masses and a closed loop take part in it. A larger c counts the velocity as well; `balance` gives the one at
-which both count alike. F is the zero-phase low-pass of that regression: differences of a sampled velocity say nothing above its
+which both count alike. There a torque that the model lacks still biases the inertia: the slope of its error is the smaller, the
+heavier the axis. F is the zero-phase low-pass of that regression: differences of a sampled velocity say nothing above its
 cutoff. L is fixed for all hypotheses, and scaled so that white noise keeps its variance.
 
 L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999.

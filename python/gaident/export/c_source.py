@@ -31,7 +31,7 @@ from gaident.version import version
 
 __all__ = ["c_source", "write_c"]
 
-FINEST = 16  # substeps that the core takes at most by itself
+FINEST = 16  # no decision: substeps that the core takes at most by itself; substeps
 
 
 def write_c(

@@ -29,7 +29,7 @@ __all__ = ["to_control", "to_scipy"]
 
 Matrix = NDArray[np.float64]
 
-HIGHEST_PADE = 10  # beyond, the approximation's own poles are lost in rounding
+HIGHEST_PADE = 10  # no decision: beyond, the approximation's own poles are lost in rounding; what an argument may be
 
 
 def to_scipy(model: Model, dt: float | None, pade: int | None) -> Any:

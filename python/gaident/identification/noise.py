@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
+from gaident.estimation.criterion import bic
 
 __all__ = ["Autoregression", "autocorrelation", "autoregression_of", "chi2_tail", "highest_order", "ljung_box", "ljung_box_of"]
 
@@ -51,14 +52,14 @@ def autoregression_of(products: Vector, total: int) -> Autoregression:
         return Autoregression(np.zeros(0), 0.0)
     phi: list[float] = []
     variance = cov[0]
-    best, best_std, best_score = phi, math.sqrt(variance), total * math.log(variance)
+    best, best_std, best_score = phi, math.sqrt(variance), bic(variance, total, 0)
     for m in range(1, len(cov)):
         reflection = (cov[m] - sum(map(mul, phi, cov[m - 1 : 0 : -1]))) / variance
         phi = [f - reflection * g for f, g in zip(phi, phi[::-1], strict=True)] + [reflection]
         variance *= 1.0 - reflection**2
         if not variance > 1e-14 * cov[0]:
             break
-        score = total * math.log(variance) + m * math.log(total)
+        score = bic(variance, total, m)
         if score < best_score:
             best, best_std, best_score = phi, math.sqrt(variance), score
     return Autoregression(np.array(best, dtype=np.float64), best_std)

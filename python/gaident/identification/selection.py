@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
+from gaident.estimation.criterion import bic
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
@@ -109,11 +110,10 @@ def scored(
         whitened = experiment.go_on(fits, ranges, noise.phi, WHITE_ITERATIONS, tolerance(count), workers)
         costs = [w.cost for w in whitened]
         count -= noise.order * len(lengths)  # the first samples of each record, whose past is missing
-    logarithm = math.log(count)
     found = []
     for c, cost in zip(candidates, costs, strict=True):
-        bic = count * math.log(max(cost, 1e-300) / count) + (c.size + len(c.starts)) * logarithm
-        found.append(replace(c, bic=bic + POLICY.rival_margin * cancellations(c.fit.poles.tolist(), c.fit.zeros.tolist())))
+        own = bic(cost / count, count, c.size + len(c.starts))
+        found.append(replace(c, bic=own + POLICY.rival_margin * cancellations(c.fit.poles.tolist(), c.fit.zeros.tolist())))
     return found
 
 

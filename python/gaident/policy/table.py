@@ -14,6 +14,7 @@ was found.
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -32,13 +33,16 @@ REAL = "real"
 REGRESSION = "regression"
 SUCCESS = "success"
 WINDING = "winding"
-SHOWN_BY = (DRIVES, SHORT, LOOP, SHIFTED, REAL, REGRESSION, SUCCESS, WINDING)
+FORMS = "forms"
+LOGS = "logs"
+SHOWN_BY = (DRIVES, SHORT, LOOP, SHIFTED, REAL, REGRESSION, SUCCESS, WINDING, FORMS, LOGS)
 
 GAIN = "Is the gain enough?"
 NOISE = "Is this noise?"
 CAUSE = "Is a finding a cause?"
 SECOND = "Does a second method agree?"
 CONTROLLER = "Does the logged torque follow from the controller?"
+READING = "How is a log read?"
 RECORD = "What does a record show?"
 LINEAR = "Which linear model?"
 EFFORT = "Effort"
@@ -74,6 +78,10 @@ def check(value: float, unit: str, source: str, cases: str) -> Any:
 
 def loop(value: float, unit: str, source: str, cases: str = LOOP) -> Any:
     return _row(CONTROLLER, value, unit, source, cases)
+
+
+def reading(value: float, unit: str, source: str) -> Any:
+    return _row(READING, value, unit, source, LOGS)
 
 
 def record(value: float, unit: str, source: str, cases: str) -> Any:
@@ -116,7 +124,15 @@ class Policy:
     most_effects: int = gain(4, "1", "effects in one model at most", DRIVES)
     harm: float = gain(0.02, "1", "of the held-out error that an effect may add before it is refused", REAL)
     fitted_share: float = gain(0.7, "1", "of a record that parameters are fitted to where the rest is held out", REAL)
+    least_fitted: float = gain(0.25, "1", "of a record that is fitted at least, where its path says what is held out", REAL)
     least_held: int = gain(600, "samples", "of a record from which a part is held out", REAL)
+    interval_level: float = gain(
+        0.05, "probability", "beside the interval of a fall of the error: a finding is harmful where all of it is below 0", REAL
+    )
+    block_memory: float = gain(
+        2.5, "1", "correlation times of an error in a block of its bootstrap; shorter ones hide how slow it is", REAL
+    )
+    least_blocks: int = gain(8, "1", "blocks that a bootstrap draws at least: fewer tell no interval", REAL)
     held_motion: float = gain(0.33, "1", "rms speed of a held-out part over that before: below, it is cut by path", REAL)
     told_apart: float = gain(25.0, "chi2", "of a proposed experiment, from which it tells two explanations apart", DRIVES)
 
@@ -124,12 +140,6 @@ class Policy:
     noise_ratio: float = calibrated(NOISE, "noise_ratio", "1", "rms of whitened errors over the noise of the velocity")
     free_run_ratio: float = calibrated(
         NOISE, "free_run_ratio", "1", "rms of the free run over the noise: more is a misfit that whitening took"
-    )
-    unwhitened_ratio: float = noise(
-        2.0,
-        "1",
-        "rms before whitening over the noise: below, no noise model took a cause, and output errors are not searched",
-        DRIVES,
     )
     noise_level: float = noise(
         1e-6,
@@ -144,9 +154,6 @@ class Policy:
         "1",
         "rms of whitened errors over the noise: below, nothing more is looked for, and what explains so much is enough",
         DRIVES,
-    )
-    misfit_ratio: float = noise(
-        2.0, "1", "rms of the whitened errors of the linear model over the noise: above, output errors are searched first", REAL
     )
     immaterial: float = noise(
         0.02, "1", "of the linear mechanism's rms error: counts as noise, however little noise there is", DRIVES
@@ -171,6 +178,12 @@ class Policy:
     check_deviations: float = check(3.0, "1", "deviations of both: 0.3 % of a normal distribution are beyond", DRIVES)
     check_share: float = check(0.1, "1", "of the larger value: a smaller difference does not matter", DRIVES)
     check_torque: float = check(0.05, "1", "of the torque's rms: the same, of friction and gravity", DRIVES)
+    velocity_part: float = check(
+        0.95,
+        "1",
+        "of the weighed error of the regressed axis, that its velocity is, the rest its torque: a free run adds up small torques",
+        REAL,
+    )
     heavier: float = check(
         2.0,
         "1",
@@ -221,7 +234,37 @@ class Policy:
     lag_said: float = loop(
         0.75, "samples", "from which a lag of an open loop's log is said; a sampled torque stands at 0.5", SHIFTED
     )
+    slope_reach: float = loop(
+        0.3, "1", "of a filter's number, by which a form may move it along its slope; the filter's own fit stands else", FORMS
+    )
+    form_choice: float = loop(
+        2.0 * math.log(3.0), "BIC units", "of a setting chosen of three without a number of its own: 2 ln 3", FORMS
+    )
+    near_rounding: float = loop(
+        1.1, "1", "of what rounding makes of a replay: a set of filters that leaves no more needs no other filter", FORMS
+    )
     negligible: float = loop(1e-3, "1", "of a signal's largest value or range: less is 0, or the rounding of a log")
+
+    # How is a log read? What a file does not say is refused or asked; these say where it is clear.
+    clock_jitter: float = reading(0.01, "1", "of a sample time, by which a step, or the given dt, may differ")
+    coarse_stamps: float = reading(0.25, "1", "of a sample time: stamps printed more coarsely hide a lost sample")
+    few_unequal: float = reading(0.1, "1", "of the steps: so few unequal ones are real, more are the print of the stamps")
+    even_rise: float = reading(0.02, "1", "of a step: a column that rises so evenly is a time")
+    pause: float = reading(5.0, "1", "of the usual step: a longer one is a pause, through which no line is drawn")
+    resample_coarser: float = reading(1.5, "1", "of a log's step: a coarser grid would alias what is fast")
+    resample_finer: float = reading(100.0, "1", "times finer than the log: the given step is in another unit")
+    unit_shown: float = reading(0.02, "1", "of a factor, within which a slope shows a unit, or a jump the range of an integer")
+    derivative: float = reading(0.98, "1", "correlation of a column and a slope, from which one is the derivative")
+    wrap_jump: float = reading(0.75, "1", "of a position's range: a jump as long may be a counter that wraps")
+    wrap_beside: float = reading(0.25, "1", "of that jump: the steps beside it are no longer")
+    wrap_alike: float = reading(0.05, "1", "of that jump: by which the steps beside it differ at most")
+    wrap_steady: float = reading(
+        0.5, "1", "of the longer of these steps: the shorter one, where the motion goes on through a wrap"
+    )
+    wrap_spared: float = reading(0.999, "1", "of the steps, that are no jumps then; the rest may be lost samples")
+    overlap: float = reading(0.3, "1", "of the shorter of two logs: what they share at least")
+    aligned: float = reading(0.5, "1", "correlation of two logs of one motion at least")
+    rate_seen: float = reading(3.0, "1", "standard deviations from 0, from which two clocks run at different rates")
 
     # What does a record show? What is spoiled in it, and what it could not have shown.
     least_samples: int = record(100, "samples", "of a record: below, noise filter and linear model use up what it knows", SHORT)
@@ -265,10 +308,8 @@ class Policy:
     material_column: float = linear(
         0.05, "1", "of the squared torque, that a spring or friction by direction takes at least", REGRESSION
     )
-    lag_left: float = linear(0.05, "1", "of the squared torque, that the regression behind a lag leaves at most", REGRESSION)
-    lag_curvature: float = linear(
-        1e-3, "1", "of the squared torque per squared sample: below, the motion shows no lag", REGRESSION
-    )
+    lag_left: float = linear(0.05, "1", "of the squared torque, that the regression behind a lag leaves at most", SHIFTED)
+    lag_curvature: float = linear(1e-3, "1", "of the squared torque per squared sample: below, the motion shows no lag", SHIFTED)
     winding_sure: float = linear(5.0, "1", "standard deviations from 0, from which a resistance or inductance is shown", WINDING)
     least_rows: int = linear(
         20, "1", "rows of a regression at least, half of them in each direction for dry friction", REGRESSION
@@ -278,10 +319,13 @@ class Policy:
     )
     spring_turns: float = linear(10.0, "turns", "of travel: beyond, no spring is fixed to the ground", REGRESSION)
     another_mass: float = linear(
-        2.0, "1", "fall of the whitened error sum for a mass more, where no linear structure holds", SUCCESS
+        2.0, "1", "fall of the whitened error sum for a mass more, where no linear structure holds", DRIVES
     )
     below_zero: float = linear(
-        2.0, "1", "standard deviations below 0, from which a mass or damping is said to be negative", SUCCESS
+        2.0,
+        "1",
+        "standard deviations from 0: a mass or damping below is said to be negative, what is nearer has no sign",
+        SUCCESS,
     )
 
     # Effort: budgets.
@@ -290,8 +334,6 @@ class Policy:
     hope: float = effort(0.5, "1", "of what is asked for, that a linearised gain has to promise to be worth a fit")
     screened: int = effort(6, "1", "candidates that each ranking of the score test sends into a short fit")
     finished: int = effort(5, "1", "of these, how many are fitted to the end")
-    hopeless: float = effort(0.5, "BIC units per sample", "by which a short fit may be behind the model that it extends")
-    near_mass: float = effort(0.05, "BIC units per sample", "by which one mass with an effect may be behind two, to be looked at")
     starts: int = effort(3, "1", "best ones of a list (starts, candidates, frequencies, rivals) that are followed up")
     swaps: int = effort(2, "1", "times that a better rival may take an effect's place")
     glance: int = effort(3, "iterations", "of a fit that only ranks candidates")

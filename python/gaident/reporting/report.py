@@ -129,5 +129,5 @@ def _made_with() -> dict[str, str]:
     from importlib.metadata import version as installed
 
     names = ("numpy", "scipy", "matplotlib", "plotly")
-    python = ".".join(map(str, sys.version_info[:3]))
+    python = ".".join(map(str, sys.version_info[:3]))  # no decision: a version
     return {"gaident": version(), "Python": python, **{n: installed(n) for n in names}}

@@ -85,7 +85,7 @@ def _free_run(model: Model, rec: Record, controller: Controller | None, what: st
 
 def _finite(velocity: Vector, rec: Record, what: str, notes: list[str]) -> Vector:
     """Values beyond what a picture can show are left out: a diverging simulation ends in a gap."""
-    limit = 1e3 * float(np.abs(rec.velocity).max() or 1.0)
+    limit = 1e3 * float(np.abs(rec.velocity).max() or 1.0)  # no decision: what a chart still shows of a simulation that diverges
     with np.errstate(invalid="ignore"):
         away = ~(np.abs(velocity) <= limit)
     if not np.any(away):

@@ -6,6 +6,7 @@ import math
 import textwrap
 
 from gaident.axis import Text, identifier_words, said, say, unit, velocity_unit, word
+from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
@@ -29,7 +30,7 @@ __all__ = [
     "words",
 ]
 
-WIDTH = 100
+WIDTH = 100  # no decision: letters of a line
 TESTED_UP_TO = "Tested up to what these records asked for"
 NOT_OF_THE_AXIS = ("phase", "frequency", "zero_frequency")  # an angle within a period and angular frequencies: rad on any axis
 DRIVERS = {
@@ -207,7 +208,7 @@ def _second_method(dia: Diagnosis, axis: str) -> list[str]:
 
 def fall_words(dia: Diagnosis) -> str:
     """By how much the error falls, in words."""
-    fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)
+    fall = 100.0 * (1.0 - dia.after.rmse / dia.before.rmse)  # no decision: percent
     low, high = (100.0 * x for x in dia.gain_interval)
     if fall < -1.0:
         why = Text("the simulated controller is not the drive's")
@@ -218,7 +219,7 @@ def fall_words(dia: Diagnosis) -> str:
             )
         return say("The error of the velocity grows by {:.0f} %: this comparison is not valid, {}.", -fall, why)
     if fall < 1.0:
-        if dia.before.rmse < 1.2 * dia.before.noise_floor:
+        if dia.before.rmse < POLICY.noise_ratio * dia.before.noise_floor:
             hidden = Text(": it is at the noise with and without")
         elif dia.controller is None or not dia.controller.one_equation:
             hidden = Text("")
@@ -265,7 +266,7 @@ def _base(dia: Diagnosis, axis: str) -> list[str]:
 
 def moved_words(old: float, new: float, std: float | None) -> str:
     """By how much a parameter moved; empty where it was 0 within its deviation, for no share of that means anything."""
-    nothing = not math.isfinite(old) or abs(old) <= 2.0 * (std or 0.0)
+    nothing = not math.isfinite(old) or abs(old) <= POLICY.below_zero * (std or 0.0)
     return "" if nothing else f"{round(100.0 * (new / old - 1.0), 1) + 0.0:+.1f} %"
 
 
@@ -308,7 +309,7 @@ def next_words(dia: Diagnosis, p: Proposal) -> Text:
 
 
 def _how(dia: Diagnosis) -> list[str]:
-    data = ", ".join(digest[:12] for digest in dia.digests)
+    data = ", ".join(digest[:12] for digest in dia.digests)  # no decision: how much of a digest is printed
     version = dia.version or "of unknown version"
     work = f"{dia.samples} samples, {dia.simulations} simulations, {dia.seconds:.2f} s"
     return _wrapped(f"{work}; seed {dia.seed}, gaident {version}, data {data}")

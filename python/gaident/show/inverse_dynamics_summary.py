@@ -12,7 +12,7 @@ from gaident.show.wording import number, table, with_std
 
 __all__ = ["inverse_dynamics_summary"]
 
-WIDTH = 100
+WIDTH = 100  # no decision: letters of a line
 
 
 class Regression(Protocol):

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from gaident.axis import identifier_words, said, unit, velocity_unit, word
 from gaident.control.controller import Controller
 from gaident.models.mechanics import Mechanics, TwoMass
+from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.identification import Identification
 from gaident.show.wording import controller_lines, number, structure_words, table, with_std
@@ -22,8 +23,8 @@ __all__ = [
     "stem_of",
 ]
 
-WIDTH = 100
-SHOWN_STRUCTURES = 5
+WIDTH = 100  # no decision: letters of a line
+SHOWN_STRUCTURES = 5  # no decision: how many are listed
 
 
 def identification_summary(idn: Identification, axis: str = "rotary") -> str:
@@ -187,10 +188,10 @@ def inconsistency_words(m: Mechanics) -> str:
     if m.inconsistency is None:
         return ""
     std = m.std.get("inconsistency", math.nan)
-    text = f"inconsistency without shaft damping {with_std(100.0 * m.inconsistency, 100.0 * std)} %"
+    text = f"inconsistency without shaft damping {with_std(100.0 * m.inconsistency, 100.0 * std)} %"  # no decision: percent
     if not std > 0.0:
         return text
-    if m.inconsistency <= 3.0 * std:
+    if m.inconsistency <= POLICY.contradiction * std:
         return f"{text}: within three standard deviations, no shaft damping needed"
     return f"{text}: significant; a hint at shaft damping, or at an effect that the model lacks"
 

@@ -22,7 +22,7 @@ def structure_words(p: int, q: int) -> str:
     return known.get((p, q), "neither one mass nor two")
 
 
-def number(value: float, digits: int = 4) -> str:
+def number(value: float, digits: int = 4) -> str:  # no decision: how a number is printed
     """`value` with so many significant digits; a dash where there is none."""
     return f"{value + 0.0:.{digits}g}" if math.isfinite(value) else "-" if math.isnan(value) else f"{value}"
 
@@ -35,11 +35,11 @@ def with_std(value: float, std: float | None) -> str:
         return f"{number(value, 5)} +- inf"
     size = math.floor(math.log10(max(abs(value), std)))
     decimals = 1 - math.floor(math.log10(std))
-    if -3 <= size < 6:
+    if -3 <= size < 6:  # no decision: how a number is printed
         shift, digits = 0, max(decimals, 0)
     else:
         shift, digits = size, decimals + size
-    if digits > 9:  # next to no noise: the deviation needs an exponent of its own
+    if digits > 9:  # next to no noise: the deviation needs an exponent of its own  # no decision: how a number is printed
         return f"{value:.9g} +- {std:.1e}"
     scale = 10.0**-shift
     text = f"{round(value * scale, digits) + 0.0:.{digits}f} +- {std * scale:.{digits}f}"

@@ -29,7 +29,7 @@ from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.term import Scales, Term
-from gaident.policy.table import POLICY
+from gaident.policy.table import POLICY, rows
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -297,7 +297,8 @@ def test_the_specification_test_is_of_one_model_and_counts_what_a_fit_moves() ->
     """H = I ln(V_P(x_W) / V_P(x_P)); an order that is searched for is the same in both estimates."""
     bench = Bench({"a": (0.3,)}, noise=0.05)
     fit = bench.fit(A)
-    apart = replace(fit, x=fit.x + np.array([0.2, 0.0, 0.0]))
+    # Its free run misses more than records without effects do.
+    apart = replace(fit, x=fit.x + np.array([0.4, 0.0, 0.0]))
     found = specification(bench.space, bench.task, apart)
     objective = bench.space.objective
     plain = ls.fit(objective, fit.hypothesis, fit.x, WHITE, 12)
@@ -525,6 +526,21 @@ def test_resettled_puts_the_resonance_into_the_two_masses_alone_and_with_a_simpl
 # The same model again.
 
 
+def test_only_a_resonance_that_leads_is_resettled(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[str, ...]] = []
+
+    def resettled(space: moves.Moves, fit: Fit) -> list[Fit]:
+        asked.append(fit.effects)
+        return []
+
+    monkeypatch.setattr(moves.Moves, "resettled", resettled)
+    other = Bench({"a": (0.5,)}, masses=2, allowed=(A, RESONANCE))
+    assert {("a",), ("resonance",)} <= set(names(other.space.add(other.fit())))
+    resonance = Bench({"resonance": (70.0, 0.3, 40.0, 0.1)}, masses=2, allowed=(A, RESONANCE))
+    resonance.space.add(resonance.fit())
+    assert asked == [("a",), ("resonance",)]
+
+
 def test_restarted_leaves_a_start_that_led_nowhere() -> None:
     """The pulse stands at 0.52, and a fit from 0.1 does not feel it."""
     bench = Bench({"placed": (0.52,)})
@@ -590,3 +606,61 @@ def test_records_that_are_drawn_where_output_errors_count_are_as_slow_as_the_rea
         assert np.quantile(drawn, share) == pytest.approx(np.quantile(true, share), abs=most)
     again = largest_gains(one.space, fit, fit, 3, 0, lambda message: None)
     np.testing.assert_array_equal(again, drawn[:3])
+
+
+# The same data on another grid of time.
+
+
+class Finer(Toy):
+    """The toy on a grid that is finer, with straight lines in between."""
+
+    def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
+        return np.array([finer(row, len(self.data.velocity) // N) for row in super().velocities(parameters, X)])
+
+
+def finer(x: Vector, times: int) -> Vector:
+    return np.interp(np.arange(N * times) / times, np.arange(N), x)
+
+
+def followed_up(monkeypatch: pytest.MonkeyPatch, times: int, plain: bool) -> tuple[list[tuple[str, ...]], tuple[str, ...]]:
+    """(what is fitted to the end beyond the linear model, what comes out best) of one record on a grid so much finer."""
+    seen: list[tuple[str, ...]] = []
+    completed = moves.Moves.completed
+
+    def noted(space: moves.Moves, fit: Fit) -> Fit:
+        seen.append(fit.effects)
+        return completed(space, fit)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(moves.Moves, "completed", noted)
+        for module in (moves, model_space):
+            patch.setattr(module, "OpenLoop", Finer)
+        bench = Bench({"a": (0.3,), "b": (0.05,), "c": (0.01,)}, allowed=(A, B, C, PLACED, LAG))
+        w, still = finer(bench.data.velocity, times), np.zeros(N * times)
+        if not plain:  # whitened, each sample counts: the sensor's noise is on each
+            clean = Bench({"a": (0.3,), "b": (0.05,), "c": (0.01,)}, noise=0.0).data.velocity
+            w = finer(clean, times) + NOISE * np.random.default_rng(times).standard_normal(N * times)
+        rec = ga.Record(DT / times, None, w, still)
+        data = replace(DataSet.of([rec], None), moving=(False,))  # the noise is what the record shows: straight lines show less
+        family = OutputErrors(100.0) if plain else Innovations()
+        objective = Objective(data, np.ones(N * times), family)
+        space = Task(objective, replace(SCALES, dt=DT / times), ONE, (A, B, C, PLACED, LAG), lambda message: None).space()
+        hypothesis = Hypothesis(Parameterisation.of(ONE, SCALES, [False]), Finer(data))
+        grown = space.add(space.refitted(hypothesis, np.ones(2)))
+    return seen, grown[0].effects
+
+
+@pytest.mark.parametrize("plain", [False, True])
+def test_what_is_followed_up_is_the_same_however_finely_a_record_is_sampled(monkeypatch: pytest.MonkeyPatch, plain: bool) -> None:
+    first, best = followed_up(monkeypatch, 1, plain)
+    assert best == ("a",) and len(first) > 2 * plain  # whitened, the others promise too little to be fitted
+    for times in (4, 10):
+        found, same = followed_up(monkeypatch, times, plain)
+        assert same == best, times
+        # Output errors hold the same evidence; whitened ones with the noise of more samples hold more, which drops nothing.
+        assert sorted(found) == sorted(first) if plain else set(found) >= set(first), times
+
+
+def test_no_number_of_the_policy_counts_for_each_sample() -> None:
+    """Evidence counts as a whole, or for each independent sample: the same data at 1 kHz and at 100 Hz decide alike."""
+    assert not [r.name for r in rows() if "per sample" in r.unit]

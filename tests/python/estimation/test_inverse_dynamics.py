@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 import gaident as ga
 from drive_rig import Plant, run_drive
-from gaident.estimation.regression.regression import covariance, effective_samples, solve
+from gaident.estimation.criterion import effective_samples
+from gaident.estimation.regression.regression import covariance, solve
 from measured import FILES, emps_record, folder
 
 Vector = NDArray[np.float64]
@@ -121,10 +122,10 @@ def test_newey_west_and_the_effective_samples_see_the_colour() -> None:
         assert rank == 1
         means.append(theta[0])
         said.append(np.sqrt(covariance([X], [r - theta[0]])[0, 0]))
-        n_eff.append(effective_samples([r - theta[0]]))
+        n_eff.append(effective_samples(r - theta[0]))
     assert np.median(n_eff) == pytest.approx(4000 / 19, rel=0.25)
     assert np.median(said) == pytest.approx(np.std(means), rel=0.25)
-    assert effective_samples([rng.standard_normal(4000)]) > 3000
+    assert effective_samples(rng.standard_normal(4000)) > 3000
 
 
 def test_columns_that_a_record_does_not_show_have_no_deviation() -> None:

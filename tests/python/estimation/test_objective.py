@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 import gaident as ga
 from gaident.diagnosis.mechanics import mechanics_of
+from gaident.diagnosis.records.sizes import scales_of
 from gaident.estimation import uncertainty
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit as fitted
@@ -126,3 +127,21 @@ def test_the_covariance_of_a_fit_is_worked_out_once(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(uncertainty, "_at_one_point", lambda o, f: asked.append(f) or at_one_point(o, f))
     assert estimates_of(objective, fit) == {} and mechanics_of(objective, fit)["inertia"].value == pytest.approx(1e-3, rel=1e-2)
     assert asked == [fit]
+
+
+def test_a_fit_simulates_no_model_twice_and_leaves_its_error_behind() -> None:
+    """Of two masses with six parameters: 1 + 6 rows at the start, 8 for each step, 6 more before each step but the first."""
+    torque = np.repeat(np.random.default_rng(5).standard_normal(20), N // 20)
+    velocity = np.asarray(ga.simulate(TWO, ga.Record(DT, velocity=np.zeros(N), torque=torque)))
+    rec = ga.Record(DT, velocity=velocity + 0.01 * np.random.default_rng(6).standard_normal(N), torque=torque)
+    objective = Objective(DataSet.of([rec], None), np.ones(N))
+    parameters = Parameterisation.of(TWO, scales_of(objective.data), [False])
+    hypothesis = Hypothesis(parameters, OpenLoop(objective.data))
+    start = 1.1 * parameters.base_vector(TWO)
+    found = fitted(objective, hypothesis, start, WHITE, 2)
+    assert objective.counter.simulations == (1 + 6 + 8) + (6 + 8)
+    error = objective.error(found)
+    assert objective.counter.simulations == 29, "the error of the last step was simulated with it"
+    assert np.array_equal(error, objective.errors(hypothesis, found.x[None, :])[0]), "alone the same bits as among eight"
+    known = objective.linearised(hypothesis, found.x, WHITE, error)
+    assert all(np.array_equal(a, b) for a, b in zip(known, objective.linearised(hypothesis, found.x, WHITE), strict=True))

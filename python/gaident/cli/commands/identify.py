@@ -21,7 +21,7 @@ from gaident.show.progress_bar import Progress
 
 __all__ = ["identify_command"]
 
-_REPLAYED = 1 << 18  # samples of a log on which the controller is run again
+_REPLAYED = 1 << 18  # no decision: samples of a log on which the controller is run again; work
 
 
 def identify_command(args: argparse.Namespace) -> None:

@@ -32,6 +32,7 @@ def report_command(args: argparse.Namespace) -> None:
     unknown = [r.name for r in (*records, *validation) if r.digest not in _known(result)]
     if unknown:
         print(f"not the data of this result, by their hash: {', '.join(unknown)}; the page says so")
+    # no decision: how a size is printed
     print(f"written: {target} ({f'{size / 1e6:.1f} MB' if size > 1e6 else f'{size / 1e3:.0f} kB'})")
 
 

@@ -12,7 +12,7 @@ from gaident.errors import ReadError
 
 __all__ = ["ROWS", "numbers_of"]
 
-ROWS = 8192
+ROWS = 8192  # no decision: work; lines read at once
 """Lines of a text that are parsed at once."""
 
 _Bad = dict[int, tuple[int, str]]
@@ -97,6 +97,7 @@ def _careful(
         if len(row) != dialect.width or (trailing and row[-1]):
             found, usual = len(row) - (trailing and not row[-1]), dialect.width - trailing
             raise ReadError(
+                # no decision: how much of a line a message quotes
                 f"{path}, line {number}: {found} fields where the other lines have {usual}: {text[:60]!r}; "
                 f"correct or remove this line (a damaged row or a footer?)"
                 f"{_comma_hint(dialect, found - usual)}"

@@ -23,7 +23,7 @@ _NUMBER = {
     # A digit must follow the comma, so that the separator in '1, 2' is none.
     ",": re.compile(rf"[+-]?(?:\d+(?:,\d+)?|,\d+){_EXPONENT}|{_SPECIAL}", re.IGNORECASE),
 }
-_SAMPLED = 200
+_SAMPLED = 200  # no decision: work; lines looked at
 _LEADING_ZERO = re.compile(r"0\d+")
 
 
@@ -106,6 +106,7 @@ def detect(path: str, lines: Sequence[Line], delimiter: str | None, decimal: str
 def _weigh(rows: list[list[str]], delimiter: str, decimal: str) -> tuple[Dialect, tuple[float, float]]:
     """A candidate, and (numeric cells per line, minus text cells per line): the larger the better."""
     width = Counter(len(row) for row in rows).most_common(1)[0][0]
+    # no decision: comma is not the delimiter where another mark is
     others = [mark for mark in _DELIMITERS[:3] if mark != delimiter]
     table = [row for row in rows if len(row) == width]
     pattern = _NUMBER[decimal]
@@ -139,12 +140,13 @@ def _refuse_two_meanings(path: str, lines: Sequence[Line], half: Sequence[Line],
     """`0,001,1,5`: is that four whole numbers or two with decimal commas? Then only the user knows."""
     rows = [(number, split(text, ",")) for number, text in half[:: max(1, len(half) // _SAMPLED)]]
     whole = [(number, row) for number, row in rows if all(cell.lstrip("+-").isdigit() for cell in row)]
-    if 10 * len(whole) < 9 * len(rows):
+    if 10 * len(whole) < 9 * len(rows):  # no decision: the spelling of a file: where it has two meanings the user is asked
         return
     names = next((split(text, ",") for _, text in reversed(lines[: len(lines) // 2]) if not _digits_only(text)), [])
     suspicious = [number for number, row in whole if any(_LEADING_ZERO.fullmatch(cell) for cell in row[1:])]
     other_widths = [number for number, row in whole if len(row) != found.width]
     half_named = len([name for name in names if name]) * 2 == found.width
+    # no decision: the spelling of a file: where it has two meanings the user is asked
     if not suspicious and not half_named and 10 * len(other_widths) < len(whole):
         return
     number = (suspicious or other_widths or [whole[0][0]])[0]
@@ -164,4 +166,4 @@ def _digits_only(text: str) -> bool:
 
 
 def _short(text: str) -> str:
-    return text if len(text) <= 60 else text[:57] + "..."
+    return text if len(text) <= 60 else text[:57] + "..."  # no decision: how much of a line a message quotes

@@ -15,7 +15,7 @@ from gaident.errors import ReadError
 
 __all__ = ["Matrix", "array_table", "library", "midnight", "seconds_since", "unique_keys"]
 
-_LISTED_COLUMNS = 1000
+_LISTED_COLUMNS = 1000  # no decision: how many columns are listed  # no decision: how many columns are listed
 
 
 class Matrix:

@@ -17,17 +17,17 @@ from gaident.errors import ReadError
 
 __all__ = ["BLOCK", "Column", "Stored", "Table", "first_line"]
 
-BLOCK = 1 << 16
+BLOCK = 1 << 16  # no decision: work; values of a block
 """Rows that are held at once of a log that is read block by block."""
 
 _NUMBER_SIGN = re.compile(r"#\s*(\d+)")
 _PICK = re.compile(r"(.+)\[\s*(:|-?\d+)\s*,\s*(:|-?\d+)\s*\]")
-_LISTED = 40
+_LISTED = 40  # no decision: how many columns a message names
 
 
 def first_line(error: BaseException) -> str:
     """What an error of another library says, for a message of one line."""
-    return (str(error).splitlines() or [type(error).__name__])[0][:120]
+    return (str(error).splitlines() or [type(error).__name__])[0][:120]  # no decision: how much of an error is quoted
 
 
 class Stored:

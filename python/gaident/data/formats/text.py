@@ -97,10 +97,10 @@ def _guess(raw: bytes) -> str | None:
         if raw.startswith(mark):
             return name
     # UTF-16 without a mark: digits and separators leave every second byte zero.
-    head = raw[:400]
+    head = raw[:400]  # no decision: bytes that tell the spelling of a file
     even, odd = head[0::2].count(0), head[1::2].count(0)
-    if odd > 0.8 * len(head[1::2]) and even == 0:
+    if odd > 0.8 * len(head[1::2]) and even == 0:  # no decision: bytes that tell the spelling of a file
         return "utf-16-le"
-    if even > 0.8 * len(head[0::2]) and odd == 0:
+    if even > 0.8 * len(head[0::2]) and odd == 0:  # no decision: bytes that tell the spelling of a file
         return "utf-16-be"
     return None

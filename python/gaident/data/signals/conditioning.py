@@ -13,8 +13,8 @@ from gaident.errors import RecordError
 
 __all__ = ["differentiate", "low_pass"]
 
-_ORDER = 4
-_SHORTEST_EXTENSION = 15
+_ORDER = 4  # no decision: of a low-pass
+_SHORTEST_EXTENSION = 15  # no decision: of a low-pass
 
 
 def differentiate(position: ArrayLike, dt: float, cutoff_hz: float | None = None) -> NDArray[np.float64]:
@@ -65,7 +65,7 @@ def differentiate(position: ArrayLike, dt: float, cutoff_hz: float | None = None
 
 def low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float) -> NDArray[np.float64]:
     """The filter of `differentiate` alone. Raises RecordError for a corner that is not between 0 and 1/(2 dt)."""
-    nyquist = 0.5 / dt
+    nyquist = 0.5 / dt  # no decision: the Nyquist frequency
     cutoff_hz = positive_number(cutoff_hz, "cutoff_hz", "Hz", f"give a corner between 0 and {nyquist:g} Hz, or None")
     if cutoff_hz >= nyquist:
         raise RecordError(
@@ -76,6 +76,7 @@ def low_pass(x: NDArray[np.float64], dt: float, cutoff_hz: float) -> NDArray[np.
     from scipy.signal import butter, sosfiltfilt
 
     # The odd extension at the ends must outlast the filter's transient, or a start in motion would be distorted.
+    # no decision: twice the filter's transient
     extension = max(_SHORTEST_EXTENSION, math.ceil(min(2.0 / (cutoff_hz * dt), float(x.size))))
     sections = butter(_ORDER, cutoff_hz * 2.0 * dt, output="sos")
     # The straight line between the ends passes such a filter as it is. Taken off first, it costs no digits

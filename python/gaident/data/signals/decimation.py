@@ -9,18 +9,19 @@ from gaident.errors import RecordError
 
 __all__ = ["Decimator", "decimated", "factor_of", "low_passed"]
 
-_HALF = 25
+_HALF = 25  # no decision: taps of a low-pass
 """Taps on each side, in samples of the decimated signal."""
 
-_KAISER = 8.0
+_KAISER = 8.0  # no decision: taps of a low-pass
 """beta: what leaks is 72 dB down."""
 
-_CORNER = 0.9
+_CORNER = 0.9  # no decision: taps of a low-pass
 """-6 dB, of the new Nyquist frequency; with these taps the band passes up to 0.8 and is stopped from 1.0 on."""
 
 
 def factor_of(value: object, argument: str = "decimate", form: str = "={!r}") -> int:
     """`value` as a whole number from 1. Raises RecordError, which shows argument and value in this form."""
+    # no decision: what an argument may be
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= 100_000:
         raise RecordError(f"{argument}{form.format(value)}: give a whole number from 1 to 100000, of samples that become one")
     return int(value)
@@ -89,7 +90,7 @@ def _taps(half: int, ratio: float) -> NDArray[np.float64]:
 
 def low_passed(x: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:
     """x behind the same low-pass, not decimated, for a sample rate `ratio` times as slow; x itself up to 1.05."""
-    if ratio <= 1.05:
+    if ratio <= 1.05:  # no decision: a low-pass with its corner at the Nyquist frequency does nothing
         return x
     from scipy.signal import oaconvolve
 

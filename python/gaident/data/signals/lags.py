@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.signals.decimation import low_passed
+from gaident.estimation.criterion import effective_samples
+from gaident.policy.table import POLICY
 
 __all__ = ["Fit", "coarse_lags", "refine"]
 
 Vector = NDArray[np.float64]
 
-_OVERLAP = 0.3  # of the shorter signal, at least
-_LONGEST = 1 << 15  # samples of the coarse search
-_CANDIDATES = 4
-_RATES = 31
+_LONGEST = 1 << 15  # no decision: samples of the coarse search; work
+_CANDIDATES = 4  # no decision: work
+_RATES = 31  # no decision: work
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def _half_width(a: Vector) -> float:
     """Samples in which the autocorrelation falls to a half."""
     lags, correlation = _correlation(a, a)
     right = correlation[np.searchsorted(lags, 0) :]
-    below = np.flatnonzero(right < 0.5)
+    below = np.flatnonzero(right < 0.5)  # no decision: half of the width of a peak, by definition
     return float(below[0]) if below.size else len(right) / 4.0
 
 
@@ -105,7 +106,8 @@ def _correlation(a: Vector, b: Vector) -> tuple[Vector, Vector]:
     with np.errstate(divide="ignore", invalid="ignore"):
         va, vb = sums(a * a, ones_b) - sa**2 / count, sums(ones_a, b * b) - sb**2 / count
         # Where little moves in what is shared, a correlation says nothing.
-        usable = count >= _OVERLAP * min(len(a), len(b))
+        usable = count >= POLICY.overlap * min(len(a), len(b))
+        # no decision: where nothing moves there is no correlation
         usable &= (va > 1e-3 * count * a.var()) & (vb > 1e-3 * count * b.var())
         correlation = (sums(a, b) - sa * sb / count) / np.sqrt(np.where(usable, va * vb, np.inf))
     return np.arange(1.0 - len(b), len(a)), np.where(usable, correlation, 0.0)
@@ -134,11 +136,11 @@ def refine(
     slope = spline.derivative()
     own = np.arange(len(y)) * their_dt
     smooth = low_passed(y, 0.5 / (band * their_dt))
-    margin = 2.0 * max(dt, their_dt)
+    margin = 2.0 * max(dt, their_dt)  # no decision: samples at the ends, where a spline has no neighbours
     t = offset + (1.0 + rate) * own
     used = (t >= margin) & (t <= (len(x) - 1) * dt - margin)
     s, z = own[used], smooth[used]
-    if len(s) < 20:
+    if len(s) < 20:  # no decision: fewer hold no fit of four numbers
         return None
     width = 2.0 * _half_width(smooth - smooth.mean()) * their_dt
     centre = float(s.mean())
@@ -173,7 +175,7 @@ def refine(
     p = found.x
     at, rho, gain = float(p[0]), float(p[1]) if free_rate else rho, float(p[-2])
     e, J = z - model(p), slopes(p)
-    cov, independent = _sandwich(J, e)
+    cov, independent = _sandwich(J, e), effective_samples(e)
     rate_std = float(np.sqrt(cov[1, 1])) if free_rate else 0.0
     to_start = np.array([1.0, -centre]) if free_rate else np.array([1.0])
     k = len(to_start)
@@ -196,19 +198,21 @@ def _shared_band(x: Vector, dt: float, y: Vector, their_dt: float, offset: float
     inside = (t >= 0.0) & (t <= (len(x) - 1) * dt)
     a = np.interp(t[inside], np.arange(len(x)) * dt, low_passed(x, grid / dt))
     b = np.interp(time[inside], np.arange(len(y)) * their_dt, low_passed(y, grid / their_dt))
-    part = max(16, len(a) // 8)
-    if len(a) < 32:
+    part = max(16, len(a) // 8)  # no decision: segments of a coherence, and half of it: where noise and signal are as strong
+    if len(a) < 32:  # no decision: segments of a coherence, and half of it: where noise and signal are as strong
         return 0.5 / grid
     frequency, square = coherence(a, b, 1.0 / grid, nperseg=part, detrend="linear")
+    # no decision: segments of a coherence, and half of it: where noise and signal are as strong
     below = np.flatnonzero(square[3:] < 0.5)
     return float(frequency[3 + below[0]]) if below.size else 0.5 / grid
 
 
-def _sandwich(J: Vector, e: Vector) -> tuple[Vector, float]:
-    """(covariance of the parameters, number of independent samples of e), with Bartlett's weights over the lags."""
+def _sandwich(J: Vector, e: Vector) -> Vector:
+    """Covariance of the parameters, with Bartlett's weights over the lags."""
     n = len(e)
+    # no decision: bandwidth of an estimate of variance
     r = np.array([e[: n - k] @ e[k:] for k in range(min(n // 4, 400))]) / max(float(e @ e), 1e-300)
-    quiet = np.flatnonzero(np.abs(r) < 2.0 / np.sqrt(n))
+    quiet = np.flatnonzero(np.abs(r) < 2.0 / np.sqrt(n))  # no decision: bandwidth of an estimate of variance
     reach = min(2 * (int(quiet[0]) if quiet.size else len(r)) + 1, n // 2)
     scale = np.linalg.norm(J, axis=0) + 1e-300
     scores = (J / scale) * e[:, None]
@@ -218,5 +222,4 @@ def _sandwich(J: Vector, e: Vector) -> tuple[Vector, float]:
         S += (1.0 - k / reach) * (part + part.T)
     inverse = np.linalg.pinv((J / scale).T @ (J / scale), rcond=1e-14)
     cov = (inverse @ S @ inverse) / np.outer(scale, scale)
-    independent = n / max(1.0, 1.0 + 2.0 * float(np.clip(r[1:reach], 0.0, None).sum()))
-    return cov * n / max(1, n - J.shape[1]), independent
+    return np.asarray(cov * n / max(1, n - J.shape[1]))

@@ -9,13 +9,9 @@ from numpy.typing import NDArray
 
 from gaident.arguments import arg
 from gaident.errors import ReadError
+from gaident.policy.table import POLICY
 
-__all__ = ["GAP", "resampled"]
-
-_COARSER = 1.5
-_FINER = 100.0
-GAP = 5.0
-"""Of the usual step: what is longer is a pause of the logger, and a straight line through it would be invented."""
+__all__ = ["resampled"]
 
 
 def resampled(
@@ -43,7 +39,7 @@ def resampled(
             raise ReadError(f"{path}: the time of {name} {where}; sort the log or remove stamps that stand twice")
         steps = np.diff(t)
         median = float(np.median(steps))
-        if dt > _COARSER * median:
+        if dt > POLICY.resample_coarser * median:
             raise ReadError(
                 f"{path}: {arg('resample', format(dt, 'g'))} s is coarser than the log, whose {name} has steps of {median:g} "
                 "s, and would alias high "
@@ -52,10 +48,10 @@ def resampled(
             )
         held[name] = (t, x)
         finest = min(finest, median)
-    if dt * _FINER < finest:
+    if dt * POLICY.resample_finer < finest:
         raise ReadError(
-            f"{path}: {arg('resample', format(dt, 'g'))} s is more than {_FINER:g} times finer than the log, whose steps "
-            f"are {finest:g} s: "
+            f"{path}: {arg('resample', format(dt, 'g'))} s is more than {POLICY.resample_finer:g} times finer than the log, "
+            f"whose steps are {finest:g} s: "
             f"give seconds, for example {arg('resample', format(finest, '.4g'))}"
         )
     start, stop = max(t[0] for t, _ in held.values()), min(t[-1] for t, _ in held.values())
@@ -72,7 +68,7 @@ def _refuse_gaps(path: str, name: str, t: NDArray[np.float64], start: float, sto
     steps = np.diff(t)
     usual = float(np.median(steps))
     at = int(np.argmax(np.where((t[:-1] < stop) & (t[1:] > start), steps, 0.0)))
-    if steps[at] > GAP * usual and t[at] < stop and t[at + 1] > start:
+    if steps[at] > POLICY.pause * usual and t[at] < stop and t[at + 1] > start:
         raise ReadError(
             f"{path}: {name} has a gap of {steps[at]:.4g} s, from {t[at]:.9g} to {t[at + 1]:.9g} s, where its usual step is "
             f"{usual:.4g} s, and nobody knows what happened in it; split the log there into two records, which can be "

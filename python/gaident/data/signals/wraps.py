@@ -19,31 +19,32 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.policy.table import POLICY
+
 __all__ = ["Unwrapper", "overflow"]
 
 Vector = NDArray[np.float64]
 
 _USUAL = (1.0, 100.0, 360.0, 3600.0, 36000.0, 360000.0, 1000.0, 2.0 * math.pi, *(float(2**k) for k in range(8, 33)))
-_NEARLY = 0.75  # of the range seen
-_SMALL = 0.25  # of the jump: the steps beside it
-_ALIKE = 0.05  # of the jump: by which they may differ
-_STEADY = 0.5  # of the larger of these steps: the smaller one
-_REACH = 8  # samples on either side in which a slow motion shows its direction
+_REACH = 8  # no decision: samples on either side in which a slow motion shows its direction; samples
 _INTEGERS = (float(2**16), float(2**32))  # of an integer that overflows
 
 
 def _clean(x: Vector, usual: Sequence[float]) -> tuple[NDArray[np.intp], Vector]:
     """(n of each clean jump from x(n) to x(n+1), what it lacks of M: the mean step beside it)."""
-    if len(x) < 4:
+    if len(x) < 4:  # no decision: a jump with a step on either side
         return np.zeros(0, dtype=np.intp), np.zeros(0)
     d = np.diff(x)
-    at = np.flatnonzero(np.abs(d[1:-1]) >= _NEARLY * float(np.ptp(x))) + 1
+    at = np.flatnonzero(np.abs(d[1:-1]) >= POLICY.wrap_jump * float(np.ptp(x))) + 1
     size, before, after = np.abs(d[at]), d[at - 1], d[at + 1]
     beside = np.maximum(np.abs(before), np.abs(after))
-    clean = (beside <= _SMALL * size) & (np.abs(before - after) <= _ALIKE * size)
+    clean = (beside <= POLICY.wrap_beside * size) & (np.abs(before - after) <= POLICY.wrap_alike * size)
     lacking = 0.5 * np.abs(before + after)
     sign = -np.sign(d[at])
-    steady = (sign * before > 0.0) & (sign * after > 0.0) & (np.minimum(np.abs(before), np.abs(after)) >= _STEADY * beside)
+    steady = (
+        (sign * before > 0.0) & (sign * after > 0.0) & (np.minimum(np.abs(before), np.abs(after)) >= POLICY.wrap_steady * beside)
+    )
+    # no decision: digits that a range is logged with
     known = np.array([any(abs(m - s) <= 1e-3 * m for m in usual) for s in size + lacking], dtype=bool)
     came = sign * (x[at] - x[np.maximum(at - _REACH, 0)])
     went = sign * (x[np.minimum(at + 1 + _REACH, len(x) - 1)] - x[at + 1])
@@ -84,11 +85,11 @@ class Unwrapper:
         d = np.diff(x)
         found = np.abs(d[at]) + lacking
         period = float(np.median(found))
-        slack = max(float(np.abs(d[at - 1] - d[at + 1]).max()), 1e-3 * period)
+        slack = max(float(np.abs(d[at - 1] - d[at + 1]).max()), 1e-3 * period)  # no decision: digits that a range is logged with
         near = [m for m in self.usual if abs(m - period) <= slack and m >= float(np.ptp(x))]
         period = min(near, key=lambda m: abs(m - period), default=period)
         rest = np.abs(d - period * np.round(d / period))
-        return period if float(np.quantile(rest, 0.999)) < _SMALL * period else None
+        return period if float(np.quantile(rest, POLICY.wrap_spared)) < POLICY.wrap_beside * period else None
 
 
 def overflow(x: Vector) -> tuple[int, float] | None:
@@ -105,6 +106,6 @@ def overflow(x: Vector) -> tuple[int, float] | None:
     for n, more in zip(at, lacking, strict=True):
         size = abs(float(x[n + 1] - x[n])) + float(more)
         for integer in _INTEGERS:
-            if abs(size / (integer * step) - 1.0) < 0.02:
+            if abs(size / (integer * step) - 1.0) < POLICY.unit_shown:
                 return int(n), integer * step
     return None

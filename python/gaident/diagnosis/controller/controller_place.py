@@ -21,6 +21,7 @@ from gaident.diagnosis.controller.replay import Replay, replay
 from gaident.diagnosis.controller.replay_causes import white_noise
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.diagnosis.library.terms import in_controller
+from gaident.estimation.criterion import gained
 from gaident.estimation.dataset import DataSet, torque_in
 from gaident.estimation.term import Scales, Term
 from gaident.models.effects import table
@@ -234,7 +235,7 @@ def _left_with(data: DataSet, controller: PI) -> float:
 def _finding(
     effect: str, name: str, estimate: Estimate, before: float, after: float, floor: float, n: int, text: Text
 ) -> Finding:
-    gain = float(n * np.log(before / max(after, floor, 1e-300)) - np.log(n))
+    gain = gained(before, max(after, floor), n, 1)
     fall = 1.0 - float(np.sqrt(min(after / before, 1.0)))
     return Finding(effect, {name: estimate}, (), fall, gain, None, text, place="controller")
 

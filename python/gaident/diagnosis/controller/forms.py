@@ -39,6 +39,7 @@ from gaident.diagnosis.controller.replay import tolerance_of
 from gaident.diagnosis.controller.replay_causes import white_noise
 from gaident.diagnosis.controller.slow_forms import limited, run_error, too_fast
 from gaident.diagnosis.library.settings import OF_SETTING
+from gaident.estimation.criterion import bic, cost_of
 from gaident.models.drive_torque import made_by
 from gaident.policy.table import POLICY
 
@@ -47,9 +48,6 @@ __all__ = ["Form", "Shown", "form_shown"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-FARTHEST = 0.3  # no decision: how far a filter's number moves along its slope
-CHOICE = 2.0 * np.log(3.0)  # no decision: what the choice of one of three settings costs
-NEAR = 1.1  # no decision: of the floor, an estimate of it
 INSIDE = 1e-9  # no decision: of a bound, where a search starts
 ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
 WEIGHTS = ("one", "none", "free")
@@ -165,7 +163,7 @@ def form_shown(records: Sequence[Record], given: PI, unknown: tuple[str, ...] = 
         if followed is not None and len(places) > followed:
             break  # what leaves no more than rounding or white noise is not improved by another filter
         shape = fitted_shape(law, places, floor)
-        if shape.rms <= NEAR * floor or white_noise(shape.left, law.logged):
+        if shape.rms <= POLICY.near_rounding * floor or white_noise(shape.left, law.logged):
             followed = len(places)
         candidates += _candidates(law, shape, given, floor, unknown)
     candidates.sort(key=lambda c: c.criterion)
@@ -205,21 +203,22 @@ def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[
         M = np.column_stack([linear @ B @ moved, slopes])
         wanted = logged - linear @ B @ fixed
         free, left = least(M, wanted)
-        if np.any(np.abs(free[moved.shape[1] :]) > FARTHEST):  # the slope holds no longer
+        if np.any(np.abs(free[moved.shape[1] :]) > POLICY.slope_reach):  # the slope holds no longer
             free, left = least(M[:, : moved.shape[1]], wanted)
         numbers = fixed + moved @ free[: moved.shape[1]]
         if min(numbers[KP_W], numbers[KP_R], numbers[KI]) < -POLICY.negligible * float(np.abs(numbers[:FIRST_FEED]).max()):
             continue
         k = M.shape[1]
-        criterion = n * np.log(max(left / n, floor**2)) + _price(law, k, form.chosen)
+        criterion = bic(max(left / n, floor**2), n, 0) + _price(law, k, form.chosen)
         yield _Candidate(form, shape, free, k, float(criterion))
 
 
 def _price(law: Law, count: int, chosen: int) -> float:
     """What numbers and settings cost: by the BIC, in a slower log by the share of the error that each has to take away."""
     n = len(law.logged)
-    own = count * np.log(n) + CHOICE * chosen if law.every == 1 else -2.0 * n * np.log(POLICY.each_number) * (count + chosen)
-    return float(own)
+    if law.every == 1:
+        return cost_of(count, n) + POLICY.form_choice * chosen
+    return float(-2.0 * n * np.log(POLICY.each_number) * (count + chosen))
 
 
 def _slopes(law: Law, shape: Shape) -> Matrix:
@@ -261,7 +260,7 @@ def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Se
     best = candidates[0]
     numbers, filters, cov = _fitted(law, best, given)
     left = law.logged - law.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
-    if not _rms([left]) <= max(NEAR * floor, POLICY.negligible * float(np.abs(law.torque).max())):
+    if not _rms([left]) <= max(POLICY.near_rounding * floor, POLICY.negligible * float(np.abs(law.torque).max())):
         return None
     free = replace(_controller(best, numbers, filters, given, law.period), period=law.period)
     if too_fast(free, records[0].dt):

@@ -29,6 +29,7 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.diagnosis.controller.replay import replay
+from gaident.estimation.criterion import gained
 from gaident.estimation.regression.torque_lag import TorqueLag, torque_lag
 from gaident.identification.notes import reading_notes
 from gaident.policy.table import POLICY
@@ -139,7 +140,7 @@ def _shift_of_law(rec: Record, controller: PI) -> tuple[int, int]:
     best = min(left.values())
     if best > (POLICY.replay_noise * top) ** 2:
         return 0, 0
-    worse = {shift: n * float(np.log((value + least) / (best + least))) for shift, value in left.items()}
+    worse = {shift: gained(value + least, best + least, n) for shift, value in left.items()}
     alike = [shift for shift, units in worse.items() if units < POLICY.log_shift]
     if len({b for _, b in alike}) > 1:  # what the torque was made of is not sure
         return 0, 0

@@ -23,6 +23,8 @@ does not jump.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from gaident.diagnosis.library.terms import LIBRARY
@@ -37,6 +39,7 @@ from gaident.estimation.regression.reversal import jump_at_reversal, torque_held
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
+from gaident.results.inverse_dynamics import InverseDynamics
 
 __all__ = ["friction_shown", "only_describes", "share", "shown_by_the_records", "simplified"]
 
@@ -76,9 +79,19 @@ def shown_by_the_records(space: Moves, final: Fit, effect: str) -> bool | None:
     return False if refuted else None
 
 
-def friction_shown(data: DataSet, model: Model) -> bool:
-    """Whether the records show dry friction without any simulation, at the reversals or at rest."""
-    return data.torque_logged and _sure(*_friction_in(data, model), 0.0)
+def friction_shown(data: DataSet, model: Model, axis: InverseDynamics | None = None) -> bool:
+    """Whether the records show dry friction without any simulation: at the reversals, at rest, or by the regressed axis.
+
+    Where no record turns back, and none rests, the torque that does not fall with the speed is that friction, or in one direction
+    a load that no record tells from it.
+    """
+    if not data.torque_logged:
+        return False
+    jump, rest = _friction_in(data, model)
+    if jump is None and rest is None and axis is not None:
+        jump = next((axis.parameters[name] for name in ("coulomb", "offset") if name in axis.parameters), None)
+        jump = None if jump is None else replace(jump, value=abs(jump.value))
+    return _sure(jump, rest, 0.0)
 
 
 def _friction_in(data: DataSet, model: Model) -> tuple[Estimate | None, Estimate | None]:

@@ -22,7 +22,8 @@ from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
 from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.projection import WORST
-from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
+from gaident.estimation.regression.inverse_dynamics import ORDER, inverse_dynamics
+from gaident.estimation.regression.motion import BAND, cutoff_of
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
@@ -115,7 +116,7 @@ def linear_bases(task: Task) -> tuple[Task, list[Fit]]:
         for s in test.ranked(noise)[: POLICY.starts]:
             if s.term.name not in tried:
                 short = ls.scored(task.objective, ls.fit(task.objective, s.hypothesis, s.starts[0], noise, POLICY.short))
-                if short.bic - two.bic < POLICY.near_mass * task.objective.count:
+                if space.score(short) < space.score(two) + POLICY.beam_reach * space.penalty:
                     return task, [one, two]
             tried.add(s.term.name)
     return task, [two]
@@ -173,10 +174,15 @@ class ByOutputErrors:
         return self.task.objective
 
     def informed(self, samples: float) -> Task:
-        """The task with so many independent samples."""
-        family = self.objective.family
+        """The task of a search: so many independent samples, and what the records show by themselves.
+
+        Both are found out here, since the specification test, which is made of most records, needs neither.
+        """
+        task, family = self.task, self.objective.family
         assert isinstance(family, OutputErrors)
-        return self.task.under(replace(family, samples=samples))
+        shows = friction_shown(task.data, task.model, self.axis)
+        shown = frozenset(t.family for t in task.allowed if t.levels) if shows else frozenset()
+        return replace(task.under(replace(family, samples=samples)), shown=shown)
 
     def regressed(self, predictor: Predictor) -> Fit | None:
         """The regressed axis, fitted by output errors; None where there is none.
@@ -208,10 +214,10 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
     """The task under output errors.
 
     Their corner is where the error of the regressed axis has as much power in its slope as in itself: free run and torque then
-    count alike. Of a measured torque an inertia is free up to `heavier` deviations above that of the regression.
+    count alike, and a cause that only the torque shows is found. Parameters are estimated otherwise, see `Selection.estimated`.
+    Of a measured torque an inertia is free up to `heavier` deviations above that of the regression.
     """
-    shown = frozenset(t.family for t in task.allowed if t.levels) if friction_shown(task.data, task.model) else frozenset()
-    raw = ByOutputErrors(replace(task.under(OutputErrors(1.0)), shown=shown), _axis(task.data))
+    raw = ByOutputErrors(task.under(OutputErrors(1.0)), _axis(task.data))
     fit = raw.regressed(task.predictor())
     if raw.axis is None or fit is None:
         return ByOutputErrors(raw.task, None)
@@ -228,13 +234,31 @@ def _by_output_errors(task: Task) -> ByOutputErrors:
 
 
 def _axis(data: DataSet) -> InverseDynamics | None:
+    """The regressed axis; None where the records show none.
+
+    Records of held speeds hold no acceleration beyond its noise, and the cutoff that leaves only the acceleration leaves no rows:
+    they show friction all the same, behind the lowest cutoff that leaves some, and an inertia beyond its deviations.
+    """
     if not data.torque_logged:
         return None
-    try:
-        found = inverse_dynamics(list(data.records), axis=data.axis)
-    except (RecordError, SettingsError):
-        return None
-    return found if found.parameters["inertia"].value > 0.0 else None
+    records, highest = list(data.records), BAND / data.records[0].dt
+    cutoffs = [min(cutoff_of(r, ORDER) for r in records)]
+    while 2.0 * cutoffs[-1] <= highest:  # no decision: steps of a search
+        cutoffs.append(2.0 * cutoffs[-1])
+    doubtful: InverseDynamics | None = None
+    for cutoff in cutoffs:
+        try:
+            found = inverse_dynamics(records, cutoff_hz=cutoff, axis=data.axis)
+        except RecordError:
+            pass
+        except SettingsError:
+            return None
+        else:
+            inertia = found.parameters["inertia"]
+            if inertia.value > POLICY.heavier * inertia.std:
+                return found
+            doubtful = found if inertia.value > 0.0 and doubtful is None else doubtful
+    return doubtful
 
 
 def _corner(axis: InverseDynamics) -> float:

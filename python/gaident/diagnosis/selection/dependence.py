@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gaident.control.filtering import clamped_sum
 from gaident.diagnosis.selection.line import torque_of_line
+from gaident.estimation.criterion import cost_of
 from gaident.estimation.objective import Fit, Innovations, Objective
 from gaident.estimation.prediction import coupling_response, twist
 from gaident.estimation.projection import project_out
@@ -90,7 +91,7 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
     line = None
     for pairs in lines:
         # A frequency that was searched for counts as a number more.
-        gain = none - account.bic(pairs) - np.log(objective.information)
+        gain = none - account.bic(pairs) - cost_of(1, objective.information)
         if gain > gains["time"]:
             gains["time"], line = gain, torque_of_line(objective, fit, J, error, pairs)
     beside = {driver: np.vstack([J, rows]) for driver, rows in columns.items()}

@@ -20,7 +20,7 @@ from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.mechanisms import as_two_masses, resonance, swings
 from gaident.estimation import least_squares as ls
-from gaident.estimation.criterion import effective_samples
+from gaident.estimation.criterion import cost_of, effective_samples
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
@@ -117,7 +117,7 @@ class ModelSpace:
         """Whether the errors before whitening, in the loop where there is one, are little more than the noise."""
         inside = fit.hypothesis.driven_by(self.closed(fit.predictor)) if self.data.loopable else fit.hypothesis
         cost = float(self.objective.costs(inside, fit.x[None, :], WHITE)[0])
-        return bool(np.sqrt(cost / self.objective.count) < self.policy.unwhitened_ratio * self.data.noise)
+        return bool(np.sqrt(cost / self.objective.count) < self.policy.free_run_ratio * self.data.noise)
 
     def worth(self, fuller: Fit, simpler: Fit) -> bool:
         """The decision: whether a fuller model is worth its effects against a simpler one."""
@@ -168,7 +168,7 @@ class ModelSpace:
         space = self.of_output_errors()
         predictor = space.free_predictor(other)
         without, beside = (space.unwhitened(f, predictor) for f in (whitened, other))
-        if not beside.cost < self.policy.overrules * without.cost or self.ratio(without) < self.policy.unwhitened_ratio:
+        if not beside.cost < self.policy.overrules * without.cost or self.ratio(without) < self.policy.free_run_ratio:
             return False
         if self.whitens:
             space = space.of_output_errors(effective_samples(space.objective.unwhitened_errors(without)))
@@ -226,7 +226,7 @@ class ModelSpace:
         x = bare.inserted(base, neutral)
         as_fuller = ls.scored(self.objective, Fit(hypothesis, x, fuller.noise, 0.0, np.inf))
         freedom = term.size - inner.size
-        return as_fuller.bic - freedom * float(np.log(self.objective.information)) + self.score(simpler) - simpler.bic
+        return as_fuller.bic - cost_of(freedom, self.objective.information) + self.score(simpler) - simpler.bic
 
     # Fits.
 

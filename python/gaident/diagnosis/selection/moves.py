@@ -36,6 +36,7 @@ from gaident.diagnosis.selection.mechanisms import (
 from gaident.diagnosis.selection.model_space import ModelSpace, words
 from gaident.diagnosis.selection.score_test import ScoreTest
 from gaident.estimation import least_squares as ls
+from gaident.estimation.criterion import gained
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis
 from gaident.estimation.prediction import OpenLoop
@@ -114,13 +115,12 @@ class Moves(ModelSpace):
                     fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, self.policy.glance))
                     if s.term not in short or fit.bic < short[s.term].bic:
                         short[s.term] = fit
-        reach = self.policy.hopeless * self.objective.information
-        near = [f for f in short.values() if f.bic < now.bic + reach]
-        best = sorted(near, key=lambda f: f.bic)[: self.policy.finished]
+        best = sorted((f for f in short.values() if f.cost < WORST), key=lambda f: f.bic)[: self.policy.finished]
         best = sorted((self.completed(f) for f in best), key=self.score)
         reach = self.policy.beam_reach * self.penalty
         fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
-        fits += [f for fit in fits for f in self.resettled(fit)]
+        if fits:
+            fits += self.resettled(min(fits, key=self.score))
         return self._best(now, fits)
 
     def _best(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
@@ -172,7 +172,7 @@ class Moves(ModelSpace):
             size, slope = float(column @ column), float(column @ rest)
             if size > 0.0 and slope != 0.0:
                 power = float(rest @ rest)
-                fall = -self.objective.information * float(np.log(max(1.0 - slope**2 / (size * power), 1e-300)))
+                fall = gained(power, power - slope**2 / size, self.objective.information)
                 if fall > best:
                     best, stiffness = fall, slope / size
         starts = [as_held(fit, stiffness, data)] if stiffness > 0.0 and best > self.policy.hope * self.penalty else []
@@ -185,13 +185,15 @@ class Moves(ModelSpace):
         """The two masses with the resonance that was found as their own, alone or with a simple effect beside it.
 
         What delays the torque or blocks the shaft biases the resonance of two masses so far that a local fit does not return.
-        The true one is then found as an extra resonance.
+        The true one is then found as an extra resonance, which explains more than any other effect.
+        Of the effects beside it the few best short fits are fitted to the end: they begin at the resonance already.
         """
         if fit.parameters.masses == 1 or not fit.parameters.terms[-1:] or not fit.parameters.terms[-1].resonates:
             return []
         shorter, y = as_two_masses(fit)
         shorter = shorter.driven_by(OpenLoop(self.data, fit.predictor.own_angle)) if self.whitens else shorter
         tries = [self.refitted(shorter, y, self.policy.long)]
+        short: list[Fit] = []
         for t in self.candidates(tries[0]):
             if t.size > 1 or t.place == "shaft":
                 continue
@@ -202,8 +204,10 @@ class Moves(ModelSpace):
             if t.multimodal and self.data.loopable:
                 longer = longer.driven_by(self.closed(longer.predictor))
             X = np.array([shorter.parameters.inserted(y, np.array(row)) for row in rows])
-            tries.append(self.refitted(longer, X[int(np.argmin(self.objective.costs(longer, X, WHITE)))], self.policy.long))
-        return tries
+            x = X[int(np.argmin(self.objective.costs(longer, X, WHITE)))]
+            short.append(ls.scored(self.objective, ls.fit(self.objective, longer, x, WHITE, self.policy.short)))
+        best = sorted(short, key=lambda f: f.bic)[: self.policy.starts]
+        return tries + [self.refitted(f.hypothesis, f.x, self.policy.long) for f in best]
 
     # Moves that reduce.
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-import numpy as np
-
 from gaident.diagnosis.selection.moves import Moves
-from gaident.estimation.criterion import chi_square_bound
+from gaident.estimation.criterion import chi_square_bound, cost_of
 from gaident.estimation.objective import Fit
 from gaident.estimation.term import Term
 
@@ -49,7 +47,7 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
                 continue
             # A generalisation is never worse by more than its parameters: only a hint of what it adds counts.
             more = other.size - term.size
-            gained = more * np.log(space.objective.information) - behind  # likelihood ratio, 2 ln
+            gained = cost_of(more, space.objective.information) - behind  # likelihood ratio, 2 ln
             if gained < chi_square_bound(more, space.policy.detail_level):
                 continue
             if behind < -space.penalty and not space.in_both_loops(final, f):

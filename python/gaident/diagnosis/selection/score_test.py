@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.selection.mechanisms import evenly_damped
 from gaident.estimation import least_squares as ls
+from gaident.estimation.criterion import gained
 from gaident.estimation.noise_model import WHITE, NoiseFilter
 from gaident.estimation.objective import LOST, Fit, Hypothesis, Objective
 from gaident.estimation.prediction import ClosedLoop
@@ -244,9 +245,9 @@ class ScoreTest:
         cost, size = max(float(costs[0]), 1e-300), t.hypothesis.parameters.size - t.base.hypothesis.parameters.size
         if not np.isfinite(cost):  # every start diverges
             return Screened(t.term, t.hypothesis, starts, filtered.noise, -np.inf, -np.inf)
-        fall = n * np.log(max(power, 1e-300) / cost) - size * np.log(n)
+        fall = gained(power, cost, n, size)
         bic = self.objective.bic(cost, filtered.noise, t.hypothesis.parameters.size)
-        return Screened(t.term, t.hypothesis, starts, filtered.noise, float(fall), float(filtered.own - bic))
+        return Screened(t.term, t.hypothesis, starts, filtered.noise, fall, float(filtered.own - bic))
 
     def _without(self, base: _Base, noise: NoiseFilter | None) -> float:
         """BIC of the model that is extended, under a filter or that of its own errors."""

@@ -32,7 +32,7 @@ from gaident.diagnosis.selection.rivals import Replacement, rivals_of
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import Specification, chi_square_bound, effective_samples, specification_statistic
 from gaident.estimation.noise_model import WHITE, ShaftNoise
-from gaident.estimation.objective import Fit, Innovations, Objective
+from gaident.estimation.objective import Fit, Innovations, Objective, OutputErrors
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
@@ -58,6 +58,24 @@ class Selection:
     rivals: dict[str, tuple[float, list[Replacement]]]
     specification: Specification | None
     whitened: _Found | None = None
+
+    def estimated(self) -> tuple[Objective, Fit]:
+        """What the parameters of the selected model are estimated under, and the model with them.
+
+        Output errors weighed as torques show a cause best. But a torque that the model lacks biases the inertia there: the slope
+        of its error is the smaller, the heavier the axis. So the velocity is nearly all of the error that is minimised
+        (`velocity_part`), and the torque the rest.
+        """
+        objective, final = self.space.objective, self.final
+        family = objective.family
+        if not isinstance(family, OutputErrors) or family.prefilter is None:
+            return objective, final
+        ratio = float(np.sqrt(POLICY.velocity_part / (1.0 - POLICY.velocity_part)))
+        family = replace(family, prefilter=replace(family.prefilter, corner=ratio * family.prefilter.corner))
+        fit = ls.fit(objective.under(family), final.hypothesis, final.x, WHITE, POLICY.usual)
+        samples = effective_samples(objective.under(family).unwhitened_errors(fit))
+        objective = objective.under(replace(family, samples=samples))
+        return objective, objective.rescored(fit)
 
 
 def selected(
@@ -111,7 +129,7 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
         # Noise on the input makes a whitened inertia too large, whatever the noise model; at the slow end there is little of it.
         return _by_output_errors(task.by_output_errors, bases, note)
     by_output: _Found | None = None
-    if min(space.ratio(b) for b in bases) > POLICY.misfit_ratio:
+    if min(space.ratio(b) for b in bases) > POLICY.noise_ratio:
         by_output = _by_output_errors(task.by_output_errors, bases, note)
         test = specification(space, task, _as_innovations(space, by_output.final))
         if test.contradicts:

@@ -148,21 +148,30 @@ def force_error(
     cutoff = band_of(model, given, int(order)) if cutoff_hz is None else float(cutoff_hz)
     if not 0.0 < cutoff < 0.5 / given[0].dt:  # no decision: the Nyquist frequency
         raise SettingsError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {0.5 / given[0].dt:g} Hz, or None")
-    left = whole = floor = 0.0
-    count = 0
-    for rec, start in zip(given, firsts, strict=True):
-        motion = motion_of(rec, cutoff, int(order))
-        kept = in_motion(motion, cutoff, start)
-        at_shaft, needed = _torques(model, rec, motion, cutoff, int(order))
-        e = low_passed(at_shaft - needed, rec.dt, cutoff, int(order))[kept]
-        s = low_passed(at_shaft, rec.dt, cutoff, int(order))[kept]
-        n = int(np.count_nonzero(kept))
-        left, whole, count = left + float(e @ e), whole + float(s @ s), count + n
-        floor += n * _noise_power(model, rec, motion, cutoff, int(order))
+    parts = force_errors(model, given, cutoff, int(order), firsts)
+    count = sum(len(e) for e, _ in parts)
     if count == 0:
         raise RecordError("nothing moves from `first` on, so there is no force error; give records that move")
+    left, whole = (sum(float(part[i] @ part[i]) for part in parts) for i in (0, 1))
+    motions = [motion_of(rec, cutoff, int(order)) for rec in given]
+    powers = [_noise_power(model, rec, m, cutoff, int(order)) for rec, m in zip(given, motions, strict=True)]
+    floor = sum(len(e) * power for (e, _), power in zip(parts, powers, strict=True))
     rms, size, least = (float(np.sqrt(x / count)) for x in (left, whole, floor))
     return ForceError(rms if math.isfinite(rms) else math.inf, size, least, cutoff, int(order), count)
+
+
+def force_errors(
+    model: Model | InverseDynamics | TorqueOf, records: Sequence[Record], cutoff_hz: float, order: int, first: Sequence[int]
+) -> list[tuple[Vector, Vector]]:
+    """(logged minus needed torque, torque at the shaft) of each record, over its samples in motion [N m]."""
+    parts = []
+    for rec, start in zip(records, first, strict=True):
+        motion = motion_of(rec, cutoff_hz, order)
+        kept = in_motion(motion, cutoff_hz, start)
+        at_shaft, needed = _torques(model, rec, motion, cutoff_hz, order)
+        e, s = (low_passed(x, rec.dt, cutoff_hz, order)[kept] for x in (at_shaft - needed, at_shaft))
+        parts.append((e, s))
+    return parts
 
 
 def needed_torque(model: Model, rec: Record, cutoff_hz: float, order: int = ORDER) -> Vector:

@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 from gaident.axis import Text, checked_axis, say, turns
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
+from gaident.estimation.criterion import bic, effective_samples
 from gaident.estimation.regression.motion import cutoff_of, noise_share
-from gaident.estimation.regression.regression import bic, covariance, effective_samples, solve
+from gaident.estimation.regression.regression import covariance, solve
 from gaident.estimation.regression.rows import Rows, decimation_of, rows_of
 from gaident.estimation.regression.torque_terms import CHOICES, TERMS, estimates_of
 from gaident.policy.table import POLICY
 from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["inverse_dynamics"]
+__all__ = ["ORDER", "inverse_dynamics"]
 
 Vector = NDArray[np.float64]
 
@@ -135,7 +136,7 @@ def inverse_dynamics(
     if asked is None:
         possible = [c for c in possible if _exists(rows, c)] or possible
     squares = {choice: _squares(rows, choice) for choice in possible}
-    scores = {c: bic(squares[c], count, n_eff, _count(c)) for c in possible}
+    scores = {c: bic(squares[c] / count, n_eff, _count(c)) for c in possible}
     chosen = _material(min(possible, key=lambda c: (scores[c], len(c))), squares)
     theta, rank = _fitted(rows, chosen)
     X, left = [r.of(chosen) for r in rows], [r.torque - r.of(chosen) @ theta for r in rows]
@@ -279,7 +280,7 @@ def _effective(rows: Sequence[Rows], possible: Sequence[tuple[str, ...]]) -> flo
     fits = [(c, _fitted(rows, c)[0]) for c in possible]
     lefts = [[r.torque - r.of(c) @ theta for r in rows] for c, theta in fits]
     best = int(np.argmin([sum(float(x @ x) for x in left) for left in lefts]))
-    return max(effective_samples(lefts[best]), 2.0 * len(fits[best][1]))  # no decision: no fewer than the fit has numbers twice
+    return max(effective_samples(*lefts[best]), 2.0 * len(fits[best][1]))  # no decision: no fewer than the fit has numbers twice
 
 
 def _relative(left: Sequence[Vector], rows: Sequence[Rows]) -> float:

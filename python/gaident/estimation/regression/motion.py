@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 
-__all__ = ["Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "torque_noise"]
+__all__ = ["BAND", "Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "torque_noise"]
 
 Vector = NDArray[np.float64]
 

@@ -1,15 +1,14 @@
-"""Ordinary least squares whose deviations and whose criterion know that neighbouring residuals are alike.
+"""Ordinary least squares whose deviations know that neighbouring residuals are alike.
 
     theta = argmin |y - X theta|^2
     cov   = (X'X)^-1 S (X'X)^-1
     S     = sum_j k(j) sum_i (x_i r_i)(x_i-j r_i-j)',   k(j) = 1 - |j|/(L + 1) for |j| <= L       (Newey and West 1987)
-    n_eff = n/(1 + 2 sum_j rho(j)),   rho the autocorrelation of r up to its last positive pair    (Geyer 1992)
-    BIC   = n_eff ln(|r|^2/n) + k ln n_eff,   k columns
 
 L = 1.3 sqrt(n), as Lazarus, Lewis, Stock and Watson (2018) recommend for tests. No deviation is smaller than that of
-white residuals. Theory: docs/theory/inverse-dynamics.md.
+white residuals. Columns are chosen by the criterion of all models (estimation/criterion.py), with the independent samples of
+the residuals. Theory: docs/theory/inverse-dynamics.md.
 
-W. K. Newey, K. D. West, Econometrica 55(3):703-708, 1987. C. J. Geyer, Statistical Science 7(4):473-483, 1992.
+W. K. Newey, K. D. West, Econometrica 55(3):703-708, 1987.
 E. Lazarus, D. J. Lewis, J. H. Stock, M. W. Watson, Journal of Business and Economic Statistics 36(4):541-559, 2018.
 """
 
@@ -20,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["bic", "covariance", "effective_samples", "solve"]
+__all__ = ["covariance", "solve"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -36,29 +35,6 @@ def solve(X: Matrix, y: Vector) -> tuple[Vector, int]:
     length[length == 0.0] = 1.0
     theta, _, rank, _ = np.linalg.lstsq(X / length, y, rcond=RANK)
     return np.asarray(theta / length), int(rank)
-
-
-def effective_samples(residuals: Sequence[Vector]) -> float:
-    """How many independent samples the residuals of these records, (n_i,) each, are worth; from 1 to the sum of n_i."""
-    n = sum(len(r) for r in residuals)
-    longest = max(len(r) for r in residuals)
-    size = 1 << (2 * longest - 1).bit_length()
-    products = np.zeros(longest)
-    for r in residuals:
-        spectrum = np.abs(np.fft.rfft(r, size)) ** 2
-        products[: len(r)] += np.fft.irfft(spectrum, size)[: len(r)]
-    if not products[0] > 0.0:
-        return float(n)
-    rho = products / products[0]
-    pairs = rho[1 : 2 * ((longest - 1) // 2) + 1].reshape(-1, 2).sum(axis=1)
-    negative = np.flatnonzero(pairs <= 0.0)
-    kept = pairs[: negative[0]] if negative.size else pairs
-    return float(np.clip(n / (1.0 + 2.0 * kept.sum()), 1.0, n))  # no decision: the variance of a mean of correlated samples
-
-
-def bic(squares: float, n: int, n_eff: float, columns: int) -> float:
-    """The criterion of a model with this sum of squares; a perfect one is worth as much as the last digits are."""
-    return float(n_eff * np.log(max(squares, 1e-300) / n) + columns * np.log(n_eff))
 
 
 def covariance(X: Sequence[Matrix], residuals: Sequence[Vector]) -> Matrix:

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from gaident.data.record import Record
 from gaident.data.signals.decimation import low_passed
+from gaident.estimation.criterion import effective_samples
 from gaident.estimation.regression.motion import cutoff_of, motion_of
-from gaident.estimation.regression.regression import effective_samples, solve
+from gaident.estimation.regression.regression import solve
 from gaident.estimation.regression.rows import decimation_of
 from gaident.estimation.regression.torque_terms import columns_of
 from gaident.policy.table import POLICY
@@ -88,5 +89,5 @@ def torque_lag(rec: Record) -> TorqueLag | None:
         return None
     within = 0.25 * (before - after) / curvature  # no decision: a parabola through three values
     lowest = max(least - curvature * within**2, 0.0)
-    std = float(np.sqrt(lowest / (effective_samples([residuals[best][::factor]]) * curvature)))
+    std = float(np.sqrt(lowest / (effective_samples(residuals[best][::factor]) * curvature)))
     return TorqueLag(steps[best] + within, std, lowest)

@@ -97,7 +97,7 @@ def tiles(dia: Diagnosis, view: View) -> Html:
         low, high = dia.gain_interval
         interval = typeset(f"95 % interval of the fall: {percent(low)} to {percent(high)} %") if math.isfinite(low) else ""
         fall = 1.0 - dia.after.rmse / dia.before.rmse
-        label = "the error grows by" if fall < -0.005 else "the error falls by"
+        label = "the error grows by" if fall < -0.005 else "the error falls by"  # no decision: what is printed as 0 %
         shown.append(tile(label, typeset(f"{percent(abs(fall))} %"), interval))
     return joined(shown)
 
@@ -186,7 +186,7 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
         if dia.model.effects:
             parts.append(table(("", "value", "unit", "linear fit alone", "moved", ""), [rows]))
         else:
-            parts.append(table(("", "value", "unit", ""), [[(*r[:3], r[5]) for r in rows]]))
+            parts.append(table(("", "value", "unit", ""), [[(*r[:3], r[5]) for r in rows]]))  # no decision: columns of a table
         parts.append(tag("p", tag("small", "± is one standard deviation, the colour of the noise taken into account.")))
     if any(not f.is_noise for f in dia.findings):
         parts.append(tag("p", "The parameters of the effects stand with their cause above."))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaident.axis import said, word
+from gaident.policy.table import POLICY
 from gaident.show.chart import Chart
 from gaident.show.diagnosis_charts import missing_over_velocity, missing_reversals, residual_spectrum
 from gaident.show.draw import picture
@@ -35,7 +36,7 @@ __all__ = [
     "tile",
 ]
 
-SHOWN = 4  # records with a chart of their own
+SHOWN = 4  # no decision: records with a chart of their own; how many are drawn
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,7 @@ def missing_section(view: View, noise: float, drawn: Charts, *before: str) -> Se
     else:
         parts.append(tag("h3", "Against the velocity"))
         parts.append(drawn.put(missing_over_velocity(run.measured, run.dhat, run.dt, run.std, view.curve, axis)))
-    if run.dhat is not None and float(np.abs(run.dhat).max()) <= 2.0 * run.std:
+    if run.dhat is not None and float(np.abs(run.dhat).max()) <= POLICY.below_zero * run.std:
         text = f"None of the missing {word('torque', axis)} can be told from zero: there is no more to show."
         parts.append(tag("p", text))
     elif run.dhat is not None:
@@ -206,4 +207,5 @@ def roots_table(roots: Sequence[tuple[str, complex, str]]) -> Html:
 def title_of(runs: Sequence[Run]) -> str:
     """The names of the fitted records, as far as they fit."""
     names = [r.name for r in runs if r.name]
+    # no decision: how many names are listed
     return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

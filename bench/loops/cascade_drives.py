@@ -1,6 +1,6 @@
 """identify() on random drives whose log has a line for every 8th sample of a known controller: right (p, q), and deviations.
 
-    python bench/cascade_drives.py [--drives 20] [--noise 0.01]
+    python bench/loops/cascade_drives.py [--drives 20] [--noise 0.01]
 
 Each drive is one or two masses under a cascade (rule, weight and filters at random) at 125 us; its log has a line each
 millisecond.

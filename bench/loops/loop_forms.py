@@ -1,7 +1,8 @@
 """Which form of controller a diagnosis finds, where only a bare PI is given and the drive's loop is another.
 
-    python bench/loop_forms.py --out forms.jsonl [--cases 1] [--seed 1] [--loops NAME ...] [--every 1 2 4 8] [--effects NAME ...]
-    python bench/loop_forms.py --out forms.jsonl --report
+    python bench/loops/loop_forms.py --out forms.jsonl [--cases 1] [--seed 1] [--loops NAME ...] [--every 1 2 4 8]
+        [--effects NAME ...]
+    python bench/loops/loop_forms.py --out forms.jsonl --report
 
 Drives as in industry (tests/python/loop_cases.py): 60 to 500 Hz, inertia ratio 0.3 to 10, a current loop of 0.1 to 0.5 ms, an
 encoder of 17 to 24 bits, a torque limit reached in a third; a log line for every 1, 2, 4 and 8 samples of the controller.
@@ -23,7 +24,8 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 # ruff: noqa: E402
 import sys
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "python" / "support"))
+BENCH = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(BENCH), str(BENCH.parent / "tests" / "python" / "support")]
 
 import numpy as np
 from json_lines import read, work
