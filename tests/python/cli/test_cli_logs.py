@@ -357,7 +357,7 @@ SEARCHING = Message("generation 120, best fitness 9.107e+05, species (1, 2) of 1
 
 
 def test_a_search_says_how_far_it_is_in_long_and_in_short() -> None:
-    from test_plots import one_mass_record
+    from one_mass import one_mass_record
 
     rec, controller = one_mass_record()
     heard: list[str] = []

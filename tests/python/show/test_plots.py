@@ -6,7 +6,6 @@ import dataclasses
 import io
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,18 +14,8 @@ import pytest
 import gaident as ga
 from gaident.show import plot_bode, plot_convergence, plot_identification, plot_poles_zeros, plot_structures
 from gaident.show.chart import envelope
-
-TRUTH = ga.OneMass(J=2e-4, D=0.004)
-CONTROLLER = ga.PI(kp=0.02, ki=0.5)
-
-
-def one_mass_record(samples: int = 300) -> tuple[ga.Record, ga.PI]:
-    """A staircase of a one-mass drive with noise."""
-    command = np.repeat([20.0, -10.0, 30.0], samples // 3)
-    still = ga.Record(1e-3, command=command, velocity=0.0 * command, torque=0.0 * command)
-    done = ga.run(TRUTH, still, CONTROLLER)
-    velocity = done.velocity + 0.2 * np.random.default_rng(5).standard_normal(command.size)
-    return ga.Record(1e-3, command, velocity, torque=done.torque, name="staircase"), CONTROLLER
+from one_mass import one_mass_record
+from places import SUPPORT
 
 
 @pytest.fixture(scope="module")
@@ -108,11 +97,11 @@ def test_long_signals_keep_their_extremes() -> None:
 def test_no_pyplot_and_no_window() -> None:
     code = """
 import sys
-from test_plots import one_mass_record
+from one_mass import one_mass_record
 import gaident as ga
 rec, controller = one_mass_record()
 figure = ga.identify(rec, controller=controller).plot()
 assert type(figure.canvas).__name__ == "FigureCanvasAgg", figure.canvas
 assert "matplotlib.pyplot" not in sys.modules
 """
-    subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parent, check=True)
+    subprocess.run([sys.executable, "-c", code], cwd=SUPPORT, check=True)

@@ -171,7 +171,7 @@ def test_wording() -> None:
 
 
 def test_real_result_and_its_copy_from_a_file_read_alike(tmp_path: Path) -> None:
-    from test_plots import one_mass_record
+    from one_mass import one_mass_record
 
     rec, controller = one_mass_record()
     idn = ga.identify(rec, controller=controller)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["BENCH", "CORE", "GOLDEN", "PACKAGE", "ROOT", "SAMPLES"]
+__all__ = ["BENCH", "CORE", "GOLDEN", "PACKAGE", "ROOT", "SAMPLES", "SUPPORT"]
 
 ROOT = Path(__file__).resolve().parents[3]
 BENCH = ROOT / "bench"
 CORE = ROOT / "csrc" / "gaident"
 PACKAGE = ROOT / "python" / "gaident"
-SAMPLES = Path(__file__).parent / "samples"
-GOLDEN = Path(__file__).parent / "golden"
+SUPPORT = Path(__file__).parent
+SAMPLES = SUPPORT / "samples"
+GOLDEN = SUPPORT / "golden"
