@@ -10,7 +10,7 @@ from typing import Any
 from gaident.axis import Text, say
 from gaident.checks import one_of
 from gaident.control.controller import Controller
-from gaident.control.pi import LOOPS
+from gaident.control.words import LOOPS
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.drive.drive_file import COLUMNS, KEYS, Drive, read_drive_file, unfilled_of

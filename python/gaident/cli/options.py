@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 
 from gaident.cli.log_options import add_log_commands, add_log_options, number
 from gaident.cli.report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
-from gaident.control.pi import LOOPS
+from gaident.control.words import LOOPS
 from gaident.errors import SettingsError
 from gaident.results.settings import INITIAL_STATES
 

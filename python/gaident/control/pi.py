@@ -20,16 +20,15 @@ from gaident.control.filtering import rate_limited
 from gaident.control.pi_torque import pi_torque
 from gaident.control.ticks import Ticks, of_lines
 from gaident.control.unknown import known, with_own
+from gaident.control.words import ANTI_WINDUP, LOOPS
 from gaident.errors import ControllerError, SettingsError
 
 Vector = NDArray[np.float64]
 
 PI_OF_GAINS = arg("controller", "PI(kp=..., ki=...)", python="PI(kp=..., ki=...)")
-LOOPS = ("sampled", "continuous")
 RULES = {"trapezoidal": 0.5, "backward": 1.0, "forward": 0.0}
 """Rule of integration -> share of ki T that the newest error has in a step of the integral."""
 DIGITAL = ("rule", "command_weight", "anti_windup", "tracking_time")
-ANTI_WINDUP = ("none", "hold", "tracking")
 _NOT_GIVEN = float("nan")  # told from a given nan by identity
 
 
