@@ -54,6 +54,12 @@ def test_a_hidden_effect_is_named(effect: str) -> None:
     assert judged.exact, judged
 
 
+def test_a_cause_that_output_errors_do_not_show_is_looked_for_in_whitened_ones() -> None:
+    """Without a torque, a late loop leaves an error so large and slow that under output errors no effect is worth its penalty."""
+    judged = diagnosed(("transport_delay",), noise="coloured", torque=False, seed=131000002)
+    assert judged.exact, judged
+
+
 EQUIVALENT = ("torque_lag", "velocity_filter")
 
 

@@ -122,7 +122,10 @@ class _Found:
 
 
 def _decided(task: Task, note: Callable[[str], None]) -> _Found:
-    """Steps 1 to 4; where the linear model leaves a large misfit, step 2 first: step 1 may then be needless."""
+    """Steps 1 to 4; where the linear model leaves a large misfit, step 2 first: what that finds may make step 1 needless.
+
+    Where it finds nothing, the test is of a model that lacks the cause, and says nothing of the noise.
+    """
     task, bases = linear_bases(task)
     space = task.space()
     if task.data.torque_measured:
@@ -132,7 +135,7 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     if min(space.ratio(b) for b in bases) > POLICY.noise_ratio:
         by_output = _by_output_errors(task.by_output_errors, bases, note)
         test = specification(space, task, _as_innovations(space, by_output.final))
-        if test.contradicts:
+        if test.contradicts and by_output.final.effects:
             return replace(by_output, specification=test)
     base, final = _explored(task, space, bases)
     test = specification(space, task, final)
