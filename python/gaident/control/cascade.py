@@ -279,7 +279,7 @@ class Cascade(Controller):
         """See `Controller`."""
         source, placed = self.command_of(log), self.position is not None
         assert source is not None
-        start = float(log.position[0]) if placed and log.position is not None else 0.0
+        start = float(log.position[0]) if placed and log.position is not None else self.start_angle(source)
         feed = self.velocity_feedforward, self.acceleration_feedforward
         return core.line_record(log.dt, source - start, log.velocity, self.log_every(log.dt), placed, *feed)
 

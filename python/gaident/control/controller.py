@@ -131,6 +131,10 @@ class Controller(ABC):
         signal: Vector | None = getattr(log, self.driven_by)
         return signal
 
+    def start_angle(self, source: Vector) -> float:
+        """Angle [rad] at which its axis rests before a log without a position; source: of `command_of`, (n,)."""
+        return float(source[0]) if self.driven_by == "position_command" else 0.0
+
     def simulated_with(self, dt: float) -> Controller | None:
         """What an estimation closes a simulated loop over, the log's sample time dt [s]; None: the torque drives the model.
 

@@ -258,7 +258,7 @@ class _Work:
             mechanics = mechanics_of(self.under, self.estimate)
             model = with_effects(self.estimate.parameters.model(self.estimate.x), self.at_controller.effects)
             check = by_second_method(self.clean, gains, model, mechanics, estimates, self.pi is None, self.axis)
-            causes, why = standing(causes, gains, check)
+            causes, why = standing(causes, gains, check, self._equivalent_here)
             if why:
                 driver = driver or self.left.strongest or "time"
                 self.notes += why

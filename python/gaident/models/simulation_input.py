@@ -80,5 +80,7 @@ def checked_substeps(substeps: int | None) -> int:
 
 
 def core_record(rec: Record, source: Signal, controller: Controller | None) -> _core.EffectRecord:
-    start = 0.0 if rec.position is None else float(rec.position[0])
+    start = 0.0 if controller is None else controller.start_angle(source)
+    if rec.position is not None:
+        start = float(rec.position[0])
     return core.effect_record(rec.dt, source, rec.position, rec.velocity, start, controller)

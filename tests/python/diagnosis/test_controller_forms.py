@@ -153,3 +153,11 @@ def test_a_slower_log_whose_torque_no_form_makes_names_none() -> None:
     assert rec.torque is not None
     loop = loop_of([rec.with_channels(torque=rec.torque * (1.0 + 0.2 * np.sign(rec.torque)))], ga.Cascade(GIVEN, T))
     assert loop.findings == () and loop.controller == ga.Cascade(GIVEN, T)
+
+
+@pytest.mark.parametrize("every", [2, 8])
+def test_the_given_controller_is_no_other_form_of_itself_in_a_slow_log(every: int) -> None:
+    """A limit between the lines leaves an error of colour, in which other gains by a part in a thousand would gain BIC units."""
+    rec = slower(every, noise=0.02, torque_limit=0.6)
+    shown = form_shown([rec], GIVEN, (), every)
+    assert shown is not None and set(shown.numbers) == {"torque_saturation"}

@@ -16,6 +16,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 import gaident as ga
+from gaident.control.controller import Limiting
 from gaident.diagnosis.selection import model_space, moves, score_test
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.bootstrap import largest_gains
@@ -75,7 +76,7 @@ DEEP = toy("deep", [(0.5, 0.3, 0.1)], family="friction", levels=True, nested=("l
 GAP = toy("gap", [(0.5,)], place="coupling", excludes=frozenset({"resonance"}))
 RESONANCE = toy("resonance", [(60.0, 0.1, 50.0, 0.1)], place="plant", resonates=True, excludes=frozenset({"gap"}))
 RESONANCE = replace(RESONANCE, limits=lambda s: [(1.0, 500.0), (0.0, 2.0)] * 2, steps=lambda s: (5.0, 0.1) * 2)
-LIMIT = toy("limit", [(0.5,)], place="controller", replayed=lambda rec, pi, v: (rec, pi))
+LIMIT = toy("limit", [(0.5,)], place="controller", limiting=lambda p: Limiting())
 PLACED = toy("placed", [(0.1,), (0.5,), (0.9,)])
 VALLEY = toy("valley", [(0.25,)], multimodal=True)
 VALLEY = replace(VALLEY, limits=lambda s: [(0.0, 1.0)], steps=lambda s: (0.6,))

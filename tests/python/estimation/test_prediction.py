@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from gaident.control.controller import Limiting
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.estimation.dataset import DataSet, torque_in, with_angle
 from gaident.estimation.parameterisation import Parameterisation
@@ -57,16 +58,16 @@ def test_an_effect_of_the_controller_may_have_several_parameters() -> None:
     found = data()
     seen: list[np.ndarray] = []
 
-    def replayed(rec: ga.Record, controller: ga.PI, values: np.ndarray) -> tuple[ga.Record, ga.PI]:
+    def limiting(values: np.ndarray) -> Limiting:
         seen.append(values.copy())
-        return rec, replace(controller, integrator_limit=float(values[0]), torque_limit=float(values[1]))
+        return Limiting(integrator=float(values[0]), slope=1e3 * float(values[1]))
 
     two = replace(
         CLAMP,
         natural=lambda Z: np.exp(Z),
         limits=lambda s: [(-10.0, 10.0)] * 2,
         steps=lambda s: (0.1, 0.1),
-        replayed=replayed,
+        limiting=limiting,
     )
     p, x = parameters()
     rows = np.array([[0.05, 0.6], [0.05, 0.2], [0.05, 0.6]])

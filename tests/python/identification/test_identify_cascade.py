@@ -97,6 +97,10 @@ def test_one_equation_is_the_simulated_position_loop(position_every: int, every:
     rec = still.with_channels(velocity=ga.simulate(DRIVE, still, cascade))
     assert cost(rec, cascade) < 5e-6
     assert line_equation([rec], cascade, None)
+    # Without a position in the log the axis rests where its path begins.
+    moved = ga.Record(rec.dt, position_command=command + 10.0, torque=np.zeros(500), velocity=rec.velocity)
+    np.testing.assert_allclose(ga.simulate(DRIVE, moved, cascade), rec.velocity, atol=1e-9)
+    assert cost(moved, cascade) < 5e-6
 
 
 @pytest.mark.parametrize(

@@ -256,17 +256,20 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
 
 
 def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[_Candidate], floor: float) -> Shown | None:
-    """The same of a log with fewer lines: None where it leaves more than another course between the lines could make."""
-    best = candidates[0]
-    numbers, filters, cov = _fitted(law, best, given)
-    left = law.logged - law.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
-    if not _rms([left]) <= max(POLICY.near_rounding * floor, POLICY.negligible * float(np.abs(law.torque).max())):
+    """The same of a log with fewer lines: None where it leaves more than another course between them could make."""
+    allowed = max(POLICY.near_rounding * floor, POLICY.negligible * float(np.abs(law.torque).max()))
+    plain = [c for c in candidates if not c.names]  # where the given controller leaves no more, no other one is looked for
+    for best in (*plain[:1], candidates[0]):
+        numbers, filters, cov = _fitted(law, best, given)
+        left = law.logged - law.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
+        if _rms([left]) <= allowed:
+            break
+    else:
         return None
+    candidates = [best, *(c for c in candidates if c is not best)]
     free = replace(_controller(best, numbers, filters, given, law.period), period=law.period)
-    if too_fast(free, records[0].dt):
-        return None
     at_limit = limited(records, free)
-    if not best.names and at_limit.limit is None:
+    if too_fast(free, records[0].dt) or (not best.names and at_limit.limit is None):
         return None
     named, gains = _named(best, numbers, filters, cov, law.period), _gains(candidates)
     if at_limit.limit is not None:

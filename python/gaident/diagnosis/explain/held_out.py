@@ -8,13 +8,13 @@ A name rests on the records that were fitted. Data that no parameter has seen sp
 "Worse", "better" and "larger" are beyond the variation over blocks of the held-out data (95 % of a paired bootstrap): a lower
 error alone decides nothing. "Worse" is also by more than an effect may add to the error (`harm`): of two models that leave
 little more than the noise, one is surely the worse, by less than matters.
-A cause that the inverse-dynamics regression holds too has a second witness and stands: a free run may miss where the data cannot
-show a motion, as speeds that are only held.
+A cause that the inverse-dynamics regression holds too, or that these records cannot tell from what it holds, stands:
+a free run may miss where the data cannot show a motion, as speeds that are only held.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from gaident.axis import Text, say
 from gaident.diagnosis.check import Check
@@ -25,9 +25,11 @@ from gaident.policy.table import POLICY
 __all__ = ["standing"]
 
 
-def standing(causes: Sequence[str], gains: Gains, check: Check) -> tuple[list[str], tuple[Text, ...]]:
-    """(the causes that the held-out data leave, why others went)."""
-    kept = _witnessed(causes, check)
+def standing(
+    causes: Sequence[str], gains: Gains, check: Check, same: Callable[[str], Collection[str]]
+) -> tuple[list[str], tuple[Text, ...]]:
+    """(the causes that the held-out data leave, why others went); same: effect -> what these records cannot tell from it."""
+    kept = _witnessed(causes, check, same)
     why = _lost(gains, check) if len(kept) < len(causes) else None
     return (list(causes), ()) if why is None else (kept, (why,))
 
@@ -55,10 +57,10 @@ def _lost(gains: Gains, check: Check) -> Text | None:
     return None
 
 
-def _witnessed(effects: Sequence[str], check: Check) -> list[str]:
-    """Those of the effects that the regression holds too, itself or another of its family."""
+def _witnessed(effects: Sequence[str], check: Check, same: Callable[[str], Collection[str]]) -> list[str]:
+    """Those that the regression holds too: itself, another of its family, or what is the same in these records."""
     if check.regression is None:
         return []
     terms = of_inverse_dynamics({name: e.value for name, e in check.regression.parameters.items()})
     names, families = {t.name for t in terms}, {t.family for t in terms if t.family}
-    return [e for e in effects if e in names or LIBRARY[e].family in families]
+    return [e for e in effects if LIBRARY[e].family in families or names & {e, *same(e)}]

@@ -170,9 +170,9 @@ class Moves(ModelSpace):
             basis = orthonormal_rows(rows[:-2])
             column, rest = (v - (v @ basis.T) @ basis for v in rows[-2:])
             size, slope = float(column @ column), float(column @ rest)
-            if size > 0.0 and slope != 0.0:
+            if size > 0.0 and 0.0 < slope * slope < np.inf:  # infinite where the fit has diverged
                 power = float(rest @ rest)
-                fall = gained(power, power - slope**2 / size, self.objective.information)
+                fall = gained(power, power - slope * slope / size, self.objective.information)
                 if fall > best:
                     best, stiffness = fall, slope / size
         starts = [as_held(fit, stiffness, data)] if stiffness > 0.0 and best > self.policy.hope * self.penalty else []
