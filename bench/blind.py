@@ -16,6 +16,7 @@ Every finished case is a line of the file: stop at will, start again and it goes
     settled  a load that the integrator carries before the record starts, torque logged
     loops    loops of servo drives, wholly known, at 125 us with the log every 1, 2, 4, 8 samples: clean, and the effects in turn
              (--loops, --every: only these; --effects none: only clean ones)
+    measured no controller: a torque that was measured, with white noise of 5 and 10 % of its rms; clean, and effects at the shaft
 """
 
 from __future__ import annotations
@@ -51,7 +52,9 @@ from drive_rig import COUPLING, OUTSIDE
 from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_noise, loop_plant
 
 NOISE_KINDS = ("white", "encoder", "coloured")
-GROUPS = ("clean", "effects", "sizes", "pairs", "outside", "encoder", "settled", "loops")
+GROUPS = ("clean", "effects", "sizes", "pairs", "outside", "encoder", "settled", "loops", "measured")
+TORQUE_NOISE = (0.05, 0.1)  # of the rms of a measured torque
+AT_THE_SHAFT = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "quadratic_drag", "unbalance", "cogging")
 
 
 @dataclass(frozen=True)
@@ -69,11 +72,13 @@ class Cell:
     plant: str | None = None
     loop: str = ""  # of LOOPS; "": a bare PI at the log's clock
     every: int = 1  # controller samples to a line of the log
+    torque_noise: float = 0.0  # of the torque's rms: a measured torque drives the axis; 0: the controller's, as logged
 
     @property
     def key(self) -> str:
         factor = "" if self.factor is None else f"{self.factor:.4g}"
         loop = [self.loop, str(self.every)] if self.loop else []
+        loop += [f"torque {self.torque_noise:g}"] if self.torque_noise else []
         parts = [self.group, *loop, "+".join(self.effects), self.kind, self.noise, f"u{self.torque:d}", factor, str(self.seed)]
         return "/".join(parts)
 
@@ -120,6 +125,10 @@ def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float
             yield Cell(group, ("load_torque",), "multi", NOISE_KINDS[number % 3], True, number, settle=1500)
         elif group == "loops":
             yield from loop_cells(number)
+        elif group == "measured":
+            for share in TORQUE_NOISE:
+                for effect in ("", *AT_THE_SHAFT):
+                    yield Cell(group, (effect,) if effect else (), "multi", "white", True, number, torque_noise=share)
 
 
 def loop_cells(number: int) -> Iterator[Cell]:
@@ -133,7 +142,7 @@ def loop_cells(number: int) -> Iterator[Cell]:
                 yield Cell("loops", effects, loop_kind(loop), noise, True, number, loop=loop, every=every)
 
 
-def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade, Truth]:
+def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade | None, Truth]:
     """Record, validation record, controller and truth of a cell. Raises RuntimeError where its effect does not act there."""
     rng = np.random.default_rng(cell.seed)
     if cell.loop:
@@ -142,7 +151,20 @@ def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade
         plant, noise = loop_plant(cell.loop, cell.every, rng, two), loop_noise(cell.noise, cell.seed)
         return random_case(cell.seed, cell.effects, cell.kind, noise, cell.torque, cell.factor, plant, plant.placed)
     plant = next(p for p in iter(lambda: random_plant(rng), None) if p.name == cell.plant) if cell.plant else None
-    return random_case(cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, plant, settle=cell.settle)
+    case = random_case(cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, plant, settle=cell.settle)
+    if not cell.torque_noise:
+        return case
+    record, validation, _, truth = case
+    assert validation is not None
+    return measured(record, cell, 0), measured(validation, cell, 1), None, truth
+
+
+def measured(record: ga.Record, cell: Cell, number: int) -> ga.Record:
+    """The record with a torque that was measured, not commanded, and with the noise of such a measurement."""
+    torque = np.asarray(record.torque)
+    noise = np.random.default_rng([cell.seed, number]).standard_normal(len(torque))
+    torque = torque + cell.torque_noise * float(np.sqrt(np.mean(torque**2))) * noise
+    return ga.Record(record.dt, velocity=record.velocity, torque=torque, torque_is="measured", name=record.name)
 
 
 def run(cell: Cell, with_oracle: bool) -> dict[str, Any]:
@@ -161,10 +183,19 @@ def run(cell: Cell, with_oracle: bool) -> dict[str, Any]:
     line |= {"seconds": time.perf_counter() - started, "judged": judge(dia, truth.effects).as_dict()}
     line |= {"processor": time.process_time() - processor, "simulations": dia.simulations}
     line |= {"before": dia.before.rmse, "after": dia.after.rmse}
+    if cell.torque_noise:
+        line |= inertia_of(dia, truth.plant.J + truth.plant.JL)
     inside = cell.effects and not set(cell.effects) & set(OUTSIDE) and not describes_noise(cell.effects)
     if with_oracle and validation is not None and inside and not cell.settle and not cell.loop:
         line["oracle"] = blind_refit.oracle(truth, record.velocity, validation.velocity)
     return line
+
+
+def inertia_of(dia: Any, truth: float) -> dict[str, float]:
+    """Relative error of the whole inertia, and how many of its deviations that is."""
+    found = dia.mechanics["inertia"]
+    error = found.value - truth
+    return {"inertia_error": error / truth, "inertia_deviations": error / found.std}
 
 
 def limit_cells(plants: list[str]) -> Iterator[tuple[str, int]]:

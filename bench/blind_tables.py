@@ -257,6 +257,22 @@ def seconds_table(lines: list[Line]) -> str:
     return table(["record", "n", "median [s]", "95 %", "longest"], rows)
 
 
+def measured_table(lines: list[Line]) -> str:
+    """A torque that was measured: names, and how far the inertia is off."""
+    rows = []
+    for share in sorted({x["cell"]["torque_noise"] for x in lines}):
+        some = [x for x in lines if x["cell"]["torque_noise"] == share]
+        clean, hidden = ([x for x in some if bool(x["cell"]["effects"]) is there] for there in (False, True))
+        off, far = (np.abs([x[f"inertia_{name}"] for x in some]) for name in ("error", "deviations"))
+        numbers = [f"{100 * np.median(off):.2g} %", f"{100 * np.max(off):.2g} %", f"{np.median(far):.2g}", f"{np.max(far):.2g}"]
+        reported = rate(sum(bool(x["judged"]["sets"]) for x in clean), len(clean))
+        found, wrong = (rate(sum(bool(x["judged"][key]) for x in hidden), len(hidden)) for key in ("in_set", "wrong"))
+        rows.append([f"{100 * share:g} %", reported, found, wrong, *numbers])
+    head = ("noise of the torque", "clean: anything reported", "hidden: in set", "hidden: a wrong name", "inertia, median error",
+            "largest", "in deviations, median", "largest")  # fmt: skip
+    return table(head, rows)
+
+
 def report(lines: list[Line]) -> str:
     """All tables for which there are lines."""
     done = [x for x in lines if "judged" in x]
@@ -281,6 +297,7 @@ def report(lines: list[Line]) -> str:
     add("An encoder that is really differenced", groups.get("encoder", []), encoder_table)
     add("A load settled before the record", groups.get("settled", []), effect_table)
     add("Loops of servo drives, wholly known", groups.get("loops", []), loop_table)
+    add("A measured torque that drives the axis", groups.get("measured", []), measured_table)
     add("Time of a diagnosis", done, seconds_table)
     crashed = [x for x in lines if "crash" in x]
     add("Crashes", crashed, lambda some: "\n".join(f"- {x['key']}: {x['crash']}" for x in some))

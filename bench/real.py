@@ -72,6 +72,7 @@ def of_model(model: ga.Model, parts: Parts) -> dict[str, Any]:
         "velocity": fits.rmse(parts.held_out, lambda r: models.free_run(model, r)),
         "force": fits.force_error(parts.held_out, model),
         "training": fits.rmse(parts.training, lambda r: models.free_run(model, r)),
+        "blocks": fits.blocks(parts.held_out, lambda r: models.free_run(model, r)),
     }
 
 
@@ -112,6 +113,7 @@ def of_rigid(eight: np.ndarray, parts: Parts) -> dict[str, Any]:
         "velocity": fits.rmse(parts.held_out, lambda r: fits.simulated(eight, r)),
         "force": fits.force_error(parts.held_out, lambda r: fits.rigid_torque(eight, r)),
         "training": fits.rmse(parts.training, lambda r: fits.simulated(eight, r)),
+        "blocks": fits.blocks(parts.held_out, lambda r: fits.simulated(eight, r)),
     }
 
 

@@ -4,8 +4,9 @@
         [--effects NAME ...]
     python bench/loops/loop_forms.py --out forms.jsonl --report
 
-Drives as in industry (tests/python/loop_cases.py): 60 to 500 Hz, inertia ratio 0.3 to 10, a current loop of 0.1 to 0.5 ms, an
-encoder of 17 to 24 bits, a torque limit reached in a third; a log line for every 1, 2, 4 and 8 samples of the controller.
+Drives as in industry (tests/python/support/loop_cases.py): 60 to 500 Hz, inertia ratio 0.3 to 10, a current loop of 0.1 to
+0.5 ms, an encoder of 17 to 24 bits, a torque limit reached in a third.
+The log has a line for every 1, 2, 4 and 8 samples of the controller.
 The controller that is given is PI(kp, ki), in a Cascade of the right period where the log is slower.
 --bare gives the PI alone there too; --unknown gives None for both gains.
 """

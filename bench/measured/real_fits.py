@@ -28,6 +28,7 @@ SUBSTEPS = 4
 START = 10
 SIXTH_OF_A_TURN = np.pi / 3.0
 TEN_TURNS = 20.0 * np.pi
+BLOCKS = 20  # each a few oscillations of the slowest error that these records show
 BAND = 0.1  # of the sample rate: the band in which torques are compared
 
 
@@ -100,6 +101,12 @@ def rmse(records: Sequence[ga.Record], model: Callable[[ga.Record], Vector]) -> 
     """Of the velocity over all records; inf where a run diverges."""
     squares = sum(float(np.sum((r.velocity - model(r)) ** 2)) for r in records)
     return float(np.sqrt(squares / sum(map(len, records)))) if np.isfinite(squares) else float("inf")
+
+
+def blocks(records: Sequence[ga.Record], model: Callable[[ga.Record], Vector]) -> list[float]:
+    """Mean squared velocity error of each of `BLOCKS` equal parts of all records in a row; [] where a run diverges."""
+    squares = np.concatenate([(r.velocity - model(r)) ** 2 for r in records])
+    return [float(np.mean(part)) for part in np.array_split(squares, BLOCKS)] if np.all(np.isfinite(squares)) else []
 
 
 def output_error(records: Sequence[ga.Record], axis: RigidAxis) -> Vector:

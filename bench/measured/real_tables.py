@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from real_records import DRIVES, cases
 
 PLAIN = ("regression", "rigid", "rigid by direction", "rigid, gravity", "rigid by direction, gravity")
@@ -66,6 +67,21 @@ def best_plain(lines: Lines, case: str, figure: str = "velocity") -> tuple[str, 
     return (min(kept)[1], min(kept)[0]) if kept else None
 
 
+def chosen_plain(lines: Lines, case: str) -> str | None:
+    """The plain fit with the least error on the training data: the one that an engineer would take."""
+    found = [(figures["training"], m) for m in PLAIN if "training" in (figures := method_of(lines, case, m))]
+    return min(found)[1] if found else None
+
+
+def worse_beyond_variation(lines: Lines, case: str, method: str) -> bool | None:
+    """Whether a method is better than the extended model in 97.5 of 100 draws of the held-out blocks; None where one has none."""
+    own, other = (method_of(lines, case, m).get("blocks") for m in ("extended", method))
+    if not own or not other:
+        return None
+    drawn = np.random.default_rng(0).integers(0, len(own), (2000, len(own)))
+    return bool(np.mean(np.mean(np.array(own)[drawn], axis=1) > np.mean(np.array(other)[drawn], axis=1)) > 0.975)
+
+
 def ratios(lines: Lines, figure: str) -> list[float]:
     """Ascending: the extended model's error over that of the best plain fit, of each case that has both."""
     found = []
@@ -77,7 +93,14 @@ def ratios(lines: Lines, figure: str) -> list[float]:
 
 
 def report(lines: Lines) -> str:
-    parts = [_figures(lines, "velocity"), _figures(lines, "force"), _names(lines), _stability(lines), _sums(lines)]
+    parts = [
+        _figures(lines, "velocity"),
+        _figures(lines, "force"),
+        _chosen(lines),
+        _names(lines),
+        _stability(lines),
+        _sums(lines),
+    ]
     return "\n\n".join(parts)
 
 
@@ -107,6 +130,40 @@ def _figures(lines: Lines, figure: str) -> str:
     unit = "free-run velocity rmse [rad/s or m/s]" if figure == "velocity" else "relative force error"
     head = ["case", *methods, "extended / best plain"]
     return f"Held-out {unit}; plain: {', '.join(PLAIN)}\n\n{_table(head, rows)}"
+
+
+def _chosen(lines: Lines) -> str:
+    """The extended model against the plain fit that the training data choose, and against the best on the held-out data."""
+    rows, sizes, forces, behind = [], [], [], 0
+    for case in cases():
+        best, chosen = best_plain(lines, case.key), chosen_plain(lines, case.key)
+        extended = method_of(lines, case.key, "extended")
+        if best is None or chosen is None or not extended:
+            continue
+        plain = method_of(lines, case.key, chosen)
+        sizes.append(extended["velocity"] / plain["velocity"])
+        forces.append(extended["force"] / plain["force"])
+        is_worse = worse_beyond_variation(lines, case.key, best[0])
+        behind += bool(is_worse)
+        said = "" if is_worse is None else "yes" if is_worse else "no"
+        rows.append([case.key, chosen, _number(sizes[-1]), _number(forces[-1]), _number(extended["velocity"] / best[1]), said])
+    if not rows:
+        return "No case has both parts"
+    head = [
+        "case",
+        "plain fit of the least training error",
+        "velocity",
+        "force",
+        "velocity over the best",
+        "worse beyond variation",
+    ]
+    said = [
+        f"{name}: at most {CLOSE} in {sum(r <= CLOSE for r in found)}, below 1 in {sum(r < 1.0 for r in found)} of {len(rows)}"
+        for name, found in (("velocity", sizes), ("force", forces))
+    ]
+    sums = "; ".join([*said, f"worse than the best beyond the variation of the held-out blocks in {behind}"])
+    title = "Held out, extended over the plain fit that the training data choose, and over the one best on the held-out data"
+    return f"{title}\n\n{_table(head, rows)}\n\n{sums}"
 
 
 def _names(lines: Lines) -> str:

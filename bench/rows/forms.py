@@ -1,6 +1,6 @@
 """Logs of a servo controller of another form than the bare PI that is given: which form the torque shows.
 
-The referee is tests/python/servo_referee.py, which shares no code with the library.
+The referee is tests/python/support/servo_referee.py, which shares no code with the library.
 """
 
 from __future__ import annotations

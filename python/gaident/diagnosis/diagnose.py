@@ -22,7 +22,7 @@ from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.experiments.candidates import IN_MOTION, candidates
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.held_out import standing
-from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off
+from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off, hidden_by_torque_noise
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
 from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.record import findings_of_the_record
@@ -33,8 +33,7 @@ from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_or
 from gaident.diagnosis.records.folded import ADVICE, folded
 from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation
 from gaident.diagnosis.records.sizes import scales_of
-from gaident.diagnosis.selection.attribution import only_describes, shown_by_the_records, simplified
-from gaident.diagnosis.selection.dependence import dependence
+from gaident.diagnosis.selection.attribution import only_describes, shown_by_the_records, simplified, what_is_left
 from gaident.diagnosis.selection.offset import Offset, offset_of
 from gaident.diagnosis.selection.rivals import Replacement
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
@@ -231,8 +230,7 @@ class _Work:
 
     def _settle(self, final: Fit) -> None:
         self.final = final
-        self.adequate = self.found.space.is_noise(final)
-        self.left = dependence(self.objective, final)
+        self.adequate, self.left = what_is_left(self.found.space, final)
         self.under, self.estimate = self.found.estimated()
 
     def judged(self) -> _Judged:
@@ -243,10 +241,13 @@ class _Work:
             gains = self._accepted_gains()
             driver = self.left.driver if self.adequate else self.left.strongest
             after = gains.after
-            if driver is None and after.rmse > POLICY.free_run_ratio * after.noise_floor > 0.0:
+            beyond = after.rmse / floor if (floor := gains.floor) > 0.0 else 0.0
+            if driver is None and beyond > POLICY.free_run_ratio:
                 # A noise filter removes a slow misfit completely; the free run shows it.
                 driver = self.left.strongest or "time"
-                self.notes.append(far_off(after.rmse / after.noise_floor))
+                self.notes.append(far_off(beyond))
+            if driver is None and self.data.torque_measured:
+                self.notes.append(hidden_by_torque_noise(floor))
             space = self.found.space
             causes = []
             for e in self.final.effects:
@@ -315,7 +316,7 @@ class _Work:
             verdict=verdict,
             findings=tuple(findings),
             not_testable=self.not_testable,
-            model=model,
+            model=model if self.final.effects or self.at_controller.effects or self.data.slower else self.idn.model,
             before=check.before,
             after=check.after,
             driver=driver,

@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
+from gaident.data.torque_kind import MEASURED
 from gaident.diagnosis.records.hygiene import quantisation
 from gaident.estimation.criterion import effective_samples
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit
 from gaident.estimation.objective import Fit, Objective
+from gaident.estimation.regression.motion import torque_noise
 from gaident.models import simulate
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
@@ -65,6 +67,13 @@ class Gains:
     def of(self, effect: str) -> float:
         """Fall of the error that one effect brought, as a fraction of the error before it."""
         return self.steps.get(effect, 0.0)
+
+    @property
+    def floor(self) -> float:
+        """Rms error [rad/s] that noise leaves of a free run: of the velocity, and of a measured torque that adds up."""
+        measured = [r for r, _ in self.scored if r.torque is not None and r.torque_is == MEASURED]
+        power = sum(len(r) * added_up(self.mechanism, r) for r in measured) / max(sum(len(r) for r, _ in self.scored), 1)
+        return float(np.hypot(self.after.noise_floor, np.sqrt(power)))
 
 
 def measured_gains(
@@ -152,6 +161,15 @@ def closed_over(controller: Controller | None, records: Sequence[Record]) -> Con
     if loop is not None and not loop.one_equation and any(starts_moving(r, None) for r in records):
         return None
     return loop
+
+
+def added_up(mechanism: Model, rec: Record) -> float:
+    """Variance [(rad/s)^2] that white noise of a record's torque, of its level at high frequencies, makes of the free run."""
+    unit = np.zeros(len(rec))
+    unit[0] = 1.0
+    response = simulate(mechanism.linear, Record(rec.dt, torque=unit, velocity=np.zeros(len(rec))))
+    highest = 0.499 / rec.dt  # no decision: next to the Nyquist frequency, so that nothing is filtered
+    return torque_noise(rec, highest, 1) ** 2 * float(np.mean(np.cumsum(response**2)))
 
 
 def _turned(rec: Record, controller: Controller | None, final: Fit) -> Record:

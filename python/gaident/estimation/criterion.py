@@ -12,6 +12,11 @@ exact are slow: neighbouring samples say the same, and
 
 with rho the autocorrelation of the errors about their mean, up to the first pair rho(2m-1) + rho(2m) that is not positive
 (Geyer 1992): from there on it is its own error.
+Errors of a shaft that swings have a rho that changes its sign, and hardly any sum. ln V is uncertain by sqrt(2/I) with
+
+    I = N / (1 + 2 sum_k rho(k)^2)            (variance of a mean square; Bartlett 1946)
+
+and slow errors beside them show in the spectrum alone: S(0) = V (1 + 2 sum_k rho(k)). There the lesser of these two counts.
 Every comparison of two models and every count of independent samples in the package is one of these formulas.
 
 **The specification test** (Hausman 1978). Least squares of whitened errors and of output errors estimate the same parameters
@@ -47,6 +52,10 @@ __all__ = ["Specification", "bic", "chi_square_bound", "cost_of", "effective_sam
 
 Vector = NDArray[np.float64]
 
+LOWEST = 8  # no decision: frequencies of a record's spectrum whose mean is S(0); that is uncertain by 1/sqrt(8)
+SWINGS = 0.5  # no decision: of sum rho^2, from which errors swing where it is above sum rho; of white ones it is near 0
+LAGS = 10  # no decision: of the samples, one in so many is a lag at which rho^2 is taken; at more it is mostly its own error
+
 
 def bic(variance: float, information: float, numbers: int) -> float:
     """I ln(variance) + k ln I."""
@@ -65,6 +74,9 @@ def gained(before: float, after: float, information: float, numbers: int = 0) ->
 
 def effective_samples(*errors: Vector) -> float:
     """Independent samples in errors of colour, 1 at least and all of them at most.
+
+    N/(1 + 2 sum rho) of slow errors. Of such that swing, whose rho changes its sign, the lesser of N/(1 + 2 sum rho^2) and of
+    N V/S(0), the first count by the lowest frequencies of the spectrum.
 
     errors: of one record each, (n_i,), samples that do not count being 0; no pair of samples of two records is a neighbour.
 
@@ -85,8 +97,16 @@ def effective_samples(*errors: Vector) -> float:
         return float(max(count, 1))
     pairs = (products[1:] / products[0])[: (longest - 1) // 2 * 2].reshape(-1, 2).sum(axis=1)
     negative = np.flatnonzero(~(pairs > 0.0))
-    memory = float(pairs[: negative[0]].sum()) if len(negative) else float(pairs.sum())
-    return float(np.clip(count / (1.0 + 2.0 * memory), 1.0, count))  # no decision: the variance of a mean of correlated samples
+    slow = float(pairs[: negative[0]].sum()) if len(negative) else float(pairs.sum())
+    squares = products[1 : 1 + longest // LAGS] ** 2 / products[0] ** 2
+    chance = (count - np.arange(1, len(squares) + 1)) / count**2  # what rho^2 of white errors is in the mean
+    swinging = float(np.sum(squares - chance))
+    memory = 1.0 + 2.0 * slow
+    if swinging > max(slow, SWINGS):
+        lowest = sum(float(np.sum(np.abs(np.fft.rfft(e - mean)[1 : 1 + LOWEST]) ** 2)) for e in errors)
+        spectral = lowest / (products[0] * sum(min(LOWEST, len(e) // 2) * len(e) for e in errors) / count)
+        memory = max(1.0 + 2.0 * swinging, spectral)
+    return float(np.clip(count / memory, 1.0, count))  # no decision: variances of means of correlated samples
 
 
 class Specification(NamedTuple):

@@ -45,7 +45,7 @@ class Diagnosis(SavedResult):
     not_testable : mapping of str to str
         Effect -> why the records say nothing about it.
     model : Model
-        The extended model.
+        The extended model; the identified linear one where it holds no effect.
     before, after : Fitness
         The linear and the extended model on held-out data.
     driver : str or None

@@ -10,7 +10,7 @@ from gaident.diagnosis.selection.select import Selection
 from gaident.models.effects import table
 from gaident.results.estimate import Estimate
 
-__all__ = ["basis_of", "drives_itself", "evidence_of", "far_off"]
+__all__ = ["basis_of", "drives_itself", "evidence_of", "far_off", "hidden_by_torque_noise"]
 
 
 def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None) -> Text:
@@ -54,6 +54,15 @@ def far_off(ratio: float) -> Text:
         "is far too large for noise: a controller or a limit that is not the one given here, or a load that changes in time."
     )
     return say(text, ratio)
+
+
+def hidden_by_torque_noise(floor: float) -> Text:
+    """What the noise of a measured torque makes of the free run: an rms error [rad/s] in which smaller effects do not show."""
+    text = (
+        "The noise of the measured {torque} by itself lets a free run miss the velocity by about {:.2g} {rad/s}: "
+        "an effect that moves it by much less does not show in these data."
+    )
+    return say(text, floor)
 
 
 def drives_itself(damping: Estimate) -> Text:

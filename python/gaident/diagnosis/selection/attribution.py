@@ -28,7 +28,7 @@ from dataclasses import replace
 import numpy as np
 
 from gaident.diagnosis.library.terms import LIBRARY
-from gaident.diagnosis.selection.dependence import Dependence, dependence
+from gaident.diagnosis.selection.dependence import Dependence, beside_torque_noise, dependence
 from gaident.diagnosis.selection.moves import Moves
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit as fitted
@@ -41,7 +41,21 @@ from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["friction_shown", "only_describes", "share", "shown_by_the_records", "simplified"]
+__all__ = ["friction_shown", "only_describes", "share", "shown_by_the_records", "simplified", "what_is_left"]
+
+
+def what_is_left(space: Moves, final: Fit) -> tuple[bool, Dependence]:
+    """(whether a model leaves noise, what its error depends on).
+
+    The variance-ratio test knows the velocity's noise. Of a measured torque's noise nothing is known: it is noise where no driver
+    explains more beside it than in records without effects.
+    """
+    if space.data.torque_measured:
+        beside = beside_torque_noise(space.objective, final)
+        if beside.driver is None:
+            return True, beside
+    left = dependence(space.objective, final)
+    return not space.data.torque_measured and space.is_noise(final), left
 
 
 def only_describes(

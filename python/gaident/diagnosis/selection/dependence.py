@@ -8,7 +8,7 @@ parameters could, is the driver's gain in BIC units. All share one noise filter,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 from gaident.control.filtering import clamped_sum
 from gaident.diagnosis.selection.line import torque_of_line
 from gaident.estimation.criterion import cost_of
+from gaident.estimation.least_squares import scored
+from gaident.estimation.noise_model import ShaftNoise
 from gaident.estimation.objective import Fit, Innovations, Objective
 from gaident.estimation.prediction import coupling_response, twist
 from gaident.estimation.projection import project_out
 from gaident.policy.table import POLICY
 
-__all__ = ["Dependence", "dependence"]
+__all__ = ["Dependence", "beside_torque_noise", "dependence"]
 
 ROOM, LEAST = 16, 4  # no decision: samples for each function of a driver's family, and the functions that any record has room for
 LINES = (64, 31, 4)  # no decision: samples of a spectrum that peaks are looked for in, lines of its running mean, half a peak's
@@ -100,6 +102,21 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
     whitened = isinstance(objective.family, Innovations)
     needed = POLICY.dependence_gain * (1.0 + (POLICY.short_record / objective.count if whitened else 0.0))
     return Dependence({driver: float(gain) for driver, gain in gains.items()}, least, unwhitened, needed, line, whitened)
+
+
+def beside_torque_noise(objective: Objective, fit: Fit) -> Dependence:
+    """Every driver's gain over a model that a measured torque drives.
+
+    The noise of that torque makes errors of the colour of the mechanism, slow ones and such that swing: a noise model of torques
+    at the shaft whitens them, and each sample counts. The torque is no driver here: a function of it holds its noise.
+    """
+    shaft = ShaftNoise(fit.parameters.linear(fit.x), objective.data.dt, None)
+    whitened = objective.under(Innovations(shaft))
+    left = dependence(whitened, scored(whitened, fit))
+    gains, least, unwhitened = (
+        {d: value for d, value in values.items() if d != "torque"} for values in (left.gains, left.least, left.unwhitened)
+    )
+    return replace(left, gains=gains, least=least, unwhitened=unwhitened)
 
 
 def _strongest(rows: Matrix, room: int) -> Matrix:

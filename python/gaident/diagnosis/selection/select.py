@@ -165,8 +165,7 @@ def _offered(by_output: _Found, whitened: Fit) -> _Found:
 def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callable[[str], None]) -> _Found:
     """Step 2: the search under output errors.
 
-    The information is that of the errors which the best linear model or the regressed axis leaves: those of a better model are
-    more.
+    The information is that of the errors which the best linear model or the regressed axis leaves, whichever leaves less.
     """
     note("looking at the output errors")
     starts = output_error_bases(output.task, bases)
@@ -181,8 +180,9 @@ def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callab
 
 
 def _informed(output: ByOutputErrors, *fits: Fit | None) -> Task:
-    """The task under output errors, with as many independent samples as the errors of one of these fits hold."""
-    return output.informed(max(effective_samples(output.objective.unwhitened_errors(f)) for f in fits if f is not None))
+    """The task under output errors, with as many independent samples as the errors of the best of these fits hold."""
+    best = min((f for f in fits if f is not None), key=lambda f: f.cost)
+    return output.informed(effective_samples(output.objective.unwhitened_errors(best)))
 
 
 def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]:
@@ -190,6 +190,8 @@ def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]
     ends: list[tuple[Fit, Fit]] = []
     for base in bases:
         end = _searched(space, base)
+        if space.swings(base) and not space.swings(end):  # its shaft went into something else: as a shaft it counts all the same
+            end = base
         # On a coarse grid a resonance beyond what it shows stands for another fast effect: the fit to all samples decides.
         # Two overdamped masses describe some other effect, which one mass leaves in the error.
         shown = task.scales.blocks == 1 or resonance(end) < POLICY.seen_band * np.pi / task.scales.dt

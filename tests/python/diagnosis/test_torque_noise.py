@@ -1,0 +1,68 @@
+"""A measured torque with noise: what that noise makes of a free run is no cause, and no reason to doubt one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from drive_cases import random_case
+from gaident.diagnosis.gains import added_up
+from gaident.estimation.criterion import effective_samples
+from gaident.estimation.regression.motion import torque_noise
+
+
+def noisy(record: ga.Record, share: float, seed: int) -> ga.Record:
+    """The record as one whose torque was measured, with white noise of a share of its rms."""
+    torque = np.asarray(record.torque)
+    noise = share * float(np.sqrt(np.mean(torque**2))) * np.random.default_rng(seed).standard_normal(len(torque))
+    return replace(record, command=None, torque=torque + noise, torque_is="measured")
+
+
+def test_torque_noise_of_a_drive_without_effects_is_no_cause() -> None:
+    """A stiff shaft, which the noise lets swing: 3500 samples held the information of 440, and cogging seemed to be there."""
+    record, validation, _, truth = random_case(211000000, (), "multi", "white")
+    assert validation is not None and truth.plant.two_masses
+    dia = ga.diagnose(noisy(record, 0.05, 0), validation=noisy(validation, 0.05, 1))
+    assert (dia.verdict, dia.findings, dia.driver) == ("adequate", (), None)
+    inertia = dia.mechanics["inertia"]
+    assert abs(inertia.value - truth.plant.J - truth.plant.JL) < 3.0 * inertia.std
+    assert any("noise of the measured torque" in note for note in dia.notes)
+
+
+def test_friction_beside_torque_noise_is_explained() -> None:
+    record, validation, _, truth = random_case(212000000, "coulomb_friction", "multi", "white")
+    assert validation is not None
+    dia = ga.diagnose(noisy(record, 0.1, 0), validation=noisy(validation, 0.1, 1))
+    assert dia.verdict == "explained"
+    (finding,) = (f for f in dia.findings if not f.is_noise)
+    assert finding.effect == "coulomb_friction"
+    torque = finding.parameters["torque"]
+    assert abs(torque.value - truth.effects["coulomb_friction"]["torque"]) < 4.0 * torque.std
+
+
+@pytest.mark.parametrize("damping", [0.02, 0.1])
+def test_errors_that_swing_hold_little_information(damping: float) -> None:
+    """An autoregression of order 2 that rings: the mean square varies by sqrt(2/I), which 400 draws measure."""
+    omega, count = 0.27, 2000
+    pole = np.exp(complex(-damping * omega, omega * np.sqrt(1.0 - damping**2)))
+    from scipy.signal import lfilter
+
+    rng = np.random.default_rng(5)
+    errors = lfilter([1.0], [1.0, -2.0 * pole.real, abs(pole) ** 2], rng.standard_normal((400, count + 1000)), axis=1)[:, 1000:]
+    powers = np.mean(errors**2, axis=1)
+    measured = 2.0 * float(np.mean(powers) ** 2 / np.var(powers))
+    said = float(np.median([effective_samples(e) for e in errors]))
+    assert 0.7 * measured < said < 1.4 * measured
+
+
+def test_added_up_is_what_white_torque_noise_makes_of_a_free_run() -> None:
+    """Of a rigid axis: sigma^2 dt^2 / J^2 times the mean number of samples so far, with little damping."""
+    model = ga.OneMass(J=1e-3, D=1e-3).model()
+    rng, dt, count = np.random.default_rng(2), 1e-3, 4000
+    noise = [ga.Record(dt, torque=0.1 * rng.standard_normal(count), velocity=np.zeros(count)) for _ in range(40)]
+    measured = float(np.mean([np.mean(ga.simulate(model, r) ** 2) for r in noise]))
+    per_power = added_up(model, noise[0]) / torque_noise(noise[0], 0.499 / dt, 1) ** 2
+    assert abs(0.1**2 * per_power - measured) < 0.15 * measured
