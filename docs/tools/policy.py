@@ -93,7 +93,7 @@ Four numbers ask something else, and no level of that test answers it:
 DECIDING = """\
 ## {group}
 
-| number | value | unit | where it comes from | measured by |
+| number | value | unit | what it is, and why this value | measured by |
 |---|---|---|---|---|
 """
 
@@ -124,7 +124,7 @@ up to two octaves either way: a range that ends at a quarter or at four times th
 Outside of it some comparison changes, which need not change what is said: the cases are run again.
 "Nothing" means that every case said the same, down to parameters of three digits, notes and the next experiment.
 "Said otherwise" is another verdict, finding, structure or term, "the rest" what else differs.
-"Not run" are cases in which a comparison changes and that were not run again: they are open.
+"Not run" are cases in which a comparison changes and that were not run again: they are open, for the time that they take.
 
 "Read in" counts the cases that used the number at all; what no case reads is not measured by them.
 
@@ -181,8 +181,10 @@ def _at(at: Mapping[str, Any]) -> str:
     other = at["said"] - len(at["changed"])
     told += [f"{other} said otherwise"] if other > 0 else []
     told += [f"the rest of {at['other']}"] if at["other"] else []
-    told += [f"{at['missing']} not run"] if at["missing"] else []
-    return f"{at['value']:.3g}: {', '.join(told) or 'nothing'}"
+    text = f"{at['value']:.3g}: {', '.join(told) or 'nothing'}"
+    if not at["missing"]:
+        return text
+    return f"{text} in {at['again']}, {at['missing']} not run" if at["again"] else f"{at['value']:.3g}: {at['missing']} not run"
 
 
 def _names(names: Sequence[str]) -> str:

@@ -80,6 +80,10 @@ def test_a_watched_number_is_the_number_and_notes_what_would_come_out_otherwise(
     assert int(100 * policy.fitted_share) == 70 and len(turned("fitted_share")) == len(watch.STEPS) - 2  # to below 0: none
     assert math.ceil(policy.seen_turn) == 1 and f"{policy.swap:.1f}" == "2.0"
     assert turned("seen_turn") == []
+    errors = x * policy.swap
+    worked_on = np.multiply(errors, x, out=errors)
+    assert type(worked_on) is np.ndarray and list(worked_on) == [2.0, 18.0]  # in place: every other value is another
+    assert turned("swap") == list(watch.STEPS)
     assert math.sqrt(policy.swap) == math.sqrt(2.0)  # no arithmetic that it can follow: every other value is another
     assert turned("swap") == list(watch.STEPS)
 
