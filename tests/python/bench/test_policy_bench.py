@@ -174,3 +174,21 @@ def test_a_row_is_measured_and_what_is_there_is_not_run_again(tmp_path: Path) ->
     assert len(same) >= 3
     for line in same:
         assert all(line[name] == watched[line["case"]][name] for name in ("outcome", "said", "detail")), line["case"]
+
+
+def test_every_kind_has_cases_with_keys_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    for folder in ("bench/measured", "bench"):
+        monkeypatch.syspath_prepend(str(ROOT / folder))
+    kinds = importlib.import_module("rows.cases")
+    assert set(kinds.KINDS) == set(SHOWN_BY)
+    keys = [c.key for kind in SHOWN_BY for c in kinds.cases(kind, 1, 5)]
+    assert len(set(keys)) == len(keys) and all(sum(k.startswith(f"{kind}/") for k in keys) >= 5 for kind in SHOWN_BY)
+
+
+def test_a_slower_log_shows_the_form_that_made_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    for folder in ("bench/measured", "bench"):
+        monkeypatch.syspath_prepend(str(ROOT / folder))
+    kinds = importlib.import_module("rows.cases")
+    found = {c.what: kinds.run(c) for c in kinds.cases("slower", 1, 5) if c.what in (("bare", "steps"), ("gains", "ramps"))}
+    assert {what: result.said for what, result in found.items()} == {("bare", "steps"): "", ("gains", "ramps"): "other_gains"}
+    assert all(result.outcome == "right" for result in found.values())
