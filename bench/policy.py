@@ -7,6 +7,7 @@
 NAME is a row of `gaident.policy.table` that decides, or the kind of cases by which rows are shown: "drives" measures every row
 that they show, "all" every row. `--kind` runs other cases than those that a row names.
 `--cases` is the count of each combination; which cases a kind holds says bench/rows/cases.py.
+`--only` keeps those whose key holds one of some texts: where a case takes minutes, fewer of them.
 Every finished case is a line of the file: stop at will, start again and it goes on.
 `--write` puts what was measured into the data of docs/theory/policy.md (bench/rows/measured.json); `python docs/tools/policy.py`
 writes the page then.
@@ -115,6 +116,7 @@ def options_of(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--seed", type=int, default=5)
     parser.add_argument("--kind", choices=SHOWN_BY, help="other cases than those that the row names")
+    parser.add_argument("--only", nargs="+", default=[""], metavar="TEXT", help="cases whose key holds one of these texts")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--ranges", action="store_true", help="only the watched run: in which range no decision changes")
     which.add_argument("--report", action="store_true", help="run nothing: from what is there")
@@ -138,8 +140,9 @@ def main() -> None:
     found = []
     for row in options.rows:
         kind = options.kind or row.cases
-        of_row = cases(kind, options.cases, options.seed)
+        of_row = [c for c in cases(kind, options.cases, options.seed) if any(text in c.key for text in options.only)]
         told = {"date": date.today().isoformat(), "kind": kind, "each": options.cases, "seed": options.seed}
+        told |= {"only": options.only} if any(options.only) else {}
         runs = () if options.report else RUNS[:1] if options.ranges else RUNS
         found.append({"name": row.name} | told | measured(row, of_row, options.out, options.workers, runs))
         print(report([found[-1]], head=row is options.rows[0]), flush=True)

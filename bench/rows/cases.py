@@ -3,7 +3,9 @@
     drives      simulated drives of the blind bench, of each number five: one that hides nothing, one effect at its typical size,
                 one at 0.1 to 4 times of it, two effects, one that the library does not know
     short       the same with nothing or one effect hidden, cut to 80, 200 or 400 samples
-    loop        what only the controller shows: saturation, clamp, rate limit, outliers; and two clean records at once
+    loop        what only the controller shows: saturation, clamp, rate limit, outliers; two clean records at once, with the gains
+                of the loop and with others
+    slower      logs with a line for every fourth sample of the controller: its form (rows/slower.py), and drives in such loops
     shifted     clean drives whose log wrote the torque 0, 1 or 2 samples late, with and without a controller
     real        measured drives, diagnosed (GAIDENT_DATA)
     regression  the same records, `ga.inverse_dynamics` alone
@@ -35,12 +37,15 @@ import success
 from rows.case import Case, Result, digest
 from rows.forms import forms, shown
 from rows.logs import logs, read_log
+from rows.slower import EVERY, shown_slower, slower_forms
 
 import gaident as ga
 from blind_judge import judge
 from drive_rig import OUTSIDE
 
 LOOP = ("torque_saturation", "integrator_clamp", "command_rate_limit", "outliers")
+SLOW_LOOPS = ("bare", "position", "together")
+GIVEN = (1.0, 0.9)  # gains that are given, of those of the loop
 LENGTHS = (80, 200, 400)  # samples of a short record
 STRIDE = 7  # has no divisor in common with the count of effects: neighbours in their list are of one family
 OUTCOMES = ("right", "in set", "missed", "wrong", "false alarm", "refused", "crash")
@@ -80,7 +85,14 @@ def short(count: int, seed: int) -> list[Case]:
 def loop(count: int, seed: int) -> list[Case]:
     found = [c for c in blind.cells("effects", count, seed) if c.kind == "multi" and c.effects[0] in LOOP]
     found += [replace(c, kind="multi", torque=True) for c in _cells(("clean",), count, seed)]
-    return [Case("loop", c.key, replace(c, torque=True)) for c in sorted(found, key=lambda c: c.seed)]
+    found = [replace(c, torque=True) for c in sorted(found, key=lambda c: c.seed)]
+    return [Case("loop", c.key if given == 1.0 else f"{c.key}/{given:g} of the gains", (c, given))
+            for c in found for given in (GIVEN[:1] if c.effects else GIVEN)]  # fmt: skip
+
+
+def slower(count: int, seed: int) -> list[Case]:
+    cells = [c for n in range(count) for c in blind.loop_cells(seed * 1_000_000 + n)]
+    return slower_forms(count, seed) + [Case("slower", c.key, c) for c in cells if c.every == EVERY and c.loop in SLOW_LOOPS]
 
 
 def shifted(count: int, seed: int) -> list[Case]:
@@ -90,7 +102,7 @@ def shifted(count: int, seed: int) -> list[Case]:
 
 
 def diagnosed(case: Case) -> Result:
-    """A cell of the blind bench, whole or cut; a clean one of `loop` as two records of one drive."""
+    """A cell of the blind bench, whole or cut."""
     cell: blind.Cell = case.what
     try:
         record, validation, controller, truth = blind.case_of(cell)
@@ -98,10 +110,18 @@ def diagnosed(case: Case) -> Result:
         return Result("refused", "impossible", digest(str(none)))
     if case.number:
         record, validation = record[: case.number], None
-    if case.kind == "loop" and not cell.effects and validation is not None:
-        dia = ga.diagnose([record, validation], controller=controller)
-    else:
-        dia = ga.diagnose(record, controller=controller, validation=validation)
+    dia = ga.diagnose(record, controller=controller, validation=validation)
+    return Result(outcome(dia, truth.effects), *texts(dia))
+
+
+def looped(case: Case) -> Result:
+    """A cell with an effect as it is; a clean one as two records of one drive, also with other gains than the loop has."""
+    cell, given = case.what
+    if cell.effects:
+        return diagnosed(replace(case, what=cell))
+    record, validation, controller, truth = blind.case_of(cell)
+    assert validation is not None and isinstance(controller, ga.PI)
+    dia = ga.diagnose([record, validation], controller=replace(controller, kp=given * controller.kp, ki=given * controller.ki))
     return Result(outcome(dia, truth.effects), *texts(dia))
 
 
@@ -213,7 +233,8 @@ def wound(case: Case) -> Result:
 KINDS: dict[str, tuple[Callable[[int, int], list[Case]], Callable[[Case], Result]]] = {
     "drives": (drives, diagnosed),
     "short": (short, diagnosed),
-    "loop": (loop, diagnosed),
+    "loop": (loop, looped),
+    "slower": (slower, lambda case: diagnosed(case) if isinstance(case.what, blind.Cell) else shown_slower(case)),
     "shifted": (shifted, moved),
     "real": (real, diagnosed_real),
     "regression": (lambda count, seed: [replace(c, kind="regression") for c in real(count, seed)], regressed),

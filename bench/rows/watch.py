@@ -121,8 +121,11 @@ class Watched:
         return f"Watched({self.plain!r})"
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
-        if method == "__call__" and "out" not in options:
-            return carried(functools.partial(ufunc, **options), *inputs)
+        (out,) = options.get("out") or (None,)
+        if method == "__call__" and (out is None or isinstance(out, Watched)):
+            options.pop("out", None)
+            found = carried(functools.partial(ufunc, **options), *inputs)
+            return found if out is None else np.asarray(found)  # what is worked on in place, such as errors of a fit, ends plain
         return getattr(ufunc, method)(*(np.asarray(i) if isinstance(i, Watched) else i for i in inputs), **options)
 
     def noted(self, function: Callable[[Any], Any]) -> Any:

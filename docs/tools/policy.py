@@ -93,7 +93,7 @@ Four numbers ask something else, and no level of that test answers it:
 DECIDING = """\
 ## {group}
 
-| number | value | unit | where it comes from | measured by |
+| number | value | unit | what it is, and why this value | measured by |
 |---|---|---|---|---|
 """
 
@@ -134,7 +134,15 @@ Outside of it some comparison changes, which need not change what is said: the c
 Moved either way, {free} change nothing that is said in these cases: they are no finer than a factor of two, or these cases do
 not show them.
 
+{left}
 Not measured, or at another value: {open}.
+"""
+
+LEFT = """\
+Not run again are {count} runs, for the time that they take: about {minutes} minutes of one processor.
+They belong to {names}.
+Most of these numbers enter a bound, a probability or a fit of nearly every case, so that some comparison changes in nearly every
+one. Where some of its cases were run, these are the first ones, and what they show stands before "not run".
 """
 
 
@@ -161,14 +169,39 @@ def _changes() -> str:
         cases=f"{', '.join(kinds[:-1])} or {kinds[-1]}",
         changes="".join(map(_changed, valid)),
         free=_names([name for name in deciding if name in names - moving]),
+        left=_left(valid),
         open=_names([name for name in deciding if name not in names]),
     )
 
 
+def _left(valid: Sequence[Mapping[str, Any]]) -> str:
+    """What was not run again, and what it would take."""
+    missing = [(m["name"], m["kind"], n) for m in valid if (n := sum(at["missing"] for at in m["at"]))]
+    if not missing:
+        return ""
+    seconds = sum(n * _seconds([m for m in valid if m["kind"] == kind] or valid) for _, kind, n in missing)
+    return LEFT.format(
+        count=sum(n for _, _, n in missing),
+        minutes=max(round(seconds / 60.0), 1),
+        names=_names(list(dict.fromkeys(name for name, _, _ in missing))),
+    )
+
+
+def _seconds(found: Sequence[Mapping[str, Any]]) -> float:
+    """Processor time of a run at another value, on average [s]."""
+    runs = [at for m in found for at in m["at"]]
+    return sum(at["seconds"][1] for at in runs) / max(sum(at["again"] for at in runs), 1)
+
+
 def _changed(m: Mapping[str, Any]) -> str:
     low, high = m["unchanged"]
-    cells = (f"`{m['name']}` = {m['value']:g}", f"{m['cases']} {m['kind']}", str(m["seed"]), m["date"], str(m["used"]))
+    cells = (f"`{m['name']}` = {m['value']:g}", f"{m['cases']} {m['kind']}{_only(m)}", str(m["seed"]), m["date"], str(m["used"]))
     return "| " + " | ".join([*cells, f"{low:.3g} to {high:.3g}", *map(_at, m["at"])]) + " |\n"
+
+
+def _only(m: Mapping[str, Any]) -> str:
+    """Texts in the keys of the cases, where only some were run."""
+    return f" ({', '.join(m['only'])})" if "only" in m else ""
 
 
 def _nothing(at: Mapping[str, Any]) -> bool:
@@ -181,8 +214,10 @@ def _at(at: Mapping[str, Any]) -> str:
     other = at["said"] - len(at["changed"])
     told += [f"{other} said otherwise"] if other > 0 else []
     told += [f"the rest of {at['other']}"] if at["other"] else []
-    told += [f"{at['missing']} not run"] if at["missing"] else []
-    return f"{at['value']:.3g}: {', '.join(told) or 'nothing'}"
+    text = f"{at['value']:.3g}: {', '.join(told) or 'nothing'}"
+    if not at["missing"]:
+        return text
+    return f"{text} in {at['again']}, {at['missing']} not run" if at["again"] else f"{at['value']:.3g}: {at['missing']} not run"
 
 
 def _names(names: Sequence[str]) -> str:

@@ -28,6 +28,7 @@ CALIBRATED: dict[str, Any] = json.loads(Path(__file__).with_name("calibrated.jso
 DRIVES = "drives"
 SHORT = "short"
 LOOP = "loop"
+SLOWER = "slower"
 SHIFTED = "shifted"
 REAL = "real"
 REGRESSION = "regression"
@@ -35,7 +36,7 @@ SUCCESS = "success"
 WINDING = "winding"
 FORMS = "forms"
 LOGS = "logs"
-SHOWN_BY = (DRIVES, SHORT, LOOP, SHIFTED, REAL, REGRESSION, SUCCESS, WINDING, FORMS, LOGS)
+SHOWN_BY = (DRIVES, SHORT, LOOP, SLOWER, SHIFTED, REAL, REGRESSION, SUCCESS, WINDING, FORMS, LOGS)
 
 GAIN = "Is the gain enough?"
 NOISE = "Is this noise?"
@@ -56,7 +57,7 @@ def _row(group: str, value: float, unit: str, source: str, cases: str = "", comm
 def calibrated(group: str, name: str, unit: str, source: str) -> Any:
     """A row with the value that the blind bench wrote."""
     measured = CALIBRATED["numbers"][name]
-    source = f"{source}; extrapolated to `noise_level`, the largest of {measured['records']} is {measured['largest']:.3g}"
+    source = f"{source}; extrapolated to `noise_level`, the largest of {measured['records']} records is {measured['largest']:.3g}"
     return _row(group, measured["value"], unit, source, DRIVES, CALIBRATED["command"])
 
 
@@ -101,45 +102,48 @@ class Policy:
     """See the module; `rows()` lists all with unit, source and command."""
 
     # Is the gain enough? One criterion: BIC and a penalty for each effect, which stands for the number of candidates tried.
-    effect_penalty: float = calibrated(GAIN, "effect_penalty", "BIC units", "of each effect, for the number of candidates tried")
-    short_record: int = gain(200, "samples", "a record this short doubles the penalty: its noise filter is uncertain", SHORT)
+    effect_penalty: float = calibrated(
+        GAIN, "effect_penalty", "BIC units", "what each effect costs beside its parameters, for the number of candidates tried"
+    )
+    short_record: int = gain(
+        200, "samples", "length at which that penalty is twice that of a long record: the noise filter is uncertain there", SHORT
+    )
     material_share: float = gain(
-        0.1, "1", "of the error beyond the noise, whitened or before whitening, that an effect explains at least", DRIVES
+        0.1, "1", "least part of the error beyond the noise, whitened or before whitening, that an effect explains", DRIVES
     )
-    material_beside_impacts: float = gain(
-        0.5, "1", "the same beside a gap or a hard coupling: no model foresees an impact", DRIVES
+    material_beside_impacts: float = gain(0.5, "1", "the same beside a gap or hard coupling: no model foresees an impact", DRIVES)
+    overrules: float = gain(0.5, "1", "most that a cause which whitening hid leaves of the squared error before whitening", REAL)
+    rival_margin: float = gain(
+        10.0, "BIC units", "explanations closer than odds of e^5 are not told apart (Kass and Raftery 1995)", DRIVES
     )
-    overrules: float = gain(
-        0.5, "1", "of the squared error before whitening: a cause that whitening hid leaves at most this", REAL
-    )
-    rival_margin: float = gain(10.0, "BIC units", "closer explanations are not told apart (Kass and Raftery 1995)", DRIVES)
-    rival_short: int = gain(400, "samples", "a record this short doubles the margin", SHORT)
+    rival_short: int = gain(400, "samples", "length at which that margin is twice that of a long record", SHORT)
     detail_level: float = gain(
-        0.005,
-        "probability",
-        "of the likelihood-ratio test that a generalisation adds nothing to what it contains (Wilks 1938)",
-        DRIVES,
+        0.005, "probability", "level of the likelihood-ratio test of an effect against a simpler one in it (Wilks 1938)", DRIVES
     )
-    swap: float = gain(2.0, "BIC units", "by which a rival has to be better to take a place", DRIVES)
+    swap: float = gain(2.0, "BIC units", "by which a rival has to be better to take an effect's place", DRIVES)
     most_effects: int = gain(4, "1", "effects in one model at most", DRIVES)
-    harm: float = gain(0.02, "1", "of the held-out error that an effect may add before it is refused", REAL)
-    fitted_share: float = gain(0.7, "1", "of a record that parameters are fitted to where the rest is held out", REAL)
-    least_fitted: float = gain(0.25, "1", "of a record that is fitted at least, where its path says what is held out", REAL)
-    least_held: int = gain(600, "samples", "of a record from which a part is held out", REAL)
+    harm: float = gain(0.02, "1", "part of the held-out error that an effect may add before it is refused", REAL)
+    fitted_share: float = gain(0.7, "1", "part of a record to which parameters are fitted where the rest is held out", REAL)
+    least_fitted: float = gain(0.25, "1", "the same at least, where the cut follows the path because the end hardly moves", LOOP)
+    least_held: int = gain(600, "samples", "length of a record from which a part of it is held out", REAL)
     interval_level: float = gain(
-        0.05, "probability", "beside the interval of a fall of the error: a finding is harmful where all of it is below 0", REAL
+        0.05, "probability", "outside the interval of a fall of the error: below 0 as a whole, it is harm", REAL
     )
     block_memory: float = gain(
-        2.5, "1", "correlation times of an error in a block of its bootstrap; shorter ones hide how slow it is", REAL
+        2.5, "1", "length of the blocks of a bootstrap, in correlation times of the error; shorter ones hide how slow it is", REAL
     )
-    least_blocks: int = gain(8, "1", "blocks that a bootstrap draws at least: fewer tell no interval", REAL)
-    held_motion: float = gain(0.33, "1", "rms speed of a held-out part over that before: below, it is cut by path", REAL)
-    told_apart: float = gain(25.0, "chi2", "of a proposed experiment, from which it tells two explanations apart", DRIVES)
+    least_blocks: int = gain(8, "1", "blocks that a bootstrap has at least: fewer tell no interval", REAL)
+    held_motion: float = gain(0.33, "1", "rms speed of the held-out end over that before: below, the cut follows the path", REAL)
+    told_apart: float = gain(
+        25.0, "chi2", "from which a proposed experiment tells two explanations apart: 5 standard deviations of one number", DRIVES
+    )
 
     # Is this noise? One variance ratio, one specification test, one test for dependence.
-    noise_ratio: float = calibrated(NOISE, "noise_ratio", "1", "rms of whitened errors over the noise of the velocity")
+    noise_ratio: float = calibrated(
+        NOISE, "noise_ratio", "1", "rms of whitened errors over the noise of the velocity: above, the model is not adequate"
+    )
     free_run_ratio: float = calibrated(
-        NOISE, "free_run_ratio", "1", "rms of the free run over the noise: more is a misfit that whitening took"
+        NOISE, "free_run_ratio", "1", "rms of the free run over that noise: above, whitening took a misfit for noise"
     )
     noise_level: float = noise(
         1e-6,
@@ -148,184 +152,196 @@ class Policy:
         "tail of a calibrated number: to the user the mistake is the same",
         DRIVES,
     )
-    dependence_gain: float = calibrated(NOISE, "dependence_gain", "BIC units", "of a free function of one signal")
-    effort_ratio: float = noise(
-        1.1,
-        "1",
-        "rms of whitened errors over the noise: below, nothing more is looked for, and what explains so much is enough",
-        DRIVES,
+    dependence_gain: float = calibrated(
+        NOISE, "dependence_gain", "BIC units", "of a free function of one signal: above, the errors depend on that signal"
     )
-    immaterial: float = noise(
-        0.02, "1", "of the linear mechanism's rms error: counts as noise, however little noise there is", DRIVES
+    effort_ratio: float = noise(1.1, "1", "rms of whitened errors over the noise: below, no further effect is looked for", DRIVES)
+    immaterial: float = noise(0.02, "1", "part of the linear mechanism's rms error that always counts as noise", DRIVES)
+    grid_loss: float = noise(
+        0.02, "1", "part of the linear model's squared error beyond the noise that lies between the lines of a coarser grid", REAL
     )
-    grid_loss: float = noise(0.02, "1", "share of the linear model's squared error that a coarser grid of time may lose", REAL)
 
     # Is a finding a cause, or does it only describe what the library does not hold?
-    of_its_size: float = cause(0.25, "1", "of a finding's gain that a free function may still find beside it", DRIVES)
+    of_its_size: float = cause(0.25, "1", "part of a finding's gain that a free function beside it may still find", DRIVES)
     stands: float = cause(
-        0.9, "1", "share of what a free function explains: drag by friction 0.87, friction of a robot joint 0.946", DRIVES
+        0.9,
+        "1",
+        "least part that a cause explains of what a free function does; drag by friction 0.87, a joint's friction 0.946",
+        DRIVES,
     )
-    class_stands: float = cause(0.5, "1", "the same for a class that the record cannot split", DRIVES)
     jump_deviations: float = cause(
         4.0,
         "1",
-        "deviations of the torque's jump at a reversal, from which it is dry friction; of 237 without at most 3.4",
-        DRIVES,
+        "standard deviations of the torque's jump at reversals, from which it is dry friction; 237 records without: 3.4",
+        REAL,
     )
-    of_its_level: float = cause(0.5, "1", "of a friction's level, that its jump or a rest under torque has at least", REAL)
+    of_its_level: float = cause(
+        0.5, "1", "part of a friction's level that the jump at reversals, or the torque held at rest, has at least", REAL
+    )
 
     # Does a second method agree? The inverse-dynamics regression beside the result.
-    check_deviations: float = check(3.0, "1", "deviations of both: 0.3 % of a normal distribution are beyond", DRIVES)
-    check_share: float = check(0.1, "1", "of the larger value: a smaller difference does not matter", DRIVES)
-    check_torque: float = check(0.05, "1", "of the torque's rms: the same, of friction and gravity", DRIVES)
+    check_deviations: float = check(
+        3.0, "1", "standard deviations of the two values together: 0.3 % of a normal distribution are beyond", DRIVES
+    )
+    check_share: float = check(0.1, "1", "part of the larger value: a smaller difference does not matter", DRIVES)
+    check_torque: float = check(
+        0.05, "1", "of the torque's rms: a smaller difference of friction or gravity does not matter", REAL
+    )
     velocity_part: float = check(
         0.95,
         "1",
-        "of the weighed error of the regressed axis, that its velocity is, the rest its torque: a free run adds up small torques",
+        "of the error's power is the velocity's, the rest the torque's, when parameters are estimated from output errors",
         REAL,
     )
     heavier: float = check(
-        2.0,
-        "1",
-        "deviations above the regressed inertia, from which a heavier axis of a measured torque counts: 98 % one-sided",
-        REAL,
+        2.0, "1", "standard deviations above the regressed inertia, from which an axis counts as heavier: 98 % one-sided", REAL
     )
-    rigid_band: float = check(0.25, "1", "of the antiresonance: below, a load is rigid within 1/16 (1/(1 - 1/16))", DRIVES)
+    rigid_band: float = check(
+        0.25, "1", "of the antiresonance: below it a load moves as if the shaft were rigid, within 1/(1 - 1/16), 7 %", DRIVES
+    )
     rigid_left: float = check(
-        0.05,
-        "1",
-        "of the squared torque, that the regression of a rigid axis leaves at most: far below its cutoff no shaft swings",
-        REAL,
+        0.05, "1", "most that the regression of a rigid axis leaves of the squared torque; then its band shows no shaft", REAL
     )
-    loses: float = check(2.0, "1", "force error of the diagnosed model over that of the regression: above, it is a note", REAL)
+    loses: float = check(2.0, "1", "force error of the diagnosed model over that of the regression: above, a note says so", REAL)
 
     # Does the logged torque follow from command and velocity through the controller?
-    replay_steps: float = loop(3.0, "steps", "of the torque's rounding, within which a replayed torque follows")
-    replay_rms: float = loop(2.0, "steps", "the same, rms")
-    replay_left: float = loop(1e-3, "1", "of the replay's squared error, that an effect which explains it leaves at most")
-    replay_noise: float = loop(0.1, "1", "of the torque's deviation: more is no noise of a measured torque")
-    same_gains: float = loop(1e-2, "1", "relative difference within which records show the same gains")
-    same_value: float = loop(2e-3, "1", "the same for limits, and for a gain that is the configured one")
+    replay_steps: float = loop(3.0, "steps", "of the torque's rounding, by which a torque that follows is off at most")
+    replay_rms: float = loop(2.0, "steps", "the same for the rms")
+    replay_left: float = loop(1e-3, "1", "most that an effect leaves of the replay's squared error where it explains it")
+    replay_noise: float = loop(0.1, "1", "part of the torque's standard deviation: more is no noise of a measured torque")
+    same_gains: float = loop(1e-2, "1", "relative difference of the gains of several logs, up to which they are the same")
+    same_value: float = loop(2e-3, "1", "relative difference up to which two limits are one, or a gain is the configured one")
     at_limit: float = loop(0.999, "1", "of a limit, from which a torque or an integral is at it")
-    plateau: int = loop(5, "samples", "at a limit, from which an integrator is held at it")
-    noisy_plateau: float = loop(0.95, "1", "of the highest torque, from which its median is the limit of a noisy log")
-    same_slope: float = loop(0.2, "1", "relative difference from the median slope, within which a command is at its rate limit")
-    better_reason: float = loop(0.99, "1", "of the rms that a simpler reason leaves: a later one has to leave less")
-    rounded_command: float = loop(5e-5, "1", "of the largest command, that a command may be off in a log of few decimals")
+    plateau: int = loop(5, "samples", "at a limit, from which a torque or an integral is held there")
+    noisy_plateau: float = loop(0.95, "1", "of the highest torque: the median of what is above is the limit of a noisy log")
+    same_slope: float = loop(0.2, "1", "relative difference from a command's median slope, within which its rate is limited")
+    better_reason: float = loop(0.99, "1", "of the rms that a simpler reason leaves: a more complicated one has to leave less")
+    rounded_command: float = loop(5e-5, "1", "of the largest command: two commands of a log of few decimals differ by no more")
     log_shift: float = loop(
-        50.0, "BIC units", "by which the law holds better before a channel is moved by samples: odds of e^25", SHIFTED
+        50.0,
+        "BIC units",
+        "by which the controller's law holds better before a channel is moved by samples: odds of e^25",
+        SHIFTED,
     )
-    lag_seen: float = loop(0.5, "samples", "between motion and torque, from which a lag is seen", SHIFTED)
+    lag_seen: float = loop(0.5, "samples", "of the torque behind the motion, from which a lag is seen", SHIFTED)
     ramp: float = loop(
-        2.0, "1", "times the change over the interval before or after: a command changes faster where it jumps", SHIFTED
+        2.0,
+        "1",
+        "times the change to the line before or after: a command that changes more between two lines jumps there",
+        SLOWER,
     )
     course: float = loop(
-        4.0,
-        "1",
-        "times what another course of the velocity between a slow log's lines makes of the torque: no less is seen",
-        SHIFTED,
+        4.0, "1", "times what the path of the velocity between a slow log's lines changes in the torque: less is not seen", SLOWER
     )
     each_number: float = loop(
         0.8,
         "1",
-        "of the rms, that each number of a form may leave at most in a slow log, where the BIC would count what is no noise",
-        SHIFTED,
+        "of the rms: each number of a form leaves less in a slow log, whose errors are no noise, as a BIC would suppose",
+        SLOWER,
     )
-    lag_said: float = loop(
-        0.75, "samples", "from which a lag of an open loop's log is said; a sampled torque stands at 0.5", SHIFTED
-    )
+    lag_said: float = loop(0.75, "samples", "from which a lag of an open loop's log is said; a sampled torque's is 0.5", SHIFTED)
     slope_reach: float = loop(
-        0.3, "1", "of a filter's number, by which a form may move it along its slope; the filter's own fit stands else", FORMS
+        0.3,
+        "1",
+        "of a filter's number, by which a form may move it along its slope; beyond, the filter is fitted by itself",
+        FORMS,
     )
-    form_choice: float = loop(
-        2.0 * math.log(3.0), "BIC units", "of a setting chosen of three without a number of its own: 2 ln 3", FORMS
-    )
+    form_choice: float = loop(2.0 * math.log(3.0), "BIC units", "of a setting chosen of three that has no number: 2 ln 3", FORMS)
     near_rounding: float = loop(
-        1.1, "1", "of what rounding makes of a replay: a set of filters that leaves no more needs no other filter", FORMS
+        1.1, "1", "of what rounding makes of a replay: filters that leave no more need no other filter beside them", FORMS
     )
     negligible: float = loop(1e-3, "1", "of a signal's largest value or range: less is 0, or the rounding of a log")
 
     # How is a log read? What a file does not say is refused or asked; these say where it is clear.
     clock_jitter: float = reading(0.01, "1", "of a sample time, by which a step, or the given dt, may differ")
     coarse_stamps: float = reading(0.25, "1", "of a sample time: stamps printed more coarsely hide a lost sample")
-    few_unequal: float = reading(0.1, "1", "of the steps: so few unequal ones are real, more are the print of the stamps")
-    even_rise: float = reading(0.02, "1", "of a step: a column that rises so evenly is a time")
+    few_unequal: float = reading(0.1, "1", "of the steps: so few unequal ones are real; more come from printed stamps")
+    even_rise: float = reading(0.02, "1", "of a step, by which the steps of a column differ that is a time")
     pause: float = reading(5.0, "1", "of the usual step: a longer one is a pause, through which no line is drawn")
     resample_coarser: float = reading(1.5, "1", "of a log's step: a coarser grid would alias what is fast")
-    resample_finer: float = reading(100.0, "1", "times finer than the log: the given step is in another unit")
-    unit_shown: float = reading(0.02, "1", "of a factor, within which a slope shows a unit, or a jump the range of an integer")
-    derivative: float = reading(0.98, "1", "correlation of a column and a slope, from which one is the derivative")
+    resample_finer: float = reading(100.0, "1", "of a log's step over the given one: finer, the given step is in another unit")
+    unit_shown: float = reading(0.02, "1", "relative difference up to which a slope shows a unit, a jump an integer's range")
+    derivative: float = reading(0.98, "1", "correlation of a column with the slope of another, from which it is its derivative")
     wrap_jump: float = reading(0.75, "1", "of a position's range: a jump as long may be a counter that wraps")
-    wrap_beside: float = reading(0.25, "1", "of that jump: the steps beside it are no longer")
-    wrap_alike: float = reading(0.05, "1", "of that jump: by which the steps beside it differ at most")
+    wrap_beside: float = reading(0.25, "1", "of that jump: the steps beside it are shorter")
+    wrap_alike: float = reading(0.05, "1", "of that jump, by which the steps before and behind it differ at most")
     wrap_steady: float = reading(
-        0.5, "1", "of the longer of these steps: the shorter one, where the motion goes on through a wrap"
+        0.5, "1", "of the longer of these two steps: the shorter one is longer, where the motion goes on through a wrap"
     )
-    wrap_spared: float = reading(0.999, "1", "of the steps, that are no jumps then; the rest may be lost samples")
-    overlap: float = reading(0.3, "1", "of the shorter of two logs: what they share at least")
+    wrap_spared: float = reading(0.999, "1", "of the steps are no jumps then; the rest may be lost samples")
+    overlap: float = reading(0.3, "1", "of the shorter of two logs, that both have at least")
     aligned: float = reading(0.5, "1", "correlation of two logs of one motion at least")
     rate_seen: float = reading(3.0, "1", "standard deviations from 0, from which two clocks run at different rates")
 
     # What does a record show? What is spoiled in it, and what it could not have shown.
-    least_samples: int = record(100, "samples", "of a record: below, noise filter and linear model use up what it knows", SHORT)
-    one_course: float = record(0.9, "1", "correlation of command and velocity, from which they go together in any unit", SUCCESS)
+    least_samples: int = record(
+        100, "samples", "length of a record at least: below, noise filter and linear model use up what it knows", SHORT
+    )
+    one_course: float = record(0.9, "1", "correlation of command and velocity, from which one follows the other", SUCCESS)
     same_unit: float = record(3.0, "1", "factor between the two then, up to which they have the same unit", SUCCESS)
-    near_rpm: float = record(1.25, "1", "factor from that of rpm to rad/s, within which one is in rpm", SUCCESS)
+    near_rpm: float = record(1.25, "1", "factor within which their ratio is that of rpm to rad/s: one of them is in rpm", SUCCESS)
     repeats: float = record(0.9, "1", "share of differences that are not 0: below, a velocity is quantised", DRIVES)
-    rest_steps: float = record(1.5, "steps", "of that lattice: a first velocity above is no rest", DRIVES)
+    rest_steps: float = record(1.5, "steps", "of that quantisation: a first velocity above is no rest", DRIVES)
     rest_share: float = record(0.6, "1", "of the first command: a first velocity up to it is the response from rest", SUCCESS)
-    outlier_far: float = record(9.0, "1", "standard deviations of what is usual, by which an outlier stands out at least", LOOP)
-    outlier_missed: float = record(0.4, "1", "of that, by which the lines from either side, and a model, miss it", LOOP)
-    outlier_alone: float = record(0.5, "1", "of that: where two samples near by stand out as much, the axis rings", LOOP)
-    sensor_step: float = record(1e-4, "1", "of the velocity's range: a finer lattice is that of a text log", DRIVES)
+    outlier_far: float = record(9.0, "1", "standard deviations from its neighbours, from which a sample may be an outlier", LOOP)
+    outlier_missed: float = record(0.4, "1", "of that distance, by which the lines from either side, and a model, miss it", LOOP)
+    outlier_alone: float = record(0.5, "1", "of that distance: where two samples near by are as far off, the axis rings", LOOP)
+    sensor_step: float = record(1e-4, "1", "of the velocity's range: a finer quantisation is that of a text log", DRIVES)
     on_lattice: float = record(0.1, "steps", "from the places of a lattice, within which all values lie on it", DRIVES)
-    folded_steep: float = record(0.15, "1", "of the 95 % quantile of slopes: less is a rest, no turning point", REAL)
-    folded_smoother: float = record(0.8, "1", "of the curvature there, below which turning the sign over smooths it", REAL)
-    folded_points: int = record(3, "1", "turning points of a speed without its sign; one or two may be chance", REAL)
+    folded_steep: float = record(0.15, "1", "of the 95 % quantile of slopes: a turning point with less is a rest", REAL)
+    folded_smoother: float = record(
+        0.8, "1", "of the curvature at a turning point: below, the signal is smoother with its sign turned there", REAL
+    )
+    folded_points: int = record(3, "1", "such points, from which a speed has lost its sign; one or two may be chance", REAL)
     above_noise: float = record(6.0, "1", "standard deviations of a signal's noise, beyond which it is not 0", DRIVES)
     still: float = record(0.02, "1", "of a signal's largest value or range: within, it holds a value, or is 0", DRIVES)
     apart: float = record(0.05, "1", "of the highest speed, by which two speeds or jumps differ", DRIVES)
     slow: float = record(0.1, "1", "of the highest speed or torque: below, it is a slow or a small one", DRIVES)
     held_samples: int = record(20, "samples", "for which a speed is held at least", DRIVES)
-    no_ramp: float = record(0.35, "1", "of the band of a held speed, by which its halves differ at most; on a ramp 0.5", DRIVES)
-    seen_turn: float = record(0.75, "1", "of a period of the angle, that a record has to turn to show its order", DRIVES)
-    seen_path: float = record(
-        3.0, "periods", "of the angle that a record has to travel, there and back, to show an order", DRIVES
+    no_ramp: float = record(
+        0.35, "1", "of the band of a held speed, by which its halves differ at most; on a ramp by 0.5", DRIVES
     )
+    seen_turn: float = record(0.75, "1", "of a period, that a record turns at least to show its order", DRIVES)
+    seen_path: float = record(3.0, "periods", "that a record travels at least, there and back, to show an order", DRIVES)
     seen_band: float = record(0.8, "1", "of half the sampling frequency: what is faster does not show", DRIVES)
-    gravity_turn: float = record(
-        1 / 6, "turns", "of travel: below, a torque once per turn is a constant and a spring", REGRESSION
-    )
+    gravity_turn: float = record(1 / 6, "turns", "of travel: below, a torque once per turn is a constant or a spring", REGRESSION)
     swing_damping: float = record(0.5, "1", "damping ratio below which two masses swing as on a shaft", DRIVES)
 
     # Which linear model holds? What identify() and inverse_dynamics() decide for themselves; a diagnosis starts from it.
     test_level: float = linear(
-        1e-4, "probability", "of the tests that a linear model holds, and that a replay leaves white noise", SUCCESS
+        1e-4, "probability", "of the tests that a linear model holds, that a replay leaves white noise", SUCCESS
     )
-    undecided_ratio: float = linear(2.0, "1", "rms of a residual over the noise: above, colour may hide a misfit", SUCCESS)
+    undecided_ratio: float = linear(
+        2.0, "1", "rms of a residual over the noise: above, what is not white may hide a misfit", SUCCESS
+    )
     cancellation: float = linear(0.02, "1", "of a zero's magnitude: a pole so close cancels it", SUCCESS)
-    contradiction: float = linear(3.0, "1", "standard deviations by which numbers of a mechanism contradict each other", SUCCESS)
+    contradiction: float = linear(
+        3.0, "1", "standard deviations by which numbers of a mechanism contradict each other, or a lag is not 0", SUCCESS
+    )
     material_column: float = linear(
-        0.05, "1", "of the squared torque, that a spring or friction by direction takes at least", REGRESSION
+        0.05, "1", "of the squared torque, that a spring or friction by direction explains", REGRESSION
     )
-    lag_left: float = linear(0.05, "1", "of the squared torque, that the regression behind a lag leaves at most", SHIFTED)
-    lag_curvature: float = linear(1e-3, "1", "of the squared torque per squared sample: below, the motion shows no lag", SHIFTED)
+    lag_left: float = linear(
+        0.05, "1", "most of the squared torque, or velocity, that the regression behind a lag leaves: more tells no lag", SHIFTED
+    )
+    lag_curvature: float = linear(
+        1e-3,
+        "1",
+        "of the squared torque per squared sample, by which a wrong lag is worse: below, the motion shows no lag",
+        SHIFTED,
+    )
     winding_sure: float = linear(5.0, "1", "standard deviations from 0, from which a resistance or inductance is shown", WINDING)
-    least_rows: int = linear(
-        20, "1", "rows of a regression at least, half of them in each direction for dry friction", REGRESSION
-    )
-    both_ways: float = linear(
-        0.02, "1", "of the rows, that either direction has at least to tell dry friction from a load", REGRESSION
-    )
+    least_rows: int = linear(20, "1", "rows of a regression at least, half of them each way for dry friction", REGRESSION)
+    both_ways: float = linear(0.02, "1", "of the rows in either direction at least, to tell dry friction from a load", REGRESSION)
     spring_turns: float = linear(10.0, "turns", "of travel: beyond, no spring is fixed to the ground", REGRESSION)
     another_mass: float = linear(
-        2.0, "1", "fall of the whitened error sum for a mass more, where no linear structure holds", DRIVES
-    )
-    below_zero: float = linear(
         2.0,
         "1",
-        "standard deviations from 0: a mass or damping below is said to be negative, what is nearer has no sign",
-        SUCCESS,
+        "factor by which a further mass reduces the whitened error sum at least, where no linear structure holds",
+        DRIVES,
+    )
+    below_zero: float = linear(
+        2.0, "1", "standard deviations below 0, from which a mass or damping is said to be negative; nearer has no sign", SUCCESS
     )
 
     # Effort: budgets.

@@ -80,6 +80,10 @@ def test_a_watched_number_is_the_number_and_notes_what_would_come_out_otherwise(
     assert int(100 * policy.fitted_share) == 70 and len(turned("fitted_share")) == len(watch.STEPS) - 2  # to below 0: none
     assert math.ceil(policy.seen_turn) == 1 and f"{policy.swap:.1f}" == "2.0"
     assert turned("seen_turn") == []
+    errors = x * policy.swap
+    worked_on = np.multiply(errors, x, out=errors)
+    assert type(worked_on) is np.ndarray and list(worked_on) == [2.0, 18.0]  # in place: every other value is another
+    assert turned("swap") == list(watch.STEPS)
     assert math.sqrt(policy.swap) == math.sqrt(2.0)  # no arithmetic that it can follow: every other value is another
     assert turned("swap") == list(watch.STEPS)
 
@@ -170,3 +174,21 @@ def test_a_row_is_measured_and_what_is_there_is_not_run_again(tmp_path: Path) ->
     assert len(same) >= 3
     for line in same:
         assert all(line[name] == watched[line["case"]][name] for name in ("outcome", "said", "detail")), line["case"]
+
+
+def test_every_kind_has_cases_with_keys_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    for folder in ("bench/measured", "bench"):
+        monkeypatch.syspath_prepend(str(ROOT / folder))
+    kinds = importlib.import_module("rows.cases")
+    assert set(kinds.KINDS) == set(SHOWN_BY)
+    keys = [c.key for kind in SHOWN_BY for c in kinds.cases(kind, 1, 5)]
+    assert len(set(keys)) == len(keys) and all(sum(k.startswith(f"{kind}/") for k in keys) >= 5 for kind in SHOWN_BY)
+
+
+def test_a_slower_log_shows_the_form_that_made_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    for folder in ("bench/measured", "bench"):
+        monkeypatch.syspath_prepend(str(ROOT / folder))
+    kinds = importlib.import_module("rows.cases")
+    found = {c.what: kinds.run(c) for c in kinds.cases("slower", 1, 5) if c.what in (("bare", "steps"), ("gains", "ramps"))}
+    assert {what: result.said for what, result in found.items()} == {("bare", "steps"): "", ("gains", "ramps"): "other_gains"}
+    assert all(result.outcome == "right" for result in found.values())
