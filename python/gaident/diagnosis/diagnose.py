@@ -36,6 +36,7 @@ from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection.attribution import only_describes, shown_by_the_records, simplified, what_is_left
 from gaident.diagnosis.selection.offset import Offset, offset_of
 from gaident.diagnosis.selection.rivals import Replacement
+from gaident.diagnosis.selection.sensor_age import as_old_as_shown
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.objective import Fit, Objective
@@ -203,7 +204,9 @@ class _Work:
         data = replace(data, controller=shown, loop_follows=self.at_controller.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
-        self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
+        self.objective, older = as_old_as_shown(Objective(self.data, np.concatenate(kept) * 1.0), self.scales, self.idn.model)
+        self.data = self.objective.data
+        self.notes += older
         self.spoiled = int(sum(len(h) for h in hit))
         self.excited = excitation(self.clean, self.data.loop, axis=self.axis)
 

@@ -279,6 +279,7 @@ class Policy:
     outlier_alone: float = record(0.5, "1", "of that: where two samples near by stand out as much, the axis rings", LOOP)
     sensor_step: float = record(1e-4, "1", "of the velocity's range: a finer lattice is that of a text log", DRIVES)
     on_lattice: float = record(0.1, "steps", "from the places of a lattice, within which all values lie on it", DRIVES)
+    whole_lines: float = record(0.01, "1", "lines of a turn, within which an encoder's number of lines is whole", DRIVES)
     folded_steep: float = record(0.15, "1", "of the 95 % quantile of slopes: less is a rest, no turning point", REAL)
     folded_smoother: float = record(0.8, "1", "of the curvature there, below which turning the sign over smooths it", REAL)
     folded_points: int = record(3, "1", "turning points of a speed without its sign; one or two may be chance", REAL)

@@ -7,11 +7,12 @@ from numpy.typing import NDArray
 
 from gaident.policy.table import POLICY
 
-__all__ = ["lattice_step", "rounding_step"]
+__all__ = ["encoder_lines", "lattice_step", "rounding_step"]
 
 Vector = NDArray[np.float64]
 
 FEWEST = 4  # no decision: distinct values that a lattice could be told from chance by
+FEWEST_LINES = 100  # no decision: of a turn; no encoder of a drive has fewer
 EXACT = 1e-4  # no decision: steps, what a decimal number is exact to in binary and scaled by ten
 
 DIGITS = range(4, 10)  # no decision: significant digits that text logs are written with; more round off nothing that matters
@@ -37,6 +38,20 @@ def lattice_step(values: Vector) -> float:
     off = np.abs(places - np.round(places))
     # On no lattice, the gaps are no multiples of the least one and `off` is spread evenly over 0..0.5.
     return step if float(off.max()) < POLICY.on_lattice else 0.0
+
+
+def encoder_lines(velocity: Vector, period: float, turn: float) -> int:
+    """Lines to a turn of the encoder whose angle, differenced over `period` [s], gives these velocities; 0 where none does.
+
+    A difference of counts is a multiple of q = turn/(lines period), `turn` 2 pi rad, or 1 m where velocities are in m/s. The
+    number of lines that q stands for is whole then, and for chance to make it whole is as rare as `whole_lines` says.
+    """
+    step = lattice_step(velocity)
+    if not step > 0.0:
+        return 0
+    lines = turn / (step * period)
+    whole = round(lines)
+    return whole if whole >= FEWEST_LINES and abs(lines - whole) < POLICY.whole_lines else 0
 
 
 def rounding_step(values: Vector) -> float:
