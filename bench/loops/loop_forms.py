@@ -76,7 +76,11 @@ def run(loop: str, every: int, effect: str, number: int, given: str) -> dict[str
     assert isinstance(whole, ga.Cascade)
     controller = pi if every == 1 or given == "bare" else ga.Cascade(pi, period=plant.dt / every)
     controller = whole if given == "whole" else controller
-    expected = set() if given == "whole" else EXPECTED[loop] | ({"torque_saturation"} if whole.velocity.torque_limit is not None else set())
+    expected = (
+        set()
+        if given == "whole"
+        else EXPECTED[loop] | ({"torque_saturation"} if whole.velocity.torque_limit is not None else set())
+    )
     started = time.perf_counter()
     try:
         dia = ga.diagnose(record, controller=controller, validation=validation)

@@ -31,7 +31,7 @@ from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_dampi
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_order, noise_std_of, records_of
 from gaident.diagnosis.records.folded import ADVICE, folded
-from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation
+from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation, unexplained
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection.attribution import only_describes, shown_by_the_records, simplified, what_is_left
 from gaident.diagnosis.selection.offset import Offset, offset_of
@@ -194,7 +194,7 @@ class _Work:
         self.scales = scales_of(data)
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.driving.logged.replays)
         self.notes += notes
-        self.controller_steps += self.driving.findings
+        self.controller_steps += (*self.driving.logged.findings, *self.driving.findings)
         # Limits that the log shows act in every loop that is closed for a fit.
         limits = self.at_controller.effects
         known: dict[Term, NDArray[np.float64]] = {
@@ -207,7 +207,6 @@ class _Work:
         self.objective, older = as_old_as_shown(Objective(self.data, np.concatenate(kept) * 1.0), self.scales, self.idn.model)
         self.data = self.objective.data
         self.notes += older
-        self.spoiled = int(sum(len(h) for h in hit))
         self.excited = excitation(self.clean, self.data.loop, axis=self.axis)
 
     def search(self) -> None:
@@ -276,7 +275,8 @@ class _Work:
         """Everything the user sees."""
         self.note(0.9, "measuring the gain")
         gains, driver, causes, estimates, offset, mechanics, model, check = self.judged()
-        findings = findings_of_the_record(self.spoiled, sum(len(r) for r in self.records), self.step)
+        spoiled = unexplained(self.data.velocity, self.objective.error(self.final), self.objective.weight)
+        findings = findings_of_the_record(spoiled, sum(len(r) for r in self.records), self.step)
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         for effect in causes:
             gain, rivals = self.rivals[effect]

@@ -213,6 +213,7 @@ def _of_true_angle(
             angle = true_angle(angle, driven.velocity, own)
         states = None if controller is not None else parameters.start_values(x[None, :], i)
         turned = with_angle(record, angle)
+
         def run(rec: Record, steps: int | None, states: Matrix | None = states) -> Matrix:
             return simulate_values(parameters.structure, names, values, rec, controller, initial_states=states, substeps=steps)
 

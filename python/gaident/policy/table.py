@@ -237,6 +237,10 @@ class Policy:
     slope_reach: float = loop(
         0.3, "1", "of a filter's number, by which a form may move it along its slope; the filter's own fit stands else", FORMS
     )
+    quiet_torque: float = loop(0.5, "1", "of the largest torque: below, no limit acts, whatever it limits", FORMS)
+    filter_memory: int = loop(
+        200, "samples", "after which no filter remembers a limit; a quarter of it where too few are left", FORMS
+    )
     form_choice: float = loop(
         2.0 * math.log(3.0), "BIC units", "of a setting chosen of three without a number of its own: 2 ln 3", FORMS
     )
