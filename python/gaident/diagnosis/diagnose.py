@@ -21,10 +21,10 @@ from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.experiments.candidates import IN_MOTION, candidates
 from gaident.diagnosis.experiments.excitation import excitation
+from gaident.diagnosis.explain.alternatives import alternatives_of
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off, hidden_by_torque_noise
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
-from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, in_controller
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
@@ -36,8 +36,8 @@ from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection.attribution import only_describes, shown_by_the_records, simplified, what_is_left
 from gaident.diagnosis.selection.offset import Offset, offset_of
 from gaident.diagnosis.selection.rivals import Replacement
-from gaident.diagnosis.selection.sensor_age import as_old_as_shown
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
+from gaident.diagnosis.selection.sensor_age import as_old_as_shown
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.term import Term
@@ -204,7 +204,9 @@ class _Work:
         data = replace(data, controller=shown, loop_follows=self.at_controller.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
-        self.objective, older = as_old_as_shown(Objective(self.data, np.concatenate(kept) * 1.0), self.scales, self.idn.model)
+        self.objective, older = as_old_as_shown(
+            Objective(self.data, np.concatenate(kept).astype(np.float64)), self.scales, self.idn.model
+        )
         self.data = self.objective.data
         self.notes += older
         self.excited = excitation(self.clean, self.data.loop, axis=self.axis)
@@ -375,14 +377,11 @@ class _Work:
             self.take(compared(self.found, shorter, self._equivalent_here, self._say))
 
     def _alternatives(self, effect: str, rivals: Sequence[Replacement], offset: Offset | None) -> tuple[str, ...]:
-        """Statistical rivals and equivalent effects, no untestable ones; offset: what an effect is not the same as."""
-        # Where the records show the torque's jump by themselves, nothing without such a jump stands for it.
+        """Rivals, equivalent effects and, where the loop is not the drive's, the controller; no untestable ones."""
         shown = shown_by_the_records(self.found.space, self.final, effect)
-        names = [r.effect for r in rivals if not shown or LIBRARY[r.effect].levels]
-        names += sorted(self._equivalent_here(effect))
-        if offset is None or effect != offset.effect:
-            names += equivalents(effect)
-        return tuple(name for name in dict.fromkeys(names) if name not in self.not_testable)
+        here = sorted(self._equivalent_here(effect))
+        names = alternatives_of(effect, rivals, here, bool(shown), offset, self.driving.follows)
+        return tuple(name for name in names if name not in self.not_testable)
 
     def _equivalent_here(self, effect: str) -> set[str]:
         """What these records cannot tell from an effect, whatever their noise, for lack of reversals or of sizes of steps."""

@@ -10,6 +10,7 @@ large as the steps of a fine encoder.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,8 @@ def with_middles(rec: Record) -> Record:
     def between(name: str, x: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.repeat(x, 2) if name == "torque" else np.interp(at, np.arange(len(rec)), x)
 
-    return rec.with_channels(dt=0.5 * rec.dt, **{name: between(name, x) for name, x in rec.channels()})
+    channels: dict[str, Any] = {name: between(name, x) for name, x in rec.channels()}
+    return rec.with_channels(dt=0.5 * rec.dt, **channels)  # no decision: half the sample
 
 
 def means(W: Matrix) -> Matrix:

@@ -237,6 +237,9 @@ class Policy:
     slope_reach: float = loop(
         0.3, "1", "of a filter's number, by which a form may move it along its slope; the filter's own fit stands else", FORMS
     )
+    other_loop: float = loop(
+        0.1, "1", "of the logged torque's rms, that a controller run on a slow log leaves: more, and it is not the drive's", FORMS
+    )
     quiet_torque: float = loop(0.5, "1", "of the largest torque: below, no limit acts, whatever it limits", FORMS)
     filter_memory: int = loop(
         200, "samples", "after which no filter remembers a limit; a quarter of it where too few are left", FORMS

@@ -206,7 +206,7 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
 def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[Candidate], floor: float) -> Shown | None:
     """The same of a log with fewer lines: None where it leaves more than another course between them could make."""
     allowed = max(POLICY.near_rounding * floor, POLICY.negligible * float(np.abs(law.torque).max()))
-    # Where the given controller leaves no more, no other one is looked for, but one with another setting and no number of its own.
+    # Where the given controller leaves no more, no other one is looked for; only a setting without a number of its own.
     plain = [c for c in candidates if not c.names]
     as_free = [c for c in candidates if plain and c.count == plain[0].count and c.shape is plain[0].shape and not c.form.free]
     for best in (*as_free[:1], *plain[:1], candidates[0]):

@@ -7,7 +7,7 @@ encoder has it. Left out, it is fitted as a delay or, beside a current loop, as 
 
 The lattice of the velocities says how many lines the encoder had. Not every velocity on such a lattice is a difference: one that
 an observer or the drive's firmware rounds to the lattice is not. So both ages are fitted, with the linear mechanism alone and
-with the lag of a current loop, and the one that scores better counts.
+with the lag of a current loop, and the velocity is no difference where that scores better beyond the margin of two rivals.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def as_old_as_shown(objective: Objective, scales: Scales, model: Model) -> tuple
     if not lines:
         return objective, []
     older = Objective(data.aged(HALF / every), objective.weight, counter=objective.counter)
-    if not _score(older, scales, model) < _score(objective, scales, model) - POLICY.rival_margin:
+    if _score(objective, scales, model) < _score(older, scales, model) - POLICY.rival_margin:
         return objective, []
     text = (
         "The velocity is the difference of an encoder's {angle} over one sample of the controller ({} lines a turn), and with it "
