@@ -188,20 +188,22 @@ def quiet_law(law: Law, memory: int) -> Law | None:
 
     A limit acts at large torques only, wherever it stands: before a filter, whose output shows no plateau, or with an integrator
     that does not wind up. A stretch begins `memory` lines after the last large torque, when no filter remembers it, and has an
-    integral of its own. None where too little is left.
+    integral of its own. It ends before the next one, whose beginning a filter shows late. None where too little is left.
     """
+    ahead = memory // 4  # no decision: a filter shows half of a step much sooner than all of it
     parts = []
     at = 0
     for length in law.lengths:
         size = np.abs(law.torque[at : at + length])
         at += length
         loud = size > POLICY.quiet_torque * float(size.max())
-        since = np.convolve(loud, np.ones(memory + 1))[:length] > 0.5  # no decision: one of them
-        begins = ~since & np.append(True, since[:-1])
-        parts.append(np.where(since, -1, np.cumsum(begins) - 1))
+        around = np.convolve(loud, np.ones(memory + ahead + 1))[ahead : ahead + length] > 0.5  # no decision: one of them
+        begins = ~around & np.append(True, around[:-1])
+        parts.append(np.where(around, -1, np.cumsum(begins) - 1))
     stretch = numbered(parts)
     quiet = replace(law, used=stretch >= 0, stretch=stretch)
-    return quiet if _with_enough(quiet, 0.0) is not None else None
+    several = int(stretch.max(initial=-1)) > 0  # of one alone, other forms come as close
+    return quiet if several and _with_enough(quiet, 0.0) is not None else None
 
 
 def _with_enough(law: Law, floor: float) -> tuple[Law, float] | None:

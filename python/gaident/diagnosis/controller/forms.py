@@ -227,10 +227,8 @@ def _shown_quietly(records: Sequence[Record], law: Law, given: PI, floor: float,
     for memory in (POLICY.filter_memory, POLICY.filter_memory // 4):  # no decision: a quarter
         quiet = quiet_law(law, memory)
         candidates = [] if quiet is None else _compared(quiet, given, floor, unknown)
-        if quiet is None:
+        if quiet is None or not candidates:
             continue
-        if not candidates:
-            return None
         best = candidates[0]
         numbers, filters, cov = _fitted(quiet, best, given)
         made = quiet.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
@@ -238,7 +236,6 @@ def _shown_quietly(records: Sequence[Record], law: Law, given: PI, floor: float,
         allowed = max(_allowed(r, given) for r in records)
         if float(np.abs(left).max()) <= allowed or white_noise(left, quiet.logged):
             return _with_limit(records, quiet, given, candidates, (numbers, filters, cov))
-        return None
     return None
 
 
