@@ -51,6 +51,7 @@ EXPECTED: dict[str, set[str]] = {
     "tracking": {"torque_saturation", "anti_windup"},
     "command filter": {"command_filter"},
     "velocity filter": {"velocity_feedback_filter"},
+    "computing delay": set(),
     "together": {"integration_rule", "command_weight", "torque_filter", "velocity_feedback_filter", "command_filter",
                  "torque_saturation", "anti_windup"},
 }  # fmt: skip

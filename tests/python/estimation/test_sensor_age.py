@@ -38,6 +38,8 @@ def test_lines_of_an_encoder_are_whole() -> None:
     assert encoder_lines(w, T, 2.0 * np.pi) == LINES
     assert encoder_lines(1.0003 * w, T, 2.0 * np.pi) == 0
     assert encoder_lines(angle, T, 2.0 * np.pi) == 0
+    rpm = np.pi / 30.0 * np.round(angle / angle.max() * 900.0)
+    assert encoder_lines(rpm, 1e-3, 2.0 * np.pi) == 0  # not 60000 lines
 
 
 def test_the_mean_over_a_sample_is_exact_behind_a_current_loop() -> None:

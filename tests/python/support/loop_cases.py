@@ -78,6 +78,7 @@ LOOPS: dict[str, Callable[[Plant, np.random.Generator], ga.Cascade]] = {
     "tracking": tracking,
     "command filter": lambda plant, rng: ga.Cascade(pi(plant), PERIOD, command_filters=(low_pass(rng, 1e-3, 5e-3),)),
     "velocity filter": lambda plant, rng: ga.Cascade(pi(plant), PERIOD, velocity_filters=(low_pass(rng, 0.3e-3, 1e-3),)),
+    "computing delay": lambda plant, rng: ga.Cascade(pi(plant), PERIOD, delay=PERIOD * float(rng.choice([0.5, 1.0, 1.5]))),
     "position": position,
     "together": together,
 }
