@@ -28,7 +28,6 @@ from gaident.policy.table import POLICY
 __all__ = ["as_old_as_shown"]
 
 HALF = 0.5  # no decision: of a sample, the age of a mean over it
-LAG = "torque_lag"
 
 
 def as_old_as_shown(objective: Objective, scales: Scales, model: Model) -> tuple[Objective, list[Text]]:
@@ -60,7 +59,7 @@ def as_old_as_shown(objective: Objective, scales: Scales, model: Model) -> tuple
 def _score(objective: Objective, scales: Scales, model: Model) -> float:
     """BIC of the best linear mechanism with and without a lag of the torque, each under a noise filter of its own."""
     task = Task(objective, scales, model, (), lambda message: None).under(Innovations())
-    space, lag = task.space(), LIBRARY[LAG]
+    space, lag = task.space(), next(t for t in LIBRARY.values() if t.late)  # the same as a lag of the torque, see `EQUIVALENT`
     starts = [task.start(m, POLICY.short) for m in (one_mass(task.data, model), *reduced(model))]
     base = min(starts, key=lambda f: f.cost)
     longer = base.hypothesis.extended(lag)
