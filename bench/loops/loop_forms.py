@@ -51,6 +51,7 @@ EXPECTED: dict[str, set[str]] = {
     "tracking": {"torque_saturation", "anti_windup"},
     "command filter": {"command_filter"},
     "velocity filter": {"velocity_feedback_filter"},
+    "computing delay": set(),
     "together": {"integration_rule", "command_weight", "torque_filter", "velocity_feedback_filter", "command_filter",
                  "torque_saturation", "anti_windup"},
 }  # fmt: skip
@@ -73,9 +74,14 @@ def run(loop: str, every: int, effect: str, number: int, given: str) -> dict[str
     pi = ga.PI(plant.kp, plant.ki)
     if given == "unknown":
         pi = ga.PI(kp=None, ki=None)
-    controller = pi if every == 1 or given == "bare" else ga.Cascade(pi, period=plant.dt / every)
     assert isinstance(whole, ga.Cascade)
-    expected = EXPECTED[loop] | ({"torque_saturation"} if whole.velocity.torque_limit is not None else set())
+    controller = pi if every == 1 or given == "bare" else ga.Cascade(pi, period=plant.dt / every)
+    controller = whole if given == "whole" else controller
+    expected = (
+        set()
+        if given == "whole"
+        else EXPECTED[loop] | ({"torque_saturation"} if whole.velocity.torque_limit is not None else set())
+    )
     started = time.perf_counter()
     try:
         dia = ga.diagnose(record, controller=controller, validation=validation)
@@ -145,10 +151,11 @@ def main() -> None:
     parser.add_argument("--effects", nargs="+", default=[""], help="hidden beside the current loop; default: none")
     parser.add_argument("--bare", action="store_true", help="give the PI alone where the log is slower, too")
     parser.add_argument("--unknown", action="store_true", help="give PI(kp=None, ki=None)")
+    parser.add_argument("--whole", action="store_true", help="give all of the controller")
     parser.add_argument("--report", action="store_true")
     options = parser.parse_args()
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    given = "unknown" if options.unknown else "bare" if options.bare else "period"
+    given = "whole" if options.whole else "unknown" if options.unknown else "bare" if options.bare else "period"
     if not options.report:
         there = read(options.out)
         jobs = [

@@ -21,22 +21,23 @@ from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.experiments.candidates import IN_MOTION, candidates
 from gaident.diagnosis.experiments.excitation import excitation
+from gaident.diagnosis.explain.alternatives import alternatives_of
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off, hidden_by_torque_noise
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
-from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, in_controller
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_order, noise_std_of, records_of
 from gaident.diagnosis.records.folded import ADVICE, folded
-from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation
+from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation, unexplained
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection.attribution import only_describes, shown_by_the_records, simplified, what_is_left
 from gaident.diagnosis.selection.offset import Offset, offset_of
 from gaident.diagnosis.selection.rivals import Replacement
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
+from gaident.diagnosis.selection.sensor_age import as_old_as_shown
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.term import Term
@@ -193,7 +194,7 @@ class _Work:
         self.scales = scales_of(data)
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.driving.logged.replays)
         self.notes += notes
-        self.controller_steps += self.driving.findings
+        self.controller_steps += (*self.driving.logged.findings, *self.driving.findings)
         # Limits that the log shows act in every loop that is closed for a fit.
         limits = self.at_controller.effects
         known: dict[Term, NDArray[np.float64]] = {
@@ -203,8 +204,11 @@ class _Work:
         data = replace(data, controller=shown, loop_follows=self.at_controller.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
-        self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
-        self.spoiled = int(sum(len(h) for h in hit))
+        self.objective, older = as_old_as_shown(
+            Objective(self.data, np.concatenate(kept).astype(np.float64)), self.scales, self.idn.model
+        )
+        self.data = self.objective.data
+        self.notes += older
         self.excited = excitation(self.clean, self.data.loop, axis=self.axis)
 
     def search(self) -> None:
@@ -271,7 +275,8 @@ class _Work:
         """Everything the user sees."""
         self.note(0.9, "measuring the gain")
         gains, driver, causes, estimates, offset, mechanics, model, check = self.judged()
-        findings = findings_of_the_record(self.spoiled, sum(len(r) for r in self.records), self.step)
+        spoiled = unexplained(self.data.velocity, self.objective.error(self.final), self.objective.weight)
+        findings = findings_of_the_record(spoiled, sum(len(r) for r in self.records), self.step)
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         for effect in causes:
             gain, rivals = self.rivals[effect]
@@ -370,14 +375,11 @@ class _Work:
             self.take(compared(self.found, shorter, self._equivalent_here, self._say))
 
     def _alternatives(self, effect: str, rivals: Sequence[Replacement], offset: Offset | None) -> tuple[str, ...]:
-        """Statistical rivals and equivalent effects, no untestable ones; offset: what an effect is not the same as."""
-        # Where the records show the torque's jump by themselves, nothing without such a jump stands for it.
+        """Rivals, equivalent effects and, where the loop is not the drive's, the controller; no untestable ones."""
         shown = shown_by_the_records(self.found.space, self.final, effect)
-        names = [r.effect for r in rivals if not shown or LIBRARY[r.effect].levels]
-        names += sorted(self._equivalent_here(effect))
-        if offset is None or effect != offset.effect:
-            names += equivalents(effect)
-        return tuple(name for name in dict.fromkeys(names) if name not in self.not_testable)
+        here = sorted(self._equivalent_here(effect))
+        names = alternatives_of(effect, rivals, here, bool(shown), offset, self.driving.follows)
+        return tuple(name for name in names if name not in self.not_testable)
 
     def _equivalent_here(self, effect: str) -> set[str]:
         """What these records cannot tell from an effect, whatever their noise, for lack of reversals or of sizes of steps."""

@@ -87,7 +87,7 @@ def measured_gains(
     at_controller: dict[str, dict[str, float]],
 ) -> Gains:
     """Errors of the linear model, of each stage and of the extended model, closed over the controller where they can be."""
-    controller = closed_over(controller, (*records, *held))
+    controller = objective.data.older(closed_over(controller, (*records, *held)))
     part: tuple[int, ...] | None
     if held:
         scored, words, part = [(r, 0) for r in held], "validation records", None
@@ -108,6 +108,8 @@ def measured_gains(
     chain += [with_effects(f.parameters.model(f.x), at_controller) for f in stages[1:]]
     # Where the simulated loop is known not to be the drive's, the torque drives the models that are compared and printed.
     driver = controller if objective.data.loop_follows or not objective.data.torque_logged else None
+    if driver is None and objective.data.age:
+        scored = [(objective.data.as_old(r), first) for r, first in scored]
     errors = [free_run_errors(m, scored, driver) for m in chain]
     levels = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in errors]
     base = free_run_errors(stages[0].parameters.model(stages[0].x), scored, driver)

@@ -101,12 +101,12 @@ def effective_samples(*errors: Vector) -> float:
     squares = products[1 : 1 + longest // LAGS] ** 2 / products[0] ** 2
     chance = (count - np.arange(1, len(squares) + 1)) / count**2  # what rho^2 of white errors is in the mean
     swinging = float(np.sum(squares - chance))
-    memory = 1.0 + 2.0 * slow
+    memory = 1.0 + 2.0 * slow  # no decision: as below
     if swinging > max(slow, SWINGS):
         lowest = sum(float(np.sum(np.abs(np.fft.rfft(e - mean)[1 : 1 + LOWEST]) ** 2)) for e in errors)
         spectral = lowest / (products[0] * sum(min(LOWEST, len(e) // 2) * len(e) for e in errors) / count)
         memory = max(1.0 + 2.0 * swinging, spectral)
-    return float(np.clip(count / memory, 1.0, count))  # no decision: variances of means of correlated samples
+    return float(np.clip(count / memory, 1.0, count))
 
 
 class Specification(NamedTuple):

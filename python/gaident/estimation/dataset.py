@@ -15,13 +15,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.cascade import cascade_of
 from gaident.control.controller import Controller, Limiting
 from gaident.control.filtering import rate_limited
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.estimation.term import Term
-from gaident.models.drive_torque import torque_of
+from gaident.models.drive_torque import late, torque_of
 from gaident.models.starts import noise_std, starts_moving
 
 __all__ = ["DataSet", "with_angle"]
@@ -42,6 +43,8 @@ class DataSet:
     shorter [s]; resolution: step of the lattice that all velocities lie on [rad/s], 0: none; known_noise: standard deviation
     of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
     makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear".
+    age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample old. What
+    drives a model is late by as much, here and in the loop that is simulated.
     """
 
     records: tuple[Record, ...]
@@ -58,6 +61,7 @@ class DataSet:
     loop_follows: bool = True
     torque_measured: bool = False
     axis: str = "rotary"
+    age: float = 0.0
 
     @classmethod
     def of(
@@ -78,6 +82,30 @@ class DataSet:
         measured = any(r.torque_is == MEASURED for r in records)
         found = cls(tuple(records), controller, driven, turned, free, moving, spoiled, seen, resolution=resolution)
         return replace(found, torque_measured=measured, axis=axis)
+
+    def aged(self, lines: float) -> DataSet:
+        """The same with a measured velocity that is so many lines of the log old."""
+        return replace(self, age=lines)
+
+    def older(self, loop: Controller | None) -> Controller | None:
+        """A loop in which the velocity has its age: its torque is late by as much."""
+        if loop is None or not self.age:
+            return loop
+        servo = cascade_of(loop)
+        return replace(servo, delay=servo.delay + self.age * self.dt)
+
+    def as_old(self, rec: Record) -> Record:
+        """A record whose torque is as late as the velocity is old: a linear model that it drives gives the velocity that is seen.
+
+        That is the mean of the velocities at the ends of a line; `gaident.estimation.mean_velocity` has what is nearer.
+        """
+        torque = torque_in(rec)
+        return rec.with_channels(torque=late(torque, self.age, torque[0] if starts_moving(rec, None) else 0.0))
+
+    @property
+    def differenced(self) -> bool:
+        """Whether the velocity is the difference of the angle from each line of the log to the next."""
+        return self.age == 0.5  # no decision: a mean over a line is half of it old
 
     @property
     def dt(self) -> float:
@@ -115,7 +143,7 @@ class DataSet:
     @cached_property
     def loop(self) -> Controller | None:
         """What a simulated loop is closed over; None: the torque drives the model."""
-        return None if self.controller is None else self.controller.simulated_with(self.dt)
+        return None if self.controller is None else self.older(self.controller.simulated_with(self.dt))
 
     @property
     def pi(self) -> PI | None:

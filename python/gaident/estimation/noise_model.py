@@ -29,7 +29,7 @@ from gaident.estimation.state_space import discretised, disturbed, steady_covari
 from gaident.identification.noise import autocorrelation, autoregression_of, highest_order
 from gaident.models.model import Model
 
-__all__ = ["HIGHEST", "WHITE", "NoiseFilter", "ShaftNoise", "autoregression", "stationary_autoregression"]
+__all__ = ["DIFFERENCED", "HIGHEST", "WHITE", "NoiseFilter", "ShaftNoise", "autoregression", "stationary_autoregression"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -81,6 +81,8 @@ class NoiseFilter:
 
 
 WHITE = NoiseFilter()
+DIFFERENCED = [NoiseFilter(a=np.array([1.0, -c]), size=1) for c in (0.9, 0.99, 0.999)]  # no decision: a grid
+"""The rounding of an angle that is differenced sample by sample: e(n) = v(n) - v(n-1), as near to it as a filter is stable."""
 Grid = dict[tuple[int, int], NoiseFilter | None]
 
 

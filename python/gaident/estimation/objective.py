@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from gaident.estimation.criterion import bic
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.masked import Bridges
-from gaident.estimation.noise_model import HIGHEST, ON_TOP, WHITE, NoiseFilter, ShaftNoise, autoregression
+from gaident.estimation.noise_model import DIFFERENCED, HIGHEST, ON_TOP, WHITE, NoiseFilter, ShaftNoise, autoregression
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import Predictor
 from gaident.estimation.prefilter import Prefilter
@@ -140,21 +140,22 @@ class Innovations:
         return E
 
     def estimated(self, objective: Objective, error: Vector, closed: bool) -> NoiseFilter:
-        """An autoregression, or noise at the shaft with a short one behind it, whichever has the lower BIC."""
+        """An autoregression, or noise at the shaft or of a differenced angle with a short one behind it: the lowest BIC."""
         lengths = objective.data.lengths
         row = objective.bridged(error[None, :])
         plain = WHITE.then(autoregression(objective.parts(row[0]), floor=self.floor))
-        if self.shaft is None:
-            return plain
 
         def variance(f: NoiseFilter) -> float:
             return objective.variance(float(sums_of_squares(objective.whitened(row, f))[0]), f)
 
-        shaft = self.shaft.best(variance, closed)
-        if shaft is None:
-            return plain
-        shaft = shaft.then(autoregression(objective.parts(shaft.of(row, lengths)[0]), ON_TOP, self.floor * shaft.power))
-        return min((plain, shaft), key=lambda f: bic(variance(f), objective.count, f.size))
+        found = [] if self.shaft is None else [self.shaft.best(variance, closed)]
+        found += DIFFERENCED if objective.data.differenced else []
+        behind = [
+            f.then(autoregression(objective.parts(f.of(row, lengths)[0]), ON_TOP, self.floor * f.power))
+            for f in found
+            if f is not None
+        ]
+        return min((plain, *behind), key=lambda f: bic(variance(f), objective.count, f.size))
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ The angle that effects depend on is the logged one (or the measured velocity, in
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -25,6 +25,7 @@ from gaident.control.filtering import filtered
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.estimation.dataset import DataSet, angle_of, with_angle
+from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.term import Term
 from gaident.models.effects import place_of
@@ -89,7 +90,7 @@ class OpenLoop:
         if not self.own_angle and _bends_the_angle(self.data, parameters):
             return np.vstack([_of_true_angle(self.data, parameters, x, records, None, left_out) for x in X])
         names, values = parameters.values(X, left_out)
-        return _simulated(parameters, X, names, values, records, substeps(self.data, parameters.terms))
+        return _simulated(self.data, parameters, X, names, values, records)
 
     def _replayed(self, parameters: Parameterisation, X: Matrix, inside: Sequence[Term]) -> Matrix:
         """With effects of the controller the torque itself depends on x: rows that share it are simulated together."""
@@ -153,19 +154,33 @@ def substeps(data: DataSet, terms: Sequence[Term]) -> int | None:
 
 
 def _simulated(
+    data: DataSet,
     parameters: Parameterisation,
     X: Matrix,
     names: tuple[str, ...],
     values: Matrix,
     records: Sequence[Record],
-    steps: int | None,
 ) -> Matrix:
-    """Rows of x under the torques of the records."""
-    parts = [
-        simulate_values(parameters.structure, names, values, r, initial_states=parameters.start_values(X, i), substeps=steps)
-        for i, r in enumerate(records)
-    ]
+    """Rows of x under the torques of the records, as the sensor shows the velocity."""
+    steps = substeps(data, parameters.terms)
+    parts = []
+    for i, r in enumerate(records):
+        states = parameters.start_values(X, i)
+
+        def run(rec: Record, steps: int | None, states: Matrix | None = states) -> Matrix:
+            return simulate_values(parameters.structure, names, values, rec, initial_states=states, substeps=steps)
+
+        parts.append(_as_seen(data, r, steps, run))
     return np.concatenate(parts, axis=1)
+
+
+def _as_seen(data: DataSet, rec: Record, steps: int | None, run: Callable[[Record, int | None], Matrix]) -> Matrix:
+    """What `run` gives under the torque of a record, as old as the sensor shows it; steps: substeps of a sample."""
+    if not data.age:
+        return run(rec, steps)
+    if not data.differenced:
+        return run(data.as_old(rec), steps)
+    return means(run(with_middles(rec), None if steps is None else max(steps // 2, 1)))  # no decision: half the sample
 
 
 def _bends_the_angle(data: DataSet, parameters: Parameterisation) -> bool:
@@ -198,9 +213,11 @@ def _of_true_angle(
             angle = true_angle(angle, driven.velocity, own)
         states = None if controller is not None else parameters.start_values(x[None, :], i)
         turned = with_angle(record, angle)
-        parts.append(
-            simulate_values(parameters.structure, names, values, turned, controller, initial_states=states, substeps=steps)
-        )
+
+        def run(rec: Record, steps: int | None, states: Matrix | None = states) -> Matrix:
+            return simulate_values(parameters.structure, names, values, rec, controller, initial_states=states, substeps=steps)
+
+        parts.append(run(turned, steps) if controller is not None else _as_seen(data, turned, steps, run))
     return np.concatenate(parts, axis=1)
 
 

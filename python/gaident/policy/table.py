@@ -246,6 +246,13 @@ class Policy:
         "of a filter's number, by which a form may move it along its slope; beyond, the filter is fitted by itself",
         FORMS,
     )
+    other_loop: float = loop(
+        0.1, "1", "of the logged torque's rms, that a controller run on a slow log leaves: more, and it is not the drive's", FORMS
+    )
+    quiet_torque: float = loop(0.5, "1", "of the largest torque: below, no limit acts, whatever it limits", FORMS)
+    filter_memory: int = loop(
+        200, "samples", "after which no filter remembers a limit; a quarter of it where too few are left", FORMS
+    )
     form_choice: float = loop(2.0 * math.log(3.0), "BIC units", "of a setting chosen of three that has no number: 2 ln 3", FORMS)
     near_rounding: float = loop(
         1.1, "1", "of what rounding makes of a replay: filters that leave no more need no other filter beside them", FORMS
@@ -288,6 +295,7 @@ class Policy:
     outlier_alone: float = record(0.5, "1", "of that distance: where two samples near by are as far off, the axis rings", LOOP)
     sensor_step: float = record(1e-4, "1", "of the velocity's range: a finer quantisation is that of a text log", DRIVES)
     on_lattice: float = record(0.1, "steps", "from the places of a lattice, within which all values lie on it", DRIVES)
+    whole_lines: float = record(0.01, "1", "lines of a turn, within which an encoder's number of lines is whole", DRIVES)
     folded_steep: float = record(0.15, "1", "of the 95 % quantile of slopes: a turning point with less is a rest", REAL)
     folded_smoother: float = record(
         0.8, "1", "of the curvature at a turning point: below, the signal is smoother with its sign turned there", REAL

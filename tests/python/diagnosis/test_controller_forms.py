@@ -12,7 +12,9 @@ import gaident as ga
 import servo_referee as referee
 from gaident.diagnosis.controller.form_findings import driver_of, loop_of
 from gaident.diagnosis.controller.forms import Shown, form_shown
+from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.controller.slow_forms import limited
+from gaident.diagnosis.explain.alternatives import alternatives_of
 from referee_logs import GIVEN, KI, KP, NOTCH, T, command, dip, log, low, slower
 
 
@@ -161,3 +163,32 @@ def test_the_given_controller_is_no_other_form_of_itself_in_a_slow_log(every: in
     rec = slower(every, noise=0.02, torque_limit=0.6)
     shown = form_shown([rec], GIVEN, (), every)
     assert shown is not None and set(shown.numbers) == {"torque_saturation"}
+
+
+@pytest.mark.parametrize("form", ["command filter", "torque filter", "none"])
+def test_a_form_is_found_although_an_unknown_limit_acts(form: str) -> None:
+    """A limit with an anti-windup that no replay knows leaves lines that follow from no form: small torques show it."""
+    made = {"command filter": {"command_filters": [low(2e-3)]}, "torque filter": {"torque_filters": [low(5e-4)]}, "none": {}}
+    named = {"command filter": {"command_filter"}, "torque filter": {"torque_filter"}, "none": set()}
+    shown = shown_by(log(torque_limit=0.6, windup="tracking", tracking=4e-3, **made[form]))
+    assert shown is not None and set(shown.numbers) == {*named[form], "torque_saturation"}
+    assert shown.numbers["torque_saturation"]["limit"][0] == pytest.approx(0.6, rel=1e-6)
+
+
+def test_a_slow_log_shows_the_rule_of_integration() -> None:
+    loop = loop_of([slower(noise=0.002, rule="backward")], ga.Cascade(GIVEN, T))
+    assert [f.effect for f in loop.findings] == ["integration_rule"] and loop.follows
+    assert loop_of([slower(noise=0.002)], ga.Cascade(GIVEN, T)).findings == ()
+
+
+def test_a_rule_of_integration_is_found_before_gains_that_differ_by_little() -> None:
+    found = replay(log(rule="backward", ki=0.5), ga.PI(KP, 0.5))  # as trapezoidal: kp off by 0.12 %
+    assert found.cause == "integration_rule"
+
+
+def test_a_controller_that_is_not_the_drives_is_a_rival_of_mechanics() -> None:
+    rec = slower(weight=0.5, torque_filters=[low(1e-3), dip()], command_filters=[low(3e-3)], torque_limit=0.4, windup="hold")
+    assert not loop_of([rec], ga.Cascade(GIVEN, T)).follows
+    assert alternatives_of("extra_resonance", [], [], False, None, True) == []
+    assert "torque_filter" in alternatives_of("extra_resonance", [], [], False, None, False)
+    assert alternatives_of("coulomb_friction", [], [], True, None, False) == []  # the records show its jump

@@ -97,7 +97,7 @@ def test_gains_that_the_log_shows_take_the_place_of_the_given_ones() -> None:
     assert any(
         "All simulations use these (kp = 0.05 N m s/rad, ki = 1.5 N m/rad, trapezoidal integral)" in note for note in found.notes
     )
-    assert [f.effect for f in found.causes] == ["coulomb_friction"]
+    assert [(f.effect, f.place) for f in found.causes] == [("other_gains", "controller"), ("coulomb_friction", "shaft")]
     assert found.after.rmse < 1.1 * found.after.noise_floor < found.before.rmse
 
 

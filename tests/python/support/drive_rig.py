@@ -189,6 +189,7 @@ def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:
     values = dict(fields())
     values.update(J1=plant.J, D1=plant.D, J2=plant.JL, D2=plant.DL, K=plant.KG, DG=plant.DG)
     values.update(ground=plant.ground, rest=plant.rest)
+    delay = 0.0 if plant.cascade is None else plant.cascade.delay
     if plant.cascade is not None and plant.cascade.velocity.integrator_limit is not None:
         values["integrator_limit"] = plant.cascade.velocity.integrator_limit
     for effect, parameters in effects.items():
@@ -210,6 +211,7 @@ def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:
                 values[place] += parameters[name]
         elif effect in FIELDS:
             values.update({known[name]: value for name, value in parameters.items()})
+    values["delay"] += delay  # of the controller: its torque is logged before it
     return values
 
 

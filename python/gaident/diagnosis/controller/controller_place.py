@@ -59,7 +59,7 @@ class AtController:
 
 @dataclass(frozen=True)
 class AsLogged:
-    """The controller as the logged torques show it; notes on what differs; digest of a record -> its replay with this controller.
+    """The controller as the logged torques show it, what differs as notes and findings; digest of a record -> its replay with it.
 
     replays: empty where there was nothing to compare, or where the controller is not the given one any more.
     """
@@ -67,6 +67,7 @@ class AsLogged:
     controller: PI | None
     notes: tuple[Text, ...] = ()
     replays: Mapping[str, Replay] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
 
 
 def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
@@ -98,7 +99,28 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
             controller.kp,
             controller.ki,
         )
-    return AsLogged(replace(controller, kp=kp, ki=ki), (off[0].sentence, used))
+    shown = replace(controller, kp=kp, ki=ki)
+    return AsLogged(shown, (off[0].sentence, used), {}, (_gains_finding(records, shown, off),))
+
+
+def _gains_finding(records: Sequence[Record], shown: PI, off: Sequence[Replay]) -> Finding:
+    """The finding that the torques follow from other gains, or with another rule of integration, than the given ones."""
+    n, floor, errors, left = sum(len(r) for r in records), 0.0, [], []
+    for rec, seen in zip(records, off, strict=True):
+        assert rec.command is not None and rec.torque is not None
+        errors.append(rec.command - rec.velocity)
+        left.append(rec.torque - pi_torque(rec.command, rec.velocity, rec.dt, shown))
+        floor += len(rec) * max(seen.resolution, ROUNDING * float(np.abs(rec.torque).max())) ** 2
+    before, after = sum(len(r) * r_off.rms**2 for r, r_off in zip(records, off, strict=True)), float(sum(d @ d for d in left))
+    integrals = [records[0].dt * np.cumsum(e) for e in errors]
+    std = float(np.sqrt(max(after, floor) / n))
+    kp_std, ki_std = (std / max(float(np.sqrt(sum(x @ x for x in part))), 1e-300) for part in (errors, integrals))
+    gains = {"kp": Estimate(shown.kp, kp_std, "N m s/rad"), "ki": Estimate(shown.ki, ki_std, "N m/rad")}
+    alone = all(r.cause == "integration_rule" for r in off)
+    name = "integration_rule" if alone else "other_gains"
+    fall = 1.0 - float(np.sqrt(min(after / before, 1.0)))
+    gain = gained(before, max(after, floor), n, 1 if alone else 2)
+    return Finding(name, {} if alone else gains, (), fall, gain, None, off[0].sentence, place="controller")
 
 
 def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: Controller | None) -> tuple[Record, ...]:
@@ -202,6 +224,9 @@ def _limit_findings(
     if not held and shown.limits[1] == given.limits[1]:
         notes = []  # the finding says it all
     findings = []
+    if shown.kp != given.kp and shown.ki == given.ki:  # as trapezoidal: kp + ki dt/2, or kp - ki dt/2
+        gain = gained(_left_with(data, replace(shown, kp=given.kp)), max(after, floor), n, 1)
+        findings.append(Finding("integration_rule", {}, (), 0.0, gain, None, off[0].sentence, place="controller"))
     for setting, words in SHOWN.items():
         effect, value, was = OF_SETTING[setting], getattr(shown, setting), getattr(given, setting)
         if value is None or value == was:

@@ -25,6 +25,7 @@ class Driving:
 
     logged: the bare PI with the gains that the torques show. findings: of the controller's form. notes: what to keep in mind.
     doubts: notes on torques that do not follow from a controller that is no bare PI. numbers: those that were not given.
+    follows: of `Loop`.
     """
 
     moved: Aligned
@@ -34,6 +35,7 @@ class Driving:
     notes: tuple[Text, ...] = ()
     doubts: tuple[Text, ...] = ()
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
+    follows: bool = True
 
     @property
     def read(self) -> tuple[Record, ...]:
@@ -65,4 +67,4 @@ def driving_of(
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
     used = controller if bare_pi(controller) is None else logged.controller
-    return Driving(moved, used, logged, findings, notes, driven.doubts, numbers)
+    return Driving(moved, used, logged, findings, notes, driven.doubts, numbers, asked.follows)

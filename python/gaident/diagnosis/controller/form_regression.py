@@ -35,9 +35,11 @@ __all__ = [
     "Shape",
     "at_places",
     "bounds_of",
+    "equation_of",
     "fitted_shape",
     "law_of",
     "least",
+    "quiet_law",
 ]
 
 Vector = NDArray[np.float64]
@@ -94,7 +96,7 @@ class Law:
         seen = {"command_filters": self.command, "velocity_filters": self.velocity}
         torque: list[tuple[Vector, Vector]] = []
         for (place, _), f in zip(places, filters(places, numbers, self.period), strict=True):
-            b, a = _equation(f, self.period)
+            b, a = equation_of(f, self.period)
             if place == "torque_filters":
                 torque.append((b, a))
             else:
@@ -178,6 +180,35 @@ def law_of(records: Sequence[Record], given: PI, every: int = 1) -> tuple[Law, f
         law = replace(law, rho=correlation_of(off, own))
         d, _ = whitened(_at(used, off), stretch, law.rho)
         floor = POLICY.course * float(np.sqrt(np.mean(d**2)))
+    return _with_enough(law, floor)
+
+
+def quiet_law(law: Law, memory: int) -> Law | None:
+    """The regression in the stretches of small torques, of a log with a line for each of the controller's samples.
+
+    A limit acts at large torques only, wherever it stands: before a filter, whose output shows no plateau, or with an integrator
+    that does not wind up. A stretch begins `memory` lines after the last large torque, when no filter remembers it, and has an
+    integral of its own. It ends before the next one, whose beginning a filter shows late. None where too little is left.
+    """
+    ahead = memory // 4  # no decision: a filter shows half of a step much sooner than all of it
+    parts = []
+    at = 0
+    for length in law.lengths:
+        size = np.abs(law.torque[at : at + length])
+        at += length
+        loud = size > POLICY.quiet_torque * float(size.max())
+        around = np.convolve(loud, np.ones(memory + ahead + 1))[ahead : ahead + length] > 0.5  # no decision: one of them
+        begins = ~around & np.append(True, around[:-1])
+        parts.append(np.where(around, -1, np.cumsum(begins) - 1))
+    stretch = numbered(parts)
+    quiet = replace(law, used=stretch >= 0, stretch=stretch)
+    several = int(stretch.max(initial=-1)) > 0  # of one alone, other forms come as close
+    return quiet if several and _with_enough(quiet, 0.0) is not None else None
+
+
+def _with_enough(law: Law, floor: float) -> tuple[Law, float] | None:
+    """Where enough lines are used."""
+    used, torque = law.used, law.torque
     enough = int(np.sum(used)) >= POLICY.least_samples and bool(np.any(torque[used]))
     return (law, floor) if enough else None
 
@@ -212,7 +243,7 @@ def at_places(places: Sequence[Place], numbers: Vector, period: float) -> dict[s
     return made
 
 
-def _equation(f: Filter, period: float) -> tuple[Vector, Vector]:
+def equation_of(f: Filter, period: float) -> tuple[Vector, Vector]:
     """(b, a) of the digital filter, as `LowPass` and `Notch` define it: s = g (1 - 1/z)/(1 + 1/z), g = w/tan(w T/2)."""
     if isinstance(f, LowPass):
         share = -np.expm1(-period / f.time_constant)

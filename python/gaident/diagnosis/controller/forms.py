@@ -23,6 +23,18 @@ from gaident.control.cascade import Cascade
 from gaident.control.filters import LowPass
 from gaident.control.pi import PI, RULES
 from gaident.data.record import Record
+from gaident.diagnosis.controller.form import (
+    FEEDS,
+    FILTER_NAMES,
+    FIRST_FEED,
+    GAINS,
+    KI,
+    KP_R,
+    KP_W,
+    WEIGHTS,
+    Candidate,
+    Form,
+)
 from gaident.diagnosis.controller.form_regression import (
     FILTER_SETS,
     FILTER_SETS_OF_ONE,
@@ -33,6 +45,7 @@ from gaident.diagnosis.controller.form_regression import (
     fitted_shape,
     law_of,
     least,
+    quiet_law,
     slope,
 )
 from gaident.diagnosis.controller.replay import tolerance_of
@@ -50,66 +63,6 @@ Matrix = NDArray[np.float64]
 
 INSIDE = 1e-9  # no decision: of a bound, where a search starts
 ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
-WEIGHTS = ("one", "none", "free")
-FEEDS = ("acceleration_feedforward", "friction_feedforward")
-FILTER_NAMES = {
-    "torque_filters": "torque_filter",
-    "velocity_filters": "velocity_feedback_filter",
-    "command_filters": "command_filter",
-}
-"""Argument of `Cascade` -> name of the finding."""
-KP_W, KP_R, KI, FIRST_FEED = 0, 1, 2, 3  # no decision: places in (kp, kp b, ki, a_ff, f_ff, starts)
-GAINS = {"kp": KP_W, "ki": KI}
-
-
-@dataclass(frozen=True)
-class Form:
-    """Constraints on the regression's numbers. free: of the gains; feeds: feedforwards; starts: an integral before the record."""
-
-    rule: str = "trapezoidal"
-    free: tuple[str, ...] = ()
-    weight: str = "one"
-    feeds: tuple[str, ...] = ()
-    starts: bool = False
-    unknown: tuple[str, ...] = ()  # gains that were not given: free, and no finding
-
-    @property
-    def chosen(self) -> int:
-        """Settings that differ without a number of their own."""
-        return int(self.rule != "trapezoidal") + int(self.weight == "none")
-
-    def names(self, shape: Shape) -> tuple[str, ...]:
-        """What differs from the bare PI with the given gains, in words of the findings."""
-        names = ["integration_rule"] * (self.rule != "trapezoidal") + ["other_gains"] * bool(set(self.free) - set(self.unknown))
-        names += ["command_weight"] * (self.weight != "one")
-        return (*names, *self.feeds, *dict.fromkeys(FILTER_NAMES[place] for place, _ in shape.places))
-
-    def constraints(self, given: PI, records: int) -> tuple[Vector, Matrix]:
-        """(P0, D) of the numbers P = P0 + D z in (kp, kp b, ki, a_ff, f_ff, starts)."""
-        fixed = np.zeros(FIRST_FEED + len(FEEDS) + records)
-        unit = np.eye(len(fixed))
-        moved: list[Vector] = []
-        if "kp" in self.free:
-            moved.append(unit[KP_W] + (unit[KP_R] if self.weight == "one" else 0.0))
-        else:
-            fixed[KP_W] = given.kp
-            fixed[KP_R] = given.kp if self.weight == "one" else 0.0
-        if self.weight == "free":
-            moved.append(unit[KP_R])
-        if "ki" in self.free:
-            moved.append(unit[KI])
-        else:
-            fixed[KI] = given.ki
-        moved += [unit[FIRST_FEED + FEEDS.index(name)] for name in self.feeds]
-        if self.starts:
-            moved += list(unit[FIRST_FEED + len(FEEDS) :])
-        return fixed, np.array(moved).reshape(len(moved), len(fixed)).T
-
-    def of_columns(self, size: int, period: float) -> Matrix:
-        """B of the columns' coefficients c = B P: a rectangular integral is the trapezoidal one and +-ki T/2 of the error."""
-        B = np.eye(size)
-        B[[KP_W, KP_R], KI] = (RULES[self.rule] - RULES["trapezoidal"]) * period
-        return B
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,19 +88,6 @@ class Shown:
     estimated: dict[str, tuple[float, float]]
 
 
-@dataclass(frozen=True, eq=False)
-class _Candidate:
-    form: Form
-    shape: Shape
-    free: Vector  # z, then by how much the filters' numbers move
-    count: int
-    criterion: float
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.form.names(self.shape)
-
-
 def form_shown(records: Sequence[Record], given: PI, unknown: tuple[str, ...] = (), every: int = 1) -> Shown | None:
     """The simplest controller that makes the logged torques; None where none does, or the bare PI needs none.
 
@@ -157,21 +97,27 @@ def form_shown(records: Sequence[Record], given: PI, unknown: tuple[str, ...] = 
     if regression is None or given.loop != "sampled" or any(r.dt != records[0].dt for r in records):
         return None
     law, floor = regression
-    candidates: list[_Candidate] = []
+    candidates = _compared(law, given, floor, unknown)
+    if not candidates:
+        return None
+    if every > 1:
+        return _shown_slowly(records, law, given, candidates, floor)
+    shown = _shown(records, law, given, candidates) if candidates[0].names else None
+    return shown or _shown_quietly(records, law, given, floor, unknown)
+
+
+def _compared(law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> list[Candidate]:
+    """Every form with every set of filters that is needed, the best first."""
+    candidates: list[Candidate] = []
     followed: int | None = None
-    for places in FILTER_SETS if every == 1 else FILTER_SETS_OF_ONE:
+    for places in FILTER_SETS if law.every == 1 else FILTER_SETS_OF_ONE:
         if followed is not None and len(places) > followed:
             break  # what leaves no more than rounding or white noise is not improved by another filter
         shape = fitted_shape(law, places, floor)
         if shape.rms <= POLICY.near_rounding * floor or white_noise(shape.left, law.logged):
             followed = len(places)
         candidates += _candidates(law, shape, given, floor, unknown)
-    candidates.sort(key=lambda c: c.criterion)
-    if not candidates:
-        return None
-    if every > 1:
-        return _shown_slowly(records, law, given, candidates, floor)
-    return _shown(records, law, given, candidates) if candidates[0].names else None
+    return sorted(candidates, key=lambda c: c.criterion)
 
 
 def _allowed(rec: Record, controller: PI) -> float:
@@ -190,7 +136,7 @@ def _forms(given: PI, unknown: tuple[str, ...]) -> Iterator[Form]:
         yield Form(rule, free, weight, feed, starts, unknown)
 
 
-def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[str, ...]) -> Iterator[_Candidate]:
+def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[str, ...]) -> Iterator[Candidate]:
     """Every form with these filters: one small least squares each, linear in the filters' numbers around those of `shape`."""
     table = law.columns(shape.places, shape.numbers)
     around = np.column_stack([table, _slopes(law, shape), law.logged])
@@ -198,6 +144,8 @@ def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[
     p, n = table.shape[1], len(law.logged)
     linear, slopes, logged = R[:, :p], R[:, p:-1], R[:, -1]
     for form in _forms(given, unknown):
+        if form.starts and law.stretch is not None and law.every == 1:
+            continue  # each stretch has an integral of its own
         fixed, moved = form.constraints(given, len(law.lengths))
         B = form.of_columns(p, law.period)
         M = np.column_stack([linear @ B @ moved, slopes])
@@ -210,7 +158,7 @@ def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[
             continue
         k = M.shape[1]
         criterion = bic(max(left / n, floor**2), n, 0) + _price(law, k, form.chosen)
-        yield _Candidate(form, shape, free, k, float(criterion))
+        yield Candidate(form, shape, free, k, float(criterion))
 
 
 def _price(law: Law, count: int, chosen: int) -> float:
@@ -229,7 +177,7 @@ def _slopes(law: Law, shape: Shape) -> Matrix:
     return np.array(slopes).reshape(len(slopes), len(law.logged)).T
 
 
-def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[_Candidate]) -> Shown | None:
+def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[Candidate]) -> Shown | None:
     """The best candidate fitted and run as a whole on every sample; None where the torque does not follow from it."""
     best = candidates[0]
     numbers, filters, cov = _fitted(law, best, given)
@@ -255,11 +203,13 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
     )
 
 
-def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[_Candidate], floor: float) -> Shown | None:
+def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[Candidate], floor: float) -> Shown | None:
     """The same of a log with fewer lines: None where it leaves more than another course between them could make."""
     allowed = max(POLICY.near_rounding * floor, POLICY.negligible * float(np.abs(law.torque).max()))
-    plain = [c for c in candidates if not c.names]  # where the given controller leaves no more, no other one is looked for
-    for best in (*plain[:1], candidates[0]):
+    # Where the given controller leaves no more, no other one is looked for; only a setting without a number of its own.
+    plain = [c for c in candidates if not c.names]
+    as_free = [c for c in candidates if plain and c.count == plain[0].count and c.shape is plain[0].shape and not c.form.free]
+    for best in (*as_free[:1], *plain[:1], candidates[0]):
         numbers, filters, cov = _fitted(law, best, given)
         left = law.logged - law.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
         if _rms([left]) <= allowed:
@@ -267,9 +217,35 @@ def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Se
     else:
         return None
     candidates = [best, *(c for c in candidates if c is not best)]
-    free = replace(_controller(best, numbers, filters, given, law.period), period=law.period)
-    at_limit = limited(records, free)
-    if too_fast(free, records[0].dt) or (not best.names and at_limit.limit is None):
+    if too_fast(_controller(best, numbers, filters, given, law.period), records[0].dt):
+        return None
+    return _with_limit(records, law, given, candidates, (numbers, filters, cov))
+
+
+def _shown_quietly(records: Sequence[Record], law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> Shown | None:
+    """The same where it follows at small torques only: what a limit does, before a filter or with an anti-windup, is no form."""
+    for memory in (POLICY.filter_memory, POLICY.filter_memory // 4):  # no decision: a quarter
+        quiet = quiet_law(law, memory)
+        candidates = [] if quiet is None else _compared(quiet, given, floor, unknown)
+        if quiet is None or not candidates:
+            continue
+        best = candidates[0]
+        numbers, filters, cov = _fitted(quiet, best, given)
+        made = quiet.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
+        left = quiet.logged - made
+        allowed = max(_allowed(r, given) for r in records)
+        if float(np.abs(left).max()) <= allowed or white_noise(left, quiet.logged):
+            return _with_limit(records, quiet, given, candidates, (numbers, filters, cov))
+    return None
+
+
+def _with_limit(
+    records: Sequence[Record], law: Law, given: PI, candidates: Sequence[Candidate], fitted: tuple[Vector, Vector, Matrix]
+) -> Shown | None:
+    """A form that was shown where no limit acts, and the limit; None where there is neither."""
+    best, (numbers, filters, cov) = candidates[0], fitted
+    at_limit = limited(records, replace(_controller(best, numbers, filters, given, law.period), period=law.period))
+    if not best.names and at_limit.limit is None:
         return None
     named, gains = _named(best, numbers, filters, cov, law.period), _gains(candidates)
     if at_limit.limit is not None:
@@ -287,20 +263,20 @@ def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Se
     )
 
 
-def _gains(candidates: Sequence[_Candidate]) -> dict[str, float]:
+def _gains(candidates: Sequence[Candidate]) -> dict[str, float]:
     best = candidates[0]
     without = {name: [c.criterion for c in candidates if name not in c.names] for name in best.names}
     return {name: min(others) - best.criterion if others else np.inf for name, others in without.items()}
 
 
-def _rivals(candidates: Sequence[_Candidate]) -> tuple[tuple[str, ...], ...]:
+def _rivals(candidates: Sequence[Candidate]) -> tuple[tuple[str, ...], ...]:
     close = [
         c for c in candidates if c.criterion - candidates[0].criterion < POLICY.rival_margin and c.count <= candidates[0].count
     ]
     return tuple(dict.fromkeys(c.names for c in close if c.names and set(c.names) != set(candidates[0].names)))
 
 
-def _estimated(best: _Candidate, numbers: Vector, cov: Matrix) -> dict[str, tuple[float, float]]:
+def _estimated(best: Candidate, numbers: Vector, cov: Matrix) -> dict[str, tuple[float, float]]:
     return {name: (float(numbers[at]), float(np.sqrt(cov[at, at]))) for name, at in GAINS.items() if name in best.form.unknown}
 
 
@@ -308,7 +284,7 @@ def _rms(parts: Sequence[Vector]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
 
 
-def _fitted(law: Law, best: _Candidate, given: PI) -> tuple[Vector, Vector, Matrix]:
+def _fitted(law: Law, best: Candidate, given: PI) -> tuple[Vector, Vector, Matrix]:
     """(P, filters' numbers, covariance of both) of a form, by least squares on the replay itself."""
     from scipy.optimize import least_squares
 
@@ -352,7 +328,7 @@ def _fitted(law: Law, best: _Candidate, given: PI) -> tuple[Vector, Vector, Matr
     return fixed + moved @ x[:m], x[m:], outward @ spread @ outward.T
 
 
-def _controller(best: _Candidate, numbers: Vector, filters: Vector, given: PI, period: float) -> Cascade:
+def _controller(best: Candidate, numbers: Vector, filters: Vector, given: PI, period: float) -> Cascade:
     kp, kp_b, ki = (max(float(x), 0.0) for x in numbers[:FIRST_FEED])
     pi = PI(
         kp=kp,
@@ -367,7 +343,7 @@ def _controller(best: _Candidate, numbers: Vector, filters: Vector, given: PI, p
 
 
 def _named(
-    best: _Candidate, numbers: Vector, filters: Vector, cov: Matrix, period: float
+    best: Candidate, numbers: Vector, filters: Vector, cov: Matrix, period: float
 ) -> dict[str, dict[str, tuple[float, float]]]:
     """Name -> parameter -> (value, deviation)."""
     std = np.sqrt(np.maximum(np.diag(cov), 0.0))

@@ -284,7 +284,7 @@ def _named(controller: PI, gains: _Gains, dt: float, start: float, shift: int, s
     same_kp = kp + share * ki * dt  # of a trapezoidal integral
     known = cause in ("gains", "scale", "integration_rule") and same_kp >= 0.0 and ki >= 0.0 and same_kp + ki > 0.0
     found = replace(controller, kp=same_kp, ki=ki) if known else None
-    return Explanation(torque, cause or "gains", value, sentence, abs(shift), len(differs) + 2 * (cause == "gains"), found)
+    return Explanation(torque, cause or "gains", value, sentence, abs(shift), len(differs) + 2 * (cause in ("", "gains")), found)
 
 
 def _check_unit(factor: float) -> Text:

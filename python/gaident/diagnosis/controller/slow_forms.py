@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gaident.control.cascade import Cascade
 from gaident.control.filters import Notch
 from gaident.data.record import Record
+from gaident.diagnosis.controller.form_regression import equation_of
 from gaident.identification.logged_stretches import log_of, plateau_of
 
 __all__ = ["Limited", "limited", "run_error", "too_fast"]
@@ -49,9 +50,10 @@ def too_fast(controller: Cascade, dt: float) -> bool:
 
 def limited(records: Sequence[Record], controller: Cascade) -> Limited:
     """The controller with the plateau of the logged torques as its limit, and the anti-windup that comes closest."""
-    if controller.velocity.torque_limit is not None or controller.torque_filters:
+    filters_unseen = controller.torque_filters and controller.log_every(records[0].dt) > 1
+    if controller.velocity.torque_limit is not None or filters_unseen:
         return Limited(controller, None, 0.0)
-    limits = [plateau_of(np.abs(r.torque)) for r in records if r.torque is not None]
+    limits = [plateau_of(np.abs(before_filters(r.torque, controller, r.dt))) for r in records if r.torque is not None]
     limit = min(limits)
     if not np.isfinite(limit):
         return Limited(controller, None, 0.0)
@@ -59,6 +61,16 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
     least, _, best = min(tried)
     n = sum(len(r) for r in records)
     return Limited(best, limit, float(2 * n * np.log(run_error(records, controller) / least) - np.log(n)))
+
+
+def before_filters(torque: Vector, controller: Cascade, period: float) -> Vector:
+    """What the controller's torque filters were given [N m] (n,), of a torque at each of its samples: the filters undone."""
+    from scipy.signal import lfilter
+
+    for f in reversed(controller.torque_filters):
+        b, a = equation_of(f, period)
+        torque = np.asarray(lfilter(a, b, torque), dtype=np.float64)
+    return torque
 
 
 def _schemes(controller: Cascade, limit: float) -> Iterator[Cascade]:

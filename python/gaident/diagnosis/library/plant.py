@@ -9,6 +9,7 @@ from gaident.diagnosis.library.cause import ONE_SIZE, Cause
 from gaident.diagnosis.library.coordinates import ln, positive
 from gaident.estimation.term import Rows, Scales
 from gaident.models.roots import quadratic_roots
+from gaident.policy.table import POLICY
 
 __all__ = ["CAUSES"]
 
@@ -27,7 +28,7 @@ CAUSES: tuple[Cause, ...] = (
         "plant",
         positive(0, 2),
         lambda p: np.array([np.log(p["frequency"]), p["damping"], np.log(p["zero_frequency"]), p["zero_damping"]]),
-        lambda s: 2 * [ln(2.0 / s.duration, 0.95 * np.pi / s.dt), (1e-4, 2.0)],
+        lambda s: 2 * [ln(2.0 / s.duration, 0.95 * np.pi / s.dt), (1e-4, POLICY.swing_damping)],
         _resonance_starts,
         lambda s: (0.1, 0.05, 0.1, 0.05),
         resonates=True,

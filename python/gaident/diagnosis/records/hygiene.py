@@ -12,7 +12,7 @@ from gaident.models.model import Model
 from gaident.models.simulate import simulate
 from gaident.policy.table import POLICY
 
-__all__ = ["cleaned", "left_out", "outliers", "quantisation"]
+__all__ = ["cleaned", "left_out", "outliers", "quantisation", "unexplained"]
 
 Vector = NDArray[np.float64]
 
@@ -106,6 +106,16 @@ def cleaned(rec: Record, hit: NDArray[np.intp]) -> Record:
     w = rec.velocity.copy()
     _interpolate(w, hit)
     return rec.with_channels(velocity=w)
+
+
+def unexplained(velocity: Vector, error: Vector, weight: Vector) -> int:
+    """Samples that were left out and that leave the error (n,) of the model that was found, too; weight (n,): 0 where left out.
+
+    In a log with few lines a shaft that rings shows peaks of one line, which the linear model misses and the found one follows.
+    """
+    left = np.flatnonzero(weight[2:-2] == 0.0)
+    size, missed = _middle(velocity)[left], _middle(error)[left]
+    return int(np.sum(np.sign(size) * missed > POLICY.outlier_missed * np.abs(size)))
 
 
 def quantisation(records: tuple[Record, ...]) -> float:

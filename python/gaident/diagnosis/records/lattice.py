@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 
 from gaident.policy.table import POLICY
 
-__all__ = ["lattice_step", "rounding_step"]
+__all__ = ["encoder_lines", "lattice_step", "rounding_step"]
 
 Vector = NDArray[np.float64]
 
 FEWEST = 4  # no decision: distinct values that a lattice could be told from chance by
+FEWEST_LINES = 100  # no decision: of a turn; no encoder of a drive has fewer
+SPEEDS = (1.0, np.pi / 30.0, np.pi / 180.0, 2.0 * np.pi)  # no decision: units of a speed; rad/s in each: rad/s, rpm, deg/s, 1/s
 EXACT = 1e-4  # no decision: steps, what a decimal number is exact to in binary and scaled by ten
 
 DIGITS = range(4, 10)  # no decision: significant digits that text logs are written with; more round off nothing that matters
@@ -37,6 +39,27 @@ def lattice_step(values: Vector) -> float:
     off = np.abs(places - np.round(places))
     # On no lattice, the gaps are no multiples of the least one and `off` is spread evenly over 0..0.5.
     return step if float(off.max()) < POLICY.on_lattice else 0.0
+
+
+def encoder_lines(velocity: Vector, period: float, turn: float) -> int:
+    """Lines to a turn of the encoder whose angle, differenced over `period` [s], gives these velocities; 0 where none does.
+
+    A difference of counts is a multiple of q = turn/(lines period), `turn` 2 pi rad, or 1 m where velocities are in m/s. The
+    number of lines that q stands for is whole then, and for chance to make it whole is as rare as `whole_lines` says.
+    A step of 1, 2 or 5 in some decimal place of a unit of speed is a log's rounding: whole rpm each ms would be 60000 lines.
+    """
+    step = lattice_step(velocity)
+    if not step > 0.0 or any(_decimal(step / unit) for unit in SPEEDS):
+        return 0
+    lines = turn / (step * period)
+    whole = round(lines)
+    return whole if whole >= FEWEST_LINES and abs(lines - whole) < POLICY.whole_lines else 0
+
+
+def _decimal(x: float) -> bool:
+    """Whether x is 1, 2 or 5 in some decimal place."""
+    first = x / 10.0 ** np.floor(np.log10(x))
+    return any(abs(first - digit) < EXACT for digit in (1.0, 2.0, 5.0, 10.0))
 
 
 def rounding_step(values: Vector) -> float:

@@ -35,6 +35,7 @@ __all__ = [
 ]
 
 Vector = NDArray[np.float64]
+AT_BOUND = 0.999  # no decision: of a bound, what a fit that ends there has
 Matrix = NDArray[np.float64]
 
 
@@ -197,8 +198,14 @@ def evenly_damped(parameters: Parameterisation, x: Vector) -> Vector:
 def is_mechanism(parameters: Parameterisation, x: Vector) -> bool:
     """Whether two masses are two masses on a shaft: sum of pairwise A = K_G (1/J_M + 1/J_L) is above prod B = K_G/J_L.
 
-    A spring to the ground has a positive stiffness.
+    A spring to the ground has a positive stiffness. A resonance swings: one that is damped as much as its bounds allow is a lag
+    or another filter, which two poles and two zeros imitate.
     """
+    for t in parameters.terms:
+        if t.resonates:
+            _, zp, _, zz = parameters.effect_values(x[None, :], t.name)[0]
+            if max(zp, zz) > AT_BOUND * POLICY.swing_damping:
+                return False
     if parameters.masses == 1:
         return not parameters.held or bool(parameters.base_values(x[None, :])[0, 2] > 0.0)
     _, a, e1, e0, _, f0 = parameters.base_values(x[None, :])[0]

@@ -1,0 +1,92 @@
+"""A form of controller: constraints on the regression's numbers, and one that was fitted with its filters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.pi import PI, RULES
+from gaident.diagnosis.controller.form_regression import Shape
+
+__all__ = ["FEEDS", "FILTER_NAMES", "FIRST_FEED", "GAINS", "KI", "KP_R", "KP_W", "WEIGHTS", "Candidate", "Form"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+WEIGHTS = ("one", "none", "free")
+FEEDS = ("acceleration_feedforward", "friction_feedforward")
+FILTER_NAMES = {
+    "torque_filters": "torque_filter",
+    "velocity_filters": "velocity_feedback_filter",
+    "command_filters": "command_filter",
+}
+"""Argument of `Cascade` -> name of the finding."""
+KP_W, KP_R, KI, FIRST_FEED = 0, 1, 2, 3  # no decision: places in (kp, kp b, ki, a_ff, f_ff, starts)
+GAINS = {"kp": KP_W, "ki": KI}
+
+
+@dataclass(frozen=True)
+class Form:
+    """Constraints on the regression's numbers. free: of the gains; feeds: feedforwards; starts: an integral before the record."""
+
+    rule: str = "trapezoidal"
+    free: tuple[str, ...] = ()
+    weight: str = "one"
+    feeds: tuple[str, ...] = ()
+    starts: bool = False
+    unknown: tuple[str, ...] = ()  # gains that were not given: free, and no finding
+
+    @property
+    def chosen(self) -> int:
+        """Settings that differ without a number of their own."""
+        return int(self.rule != "trapezoidal") + int(self.weight == "none")
+
+    def names(self, shape: Shape) -> tuple[str, ...]:
+        """What differs from the bare PI with the given gains, in words of the findings."""
+        names = ["integration_rule"] * (self.rule != "trapezoidal") + ["other_gains"] * bool(set(self.free) - set(self.unknown))
+        names += ["command_weight"] * (self.weight != "one")
+        return (*names, *self.feeds, *dict.fromkeys(FILTER_NAMES[place] for place, _ in shape.places))
+
+    def constraints(self, given: PI, records: int) -> tuple[Vector, Matrix]:
+        """(P0, D) of the numbers P = P0 + D z in (kp, kp b, ki, a_ff, f_ff, starts)."""
+        fixed = np.zeros(FIRST_FEED + len(FEEDS) + records)
+        unit = np.eye(len(fixed))
+        moved: list[Vector] = []
+        if "kp" in self.free:
+            moved.append(unit[KP_W] + (unit[KP_R] if self.weight == "one" else 0.0))
+        else:
+            fixed[KP_W] = given.kp
+            fixed[KP_R] = given.kp if self.weight == "one" else 0.0
+        if self.weight == "free":
+            moved.append(unit[KP_R])
+        if "ki" in self.free:
+            moved.append(unit[KI])
+        else:
+            fixed[KI] = given.ki
+        moved += [unit[FIRST_FEED + FEEDS.index(name)] for name in self.feeds]
+        if self.starts:
+            moved += list(unit[FIRST_FEED + len(FEEDS) :])
+        return fixed, np.array(moved).reshape(len(moved), len(fixed)).T
+
+    def of_columns(self, size: int, period: float) -> Matrix:
+        """B of the columns' coefficients c = B P: a rectangular integral is the trapezoidal one and +-ki T/2 of the error."""
+        B = np.eye(size)
+        B[[KP_W, KP_R], KI] = (RULES[self.rule] - RULES["trapezoidal"]) * period
+        return B
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A form with the filters of a shape; free: its free numbers; count of them; criterion: the less the better."""
+
+    form: Form
+    shape: Shape
+    free: Vector  # z, then by how much the filters' numbers move
+    count: int
+    criterion: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.form.names(self.shape)

@@ -1,0 +1,90 @@
+"""A velocity that is the difference of an encoder's angle: a mean over its sample, and no finding."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from drive_rig import Noise, Plant, rig, skip_without_library
+from gaident.diagnosis.library.terms import LIBRARY
+from gaident.diagnosis.records.hygiene import unexplained
+from gaident.diagnosis.records.lattice import encoder_lines
+from gaident.estimation.mean_velocity import means, with_middles
+from gaident.models.drive_torque import late
+
+T, LINES = 0.5e-3, 2**20
+DRIVE = Plant(J=3e-4, D=1.5e-3, kp=0.06, ki=3.0, dt=T, name="one mass")
+
+
+def command(seed: int) -> np.ndarray:
+    """Levels with reversals, 150 samples each, with a random binary signal on every other one [rad/s]."""
+    rng = np.random.default_rng(seed)
+    levels = np.repeat(rng.permutation([5.0, -10.0, 20.0, -40.0, 60.0, -60.0, 30.0, -3.0, 0.0, 15.0]), 150)
+    return levels + np.where(np.arange(len(levels)) // 150 % 2, 1.0, 0.0) * np.repeat(
+        rng.choice([-1.0, 1.0], len(levels) // 3), 3
+    )
+
+
+def record(seed: int, effects: dict[str, dict[str, float]], differenced: bool = True) -> ga.Record:
+    skip_without_library()
+    noise = Noise(white=0.0, encoder=2.0 * np.pi / LINES, differenced=differenced)
+    return rig(DRIVE, command(seed), effects, noise, seed)
+
+
+def test_lines_of_an_encoder_are_whole() -> None:
+    angle = np.cumsum(np.random.default_rng(1).uniform(-1.0, 1.0, 400)) * 0.01
+    w = np.diff(np.round(angle / (2.0 * np.pi / LINES))) * (2.0 * np.pi / LINES) / T
+    assert encoder_lines(w, T, 2.0 * np.pi) == LINES
+    assert encoder_lines(1.0003 * w, T, 2.0 * np.pi) == 0
+    assert encoder_lines(angle, T, 2.0 * np.pi) == 0
+    rpm = np.pi / 30.0 * np.round(angle / angle.max() * 900.0)
+    assert encoder_lines(rpm, 1e-3, 2.0 * np.pi) == 0  # not 60000 lines
+
+
+def test_the_mean_over_a_sample_is_exact_behind_a_current_loop() -> None:
+    """J dw/dt = u - tau u', from rest under one step: theta(t) = u/J (t^2/2 - tau t + tau^2 (1 - exp(-t/tau)))."""
+    J, tau, n = 1e-3, 0.3e-3, 40
+    rec = ga.Record(T, torque=np.ones(n), velocity=np.zeros(n))
+    model = ga.OneMass(J=J, D=0.0).model().with_effect("torque_lag", time_constant=tau)
+    t = T * np.arange(n)
+    theta = (t**2 / 2.0 - tau * t + tau**2 * -np.expm1(-t / tau)) / J
+    exact = np.diff(theta, prepend=0.0) / T
+    shown = means(ga.simulate(model, with_middles(rec))[None, :])[0]
+    ends = ga.simulate(model, rec.with_channels(torque=late(rec.torque, 0.5, 0.0)))
+    assert np.abs(shown - exact).max() < 0.02 * np.abs(ends - exact).max()
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.4e-3])
+def test_a_differenced_angle_is_no_finding(lag: float) -> None:
+    effects = {"torque_lag": {"time_constant": lag}} if lag else {}
+    dia = ga.diagnose(record(1, effects), DRIVE.controller, validation=record(2, effects))
+    assert any(f"({LINES} lines a turn)" in note for note in dia.notes), dia.summary()
+    if not lag:
+        assert dia.causes == (), dia.summary()
+        return
+    (found,) = dia.causes
+    assert {found.effect, *found.alternatives} == {"torque_lag", "velocity_filter"}, dia.summary()
+    assert found.parameters["time_constant"].value == pytest.approx(lag, rel=0.01)
+
+
+def test_a_rounded_velocity_that_is_no_difference_is_not_taken_for_one() -> None:
+    dia = ga.diagnose(record(1, {}, differenced=False), DRIVE.controller, validation=record(2, {}, differenced=False))
+    assert dia.causes == () and not any("lines a turn" in note for note in dia.notes), dia.summary()
+
+
+def test_an_extra_resonance_swings() -> None:
+    class Scale:
+        duration, dt = 1.0, 1e-3
+
+    limits = LIBRARY["extra_resonance"].limits(Scale())  # type: ignore[arg-type]
+    assert limits[1][1] == limits[3][1] == 0.5
+
+
+def test_a_peak_that_the_found_model_follows_is_no_outlier() -> None:
+    w = np.zeros(20)
+    w[10] = 5.0
+    weight = np.ones(20)
+    weight[10] = 0.0
+    assert unexplained(w, w, weight) == 1
+    assert unexplained(w, 0.1 * w, weight) == 0
