@@ -8,6 +8,7 @@ sensor and disturbance torques.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -22,6 +23,7 @@ from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.estimation.term import Term
 from gaident.models.drive_torque import torque_of
+from gaident.models.simulate_many import LoadedRecord
 from gaident.models.starts import noise_std, starts_moving
 
 __all__ = ["DataSet", "with_angle"]
@@ -29,6 +31,7 @@ __all__ = ["DataSet", "with_angle"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
+MOST_SUBSTEPS = 5  # no decision: powers of two
 FINEST = 0.125e-3  # no decision: s, of a substep: the accuracy that friction on a stiff shaft needs
 
 
@@ -94,6 +97,11 @@ class DataSet:
         """Whether every record holds the controller's torque."""
         return all(r.torque is not None for r in self.records)
 
+    @cached_property
+    def substeps(self) -> int:
+        """Of a sample, for every model with effects that are not smooth."""
+        return int(2 ** min(max(math.ceil(math.log2(self.dt / self.finest)), 0), MOST_SUBSTEPS))
+
     @property
     def loop_only(self) -> bool:
         """Whether no torque drives the motor as it did.
@@ -126,6 +134,20 @@ class DataSet:
     def slower(self) -> bool:
         """Whether the log has fewer lines than the controller samples: the torque is then known on the lines only."""
         return self.loop is not None and self.pi is None
+
+    def loaded(self, records: Sequence[Record], controller: Controller | None) -> tuple[LoadedRecord, ...]:
+        """Records as the core takes them, in this loop; those of the data set itself are loaded once."""
+        for name in ("records", "driven", "turned", "free"):
+            if records is getattr(self, name):
+                key = name, controller
+                if key not in self._loaded:
+                    self._loaded[key] = tuple(LoadedRecord.of(r, controller) for r in records)
+                return self._loaded[key]
+        return tuple(LoadedRecord.of(r, controller) for r in records)
+
+    @cached_property
+    def _loaded(self) -> dict[tuple[str, Controller | None], tuple[LoadedRecord, ...]]:
+        return {}
 
     @cached_property
     def lengths(self) -> tuple[int, ...]:

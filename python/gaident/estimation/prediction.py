@@ -31,14 +31,12 @@ from gaident.models.effects import place_of
 from gaident.models.model import Model
 from gaident.models.own_effects import OWN
 from gaident.models.roots import quadratic_roots
-from gaident.models.simulate_many import simulate_values
+from gaident.models.simulate_many import LoadedRecord, simulate_values
 
 __all__ = ["ClosedLoop", "OpenLoop", "Predictor", "coupling_response", "twist"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-
-MOST_SUBSTEPS = 5  # no decision: powers of two
 
 
 class Predictor(Protocol):
@@ -89,7 +87,7 @@ class OpenLoop:
         if not self.own_angle and _bends_the_angle(self.data, parameters):
             return np.vstack([_of_true_angle(self.data, parameters, x, records, None, left_out) for x in X])
         names, values = parameters.values(X, left_out)
-        return _simulated(parameters, X, names, values, records, substeps(self.data, parameters.terms))
+        return _simulated(parameters, X, names, values, self.data.loaded(records, None), substeps(self.data, parameters.terms))
 
     def _replayed(self, parameters: Parameterisation, X: Matrix, inside: Sequence[Term]) -> Matrix:
         """With effects of the controller the torque itself depends on x: rows that share it are simulated together."""
@@ -127,8 +125,8 @@ class ClosedLoop:
         names, values = parameters.values(X)
         steps = substeps(data, parameters.terms)
         records = data.records if self.own_angle else data.turned
-        parts = [simulate_values(parameters.structure, names, values, r, data.loop, substeps=steps) for r in records]
-        return np.concatenate(parts, axis=1)
+        loaded = data.loaded(records, data.loop)
+        return _side_by_side([r.velocities(parameters.structure, names, values, substeps=steps) for r in loaded])
 
     def torque_response(self, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
         """See `Predictor`; the controller answers: G d - T (G d), T the closed loop's response to the command.
@@ -146,10 +144,9 @@ class ClosedLoop:
 
 def substeps(data: DataSet, terms: Sequence[Term]) -> int | None:
     """As many for every model with effects, so that no candidate has an advantage by finer simulation."""
-    acting = [t for t in terms if not t.resonates]
-    if not acting or all(t.name in OWN for t in acting):  # user-defined effects are smooth, and take long to evaluate
-        return None
-    return int(2 ** np.clip(np.ceil(np.log2(data.dt / data.finest)), 0.0, MOST_SUBSTEPS))
+    # User-defined effects are smooth, and take long to evaluate.
+    acting = any(not t.resonates and t.name not in OWN for t in terms)
+    return data.substeps if acting else None
 
 
 def _simulated(
@@ -157,15 +154,21 @@ def _simulated(
     X: Matrix,
     names: tuple[str, ...],
     values: Matrix,
-    records: Sequence[Record],
+    records: Sequence[LoadedRecord],
     steps: int | None,
 ) -> Matrix:
     """Rows of x under the torques of the records."""
-    parts = [
-        simulate_values(parameters.structure, names, values, r, initial_states=parameters.start_values(X, i), substeps=steps)
-        for i, r in enumerate(records)
-    ]
-    return np.concatenate(parts, axis=1)
+    return _side_by_side(
+        [
+            r.velocities(parameters.structure, names, values, initial_states=parameters.start_values(X, i), substeps=steps)
+            for i, r in enumerate(records)
+        ]
+    )
+
+
+def _side_by_side(parts: Sequence[Matrix]) -> Matrix:
+    """Velocities of all records, one after the other."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
 
 def _bends_the_angle(data: DataSet, parameters: Parameterisation) -> bool:
