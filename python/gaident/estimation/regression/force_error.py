@@ -287,6 +287,6 @@ def _noise_power(model: Model | InverseDynamics | TorqueOf, rec: Record, motion:
         inertia = abs(float((1.0 / model.linear.frequency_response(omega)).imag)) / omega
     else:
         inertia = model.parameters["inertia"].value if isinstance(model, InverseDynamics) else 0.0
-    share = noise_share(rec, cutoff_hz, order)
+    share = noise_share(rec, cutoff_hz, order, motion.spectrum)
     power = share * float(np.mean(motion.acceleration**2)) * inertia**2
     return power + (torque_noise(rec, cutoff_hz, order) ** 2 if rec.torque_is == MEASURED else 0.0)

@@ -23,7 +23,7 @@ from gaident.data.record import Record
 __all__ = ["BAND", "Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "torque_noise"]
 
 Vector = NDArray[np.float64]
-Spectrum = tuple[Vector, Vector, float]
+Spectrum = tuple[Vector, Vector, float]  # frequencies [Hz], power density, level of the noise
 
 NOISE_SHARE = 1e-3  # no decision: how exact an inertia is
 """Most of the acceleration's power that may be noise: so much is the inertia too small by it."""
@@ -54,6 +54,7 @@ class Motion:
     torque: Vector | None  # N m
     threshold: float  # rad/s
     still: NDArray[np.bool_]
+    spectrum: Spectrum  # of the sensor's signal, see `noise_share`
 
 
 def motion_of(rec: Record, cutoff_hz: float, order: int, standstill: float | None = None) -> Motion:
@@ -65,12 +66,13 @@ def motion_of(rec: Record, cutoff_hz: float, order: int, standstill: float | Non
         velocity = low_passed(rec.velocity, rec.dt, cutoff_hz, order)
         position = np.concatenate([[0.0], np.cumsum(0.5 * rec.dt * (velocity[1:] + velocity[:-1]))])
     torque = None if rec.torque is None else low_passed(rec.torque, rec.dt, cutoff_hz, order)
-    least = max(DEVIATIONS * _velocity_noise(rec, cutoff_hz, order), OF_RMS * float(np.sqrt(np.mean(velocity**2))))
+    spectrum = _spectrum(rec)
+    least = max(DEVIATIONS * _velocity_noise(rec, spectrum, cutoff_hz, order), OF_RMS * float(np.sqrt(np.mean(velocity**2))))
     threshold = least if standstill is None else standstill
     still = _beside(np.abs(velocity) <= threshold, max(1, round(1.0 / (cutoff_hz * rec.dt))))
     if standstill == 0.0:
         still = np.zeros(len(velocity), dtype=bool)
-    return Motion(rec.dt, position, velocity, np.gradient(velocity, rec.dt), torque, threshold, still)
+    return Motion(rec.dt, position, velocity, np.gradient(velocity, rec.dt), torque, threshold, still, spectrum)
 
 
 def _beside(still: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
@@ -107,25 +109,21 @@ def cutoff_of(rec: Record, order: int) -> float:
     """
     grid = BAND / rec.dt * np.geomspace(1.0, LOWEST / BAND, 60)
     spectrum = _spectrum(rec)
-    fit = (float(fc) for fc in grid if _noise_share(rec, spectrum, float(fc), order) <= NOISE_SHARE)
+    fit = (float(fc) for fc in grid if noise_share(rec, float(fc), order, spectrum) <= NOISE_SHARE)
     return _round(next(fit, float(grid[-1])))
 
 
-def noise_share(rec: Record, cutoff_hz: float, order: int) -> float:
-    """Share of noise in the power of the filtered acceleration, from 0 to 1."""
-    return _noise_share(rec, _spectrum(rec), cutoff_hz, order)
-
-
-def _noise_share(rec: Record, spectrum: Spectrum, cutoff_hz: float, order: int) -> float:
-    f, power, level = spectrum
+def noise_share(rec: Record, cutoff_hz: float, order: int, spectrum: Spectrum | None = None) -> float:
+    """Share of noise in the power of the filtered acceleration, from 0 to 1; spectrum: that of the record's motion, if known."""
+    f, power, level = spectrum or _spectrum(rec)
     weight = _gain(rec, f, cutoff_hz, order, 2)
     whole = float(np.sum(weight * power))
     return min(level * float(np.sum(weight)) / whole, 1.0) if whole > 0.0 else 1.0
 
 
-def _velocity_noise(rec: Record, cutoff_hz: float, order: int) -> float:
+def _velocity_noise(rec: Record, spectrum: Spectrum, cutoff_hz: float, order: int) -> float:
     """Standard deviation of the noise of the filtered velocity [rad/s]."""
-    f, _, level = _spectrum(rec)
+    f, _, level = spectrum
     return float(np.sqrt(level * np.sum(_gain(rec, f, cutoff_hz, order, 1)) * (f[1] - f[0])))
 
 
