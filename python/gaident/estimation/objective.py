@@ -223,8 +223,9 @@ class Objective:
     def whitened(self, E: Matrix, noise: NoiseFilter, inertias: Vector | None = None) -> Matrix:
         """Rows of whitened errors, of models with these inertias [kg m^2]; samples that do not count are 0."""
         V = noise.of(self.family.prefiltered(self.bridged(E), self.lengths, inertias), self.lengths)
-        with np.errstate(invalid="ignore"):
-            return np.multiply(V, self.counted, out=None if V is E else V)
+        V = V.copy() if V is E else V
+        V[:, self._uncounted] = 0.0
+        return V
 
     @cached_property
     def counted(self) -> Vector:
@@ -235,6 +236,10 @@ class Objective:
             use[at : at + self.head] = 0.0
             at += n
         return use
+
+    @cached_property
+    def _uncounted(self) -> NDArray[np.intp]:
+        return np.flatnonzero(self.counted == 0.0)
 
     def bridged(self, E: Matrix) -> Matrix:
         """Errors with a straight line over the masked samples of each record, so that a filter does not see them."""

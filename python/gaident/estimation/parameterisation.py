@@ -204,9 +204,11 @@ class Parameterisation:
     def values(self, X: Matrix, left_out: Sequence[str] = ()) -> tuple[tuple[str, ...], Matrix]:
         """(effects in the order of the table, rows of base parameters and theirs) for `simulate_values`."""
         shown = [t for t in self._ordered if t.name not in left_out]
+        if not shown and not self.held:
+            return (), self.base_values(X)
         zero = [np.zeros((len(X), 1))] if self.held else []
-        rows = np.hstack([self.base_values(X), *zero, *(t.natural(X[:, self.slot(t.name)]) for t in shown)])
-        return tuple(t.name for t in shown), rows
+        parts = [self.base_values(X), *zero, *(t.natural(X[:, self.slot(t.name)]) for t in shown)]
+        return tuple(t.name for t in shown), np.concatenate(parts, axis=1)
 
     def start_values(self, X: Matrix, record: int) -> Matrix | None:
         """Rows of start states of one record, None where it starts at rest."""
