@@ -32,6 +32,31 @@ RealArray filtered_rows(const RealArray& b, const RealArray& a, const RealArray&
     return out;
 }
 
+// Rows b, a of filters, e and weight (n): sum of (weight v)^2 under each of them.
+RealArray powers_of(const RealArray& b, const RealArray& a, const RealArray& e, const RealArray& weight,
+                    const std::vector<std::size_t>& lengths) {
+    const py::ssize_t most = max_recursion + 1;
+    if (b.ndim() != 2 || a.ndim() != 2 || b.shape(0) != a.shape(0) || b.shape(1) != a.shape(1) || b.shape(1) < 1 ||
+        b.shape(1) > most)
+        throw std::invalid_argument("b, a: rows of as many numbers, at least one and at most " + std::to_string(most));
+    for (py::ssize_t i = 0; i < a.shape(0); ++i)
+        if (*a.data(i, 0) != 1.0) throw std::invalid_argument("a: each row begins with 1");
+    std::size_t whole = 0;
+    const auto n = static_cast<std::size_t>(e.size());
+    for (const std::size_t length : lengths)
+        whole = length <= n - whole ? whole + length : throw std::invalid_argument(wrong_lengths(n));
+    if (whole != n) throw std::invalid_argument(wrong_lengths(n));
+    if (weight.size() != e.size()) throw std::invalid_argument("weight: one number for each sample of e");
+    RealArray out(b.shape(0));
+    double* const sums = out.mutable_data();
+    {
+        const py::gil_scoped_release release;
+        filtered_powers(b.data(), a.data(), static_cast<std::size_t>(b.shape(0)), static_cast<std::size_t>(b.shape(1)), e.data(),
+                        weight.data(), lengths, sums);
+    }
+    return out;
+}
+
 // A (m, m), drive (n, m), start (m): all x(0..n-1), with `newest` x(1..n), (n, m).
 ComplexArray states(const ComplexArray& A, const ComplexArray& drive, const ComplexArray& start, bool newest) {
     const py::ssize_t m = start.size();
@@ -82,6 +107,7 @@ RealArray held(const RealArray& error, const Controller& controller, double newe
 
 void bind_filter(py::module_& m) {
     m.def("filtered", &filtered_rows, py::arg("b"), py::arg("a"), py::arg("rows"), py::arg("lengths"));
+    m.def("filtered_powers", &powers_of, py::arg("b"), py::arg("a"), py::arg("e"), py::arg("weight"), py::arg("lengths"));
     m.def("state_recursion", &states, py::arg("A"), py::arg("drive"), py::arg("start"), py::arg("newest"));
     m.def("lagged_products", &products, py::arg("e"), py::arg("lags"));
     m.def("held_torque", &held, py::arg("error"), py::arg("controller"), py::arg("newest"), py::arg("before"), py::arg("rule"),

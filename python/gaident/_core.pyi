@@ -334,6 +334,15 @@ def filtered(
 ) -> NDArray[np.float64]:
     """v(n) = sum_i b_i e(n-i) - sum_{i>=1} a_i v(n-i) of rows of e, each cut into records of these lengths, from rest."""
 
+def filtered_powers(
+    b: NDArray[np.float64],
+    a: NDArray[np.float64],
+    e: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    lengths: Sequence[int],
+) -> NDArray[np.float64]:
+    """Sum of (weight v)^2 of one row e under each filter, a row of b and of a."""
+
 def state_recursion(
     A: NDArray[np.complex128], drive: NDArray[np.complex128], start: NDArray[np.complex128], newest: bool
 ) -> NDArray[np.complex128]: ...

@@ -7,6 +7,7 @@
 //     u(n) -> torque filters -> the torque that is logged, and held for T from `delay` after its sample on
 //
 // Where |v| is above the limit: hold: if e drives v further, I(n) = I(n-1), and v and u are formed again; tracking: I(n) += (u - v) T/Tt.
+// What a log may show of other rules at the limit is replayed by held_torque (replay.hpp).
 // A bare PI, weight 1 and the trapezoidal rule, is ControllerState (controller.hpp).
 #pragma once
 

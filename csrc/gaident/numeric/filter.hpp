@@ -65,6 +65,52 @@ inline void filtered(std::span<const double> b, std::span<const double> a, const
     }
 }
 
+// The sums of (weight v)^2 of one row e under `lanes` filters side by side, in transposed direct form,
+//
+//     v(n) = b_0 e(n) + z_1,   z_i = b_i e(n) - a_i v(n) + z_{i+1}
+//
+// b, a: order + 1 numbers of each filter, numbers of the same power of q side by side.
+template <int order, int lanes>
+void powers(const double* b, const double* a, const double* e, const double* weight, std::span<const std::size_t> lengths,
+            double* sums) {
+    double sum[lanes] = {};
+    for (const std::size_t length : lengths) {
+        double z[order + 1][lanes] = {};
+        for (std::size_t k = 0; k < length; ++k) {
+            double v[lanes];
+            for (int r = 0; r < lanes; ++r) v[r] = b[r] * e[k] + z[0][r];
+            for (int i = 0; i < order; ++i)
+                for (int r = 0; r < lanes; ++r)
+                    z[i][r] = z[i + 1][r] + (b[(i + 1) * lanes + r] * e[k] - a[(i + 1) * lanes + r] * v[r]);
+            for (int r = 0; r < lanes; ++r) sum[r] += (weight[k] * v[r]) * (weight[k] * v[r]);
+        }
+        e += length;
+        weight += length;
+    }
+    std::copy_n(sum, lanes, sums);
+}
+
+// The same of any number of filters: rows of b and of a, `size` numbers each, at most 1 + max_recursion.
+inline void filtered_powers(const double* b, const double* a, std::size_t filters, std::size_t size, const double* e,
+                            const double* weight, std::span<const std::size_t> lengths, double* sums) {
+    constexpr std::size_t lanes = 4;
+    using Run = void (*)(const double*, const double*, const double*, const double*, std::span<const std::size_t>, double*);
+    static constexpr auto runs = []<int... order>(std::integer_sequence<int, order...>) {
+        return std::array<Run, sizeof...(order)>{powers<order, lanes>...};
+    }(std::make_integer_sequence<int, max_recursion + 1>{});
+    for (std::size_t first = 0; first < filters; first += lanes) {
+        double B[(max_recursion + 1) * lanes], A[(max_recursion + 1) * lanes], sum[lanes];
+        for (std::size_t r = 0; r < lanes; ++r)
+            for (std::size_t i = 0; i < size; ++i) {
+                const std::size_t from = std::min(first + r, filters - 1) * size + i;
+                B[i * lanes + r] = b[from];
+                A[i * lanes + r] = a[from];
+            }
+        runs[size - 1](B, A, e, weight, lengths, sum);
+        std::copy_n(sum, std::min(lanes, filters - first), sums + first);
+    }
+}
+
 // products[k] = sum_n e(n) e(n-k), k = 0, 1, ...; in four sums, so that none waits for itself.
 inline void lagged_products(const double* e, std::size_t n, std::span<double> products) {
     for (std::size_t k = 0; k < products.size(); ++k) {

@@ -1,4 +1,4 @@
-"""What only one sample after the other gives, in the core: rational filters over rows, states, clamped sums, limited slopes."""
+"""What only one sample after the other gives, in the core: rational filters, states, clamped sums, limited slopes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident import _core
 
-__all__ = ["clamped_sum", "filtered", "rate_limited", "recursion"]
+__all__ = ["clamped_sum", "filtered", "filtered_powers", "rate_limited", "recursion"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -23,6 +23,15 @@ def filtered(b: Vector, a: Vector, rows: Matrix, lengths: Sequence[int]) -> Matr
     Raises ValueError where the lengths are not those of the rows, and for more than 16 numbers a_i behind a_0.
     """
     return _core.filtered(b, a, rows, lengths)
+
+
+def filtered_powers(b: Matrix, a: Matrix, row: Vector, weight: Vector, lengths: Sequence[int]) -> Vector:
+    """Sum of (weight v)^2 of one row under many filters of one size, side by side; v as `filtered` has it.
+
+    b, a: (filters, numbers); row, weight: (samples,) -> (filters,). Rounded otherwise than the sum over what `filtered` gives.
+    Raises ValueError where the sizes do not fit, and for more than 17 numbers.
+    """
+    return _core.filtered_powers(b, a, row, weight, lengths)
 
 
 def recursion(A: Complex, drive: ArrayLike, start: ArrayLike | None = None, newest: bool = False) -> Complex:

@@ -16,12 +16,15 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gaident.axis import Text, joined, say, unit_text
 from gaident.data.record import Record
 from gaident.diagnosis.gains import Gains, interval_of_fall
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.errors import GaidentError
-from gaident.estimation.regression.force_error import ForceError, band_of, effects_before_the_shaft, force_error, force_errors
+from gaident.estimation.regression.force_error import FilteredRecords, ForceError, band_of, effects_before_the_shaft
 from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
 from gaident.estimation.term import Term
 from gaident.models.model import Model
@@ -31,6 +34,8 @@ from gaident.results.fitness import Comparison, Fitness
 from gaident.results.inverse_dynamics import InverseDynamics
 
 __all__ = ["Check", "checked"]
+
+Vector = NDArray[np.float64]
 
 Effects = Mapping[str, Mapping[str, Estimate]]
 
@@ -111,21 +116,23 @@ def _forces(
     if len(scored) < len(gains.scored):
         return gains.before, gains.after, None, False
     rows, firsts = [r for r, _ in scored], [first for _, first in scored]
-    cutoff = band_of(gains.extended, rows)
+    filtered = FilteredRecords(tuple(rows), tuple(firsts), band_of(gains.extended, rows))
 
-    def of(model: Model | InverseDynamics) -> ForceError | None:
+    def of(model: Model | InverseDynamics) -> tuple[ForceError, list[Vector]] | None:
         try:
-            error = force_error(model, rows, cutoff_hz=cutoff, first=firsts)
+            torques = filtered.torques(model)
+            error = filtered.force_error(model, torques)
         except GaidentError:
             return None
-        return error if math.isfinite(error.rms) else None
+        return (error, [e for e, _ in torques]) if math.isfinite(error.rms) else None
 
-    def fitness(plain: Fitness, error: ForceError | None) -> Fitness:
-        if error is None:
+    def fitness(plain: Fitness, found: tuple[ForceError, list[Vector]] | None) -> Fitness:
+        if found is None:
             return plain
+        error = found[0]
         return replace(plain, force_error=error.rms, torque_rms=error.torque_rms, force_floor=error.noise_floor)
 
-    second = fitted = None
+    second = None
     if found is not None:
         try:
             part = [r[:first] for r, first in scored] if any(firsts) else list(records)
@@ -134,10 +141,10 @@ def _forces(
         except GaidentError:
             second = None
     own, better = of(gains.extended), False
-    if own is not None and second is not None and fitted is not None and second.rms < own.rms:
-        series = [[e for e, _ in force_errors(m, rows, cutoff, own.order, firsts)] for m in (gains.extended, fitted)]
-        better = interval_of_fall(series[0], series[1])[0] > 0.0
-    return fitness(gains.before, of(gains.mechanism)), fitness(gains.after, own), None if second is None else second.rms, better
+    if own is not None and second is not None and second[0].rms < own[0].rms:
+        better = interval_of_fall(own[1], second[1])[0] > 0.0
+    before, after = fitness(gains.before, of(gains.mechanism)), fitness(gains.after, own)
+    return before, after, None if second is None else second[0].rms, better
 
 
 def _compared(

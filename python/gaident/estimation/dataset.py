@@ -8,7 +8,8 @@ sensor and disturbance torques.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,8 +22,10 @@ from gaident.control.filtering import rate_limited
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
+from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.term import Term
 from gaident.models.drive_torque import late, torque_of
+from gaident.models.simulate_many import LoadedRecord
 from gaident.models.starts import noise_std, starts_moving
 
 __all__ = ["DataSet", "with_angle"]
@@ -30,6 +33,7 @@ __all__ = ["DataSet", "with_angle"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
+MOST_SUBSTEPS = 5  # no decision: powers of two
 FINEST = 0.125e-3  # no decision: s, of a substep: the accuracy that friction on a stiff shaft needs
 
 
@@ -102,6 +106,20 @@ class DataSet:
         torque = torque_in(rec)
         return rec.with_channels(torque=late(torque, self.age, torque[0] if starts_moving(rec, None) else 0.0))
 
+    def ready(self, rec: Record) -> Record:
+        """A record whose simulation `seen` takes for the velocity that the sensor shows."""
+        if not self.age:
+            return rec
+        return with_middles(rec) if self.differenced else self.as_old(rec)
+
+    def seen(self, rows: Matrix) -> Matrix:
+        """Rows of velocities that the sensor shows, of those that a record made `ready` gives."""
+        return means(rows) if self.differenced else rows
+
+    def steps_of(self, substeps: int | None) -> int | None:
+        """Substeps of a sample of a record made `ready`, from those of a sample."""
+        return max(substeps // 2, 1) if self.differenced and substeps is not None else substeps  # no decision: half a sample
+
     @property
     def differenced(self) -> bool:
         """Whether the velocity is the difference of the angle from each line of the log to the next."""
@@ -121,6 +139,11 @@ class DataSet:
     def torque_logged(self) -> bool:
         """Whether every record holds the controller's torque."""
         return all(r.torque is not None for r in self.records)
+
+    @cached_property
+    def substeps(self) -> int:
+        """Of a sample, for every model with effects that are not smooth."""
+        return int(2 ** min(max(math.ceil(math.log2(self.dt / self.finest)), 0), MOST_SUBSTEPS))
 
     @property
     def loop_only(self) -> bool:
@@ -154,6 +177,24 @@ class DataSet:
     def slower(self) -> bool:
         """Whether the log has fewer lines than the controller samples: the torque is then known on the lines only."""
         return self.loop is not None and self.pi is None
+
+    def loaded(self, records: Sequence[Record], controller: Controller | None) -> tuple[LoadedRecord, ...]:
+        """Records as the core takes them, in this loop; those of the data set itself are loaded once.
+
+        Where their torque drives a model they are made ready for a velocity of this age: see `ready`.
+        """
+        ready: Callable[[Record], Record] = self.ready if controller is None else lambda rec: rec
+        for name in ("records", "driven", "turned", "free"):
+            if records is getattr(self, name):
+                key = name, controller
+                if key not in self._loaded:
+                    self._loaded[key] = tuple(LoadedRecord.of(ready(r), controller) for r in records)
+                return self._loaded[key]
+        return tuple(LoadedRecord.of(ready(r), controller) for r in records)
+
+    @cached_property
+    def _loaded(self) -> dict[tuple[str, Controller | None], tuple[LoadedRecord, ...]]:
+        return {}
 
     @cached_property
     def lengths(self) -> tuple[int, ...]:

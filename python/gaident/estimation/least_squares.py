@@ -16,6 +16,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 NEARBY = 0.15, 0.3, 0.7  # no decision: of a base parameter, of its unit at least, of a step of an effect: where it is searched
+DAMPINGS = 10.0 ** np.arange(-3.0, 5.0)  # no decision: times the damping of the step before
 SETTLED = 0.02  # no decision: of the noise variance: a fall of the cost by less changes no decision
 
 
@@ -41,18 +42,18 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
             v, J = objective.linearised(hypothesis, x, noise, last)
             moved = False
         A, g = J @ J.T, J @ v
-        diagonal = np.diag(A).copy()
+        diagonal = A.diagonal().copy()
         usable = (diagonal > 0.0) & (steps > 0.0) & (diagonal < WORST)
         # At a bound with the descent pointing outward: not moved in this step.
         usable &= ~(((x <= limits[0]) & (g > 0.0)) | ((x >= limits[1]) & (g < 0.0)))
         if not usable.any():
             break
         index = np.flatnonzero(usable)
-        sub, gradient, scale = A[np.ix_(index, index)], g[index], diagonal[index]
-        factors = damping * 10.0 ** np.arange(-3.0, 5.0)
+        sub, gradient, scale = A[index][:, index], g[index], diagonal[index]
+        factors = damping * DAMPINGS
         X = np.repeat(x[None, :], len(factors), axis=0)
         X[:, index] -= damped_steps(sub, gradient, factors[:, None] * scale + 1e-18 * scale.max())
-        X = np.clip(X, *limits)
+        np.minimum(np.maximum(X, limits[0], out=X), limits[1], out=X)
         costs, errors = objective.costs_and_errors(hypothesis, X, noise)
         best = int(np.argmin(costs))
         if not costs[best] < cost:
@@ -63,7 +64,7 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
             continue
         fall = cost - float(costs[best])
         x, cost, last, moved = X[best], float(costs[best]), errors[best], True
-        damping = float(np.clip(damping * 10.0 ** (best - 3.0), 1e-9, 1e9))  # no decision: the grid of a solver
+        damping = min(max(damping * 10.0 ** (best - 3.0), 1e-9), 1e9)  # no decision: the grid of a solver
         if fall < SETTLED * cost / count:
             converged = True
             break
@@ -74,7 +75,8 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
 
 def damped_steps(A: Matrix, g: Vector, damping: Matrix) -> Matrix:
     """(A + diag(d))^-1 g for each row d of damping; 0 where there is none."""
-    M = A + damping[:, :, None] * np.eye(len(g))
+    M = np.repeat(A[None, :, :], len(damping), axis=0)
+    M[:, range(len(g)), range(len(g))] += damping
     try:
         return np.asarray(np.linalg.solve(M, np.repeat(g[None, :, None], len(M), axis=0))[:, :, 0])
     except np.linalg.LinAlgError:

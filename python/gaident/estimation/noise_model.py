@@ -15,7 +15,7 @@ takes the place of G's, and an integrator that of C.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -189,10 +189,11 @@ class ShaftNoise:
         denominators = _polynomials(filtered)
         return {k: NoiseFilter(numerators[n], denominators[n], 2) if known[n] else None for n, k in enumerate(places)}
 
-    def best(self, cost: Callable[[NoiseFilter], float], closed: bool) -> NoiseFilter | None:
+    def best(self, costs_of: Callable[[Sequence[NoiseFilter]], Iterable[float]], closed: bool) -> NoiseFilter | None:
         """The filter of least cost, downhill from the middle of the grid, in large steps and then in small ones.
 
-        Always from there, so that the filter of an error is a matter of this error alone.
+        Always from there, so that the filter of an error is a matter of this error alone. costs_of: of several filters of one
+        size.
         """
         costs: dict[tuple[int, int], float] = {}
         here = MIDDLE
@@ -201,8 +202,9 @@ class ShaftNoise:
                 i, j = here
                 around = [(i + stride * u, j + stride * v) for u in (-1, 0, 1) for v in (-1, 0, 1)]
                 new = [k for k in around if k not in costs]
-                for k, f in zip(new, self.filters(new, closed), strict=True):
-                    costs[k] = np.inf if f is None else cost(f)
+                there = {k: f for k, f in zip(new, self.filters(new, closed), strict=True) if f is not None}
+                costs |= dict.fromkeys(new, np.inf)
+                costs |= dict(zip(there, costs_of(list(there.values())), strict=True)) if there else {}
                 best = min(around, key=costs.__getitem__)
                 if not costs[best] < costs[here]:
                     break

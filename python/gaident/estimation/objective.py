@@ -19,22 +19,21 @@ the independent samples (see `criterion.py`). Behind a prefilter errors are *wei
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.filtering import filtered_powers
 from gaident.estimation.criterion import bic
 from gaident.estimation.dataset import DataSet
+from gaident.estimation.hypothesis import Fit, Hypothesis
 from gaident.estimation.masked import Bridges
 from gaident.estimation.noise_model import DIFFERENCED, HIGHEST, ON_TOP, WHITE, NoiseFilter, ShaftNoise, autoregression
-from gaident.estimation.parameterisation import Parameterisation
-from gaident.estimation.prediction import Predictor
 from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.projection import WORST, project_out, slopes, sums_of_squares
-from gaident.estimation.term import Term
 
 __all__ = ["Fit", "Hypothesis", "Innovations", "NoiseFamily", "Objective", "OutputErrors"]
 
@@ -44,63 +43,6 @@ T = TypeVar("T")
 
 HEAD = 12  # no decision: parts of the shortest record, of which a filter's start takes one at most
 LOST = 1e60  # no decision: rad/s: the error of a model that diverges, every sample; its squares stay numbers
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """What is fitted: the parameters of a model, and how the data drive it."""
-
-    parameters: Parameterisation
-    predictor: Predictor
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """The effects in the model, in the order in which they were added."""
-        return self.parameters.effects
-
-    def extended(self, term: Term) -> Hypothesis:
-        """With one effect more, behind the others."""
-        return replace(self, parameters=self.parameters.extended(term))
-
-    def without(self, effect: str) -> Hypothesis:
-        """With one effect less."""
-        return replace(self, parameters=self.parameters.without(effect))
-
-    def driven_by(self, predictor: Predictor) -> Hypothesis:
-        """The same model under another predictor."""
-        return replace(self, predictor=predictor)
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """A hypothesis with its best x under a noise filter: cost V there, and BIC."""
-
-    hypothesis: Hypothesis
-    x: Vector
-    noise: NoiseFilter
-    cost: float
-    bic: float
-    converged: bool = False
-
-    @property
-    def parameters(self) -> Parameterisation:
-        """Those of the hypothesis."""
-        return self.hypothesis.parameters
-
-    @property
-    def predictor(self) -> Predictor:
-        """That of the hypothesis."""
-        return self.hypothesis.predictor
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """The effects in the model, in the order in which they were added."""
-        return self.hypothesis.effects
-
-    @cached_property
-    def key(self) -> Hashable:
-        """The same for fits of the same numbers."""
-        return self.hypothesis, self.x.tobytes(), self.noise.key, self.cost, self.bic, self.converged
 
 
 class NoiseFamily(Protocol):
@@ -113,6 +55,11 @@ class NoiseFamily(Protocol):
 
     def information(self, count: float) -> float:
         """Independent samples among so many."""
+        ...
+
+    @property
+    def weighs_inertias(self) -> bool:
+        """Whether `prefiltered` asks for the inertia of each row."""
         ...
 
     def prefiltered(self, E: Matrix, lengths: Sequence[int], inertias: Vector | None = None) -> Matrix:
@@ -130,6 +77,7 @@ class Innovations:
 
     shaft: ShaftNoise | None = None
     floor: float = 0.0
+    weighs_inertias = False
 
     def information(self, count: float) -> float:
         """All samples count."""
@@ -145,10 +93,15 @@ class Innovations:
         row = objective.bridged(error[None, :])
         plain = WHITE.then(autoregression(objective.parts(row[0]), floor=self.floor))
 
+        def variances(filters: Sequence[NoiseFilter]) -> list[float]:
+            b, a = np.array([f.b for f in filters]), np.array([f.a for f in filters])
+            powers = filtered_powers(b, a, row[0], objective.counted, lengths)
+            return [objective.variance(float(cost), f) for cost, f in zip(powers, filters, strict=True)]
+
         def variance(f: NoiseFilter) -> float:
             return objective.variance(float(sums_of_squares(objective.whitened(row, f))[0]), f)
 
-        found = [] if self.shaft is None else [self.shaft.best(variance, closed)]
+        found = [] if self.shaft is None else [self.shaft.best(variances, closed)]
         found += DIFFERENCED if objective.data.differenced else []
         behind = [
             f.then(autoregression(objective.parts(f.of(row, lengths)[0]), ON_TOP, self.floor * f.power))
@@ -171,6 +124,11 @@ class OutputErrors:
     prefilter: Prefilter | None = None
     inertia: float | None = None
     floor = 0.0
+
+    @property
+    def weighs_inertias(self) -> bool:
+        """Where the torque is measured."""
+        return self.inertia is not None
 
     def information(self, count: float) -> float:
         """No more than there are."""
@@ -234,9 +192,12 @@ class Objective:
     def errors(self, hypothesis: Hypothesis, X: Matrix) -> Matrix:
         """Rows of raw errors: measured minus simulated velocity [rad/s]."""
         self.counter.simulations += len(X)
+        E = hypothesis.predictor.velocities(hypothesis.parameters, X)
         with np.errstate(invalid="ignore", over="ignore"):
-            E = self.measured - hypothesis.predictor.velocities(hypothesis.parameters, X)
-            E[~np.all(np.abs(E) < LOST, axis=1)] = LOST
+            np.subtract(self.measured, E, out=E)
+            kept = (E.max(axis=1) < LOST) & (E.min(axis=1) > -LOST)
+        if not kept.all():
+            E[~kept] = LOST
         return E
 
     def error(self, fit: Fit) -> Vector:
@@ -257,14 +218,15 @@ class Objective:
 
     def whitened_errors(self, fit: Fit, noise: NoiseFilter) -> Vector:
         """The errors of a fit under a noise filter; its cost is their sum of squares."""
-        rows = self.whitened(self.error(fit)[None, :], noise, fit.parameters.inertias(fit.x[None, :]))
+        rows = self.whitened(self.error(fit)[None, :], noise, self._inertias(fit.hypothesis, fit.x[None, :]))
         return np.asarray(rows[0])
 
     def whitened(self, E: Matrix, noise: NoiseFilter, inertias: Vector | None = None) -> Matrix:
         """Rows of whitened errors, of models with these inertias [kg m^2]; samples that do not count are 0."""
         V = noise.of(self.family.prefiltered(self.bridged(E), self.lengths, inertias), self.lengths)
-        with np.errstate(invalid="ignore"):
-            return np.multiply(V, self.counted, out=None if V is E else V)
+        V = V.copy() if V is E else V
+        V[:, self._uncounted] = 0.0
+        return V
 
     @cached_property
     def counted(self) -> Vector:
@@ -275,6 +237,10 @@ class Objective:
             use[at : at + self.head] = 0.0
             at += n
         return use
+
+    @cached_property
+    def _uncounted(self) -> NDArray[np.intp]:
+        return np.flatnonzero(self.counted == 0.0)
 
     def bridged(self, E: Matrix) -> Matrix:
         """Errors with a straight line over the masked samples of each record, so that a filter does not see them."""
@@ -321,7 +287,11 @@ class Objective:
     def costs_and_errors(self, hypothesis: Hypothesis, X: Matrix, noise: NoiseFilter) -> tuple[Vector, Matrix]:
         """(V of each row, WORST where a model diverges; rows of raw errors)."""
         E = self.errors(hypothesis, X)
-        return sums_of_squares(self.whitened(E, noise, hypothesis.parameters.inertias(X))), E
+        return sums_of_squares(self.whitened(E, noise, self._inertias(hypothesis, X))), E
+
+    def _inertias(self, hypothesis: Hypothesis, X: Matrix) -> Vector | None:
+        """Of each row of x, where the family weighs errors by it [kg m^2]."""
+        return hypothesis.parameters.inertias(X) if self.family.weighs_inertias else None
 
     def linearised(
         self, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, error: Vector | None = None
@@ -332,7 +302,7 @@ class Objective:
         """
         X, h = self._neighbours(hypothesis, x)
         E = self._errors_around(hypothesis, X, error)
-        V = self.whitened(E, noise, hypothesis.parameters.inertias(X))
+        V = self.whitened(E, noise, self._inertias(hypothesis, X))
         return V[0], slopes(V, h)
 
     def sensitivities(self, hypothesis: Hypothesis, x: Vector) -> tuple[Matrix, Vector]:

@@ -155,6 +155,10 @@ class Parameterisation:
     def _ordered(self) -> tuple[Term, ...]:
         return tuple(sorted(self.terms, key=lambda t: place_of(t.name)))
 
+    @cached_property
+    def _units(self) -> Vector:
+        return np.array(self.units)
+
     def slot(self, effect: str) -> slice:
         """Where an effect's coordinates stand."""
         return self._slots[effect]
@@ -181,8 +185,8 @@ class Parameterisation:
     def base_values(self, X: Matrix) -> Matrix:
         """Rows [K, a, ...] of rows of x."""
         values = np.empty((len(X), self.base))
-        values[:, 0] = np.exp(np.clip(X[:, 0], -300.0, 300.0))  # no decision: what a double holds
-        values[:, 1:] = X[:, 1 : self.base] * np.array(self.units)
+        values[:, 0] = np.exp(np.minimum(np.maximum(X[:, 0], -300.0), 300.0))  # no decision: what a double holds
+        np.multiply(X[:, 1 : self.base], self._units, out=values[:, 1:])
         return values
 
     def inertias(self, X: Matrix) -> Vector:
@@ -200,9 +204,11 @@ class Parameterisation:
     def values(self, X: Matrix, left_out: Sequence[str] = ()) -> tuple[tuple[str, ...], Matrix]:
         """(effects in the order of the table, rows of base parameters and theirs) for `simulate_values`."""
         shown = [t for t in self._ordered if t.name not in left_out]
+        if not shown and not self.held:
+            return (), self.base_values(X)
         zero = [np.zeros((len(X), 1))] if self.held else []
-        rows = np.hstack([self.base_values(X), *zero, *(t.natural(X[:, self.slot(t.name)]) for t in shown)])
-        return tuple(t.name for t in shown), rows
+        parts = [self.base_values(X), *zero, *(t.natural(X[:, self.slot(t.name)]) for t in shown)]
+        return tuple(t.name for t in shown), np.concatenate(parts, axis=1)
 
     def start_values(self, X: Matrix, record: int) -> Matrix | None:
         """Rows of start states of one record, None where it starts at rest."""
@@ -241,17 +247,30 @@ class Parameterisation:
         return model
 
     def limits(self) -> Matrix:
-        """Lowest and highest value of each entry, (2, size)."""
+        """Lowest and highest value of each entry, (2, size), not to be written to."""
+        return self._limits
+
+    def steps(self) -> Vector:
+        """What counts as a large change of each entry, not to be written to; 0: not moved by a fit."""
+        return self._steps
+
+    @cached_property
+    def _limits(self) -> Matrix:
         rows: list[tuple[float, ...]] = [(-np.inf, np.inf)] * self.base
         for t in self.terms:
             rows += t.limits(self.scales)
         rows += [(-np.inf, np.inf)] * sum(self.starts)
-        return np.array(rows).T
+        return _frozen(np.array(rows).T)
 
-    def steps(self) -> Vector:
-        """What counts as a large change of each entry; 0: not moved by a fit."""
+    @cached_property
+    def _steps(self) -> Vector:
         rows = [1.0] * self.base
         for t in self.terms:
             rows += t.steps(self.scales)
         rows += [0.05 * self.scales.speed] * sum(self.starts)
-        return np.array(rows)
+        return _frozen(np.array(rows))
+
+
+def _frozen(values: Matrix) -> Matrix:
+    values.flags.writeable = False
+    return values

@@ -13,7 +13,7 @@ The angle that effects depend on is the logged one (or the measured velocity, in
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -25,7 +25,6 @@ from gaident.control.filtering import filtered
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.estimation.dataset import DataSet, angle_of, with_angle
-from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.term import Term
 from gaident.models.effects import place_of
@@ -38,8 +37,6 @@ __all__ = ["ClosedLoop", "OpenLoop", "Predictor", "coupling_response", "twist"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-
-MOST_SUBSTEPS = 5  # no decision: powers of two
 
 
 class Predictor(Protocol):
@@ -128,8 +125,8 @@ class ClosedLoop:
         names, values = parameters.values(X)
         steps = substeps(data, parameters.terms)
         records = data.records if self.own_angle else data.turned
-        parts = [simulate_values(parameters.structure, names, values, r, data.loop, substeps=steps) for r in records]
-        return np.concatenate(parts, axis=1)
+        loaded = data.loaded(records, data.loop)
+        return _side_by_side([r.velocities(parameters.structure, names, values, substeps=steps) for r in loaded])
 
     def torque_response(self, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
         """See `Predictor`; the controller answers: G d - T (G d), T the closed loop's response to the command.
@@ -147,10 +144,9 @@ class ClosedLoop:
 
 def substeps(data: DataSet, terms: Sequence[Term]) -> int | None:
     """As many for every model with effects, so that no candidate has an advantage by finer simulation."""
-    acting = [t for t in terms if not t.resonates]
-    if not acting or all(t.name in OWN for t in acting):  # user-defined effects are smooth, and take long to evaluate
-        return None
-    return int(2 ** np.clip(np.ceil(np.log2(data.dt / data.finest)), 0.0, MOST_SUBSTEPS))
+    # User-defined effects are smooth, and take long to evaluate.
+    acting = any(not t.resonates and t.name not in OWN for t in terms)
+    return data.substeps if acting else None
 
 
 def _simulated(
@@ -162,25 +158,17 @@ def _simulated(
     records: Sequence[Record],
 ) -> Matrix:
     """Rows of x under the torques of the records, as the sensor shows the velocity."""
-    steps = substeps(data, parameters.terms)
-    parts = []
-    for i, r in enumerate(records):
-        states = parameters.start_values(X, i)
-
-        def run(rec: Record, steps: int | None, states: Matrix | None = states) -> Matrix:
-            return simulate_values(parameters.structure, names, values, rec, initial_states=states, substeps=steps)
-
-        parts.append(_as_seen(data, r, steps, run))
-    return np.concatenate(parts, axis=1)
+    steps = data.steps_of(substeps(data, parameters.terms))
+    parts = [
+        r.velocities(parameters.structure, names, values, initial_states=parameters.start_values(X, i), substeps=steps)
+        for i, r in enumerate(data.loaded(records, None))
+    ]
+    return _side_by_side([data.seen(part) for part in parts])
 
 
-def _as_seen(data: DataSet, rec: Record, steps: int | None, run: Callable[[Record, int | None], Matrix]) -> Matrix:
-    """What `run` gives under the torque of a record, as old as the sensor shows it; steps: substeps of a sample."""
-    if not data.age:
-        return run(rec, steps)
-    if not data.differenced:
-        return run(data.as_old(rec), steps)
-    return means(run(with_middles(rec), None if steps is None else max(steps // 2, 1)))  # no decision: half the sample
+def _side_by_side(parts: Sequence[Matrix]) -> Matrix:
+    """Velocities of all records, one after the other."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
 
 def _bends_the_angle(data: DataSet, parameters: Parameterisation) -> bool:
@@ -213,11 +201,10 @@ def _of_true_angle(
             angle = true_angle(angle, driven.velocity, own)
         states = None if controller is not None else parameters.start_values(x[None, :], i)
         turned = with_angle(record, angle)
-
-        def run(rec: Record, steps: int | None, states: Matrix | None = states) -> Matrix:
-            return simulate_values(parameters.structure, names, values, rec, controller, initial_states=states, substeps=steps)
-
-        parts.append(run(turned, steps) if controller is not None else _as_seen(data, turned, steps, run))
+        ready = data.ready(turned) if controller is None else turned
+        taken = data.steps_of(steps) if controller is None else steps
+        run = simulate_values(parameters.structure, names, values, ready, controller, initial_states=states, substeps=taken)
+        parts.append(data.seen(run) if controller is None else run)
     return np.concatenate(parts, axis=1)
 
 

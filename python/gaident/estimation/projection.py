@@ -41,8 +41,12 @@ def project_out(J: Matrix, V: Matrix) -> Matrix:
 
 def slopes(V: Matrix, h: Vector) -> Matrix:
     """Rows of differences over the steps h, 0 where there is none. V: the row at x, and one for each step."""
-    J = np.zeros((len(h), V.shape[1]))
     moved = np.flatnonzero(h)
     with np.errstate(invalid="ignore", over="ignore"):
-        J[moved] = (V[1:] - V[0]) / h[moved][:, None]
+        S: Matrix = V[1:] - V[0]
+        S /= h[moved][:, None]
+    if len(moved) == len(h):
+        return S
+    J = np.zeros((len(h), V.shape[1]))
+    J[moved] = S
     return J

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from gaident.data.record import Record
 from gaident.errors import GaidentError, ModelError
 from gaident.models.effects import table as effect_table
 from gaident.models.factors import FactorCounts
-from gaident.models.model import Model
+from gaident.models.model import Model, require_strictly_proper
 from gaident.models.own_effects import OWN
 from gaident.models.simulation_input import (
     AnyModel,
@@ -129,20 +130,49 @@ def simulate_values(
     ModelError
         For a wrong shape or unknown names.
     """
-    table = np.ascontiguousarray(values, dtype=np.float64)
-    source, _ = input_for(structure.p, rec, controller)
-    starts = np.zeros((0, 0)) if initial_states is None else np.ascontiguousarray(initial_states, dtype=np.float64)
-    record = core_record(rec, source, controller)
-    built_in, own = _parted(structure, effects, table)
-    try:
-        with np.errstate(all="ignore"):
-            return record.simulate_values(
-                built_in, tuple(structure), [e for e in effects if e not in OWN], starts, checked_substeps(substeps), workers, own
-            )
-    except GaidentError:
-        raise
-    except ValueError as reason:
-        raise ModelError(str(reason)) from None
+    input_for(structure.p, rec, controller)
+    loaded = LoadedRecord.of(rec, controller)
+    return loaded.velocities(structure, effects, values, initial_states=initial_states, substeps=substeps, workers=workers)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedRecord:
+    """A record and its loop as the core takes them: made once for all simulations of a fit."""
+
+    core: _core.EffectRecord
+    controller: Controller | None
+
+    @classmethod
+    def of(cls, rec: Record, controller: Controller | None) -> LoadedRecord:
+        """Of a record that has what drives the loop; RecordError else."""
+        source, _ = input_for(1, rec, controller)
+        return cls(core_record(rec, source, controller), controller)
+
+    def velocities(
+        self,
+        structure: FactorCounts,
+        effects: Sequence[str],
+        values: ArrayLike,
+        *,
+        initial_states: ArrayLike | None = None,
+        substeps: int | None = None,
+        workers: int = 1,
+    ) -> Signal:
+        """As `simulate_values` gives them."""
+        require_strictly_proper(structure.p, self.controller)
+        table = np.ascontiguousarray(values, dtype=np.float64)
+        starts = np.zeros((0, 0)) if initial_states is None else np.ascontiguousarray(initial_states, dtype=np.float64)
+        built_in, own = _parted(structure, effects, table)
+        names = [e for e in effects if e not in OWN]
+        try:
+            with np.errstate(all="ignore"):
+                return self.core.simulate_values(
+                    built_in, tuple(structure), names, starts, checked_substeps(substeps), workers, own
+                )
+        except GaidentError:
+            raise
+        except ValueError as reason:
+            raise ModelError(str(reason)) from None
 
 
 def simulated_with_effects(

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 import gaident as ga
-from gaident.control.filtering import clamped_sum, filtered, recursion
+from gaident.control.filtering import clamped_sum, filtered, filtered_powers, recursion
 from gaident.errors import ModelError
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import damped_steps
@@ -43,6 +43,31 @@ def test_what_cannot_be_filtered_is_refused() -> None:
         filtered(np.ones(1), np.array([2.0, 1.0]), E, (10,))
     with pytest.raises(ValueError, match="at most 16 more"):
         filtered(np.ones(1), np.ones(18), E, (10,))
+
+
+@pytest.mark.parametrize("size", [1, 2, 5, 17])
+@pytest.mark.parametrize("filters", [1, 4, 9])
+def test_powers_are_those_of_the_filtered_row(size: int, filters: int) -> None:
+    lengths, row, weight = (100, 3, 197), RNG.standard_normal(300), RNG.integers(0, 2, 300).astype(float)
+    poles = [np.poly(0.1 * k * np.exp(1j * np.linspace(0.1, 3.0, size - 1))).real for k in range(filters)]
+    a = np.array([np.atleast_1d(p) for p in poles])
+    b = RNG.standard_normal((filters, size))
+    wanted = [float(np.sum((weight * filtered(*pair, row[None, :], lengths)[0]) ** 2)) for pair in zip(b, a, strict=True)]
+    np.testing.assert_allclose(filtered_powers(b, a, row, weight, lengths), wanted, rtol=1e-9)
+
+
+def test_powers_of_what_does_not_fit_are_refused() -> None:
+    row = np.ones(10)
+    with pytest.raises(ValueError, match="add up to the 10 columns"):
+        filtered_powers(np.ones((2, 1)), np.ones((2, 1)), row, row, (4, 5))
+    with pytest.raises(ValueError, match="rows of as many numbers"):
+        filtered_powers(np.ones((2, 3)), np.ones((2, 1)), row, row, (10,))
+    with pytest.raises(ValueError, match="at most 17"):
+        filtered_powers(np.ones((1, 18)), np.ones((1, 18)), row, row, (10,))
+    with pytest.raises(ValueError, match="begins with 1"):
+        filtered_powers(np.ones((1, 1)), np.zeros((1, 1)), row, row, (10,))
+    with pytest.raises(ValueError, match="one number for each sample"):
+        filtered_powers(np.ones((1, 1)), np.ones((1, 1)), row, np.ones(9), (10,))
 
 
 @pytest.mark.parametrize("n", [1, 3, 8, 501])
@@ -116,7 +141,7 @@ def test_rows_that_overflow_are_whitened_without_a_warning_and_the_callers_rows_
     for w in (np.ones(100), weight):
         objective = Objective(data, w)
         E = RNG.standard_normal((2, 100))
-        E[0, 5] = np.inf
+        E[0, 60] = E[1, 2] = np.inf  # the second one does not count
         before = E.copy()
         for noise in (WHITE, NoiseFilter(np.array([1.0, -0.5]), np.ones(1), 1)):
             with warnings.catch_warnings():

@@ -131,6 +131,7 @@ def _no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("a move on the toy has asked the simulator")
 
     monkeypatch.setattr(prediction, "simulate_values", simulated)
+    monkeypatch.setattr(prediction.LoadedRecord, "velocities", simulated)
     for module in (moves, model_space):
         monkeypatch.setattr(module, "LIBRARY", LIBRARY)
         monkeypatch.setattr(module, "equivalents", lambda effect: {"lag": ("seen",), "seen": ("lag",)}.get(effect, ()))

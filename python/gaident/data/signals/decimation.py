@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -82,10 +84,14 @@ class Decimator:
         self.kept = x[count * self.factor :]
 
 
+@lru_cache(maxsize=16)
 def _taps(half: int, ratio: float) -> NDArray[np.float64]:
+    """h(-half..half), normalised; not to be written to."""
     j = np.arange(-half, half + 1)
     taps = np.sinc(_CORNER * j / ratio) * np.kaiser(2 * half + 1, _KAISER)
-    return np.asarray(taps / taps.sum())
+    taps /= taps.sum()
+    taps.flags.writeable = False
+    return np.asarray(taps)
 
 
 def low_passed(x: NDArray[np.float64], ratio: float) -> NDArray[np.float64]:

@@ -144,14 +144,15 @@ class _Account:
         rows = np.vstack([self.J, columns])
         noise = self.noise
         best = np.inf
-        for _ in range(3):
+        for again in (True, True, False):
             A, v = self.objective.whitened(rows, noise), self.objective.whitened(self.error[None, :], noise)[0]
             scale = np.sqrt(np.einsum("ij,ij->i", A, A))
             scale[scale == 0.0] = 1.0
             coefficients, _, rank, _ = np.linalg.lstsq((A / scale[:, None]).T, v, rcond=1e-8)
             left = v - (coefficients / scale) @ A
             best = min(best, self.objective.bic(float(left @ left), noise, int(rank)))
-            noise = self.objective.noise_of(self.error - (coefficients / scale) @ rows, self.closed)
+            if again:
+                noise = self.objective.noise_of(self.error - (coefficients / scale) @ rows, self.closed)
         return float(best)
 
 

@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,7 @@ from gaident.models.model import Model
 from gaident.models.simulate import run, simulate
 from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["ForceError", "band_of", "effects_before_the_shaft", "force_error", "needed_torque"]
+__all__ = ["FilteredRecords", "ForceError", "band_of", "effects_before_the_shaft", "force_error", "needed_torque"]
 
 Vector = NDArray[np.float64]
 TorqueOf = Callable[[Record], Vector]
@@ -148,30 +149,45 @@ def force_error(
     cutoff = band_of(model, given, int(order)) if cutoff_hz is None else float(cutoff_hz)
     if not 0.0 < cutoff < 0.5 / given[0].dt:  # no decision: the Nyquist frequency
         raise SettingsError(f"cutoff_hz={cutoff_hz!r}: give a corner between 0 and {0.5 / given[0].dt:g} Hz, or None")
-    parts = force_errors(model, given, cutoff, int(order), firsts)
-    count = sum(len(e) for e, _ in parts)
-    if count == 0:
-        raise RecordError("nothing moves from `first` on, so there is no force error; give records that move")
-    left, whole = (sum(float(part[i] @ part[i]) for part in parts) for i in (0, 1))
-    motions = [motion_of(rec, cutoff, int(order)) for rec in given]
-    powers = [_noise_power(model, rec, m, cutoff, int(order)) for rec, m in zip(given, motions, strict=True)]
-    floor = sum(len(e) * power for (e, _), power in zip(parts, powers, strict=True))
-    rms, size, least = (float(np.sqrt(x / count)) for x in (left, whole, floor))
-    return ForceError(rms if math.isfinite(rms) else math.inf, size, least, cutoff, int(order), count)
+    filtered = FilteredRecords(tuple(given), tuple(firsts), cutoff, int(order))
+    return filtered.force_error(model, filtered.torques(model))
 
 
-def force_errors(
-    model: Model | InverseDynamics | TorqueOf, records: Sequence[Record], cutoff_hz: float, order: int, first: Sequence[int]
-) -> list[tuple[Vector, Vector]]:
-    """(logged minus needed torque, torque at the shaft) of each record, over its samples in motion [N m]."""
-    parts = []
-    for rec, start in zip(records, first, strict=True):
-        motion = motion_of(rec, cutoff_hz, order)
-        kept = in_motion(motion, cutoff_hz, start)
-        at_shaft, needed = _torques(model, rec, motion, cutoff_hz, order)
-        e, s = (low_passed(x, rec.dt, cutoff_hz, order)[kept] for x in (at_shaft - needed, at_shaft))
-        parts.append((e, s))
-    return parts
+@dataclass(frozen=True, eq=False)
+class FilteredRecords:
+    """Records with their torque, from the sample `first` of each on, behind one filter: force errors of several models."""
+
+    records: tuple[Record, ...]
+    first: tuple[int, ...]
+    cutoff_hz: float
+    order: int = ORDER
+
+    @cached_property
+    def motions(self) -> tuple[Motion, ...]:
+        """The filtered motion of each record."""
+        return tuple(motion_of(rec, self.cutoff_hz, self.order) for rec in self.records)
+
+    def torques(self, model: Model | InverseDynamics | TorqueOf) -> list[tuple[Vector, Vector]]:
+        """(logged minus needed torque, torque at the shaft) of each record, over its samples in motion [N m]."""
+        cutoff, order, parts = self.cutoff_hz, self.order, []
+        for rec, motion, start in zip(self.records, self.motions, self.first, strict=True):
+            kept = in_motion(motion, cutoff, start)
+            at_shaft, needed = _torques(model, rec, motion, cutoff, order)
+            e, s = (low_passed(x, rec.dt, cutoff, order)[kept] for x in (at_shaft - needed, at_shaft))
+            parts.append((e, s))
+        return parts
+
+    def force_error(self, model: Model | InverseDynamics | TorqueOf, torques: Sequence[tuple[Vector, Vector]]) -> ForceError:
+        """The force error of a model with these `torques`. Raises RecordError where nothing moves."""
+        count = sum(len(e) for e, _ in torques)
+        if count == 0:
+            raise RecordError("nothing moves from `first` on, so there is no force error; give records that move")
+        left, whole = (sum(float(part[i] @ part[i]) for part in torques) for i in (0, 1))
+        moved = zip(self.records, self.motions, strict=True)
+        powers = [_noise_power(model, rec, m, self.cutoff_hz, self.order) for rec, m in moved]
+        floor = sum(len(e) * power for (e, _), power in zip(torques, powers, strict=True))
+        rms, size, least = (float(np.sqrt(x / count)) for x in (left, whole, floor))
+        return ForceError(rms if math.isfinite(rms) else math.inf, size, least, self.cutoff_hz, self.order, count)
 
 
 def needed_torque(model: Model, rec: Record, cutoff_hz: float, order: int = ORDER) -> Vector:
@@ -193,7 +209,7 @@ def band_of(model: object, records: Sequence[Record], order: int = ORDER, below:
 
 def in_motion(motion: Motion, cutoff_hz: float, first: int = 0) -> NDArray[np.bool_]:
     """The samples that count: in motion, from `first` on, away from both ends of the record."""
-    kept = ~motion.still
+    kept = ~motion.still  # a copy
     edge = math.ceil(EDGE / (cutoff_hz * motion.dt))
     kept[: max(edge, first)] = kept[max(len(kept) - edge, 0) :] = False
     return kept
@@ -271,6 +287,6 @@ def _noise_power(model: Model | InverseDynamics | TorqueOf, rec: Record, motion:
         inertia = abs(float((1.0 / model.linear.frequency_response(omega)).imag)) / omega
     else:
         inertia = model.parameters["inertia"].value if isinstance(model, InverseDynamics) else 0.0
-    share = noise_share(rec, cutoff_hz, order)
+    share = noise_share(rec, cutoff_hz, order, motion.spectrum)
     power = share * float(np.mean(motion.acceleration**2)) * inertia**2
     return power + (torque_noise(rec, cutoff_hz, order) ** 2 if rec.torque_is == MEASURED else 0.0)

@@ -132,14 +132,17 @@ def inverse_dynamics(
             if name in refused:
                 raise RecordError(f"terms has {name!r}, but {refused[name]}; leave it out, or give a record that shows it")
     possible = [asked] if asked is not None else [c for c in CHOICES if not set(c) & set(refused)]
-    n_eff = _effective(rows, possible)
+    fits = {c: _fitted(rows, c) for c in possible}
+    lefts = {c: [r.torque - r.of(c) @ theta for r in rows] for c, (theta, _) in fits.items()}
+    squares = {c: sum(float(np.sum(x**2)) for x in left) for c, left in lefts.items()}
+    n_eff = _effective(lefts, fits)
     if asked is None:
-        possible = [c for c in possible if _exists(rows, c)] or possible
-    squares = {choice: _squares(rows, choice) for choice in possible}
+        possible = [c for c in possible if _exists(c, fits[c][0])] or possible
+    squares = {c: squares[c] for c in possible}
     scores = {c: bic(squares[c] / count, n_eff, _count(c)) for c in possible}
     chosen = _material(min(possible, key=lambda c: (scores[c], len(c))), squares)
-    theta, rank = _fitted(rows, chosen)
-    X, left = [r.of(chosen) for r in rows], [r.torque - r.of(chosen) @ theta for r in rows]
+    (theta, rank), left = fits[chosen], lefts[chosen]
+    X = [r.of(chosen) for r in rows]
     cov = covariance(X, left)
     result = InverseDynamics(
         parameters=estimates_of(chosen, theta, cov, axis),
@@ -232,15 +235,10 @@ def _fitted(rows: Sequence[Rows], terms: tuple[str, ...]) -> tuple[Vector, int]:
     return solve(np.vstack([r.of(terms) for r in rows]), np.concatenate([r.torque for r in rows]))
 
 
-def _exists(rows: Sequence[Rows], terms: tuple[str, ...]) -> bool:
+def _exists(terms: tuple[str, ...], theta: Vector) -> bool:
     """Whether an axis can be so: its inertia, and the stiffness of a spring, are positive."""
-    values = dict(zip((p.name for t in terms for p in TERMS[t].parameters), _fitted(rows, terms)[0], strict=True))
+    values = dict(zip((p.name for t in terms for p in TERMS[t].parameters), theta, strict=True))
     return all(values.get(name, 1.0) > 0.0 for name in ("inertia", "spring"))
-
-
-def _squares(rows: Sequence[Rows], terms: tuple[str, ...]) -> float:
-    theta, _ = _fitted(rows, terms)
-    return sum(float(np.sum((r.torque - r.of(terms) @ theta) ** 2)) for r in rows)
 
 
 def _count(terms: tuple[str, ...]) -> int:
@@ -275,12 +273,10 @@ def _rivals(scores: dict[tuple[str, ...], float], chosen: tuple[str, ...]) -> tu
     return tuple(sorted(((c, d) for c, d in worse.items() if d < POLICY.rival_margin), key=lambda item: item[1]))
 
 
-def _effective(rows: Sequence[Rows], possible: Sequence[tuple[str, ...]]) -> float:
+def _effective(lefts: dict[tuple[str, ...], list[Vector]], fits: dict[tuple[str, ...], tuple[Vector, int]]) -> float:
     """Independent samples of the residuals of the choice that leaves least, at least two for each column."""
-    fits = [(c, _fitted(rows, c)[0]) for c in possible]
-    lefts = [[r.torque - r.of(c) @ theta for r in rows] for c, theta in fits]
-    best = int(np.argmin([sum(float(x @ x) for x in left) for left in lefts]))
-    return max(effective_samples(*lefts[best]), 2.0 * len(fits[best][1]))  # no decision: no fewer than the fit has numbers twice
+    best = min(lefts, key=lambda c: sum(float(x @ x) for x in lefts[c]))
+    return max(effective_samples(*lefts[best]), 2.0 * len(fits[best][0]))  # no decision: no fewer than the fit has numbers twice
 
 
 def _relative(left: Sequence[Vector], rows: Sequence[Rows]) -> float:

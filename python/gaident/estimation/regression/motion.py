@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,7 @@ from gaident.data.record import Record
 __all__ = ["BAND", "Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "torque_noise"]
 
 Vector = NDArray[np.float64]
+Spectrum = tuple[Vector, Vector, float]  # frequencies [Hz], power density, level of the noise
 
 NOISE_SHARE = 1e-3  # no decision: how exact an inertia is
 """Most of the acceleration's power that may be noise: so much is the inertia too small by it."""
@@ -51,6 +54,7 @@ class Motion:
     torque: Vector | None  # N m
     threshold: float  # rad/s
     still: NDArray[np.bool_]
+    spectrum: Spectrum  # of the sensor's signal, see `noise_share`
 
 
 def motion_of(rec: Record, cutoff_hz: float, order: int, standstill: float | None = None) -> Motion:
@@ -62,12 +66,13 @@ def motion_of(rec: Record, cutoff_hz: float, order: int, standstill: float | Non
         velocity = low_passed(rec.velocity, rec.dt, cutoff_hz, order)
         position = np.concatenate([[0.0], np.cumsum(0.5 * rec.dt * (velocity[1:] + velocity[:-1]))])
     torque = None if rec.torque is None else low_passed(rec.torque, rec.dt, cutoff_hz, order)
-    least = max(DEVIATIONS * _velocity_noise(rec, cutoff_hz, order), OF_RMS * float(np.sqrt(np.mean(velocity**2))))
+    spectrum = _spectrum(rec)
+    least = max(DEVIATIONS * _velocity_noise(rec, spectrum, cutoff_hz, order), OF_RMS * float(np.sqrt(np.mean(velocity**2))))
     threshold = least if standstill is None else standstill
     still = _beside(np.abs(velocity) <= threshold, max(1, round(1.0 / (cutoff_hz * rec.dt))))
     if standstill == 0.0:
         still = np.zeros(len(velocity), dtype=bool)
-    return Motion(rec.dt, position, velocity, np.gradient(velocity, rec.dt), torque, threshold, still)
+    return Motion(rec.dt, position, velocity, np.gradient(velocity, rec.dt), torque, threshold, still, spectrum)
 
 
 def _beside(still: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
@@ -79,13 +84,20 @@ def _beside(still: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
 
 def low_passed(x: Vector, dt: float, cutoff_hz: float, order: int) -> Vector:
     """x behind the Butterworth filter run forward and backward; a straight line between its ends passes as it is."""
-    from scipy.signal import butter, sosfiltfilt
+    from scipy.signal import sosfiltfilt
 
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
     # no decision: samples beyond the ends, for a filter to settle
     extension = min(max(15, math.ceil(2.0 / (cutoff_hz * dt))), x.size - 1)
-    sections = butter(order, cutoff_hz * 2.0 * dt, output="sos")
-    return np.asarray(sosfiltfilt(sections, x - line, padlen=extension) + line)
+    return np.asarray(sosfiltfilt(_sections(order, cutoff_hz * 2.0 * dt), x - line, padlen=extension) + line)
+
+
+@lru_cache(maxsize=64)
+def _sections(order: int, cutoff: float) -> Any:
+    """The Butterworth filter in second-order sections; cutoff: in parts of the Nyquist frequency."""
+    from scipy.signal import butter
+
+    return butter(order, cutoff, output="sos")
 
 
 def cutoff_of(rec: Record, order: int) -> float:
@@ -96,21 +108,22 @@ def cutoff_of(rec: Record, order: int) -> float:
     At most a tenth and at least a two-hundredth of the sample rate.
     """
     grid = BAND / rec.dt * np.geomspace(1.0, LOWEST / BAND, 60)
-    fit = (float(fc) for fc in grid if noise_share(rec, float(fc), order) <= NOISE_SHARE)
+    spectrum = _spectrum(rec)
+    fit = (float(fc) for fc in grid if noise_share(rec, float(fc), order, spectrum) <= NOISE_SHARE)
     return _round(next(fit, float(grid[-1])))
 
 
-def noise_share(rec: Record, cutoff_hz: float, order: int) -> float:
-    """Share of noise in the power of the filtered acceleration, from 0 to 1."""
-    f, power, level = _spectrum(rec)
+def noise_share(rec: Record, cutoff_hz: float, order: int, spectrum: Spectrum | None = None) -> float:
+    """Share of noise in the power of the filtered acceleration, from 0 to 1; spectrum: that of the record's motion, if known."""
+    f, power, level = spectrum or _spectrum(rec)
     weight = _gain(rec, f, cutoff_hz, order, 2)
     whole = float(np.sum(weight * power))
     return min(level * float(np.sum(weight)) / whole, 1.0) if whole > 0.0 else 1.0
 
 
-def _velocity_noise(rec: Record, cutoff_hz: float, order: int) -> float:
+def _velocity_noise(rec: Record, spectrum: Spectrum, cutoff_hz: float, order: int) -> float:
     """Standard deviation of the noise of the filtered velocity [rad/s]."""
-    f, _, level = _spectrum(rec)
+    f, _, level = spectrum
     return float(np.sqrt(level * np.sum(_gain(rec, f, cutoff_hz, order, 1)) * (f[1] - f[0])))
 
 
@@ -137,12 +150,12 @@ def _gain(rec: Record, f: Vector, cutoff_hz: float, order: int, derivative: int)
     return np.asarray((twice * slope**steps) ** 2)
 
 
-def _spectrum(rec: Record) -> tuple[Vector, Vector, float]:
+def _spectrum(rec: Record) -> Spectrum:
     """(frequencies [Hz], power density of the sensor's signal, level of its noise)."""
     return _spectrum_of(rec.velocity if rec.position is None else rec.position, rec.dt)
 
 
-def _spectrum_of(x: Vector, dt: float) -> tuple[Vector, Vector, float]:
+def _spectrum_of(x: Vector, dt: float) -> Spectrum:
     from scipy.signal import welch
 
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
