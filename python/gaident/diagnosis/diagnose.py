@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, called, say
+from gaident.axis import Text, say
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
@@ -22,7 +22,7 @@ from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.experiments.candidates import IN_MOTION, candidates
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.held_out import standing
-from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off
+from gaident.diagnosis.explain.wording import basis_of, closest, drives_itself, evidence_of, far_off
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
 from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.record import findings_of_the_record
@@ -292,11 +292,10 @@ class _Work:
             verdict = "explained" if real else "adequate"
         else:
             verdict = "partly explained" if real else "unexplained"
-            dropped = [e.replace("_", " ") for e in self.final.effects if e not in causes]
+            dropped = [e for e in self.final.effects if e not in causes]
             if dropped:
-                of_driver = say(" that depends on {}", called(driver)) if self.left.gains[driver] > self.left.needed else ""
-                text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
-                self.notes.append(say(text, " and ".join(dropped), of_driver))
+                shown = driver if self.left.gains[driver] > self.left.needed else None
+                self.notes.append(closest(dropped, shown, bool(real)))
         self.notes += check.notes
         if self.final.parameters.held and any(LIBRARY[e].constant for e in self.final.effects):
             self.notes.append(
