@@ -244,7 +244,8 @@ class _Work:
             gains = self._accepted_gains()
             driver = self.left.driver if self.adequate else self.left.strongest
             after = gains.after
-            if driver is None and after.rmse > POLICY.free_run_ratio * after.noise_floor > 0.0:
+            adds_up = self.data.slower and not self.data.loopable  # what the torque lacks between the lines of the log
+            if driver is None and not adds_up and after.rmse > POLICY.free_run_ratio * after.noise_floor > 0.0:
                 # A noise filter removes a slow misfit completely; the free run shows it.
                 driver = self.left.strongest or "time"
                 self.notes.append(far_off(after.rmse / after.noise_floor))

@@ -183,6 +183,7 @@ class _Fit:
         self.period = records[0].dt / cascade.log_every(records[0].dt)
         self.whole = whole
         self.logs = [log_of(rec, share, cascade, self.whole) for rec in records]
+        self.from_rest = whole and not any(log.moving for log in self.logs)
         self.logged = np.concatenate([log.torque for log in self.logs])
         self.stretch = numbered([log.stretch for log in self.logs])
         self.used = self.stretch >= 0
@@ -247,7 +248,7 @@ class _Fit:
 
     def free(self, rho: float, straight: bool = False) -> Callable[[Vector], Vector]:
         """x -> c without the mean of each stretch."""
-        return lambda x: centred(*whitened(self.left(x, straight), self.stretch, rho), self.whole)
+        return lambda x: centred(*whitened(self.left(x, straight), self.stretch, rho), self.from_rest)
 
     def _starts(self) -> list[Vector]:
         """Points of the grid of what is not linear, each with the gains of a linear least squares."""
