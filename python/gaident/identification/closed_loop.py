@@ -43,14 +43,15 @@ class Looped(NamedTuple):
     notes: tuple[Text, ...] = ()
 
 
-def looped_over(records: Sequence[Record], controller: Controller | None, space: object) -> Looped:
+def looped_over(records: Sequence[Record], controller: Controller | None, space: object, from_rest: bool = True) -> Looped:
     """What an identification of the records does under a controller; space: the search space, or None. Raises RecordError.
 
+    from_rest: False: every record has a start state of its own, which the equation from line to line has not.
     Where a logged torque shows that a controller faster than the log is not the drive's, its gains are those that the torque
     shows or, where it does not follow from these either, the torque drives the model.
     """
     doubts = not_followed(records, controller)
-    if line_equation(records, controller, space if isinstance(space, SearchSpace) else None):
+    if from_rest and line_equation(records, controller, space if isinstance(space, SearchSpace) else None):
         if not doubts or any(r.torque is None for r in records):
             return Looped(list(records), controller, doubts)
         assert controller is not None  # else there were no doubt

@@ -13,6 +13,7 @@ import referee_logs
 import servo_referee as referee
 from gaident.control import core
 from gaident.control.ticks import at_the_clock, between_lines, straight_part
+from gaident.errors import RecordError
 from gaident.identification.closed_loop import line_equation, with_torque
 from gaident.identification.logged_torque import not_followed
 from referee_logs import GIVEN
@@ -130,6 +131,16 @@ def test_a_record_that_starts_in_motion_is_driven_by_its_torque() -> None:
     cascade = ga.Cascade(velocity=ga.PI(**PI), period=T)
     rec = ga.Record(8 * T, command=20.0 + speed(400), velocity=20.0 + speed(400))
     assert not line_equation([rec], cascade, None)
+
+
+def test_a_free_start_is_one_of_a_model_that_the_torque_drives() -> None:
+    given, free = ga.Cascade(GIVEN, CLOCK), ga.Settings(initial_state="free")
+    rec = referee_logs.slower(2)
+    idn = ga.identify(rec, given, settings=free, seed=1, workers=1)
+    assert idn.controller is None and len(idn.initial_states) == 1
+    assert np.abs(idn.model.poles).max() == pytest.approx(465.4, rel=5e-3)
+    with pytest.raises(RecordError, match="no torque"):
+        ga.identify(rec.with_channels(torque=None), given, settings=free)
 
 
 def test_the_straight_part_of_a_command() -> None:
