@@ -15,13 +15,16 @@ from numpy.typing import NDArray
 from gaident.control.cascade import Cascade
 from gaident.control.filters import Notch
 from gaident.data.record import Record
+from gaident.data.signals.lattice import rounding_step
 from gaident.identification.logged_stretches import centred, log_of, numbered, plateau_of, unlimited, whitened
 from gaident.models.starts import starts_moving
+from gaident.policy.table import POLICY
 
 __all__ = ["Limited", "limited", "run_error", "too_fast"]
 
 Vector = NDArray[np.float64]
 
+ROUNDING = 1e-9  # no decision: of a torque, what a sum is exact to
 TIMES = np.geomspace(0.3e-3, 0.3, 16)  # no decision: starts; s, tracking times
 
 
@@ -29,12 +32,13 @@ TIMES = np.geomspace(0.3e-3, 0.3, 16)  # no decision: starts; s, tracking times
 class Limited:
     """The controller with the limit that the logs show, if any; limit [N m] None: none, or the given one.
 
-    gain: BIC units by which the whole run is better than without the limit.
+    gain: BIC units by which the whole run is better than without the limit. std: of the limit [N m], of what stands at it.
     """
 
     controller: Cascade
     limit: float | None
     gain: float
+    std: float = 0.0
 
 
 def run_error(records: Sequence[Record], controller: Cascade) -> float:
@@ -71,10 +75,18 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
         return Limited(controller, None, 0.0)
     if any(starts_moving(r, None) for r in records):  # no run from rest shows what the integrator does at the limit
         known = replace(controller, velocity=replace(controller.velocity, torque_limit=limit))
-        return Limited(known, limit, _gain(records, controller, known))
+        return Limited(known, limit, _gain(records, controller, known), _spread(records, limit))
     tried = [(run_error(records, one), k, one) for k, one in enumerate(_schemes(controller, limit))]
     best = min(tried)[2]
-    return Limited(best, limit, _gain(records, controller, best))
+    return Limited(best, limit, _gain(records, controller, best), _spread(records, limit))
+
+
+def _spread(records: Sequence[Record], limit: float) -> float:
+    """Deviation of the torques at a limit [N m], no less than their rounding makes."""
+    torque = np.concatenate([r.torque for r in records if r.torque is not None])
+    at_limit = np.abs(torque)[np.abs(torque) >= POLICY.at_limit * limit]
+    rounded = rounding_step(torque) / float(np.sqrt(12.0))  # no decision: of an even distribution
+    return max(float(np.std(at_limit)), rounded, ROUNDING * limit)
 
 
 def _gain(records: Sequence[Record], without: Cascade, controller: Cascade) -> float:
