@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, called, say
+from gaident.axis import Text, say
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
@@ -23,7 +23,7 @@ from gaident.diagnosis.experiments.candidates import IN_MOTION, candidates
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.alternatives import alternatives_of
 from gaident.diagnosis.explain.held_out import standing
-from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off, hidden_by_torque_noise
+from gaident.diagnosis.explain.wording import basis_of, closest, drives_itself, evidence_of, far_off, hidden_by_torque_noise
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
 from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, in_controller
@@ -144,7 +144,8 @@ def diagnose(
         work.search()
         result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
         result = moved.noted(result)
-        result = replace(result, notes=(*driving.notes, *(() if work.at_controller.decided else driving.doubts), *result.notes))
+        answered = work.at_controller.decided or any(f.place == "controller" for f in result.findings)
+        result = replace(result, notes=(*driving.notes, *(() if answered else driving.doubts), *result.notes))
         if bootstrap:
             from gaident.diagnosis.selection.bootstrap import with_p_value
 
@@ -245,8 +246,9 @@ class _Work:
             gains = self._accepted_gains()
             driver = self.left.driver if self.adequate else self.left.strongest
             after = gains.after
+            adds_up = self.data.slower and not self.data.loopable  # what the torque lacks between the lines of the log
             beyond = after.rmse / floor if (floor := gains.floor) > 0.0 else 0.0
-            if driver is None and beyond > POLICY.free_run_ratio:
+            if driver is None and not adds_up and beyond > POLICY.free_run_ratio:
                 # A noise filter removes a slow misfit completely; the free run shows it.
                 driver = self.left.strongest or "time"
                 self.notes.append(far_off(beyond))
@@ -296,11 +298,10 @@ class _Work:
             verdict = "explained" if real else "adequate"
         else:
             verdict = "partly explained" if real else "unexplained"
-            dropped = [e.replace("_", " ") for e in self.final.effects if e not in causes]
+            dropped = [e for e in self.final.effects if e not in causes]
             if dropped:
-                of_driver = say(" that depends on {}", called(driver)) if self.left.gains[driver] > self.left.needed else ""
-                text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
-                self.notes.append(say(text, " and ".join(dropped), of_driver))
+                shown = driver if self.left.gains[driver] > self.left.needed else None
+                self.notes.append(closest(dropped, shown, bool(real)))
         self.notes += check.notes
         if self.final.parameters.held and any(LIBRARY[e].constant for e in self.final.effects):
             self.notes.append(

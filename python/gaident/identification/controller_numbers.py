@@ -22,12 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import TORQUE, arg
-from gaident.axis import Text, joined, say, unit_text
+from gaident.axis import Text
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller
+from gaident.control.pi import PI
 from gaident.control.unknown import UNITS, field_of
 from gaident.data.record import Record
 from gaident.errors import ControllerError, RecordError
+from gaident.identification import number_words
 from gaident.identification.logged_stretches import centred, correlation, log_of, numbered, unlimited, whitened
 from gaident.identification.number_ranges import grid_of, range_of
 from gaident.policy.table import POLICY
@@ -81,7 +83,7 @@ def with_estimates(records: Sequence[Record], controller: Controller | None) -> 
     for rec in records:
         _check(rec, controller, unknown[0])
     records = sorted(records, key=lambda r: (r.digest, r.name))  # no sum depends on the order in which they were given
-    numbers = _solved(controller, unknown, records)
+    numbers, shift = _shifted(controller, unknown, records, _solved(controller, unknown, records))
     values = {name: float(x) for name, x in zip(unknown, numbers.values, strict=True)}
     estimates = {
         name: Estimate(value, std, UNITS[field_of(name)], at_bound, std < abs(value))
@@ -90,10 +92,11 @@ def with_estimates(records: Sequence[Record], controller: Controller | None) -> 
     doubt = ""
     hidden = [name for name, seen in zip(unknown, numbers.seen, strict=True) if not seen or estimates[name].at_bound]
     if not numbers.rms < POLICY.replay_noise * numbers.size:
-        doubt = _not_followed(unknown, numbers)
+        doubt = number_words.not_followed(unknown, numbers.rms, numbers.size) + _remedy(controller, records)
     elif hidden:
-        doubt = _not_shown(hidden[0], estimates[hidden[0]])
-    return Numbers(controller.with_numbers(values), estimates, (_note(estimates, numbers.rms, numbers.size),), doubt)
+        doubt = number_words.not_shown(hidden[0], estimates[hidden[0]])
+    notes = (number_words.found(estimates, numbers.rms, numbers.size), *((number_words.moved(shift),) if shift else ()))
+    return Numbers(controller.with_numbers(values), estimates, notes, doubt)
 
 
 def _check(rec: Record, controller: Controller, name: str) -> None:
@@ -111,32 +114,42 @@ def _check(rec: Record, controller: Controller, name: str) -> None:
             )
 
 
-def _not_shown(name: str, estimate: Estimate) -> str:
+def _remedy(controller: Controller, records: Sequence[Record]) -> str:
+    """What makes the torque follow: its other sign, or other gains where a gain was given; else what to look for."""
+    reversed_torque = [r.with_channels(torque=-r.torque) for r in records if r.torque is not None]
+    if _follows(controller, reversed_torque):
+        return "It follows with the other sign: reverse the sign of the torque, or of command and velocity"
+    pi = cascade_of(controller).velocity
+    given = [name for name in ("kp", "ki") if getattr(pi, name) is not None]
+    none: dict[str, Any] = {"kp": None, "ki": None}
+    free = (
+        replace(controller, **none)
+        if isinstance(controller, PI)
+        else replace(cascade_of(controller), velocity=replace(pi, **none))
+    )
+    if given and _follows(free, records):
+        return f"It follows with another {' and '.join(given)}: give {' and '.join(f'{name}=None' for name in given)}"
     return (
-        f"{name} of the controller is None, not known, and the records do not show it ({estimate.value:.3g} "
-        f"+- {estimate.std:.2g} {estimate.unit}): give its number, leave out what has no effect, or log a motion in which it acts"
+        "The drive's has another form: give its filters, command_weight, feedforward and limits, with None for unknown numbers, "
+        "or leave the controller out and let the torque drive the model"
     )
 
 
-def _not_followed(unknown: Sequence[str], numbers: _Solved) -> str:
-    return (
-        f"{unknown[0]} of the controller is None, not known, and whatever it is, the logged torque does not follow from command "
-        f"and velocity through this controller (by {numbers.rms:.2g} of {numbers.size:.2g} rms): the drive's has another form. "
-        "Give its filters, command_weight, feedforward and limits, with None for unknown numbers, or leave the controller out "
-        "and let the torque drive the model"
-    )
+def _follows(controller: Controller, records: Sequence[Record]) -> bool:
+    solved = _solved(controller, controller.unknown, records)
+    return solved.rms < POLICY.replay_noise * solved.size and all(solved.seen)
 
 
-def _note(estimates: Mapping[str, Estimate], rms: float, size: float) -> Text:
-    numbers = (
-        say("{} = {:.5g} +- {:.2g}{}", name, e.value, e.std, "" if e.unit == "1" else joined("", (" ", unit_text(e.unit))))
-        for name, e in estimates.items()
-    )
-    text = (
-        "Of the controller, {}: as the logged {torque} shows, which follows from command and velocity to {:.2g} {N m} rms, "
-        "of {:.2g} {N m} rms."
-    )
-    return say(text, joined(", ", numbers), rms, size)
+def _shifted(
+    controller: Controller, unknown: tuple[str, ...], records: Sequence[Record], numbers: _Solved
+) -> tuple[_Solved, int]:
+    """The numbers, and by how many lines the torque was moved: 0, or where only so next to nothing is left of it, -1 or 1."""
+    every = max(controller.log_every(r.dt) for r in records)
+    if every > 1 or controller.driven_by != "command" or numbers.rms <= POLICY.negligible * numbers.size:
+        return numbers, 0
+    found = [(_solved(controller, unknown, [r.shifted(torque=k) for r in records]), k) for k in (-1, 1)]
+    best, shift = min(found, key=lambda one: one[0].rms)
+    return (best, shift) if best.rms**2 < POLICY.replay_left * numbers.rms**2 else (numbers, 0)
 
 
 def _solved(controller: Controller, unknown: tuple[str, ...], records: Sequence[Record]) -> _Solved:
@@ -183,6 +196,7 @@ class _Fit:
         self.period = records[0].dt / cascade.log_every(records[0].dt)
         self.whole = whole
         self.logs = [log_of(rec, share, cascade, self.whole) for rec in records]
+        self.from_rest = whole and not any(log.moving for log in self.logs)
         self.logged = np.concatenate([log.torque for log in self.logs])
         self.stretch = numbered([log.stretch for log in self.logs])
         self.used = self.stretch >= 0
@@ -219,7 +233,7 @@ class _Fit:
         from scipy.optimize import least_squares
 
         inside = _off_bound(start, low, high)
-        size = max(float(np.sqrt(np.mean(off(inside) ** 2))), SMALLEST)
+        size = max(float(np.sqrt(np.mean(off(inside) ** 2))), ROUNDING * float(np.std(self.logged)), SMALLEST)
         found = least_squares(
             lambda x: off(x) / size, inside, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-10, gtol=1e-14,
             max_nfev=evaluations,
@@ -247,7 +261,7 @@ class _Fit:
 
     def free(self, rho: float, straight: bool = False) -> Callable[[Vector], Vector]:
         """x -> c without the mean of each stretch."""
-        return lambda x: centred(*whitened(self.left(x, straight), self.stretch, rho), self.whole)
+        return lambda x: centred(*whitened(self.left(x, straight), self.stretch, rho), self.from_rest)
 
     def _starts(self) -> list[Vector]:
         """Points of the grid of what is not linear, each with the gains of a linear least squares."""

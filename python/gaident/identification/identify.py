@@ -122,11 +122,11 @@ def identify(
     began = time.perf_counter()
     checked = checked_records(rec, controller)
     numbers = with_estimates(checked, controller).trusted()
-    looped = looped_over(checked, numbers.controller, space)
-    given, loop = looped.records, looped.controller
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
+    looped = looped_over(checked, numbers.controller, space, settings.initial_state != "free")
+    given, loop = looped.records, looped.controller
     check_numbers(trials, seed, workers)
     check_arithmetic(settings, loop)
     threads = _processors() if workers is None else int(workers)

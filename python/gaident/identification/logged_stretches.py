@@ -1,6 +1,7 @@
 """Logs of a controller, cut where a limit acts: what it makes of the logged signals, and what is left of the logged torque.
 
 A stretch is what lies between two limits: what the integrator held before it is free.
+Of a record that starts in motion the first lines are left out, in which filters forget what was before it.
 """
 
 from __future__ import annotations
@@ -16,16 +17,22 @@ from gaident.control.cascade import Cascade
 from gaident.control.pi import PI
 from gaident.control.ticks import at_the_clock, smooth_between
 from gaident.data.record import Record
+from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
 
 __all__ = ["Log", "centred", "correlation", "correlation_of", "log_of", "numbered", "plateau_of", "unlimited", "whitened"]
 
 Vector = NDArray[np.float64]
 
+FORGOTTEN = 50  # no decision: lines; five time constants of a low pass of ten lines
+
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """Lines of a record; velocity: at the controller's samples. stretch (n,): number of the line's stretch; -1: none."""
+    """Lines of a record; velocity: at the controller's samples. stretch (n,): number of the line's stretch; -1: none.
+
+    moving: it starts in motion, and what the integrator held before is not known.
+    """
 
     dt: float
     source: Vector
@@ -33,6 +40,7 @@ class Log:
     position: Vector | None
     torque: Vector
     stretch: NDArray[np.intp]
+    moving: bool = False
 
     def made(self, cascade: Cascade, straight: bool = False) -> Vector:
         """What the controller makes at the lines of the log [N m] (n,); straight: of a velocity straight between the lines."""
@@ -54,9 +62,12 @@ def log_of(rec: Record, share: int, cascade: Cascade, whole: bool) -> Log:
     begins = free & ~np.append(False, free[:-1])
     stretch = np.where(free, np.cumsum(begins) - 1, -1)
     stretch[len(stretch) - cascade.ahead(rec.dt) :] = -1
+    moving = starts_moving(part, None)
+    if moving:
+        stretch[: min(FORGOTTEN, len(stretch) // 4)] = -1  # no decision: of a short record at most a quarter
     velocity = smooth_between(part.velocity, every)
     position = part.position if cascade.position is not None else None
-    return Log(rec.dt, source, velocity, position, part.torque, stretch)
+    return Log(rec.dt, source, velocity, position, part.torque, stretch, moving)
 
 
 def plateau_of(size: Vector) -> float:

@@ -6,6 +6,8 @@ import numpy as np
 
 __all__ = ["grid_of", "range_of"]
 
+SMALLEST = 1e-300  # no decision: a controller of two gains of 0 is none
+
 
 def grid_of(field: str, period: float) -> list[float]:
     """Starts of a number, as the search moves it."""
@@ -28,7 +30,7 @@ def range_of(field: str, period: float) -> tuple[float, float]:
         "numerator_damping": (0.0, 5.0),
         "denominator_damping": (float(np.log(5e-3)), float(np.log(10.0))),
         "gain": (float(np.log(1e-3)), float(np.log(1e5))),
-        "kp": (0.0, np.inf),
+        "kp": (SMALLEST, np.inf),
         "ki": (0.0, np.inf),
         "command_weight": (0.0, np.inf),
     }.get(field, (-np.inf, np.inf))

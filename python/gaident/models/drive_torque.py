@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from gaident.arguments import TORQUE
 from gaident.axis import Text, say
+from gaident.control import core
 from gaident.control.controller import Controller
 from gaident.control.pi import PI, bare_pi
 from gaident.control.pi_torque import pi_block
+from gaident.control.ticks import at_the_clock, smooth_between
 from gaident.data.record import Record
 from gaident.errors import RecordError
 from gaident.models.starts import starts_moving
@@ -51,8 +53,8 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
         note = say("The controller is not a bare PI: its {torque} drives the model, and no loop is simulated.")
     else:
         text = (
-            "The log has a line for every {}th sample of the controller. The linear model is identified from a {torque} that "
-            "goes straight from line to line; what the controller answered to noise between them is lost."
+            "The log has a line for every {}th sample of the controller. The linear model is identified from the logged "
+            "{torque}, between the lines as this controller makes it; what it answered to noise there is lost."
         )
         note = say(text, every)
     doubts = []
@@ -75,10 +77,8 @@ def driven_by(rec: Record, controller: Controller) -> Record:
     """The record with the torque that drove the motor, held over each line of the log [N m], and no more than drives it.
 
     Where the log has a line for each of the controller's samples, that is the logged torque, or the one that the controller
-    makes of the measured signals. Of a torque logged every r-th sample, which goes on between the lines, it is the mean over the
-    r samples of a straight line to the next one:
-
-        u(k) + (u(k+1) - u(k)) (r - 1)/(2 r)
+    makes of the measured signals. Of a torque logged every r-th sample, it is the mean over the r samples of its course between
+    the lines, see `_at_its_clock`.
 
     A known delay of the controller is part of it: `late`. Raises RecordError where a torque is neither logged nor can be made.
     """
@@ -87,8 +87,27 @@ def driven_by(rec: Record, controller: Controller) -> Record:
     before = torque[0] if starts_moving(rec.with_channels(torque=torque), None) else 0.0
     if every == 1:
         return rec.with_channels(torque=late(torque, controller.delay / rec.dt, before), command=None, position_command=None)
-    mean = torque + np.append(np.diff(torque), 0.0) * ((every - 1) / (2 * every))
+    mean = _at_its_clock(rec, torque, controller).reshape(len(rec), every).mean(axis=1)
     return rec.with_channels(torque=late(mean, controller.delay / rec.dt, before))
+
+
+def _at_its_clock(rec: Record, torque: Vector, controller: Controller) -> Vector:
+    """A torque logged now and then [N m] (n,) at all of the controller's samples (n every,).
+
+    Between the lines it goes as this controller makes it of command and velocity, and what it is off by on the lines goes
+    straight. Where that changes more from line to line than the torque itself, the torque goes straight.
+    """
+    every = controller.log_every(rec.dt)
+    source = controller.command_of(rec)
+    if source is not None and all(getattr(rec, channel) is not None for channel in controller.reads):
+        placed = controller.driven_by == "position_command"
+        ticks = controller.ticks(rec.dt, source, rec.position if placed else None)
+        made = core.servo_torque(rec.dt, ticks, smooth_between(rec.velocity, every), controller.core_loop(rec.dt))
+        off = torque - made[::every]
+        if np.sum(np.diff(off) ** 2) < np.sum(np.diff(torque) ** 2):
+            between: Vector = made + at_the_clock(off, every)
+            return between
+    return at_the_clock(torque, every)
 
 
 def late(torque: Vector, delay: float, before: float) -> Vector:

@@ -143,3 +143,35 @@ def test_what_cannot_be_known_is_refused_with_the_remedy() -> None:
     with pytest.raises(ControllerError, match=r"friction_feedforward of the controller is None.*do not show it.*give its number"):
         still = ga.Record(T, command=np.zeros(len(rec)), velocity=rec.velocity, torque=-KP * rec.velocity)
         ga.identify(still, ga.Cascade(ga.PI(KP, 0.0), friction_feedforward=None))
+
+
+@pytest.mark.parametrize("shift", [-1, 1])
+def test_a_torque_that_the_log_wrote_on_another_line(shift: int) -> None:
+    rec = log().shifted(torque=shift)
+    found = with_estimates([rec], UNKNOWN).trusted()
+    assert found.estimates["kp"].value == pytest.approx(KP, rel=1e-9)
+    assert found.estimates["ki"].value == pytest.approx(KI, rel=1e-9)
+    assert any("wrote the torque a line " + ("late" if shift > 0 else "early") in note for note in found.notes)
+    filtered = with_estimates([log(torque_filters=[low(4e-4)])], UNKNOWN)
+    assert not any("a line" in note for note in filtered.notes)
+
+
+def test_an_error_says_what_makes_the_torque_follow() -> None:
+    rec = log()
+    assert rec.torque is not None
+    reversed_torque = rec.with_channels(torque=-rec.torque)
+    for given in (UNKNOWN, ga.PI(None, KI), ga.Cascade(UNKNOWN, T)):
+        with pytest.raises(ControllerError, match=r"follows with the other sign: reverse the sign of the torque"):
+            ga.identify(reversed_torque, given)
+    with pytest.raises(ControllerError, match=r"kp of the controller is None.*follows with another ki: give ki=None"):
+        ga.identify(rec, ga.PI(None, 0.0))
+    with pytest.raises(ControllerError, match=r"velocity.ki of the controller is None.*another kp: give kp=None"):
+        ga.diagnose(rec, ga.Cascade(ga.PI(3.0 * KP, None), T))
+    assert with_estimates([log(ki=0.0)], ga.PI(None, 0.0)).trusted().estimates["kp"].value == pytest.approx(KP)
+
+
+@pytest.mark.parametrize("position", [None, ga.P(None), ga.P(20.0)])
+def test_data_of_a_cascade_gives_it_back(position: ga.P | None) -> None:
+    given = ga.Cascade(UNKNOWN, T, position=position, torque_filters=(ga.LowPass(None), ga.Notch(None, 0.1, None)))
+    again = ga.Cascade.from_dict(json.loads(json.dumps(given.to_dict())))
+    assert again == given and again.unknown == given.unknown

@@ -192,3 +192,13 @@ def test_a_controller_that_is_not_the_drives_is_a_rival_of_mechanics() -> None:
     assert alternatives_of("extra_resonance", [], [], False, None, True) == []
     assert "torque_filter" in alternatives_of("extra_resonance", [], [], False, None, False)
     assert alternatives_of("coulomb_friction", [], [], True, None, False) == []  # the records show its jump
+
+
+def test_a_slow_log_whose_torque_does_not_follow_is_doubted() -> None:
+    rec = slower(4, torque_filters=[low(1e-3)])
+    for tau, doubted in ((1e-3, False), (2e-4, True)):  # with a filter given, no other form is looked for
+        dia = ga.diagnose(rec, ga.Cascade(GIVEN, T, torque_filters=(ga.LowPass(tau),)))
+        assert any("does not follow from command and velocity" in note for note in dia.notes) == doubted
+    found = ga.diagnose(rec, ga.Cascade(GIVEN, T))
+    assert [f.effect for f in found.causes] == ["torque_filter"]
+    assert not any("does not follow" in note for note in found.notes)

@@ -62,3 +62,18 @@ def test_a_model_with_a_negative_damping_is_not_adequate(monkeypatch: pytest.Mon
     assert any(note.startswith("The viscous friction comes out negative (-0.01 N m s/rad)") for note in found.notes)
     monkeypatch.setattr(module, "mechanics_of", lambda *given: true(*given) | {"viscous_friction": ga.Estimate(-0.01, 0.004, "")})
     assert ga.diagnose(rec, controller).verdict == "explained"
+
+
+def test_that_none_is_named_is_said_only_where_none_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    true = module.mechanics_of
+
+    def driven(*given: Any) -> dict[str, ga.Estimate]:
+        return true(*given) | {"viscous_friction": ga.Estimate(-0.01, 0.003, "N m s/rad")}
+
+    monkeypatch.setattr(module, "mechanics_of", driven)
+    for only, said in (("load_torque", "load torque the model would come closer still"), ("", "so none is named")):
+        monkeypatch.setattr(module, "only_describes", lambda *given, only=only: given[2] == only or not only)
+        found = ga.diagnose(record(1), ga.PI(kp=0.02, ki=0.5))
+        assert bool(found.causes) == bool(only)
+        assert any(said in note for note in found.notes)
+        assert any("none is named" in note for note in found.notes) == (not only)

@@ -147,7 +147,8 @@ def _evidence(shown: Shown, name: str) -> Text:
 
 
 def _estimates(numbers: Mapping[str, tuple[float, float]]) -> dict[str, Estimate]:
-    return {name: Estimate(value, std, UNITS.get(name, "1")) for name, (value, std) in numbers.items()}
+    units = ((name, value, std, UNITS.get(name, "1")) for name, (value, std) in numbers.items())
+    return {name: Estimate(value, std, unit, identifiable=std < abs(value) or value == 0.0) for name, value, std, unit in units}
 
 
 def _words(shown: Shown) -> Text:

@@ -249,7 +249,7 @@ def _with_limit(
         return None
     named, gains = _named(best, numbers, filters, cov, law.period), _gains(candidates)
     if at_limit.limit is not None:
-        named[OF_SETTING["torque_limit"]] = {"limit": (at_limit.limit, 0.0)}
+        named[OF_SETTING["torque_limit"]] = {"limit": (at_limit.limit, at_limit.std)}
         gains[OF_SETTING["torque_limit"]] = at_limit.gain
     return Shown(
         controller=at_limit.controller,

@@ -15,13 +15,17 @@ from numpy.typing import NDArray
 from gaident.control.cascade import Cascade
 from gaident.control.filters import Notch
 from gaident.data.record import Record
+from gaident.data.signals.lattice import rounding_step
 from gaident.diagnosis.controller.form_regression import equation_of
-from gaident.identification.logged_stretches import log_of, plateau_of
+from gaident.identification.logged_stretches import centred, log_of, numbered, plateau_of, unlimited, whitened
+from gaident.models.starts import starts_moving
+from gaident.policy.table import POLICY
 
 __all__ = ["Limited", "limited", "run_error", "too_fast"]
 
 Vector = NDArray[np.float64]
 
+ROUNDING = 1e-9  # no decision: of a torque, what a sum is exact to
 TIMES = np.geomspace(0.3e-3, 0.3, 16)  # no decision: starts; s, tracking times
 
 
@@ -29,18 +33,32 @@ TIMES = np.geomspace(0.3e-3, 0.3, 16)  # no decision: starts; s, tracking times
 class Limited:
     """The controller with the limit that the logs show, if any; limit [N m] None: none, or the given one.
 
-    gain: BIC units by which the whole run is better than without the limit.
+    gain: BIC units by which the whole run is better than without the limit. std: of the limit [N m], of what stands at it.
     """
 
     controller: Cascade
     limit: float | None
     gain: float
+    std: float = 0.0
 
 
 def run_error(records: Sequence[Record], controller: Cascade) -> float:
-    """Root mean square of logged minus made torque [N m] over whole records, the controller at its own clock."""
-    off = [log.torque - log.made(controller) for log in (log_of(r, len(r), controller, True) for r in records)]
-    return float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
+    """Root mean square of logged minus made torque [N m] over whole records, the controller at its own clock.
+
+    Of records that start in motion what the integrator held is not known: the controller runs without limits, and what is left
+    is taken without its mean in each stretch between two limits; on the lines at a limit it is 0 where the controller has one.
+    """
+    whole = [log_of(r, len(r), controller, True) for r in records]
+    if not any(log.moving for log in whole):
+        return float(np.sqrt(np.mean(np.concatenate([log.torque - log.made(controller) for log in whole]) ** 2)))
+    free = replace(controller, velocity=unlimited(controller.velocity))
+    cut = [log_of(r, len(r), controller, False) for r in records]
+    off, stretch = np.concatenate([log.torque - log.made(free) for log in cut]), numbered([log.stretch for log in cut])
+    between = centred(*whitened(off, stretch, 0.0), False)
+    at_limit = off[(stretch < 0) & np.concatenate([log.stretch >= 0 for log in whole])]
+    if controller.velocity.torque_limit is not None:
+        at_limit = 0.0 * at_limit
+    return float(np.sqrt(np.mean(np.concatenate([between, at_limit]) ** 2)))
 
 
 def too_fast(controller: Cascade, dt: float) -> bool:
@@ -57,10 +75,26 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
     limit = min(limits)
     if not np.isfinite(limit):
         return Limited(controller, None, 0.0)
+    if any(starts_moving(r, None) for r in records):  # no run from rest shows what the integrator does at the limit
+        known = replace(controller, velocity=replace(controller.velocity, torque_limit=limit))
+        return Limited(known, limit, _gain(records, controller, known), _spread(records, limit))
     tried = [(run_error(records, one), k, one) for k, one in enumerate(_schemes(controller, limit))]
-    least, _, best = min(tried)
+    best = min(tried)[2]
+    return Limited(best, limit, _gain(records, controller, best), _spread(records, limit))
+
+
+def _spread(records: Sequence[Record], limit: float) -> float:
+    """Deviation of the torques at a limit [N m], no less than their rounding makes."""
+    torque = np.concatenate([r.torque for r in records if r.torque is not None])
+    at_limit = np.abs(torque)[np.abs(torque) >= POLICY.at_limit * limit]
+    rounded = rounding_step(torque) / float(np.sqrt(12.0))  # no decision: of an even distribution
+    return max(float(np.std(at_limit)), rounded, ROUNDING * limit)
+
+
+def _gain(records: Sequence[Record], without: Cascade, controller: Cascade) -> float:
+    """BIC units by which a run with a limit is better than one without."""
     n = sum(len(r) for r in records)
-    return Limited(best, limit, float(2 * n * np.log(run_error(records, controller) / least) - np.log(n)))
+    return float(2 * n * np.log(run_error(records, without) / run_error(records, controller)) - np.log(n))
 
 
 def before_filters(torque: Vector, controller: Cascade, period: float) -> Vector:

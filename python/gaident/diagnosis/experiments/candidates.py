@@ -16,9 +16,9 @@ from gaident.estimation.term import Term
 __all__ = ["IN_MOTION", "candidates"]
 
 IN_MOTION = say(
-    "A record starts in motion, and the loop of this controller is simulated from rest only: the {torque}, taken straight from "
-    "line to line of the log, drives the models. What that misses can look like a short lag or delay; give a record that starts "
-    "at rest."
+    "A record starts in motion, and the loop of this controller is simulated from rest only: the logged {torque} drives the "
+    "models, between the lines as this controller makes it. What that misses can look like a short lag or delay; give a record "
+    "that starts at rest."
 )
 """Of a log with fewer lines than the controller samples."""
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gaident.axis import Text, say
+from gaident.axis import Text, called, say
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
 from gaident.models.effects import table
 from gaident.results.estimate import Estimate
 
-__all__ = ["basis_of", "drives_itself", "evidence_of", "far_off", "hidden_by_torque_noise"]
+__all__ = ["basis_of", "closest", "drives_itself", "evidence_of", "far_off", "hidden_by_torque_noise"]
 
 
 def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None) -> Text:
@@ -45,6 +45,19 @@ def basis_of(found: Selection) -> list[Text]:
     if before is not None and not before.space.is_noise(before.final):
         return [Text("What the model leaves is more than noise: the parameters are those of least output error.")]
     return [Text("A noise model would take a cause for noise here: the parameters are those of least output error.")]
+
+
+def closest(effects: Sequence[str], driver: str | None, named: bool) -> Text:
+    """What effects say that come closest and are no causes; driver: what the error that they leave depends on, if it shows.
+
+    named: whether other causes are.
+    """
+    on = "" if driver is None else say(" that depends on {}", called(driver))
+    if named:
+        text = "With {} the model would come closer still, but an error{} stays: this fits no effect of the library."
+    else:
+        text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
+    return say(text, " and ".join(e.replace("_", " ") for e in effects), on)
 
 
 def far_off(ratio: float) -> Text:

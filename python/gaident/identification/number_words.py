@@ -1,0 +1,41 @@
+"""What is said of a controller's numbers that were given as None: how the torque follows from them, and why it does not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from gaident.axis import Text, joined, say, unit_text
+from gaident.results.estimate import Estimate
+
+__all__ = ["found", "moved", "not_followed", "not_shown"]
+
+
+def found(estimates: Mapping[str, Estimate], rms: float, size: float) -> Text:
+    numbers = (
+        say("{} = {:.5g} +- {:.2g}{}", name, e.value, e.std, "" if e.unit == "1" else joined("", (" ", unit_text(e.unit))))
+        for name, e in estimates.items()
+    )
+    text = (
+        "Of the controller, {}: as the logged {torque} shows, which follows from command and velocity to {:.2g} {N m} rms, "
+        "of {:.2g} {N m} rms."
+    )
+    return say(text, joined(", ", numbers), rms, size)
+
+
+def moved(shift: int) -> Text:
+    text = "The log wrote the {torque} a line {} against command and velocity: only so do these numbers make it."
+    return say(text, "late" if shift < 0 else "early")
+
+
+def not_followed(unknown: Sequence[str], rms: float, size: float) -> str:
+    return (
+        f"{unknown[0]} of the controller is None, not known, and whatever it is, the logged torque does not follow from command "
+        f"and velocity through this controller (by {rms:.2g} of {size:.2g} rms). "
+    )
+
+
+def not_shown(name: str, estimate: Estimate) -> str:
+    return (
+        f"{name} of the controller is None, not known, and the records do not show it ({estimate.value:.3g} "
+        f"+- {estimate.std:.2g} {estimate.unit}): give its number, leave out what has no effect, or log a motion in which it acts"
+    )
