@@ -15,7 +15,7 @@ from gaident.axis import Text, said, say, unit, word
 from gaident.data.formats.units import Constants, factor, needed_constant
 from gaident.data.guess import Guess, guess_channels, position_and_velocity, unit_from_position, unit_from_velocity
 from gaident.data.listing import Listing
-from gaident.data.timeaxis import stamp_unit
+from gaident.data.timeaxis import SLOW_STEP, stamp_unit
 from gaident.data.torque_kind import kind_of_torque
 from gaident.errors import ReadError
 
@@ -237,7 +237,11 @@ class _Draft:
                 )
         time = self.guess.time
         if time is not None and time.unit is None and (time.lowest is None or stamp_unit(time.lowest) == 1.0):
-            lines.append(_line('# time = "s"', "the log does not say it; s is taken"))
+            if self.dt is not None and self.dt >= SLOW_STEP:
+                text = f"the log does not say it; with s its lines would be {self.dt:g} s apart"
+                lines.append(self._todo('# time = "ms"', "units.time", text))
+            else:
+                lines.append(_line('# time = "s"', "the log does not say it; s is taken"))
         return lines
 
     def _controller(self) -> list[str]:

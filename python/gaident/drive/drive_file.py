@@ -92,7 +92,8 @@ class Drive:
         left_out = {k for k, v in columns.items() if v is None}
         not_read = {"axis", "dt"} | ({"torque_is"} if "torque" in left_out else set())
         more = {k: v for k, v in self.general.items() if k not in not_read}
-        self._refuse_unfilled("units", [k for k in CHANNELS if k not in left_out], "or give it with --units CHANNEL=UNIT")
+        asked = [k for k in (*CHANNELS, *([] if "dt" in self.general else ["time"])) if k not in left_out]
+        self._refuse_unfilled("units", asked, "or give it with --units CHANNEL=UNIT")
         units = {k: v for k, v in self.units.items() if k not in left_out}
         shift = {k: v for k, v in self.shift.items() if k not in left_out}
         return read(path, columns or None, units or None, self.general.get("dt"), measured=measured, shift=shift, **more)
