@@ -247,13 +247,15 @@ class _Draft:
     def _controller(self) -> list[str]:
         text = "as set in the drive"
         if "torque" in self.guess.channels:
-            text += '; or loop = "open"'
+            text += ', "unknown", or loop = "open"'
         mark = self._todo if "command" in self.guess.channels else lambda line, _, comment: _line(line, comment)
         torque = word("torque", self.axis)
+        positioned = "position_command" in self.guess.channels
         return [
             "[controller]",
             mark("# kp = 0.0232", "controller.kp", f"{unit('N m s/rad', self.axis)}; proportional gain {text}"),
             mark("# ki = 1.367", "controller.ki", f"{unit('N m/rad', self.axis)}; integral gain"),
+            *([_line("# position_gain = 40.0", "1/s; without it the velocity command drives the loop")] if positioned else []),
             _line('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model'),
             _line("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
             _line('# drive = "sinamics"', "with p1460 and p1462 in place of kp and ki: gains as the drive shows them"),
