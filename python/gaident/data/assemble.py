@@ -186,7 +186,7 @@ def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
         }
     if wanted.measured and "velocity" not in found and "position" not in found:
         raise ReadError(_say_missing(table, wanted, "velocity", "the velocity (or the position, to derive it from)"))
-    if "command" not in found and "torque" not in found and ELECTRICAL.isdisjoint(found):
+    if found.keys().isdisjoint(("command", "torque", *(() if wanted.measured else ("position_command",)), *ELECTRICAL)):
         raise ReadError(_say_missing(table, wanted, "torque", "the command or the torque"))
     if "velocity" in found and wanted.velocity_cutoff_hz is not None:
         raise ReadError(

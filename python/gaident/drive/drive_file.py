@@ -170,7 +170,10 @@ def _is_proposal(path: str) -> bool:
     try:
         with open(path, "rb") as stream:
             # no decision: how such a file begins
-            return re.fullmatch(rb"time \[s\],command \[(rad|m)/s\]\r?\n", stream.readline(64)) is not None
+            return (
+                re.fullmatch(rb"time \[s\],(command \[(rad|m)/s\]|position_command \[(rad|m)\])\r?\n", stream.readline(64))
+                is not None
+            )
     except OSError:
         return False
 

@@ -296,7 +296,8 @@ def _next(dia: Diagnosis, axis: str) -> list[str]:
     p = dia.next_experiment
     if p is None:
         return []
-    size = f"The command: {len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s."
+    driving = "command" if p.position_command is None else "position command"
+    size = f"The {driving}: {len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s."
     return ["Next experiment", *_wrapped(said(next_words(dia, p), axis), "  "), f"  {size}"]
 
 

@@ -150,9 +150,7 @@ def controller_findings(
     left = data.replayed_error({term: np.array([value])})
     std = _std(data, term, value, cost)
     better = cost < POLICY.better_reason**2 * before and np.isfinite(std)  # a limit that cuts nothing explains nothing
-    if cost < POLICY.replay_left * before or better and (
-        cost < POLICY.replay_rms**2 * floor or white_noise(left, logged)
-    ):
+    if cost < POLICY.replay_left * before or (better and (cost < POLICY.replay_rms**2 * floor or white_noise(left, logged))):
         parameter = next(r for r in table() if r.name == effect).parameters[0]
         name, unit = parameter.name, parameter.unit
         text = say(
