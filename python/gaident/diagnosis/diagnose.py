@@ -143,7 +143,8 @@ def diagnose(
         work.search()
         result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
         result = moved.noted(result)
-        result = replace(result, notes=(*driving.notes, *(() if work.at_controller.decided else driving.doubts), *result.notes))
+        answered = work.at_controller.decided or any(f.place == "controller" for f in result.findings)
+        result = replace(result, notes=(*driving.notes, *(() if answered else driving.doubts), *result.notes))
         if bootstrap:
             from gaident.diagnosis.selection.bootstrap import with_p_value
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import TORQUE
-from gaident.axis import Text
+from gaident.axis import Text, say
+from gaident.control.cascade import cascade_of
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.errors import RecordError
+from gaident.identification.controller_numbers import Numbers, with_estimates
+from gaident.identification.logged_torque import not_followed
 from gaident.identification.space import derive_space
 from gaident.models.drive_torque import torque_driven
 from gaident.models.search_space import SearchSpace
@@ -23,6 +27,11 @@ __all__ = ["Looped", "input_of", "line_equation", "looped_over", "space_of", "wi
 
 Vector = NDArray[np.float64]
 
+WITH_OTHER_GAINS = Text("With other gains it does: these are used instead of the given ones.")
+NOT_THE_LOOP = say(
+    "So the loop is not closed over it: the logged {torque} drives the model. Give all of the controller, filters and limits "
+    "too; a diagnosis looks for its form."
+)
 USUAL_POLES = 6  # no decision: p + q of the largest structure of a derived space
 
 
@@ -35,12 +44,29 @@ class Looped(NamedTuple):
 
 
 def looped_over(records: Sequence[Record], controller: Controller | None, space: object) -> Looped:
-    """What an identification of the records does under a controller; space: the search space, or None. Raises RecordError."""
+    """What an identification of the records does under a controller; space: the search space, or None. Raises RecordError.
+
+    Where a logged torque shows that a controller faster than the log is not the drive's, its gains are those that the torque
+    shows or, where it does not follow from these either, the torque drives the model.
+    """
+    doubts = not_followed(records, controller)
     if line_equation(records, controller, space if isinstance(space, SearchSpace) else None):
-        return Looped(list(records), controller)
+        if not doubts or any(r.torque is None for r in records):
+            return Looped(list(records), controller, doubts)
+        assert controller is not None  # else there were no doubt
+        if (other := _with_other_gains(records, controller)) is not None:
+            return Looped(list(records), other.controller, (*doubts, WITH_OTHER_GAINS, *other.notes))
+        doubts = (*doubts, NOT_THE_LOOP)
     driven = torque_driven(records, controller)
     given = [r.with_channels(command=None) for r in driven.records] if driven.slower else list(driven.records)
-    return Looped(given, driven.loop, (*driven.notes, *driven.doubts))
+    return Looped(given, driven.loop, (*driven.notes, *driven.doubts, *doubts))
+
+
+def _with_other_gains(records: Sequence[Record], controller: Controller) -> Numbers | None:
+    """The controller with the kp and ki that the logged torques show, where they follow from it then; else None."""
+    cascade, unknown = cascade_of(controller), dict[str, Any](kp=None, ki=None)
+    numbers = with_estimates(records, replace(cascade, velocity=replace(cascade.velocity, **unknown)))
+    return None if numbers.doubt or not_followed(records, numbers.controller) else numbers
 
 
 def line_equation(records: Sequence[Record], controller: Controller | None, space: SearchSpace | None) -> bool:

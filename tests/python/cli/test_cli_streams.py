@@ -60,8 +60,6 @@ def test_a_command_imports_what_it_needs(here: Path) -> None:
         "controller.replay_causes",
         "library",
         "library.settings",
-        "records",
-        "records.lattice",
     )
     replay = {"gaident.diagnosis", *(f"gaident.diagnosis.{name}" for name in needed)}
     assert {name for name in imported if name.startswith("gaident.diagnosis")} == replay

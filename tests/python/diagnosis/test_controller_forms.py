@@ -161,3 +161,13 @@ def test_the_given_controller_is_no_other_form_of_itself_in_a_slow_log(every: in
     rec = slower(every, noise=0.02, torque_limit=0.6)
     shown = form_shown([rec], GIVEN, (), every)
     assert shown is not None and set(shown.numbers) == {"torque_saturation"}
+
+
+def test_a_slow_log_whose_torque_does_not_follow_is_doubted() -> None:
+    rec = slower(4, torque_filters=[low(1e-3)])
+    for tau, doubted in ((1e-3, False), (2e-4, True)):  # with a filter given, no other form is looked for
+        dia = ga.diagnose(rec, ga.Cascade(GIVEN, T, torque_filters=(ga.LowPass(tau),)))
+        assert any("does not follow from command and velocity" in note for note in dia.notes) == doubted
+    found = ga.diagnose(rec, ga.Cascade(GIVEN, T))
+    assert [f.effect for f in found.causes] == ["torque_filter"]
+    assert not any("does not follow" in note for note in found.notes)

@@ -11,13 +11,13 @@ import pytest
 from scipy import signal
 
 import gaident as ga
+from gaident.data.signals.lattice import lattice_step, rounding_step
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.missing_torque import missing_torque
 from gaident.diagnosis.library import terms
 from gaident.diagnosis.library.coordinates import HIGHEST_ORDER
 from gaident.diagnosis.library.equivalences import EQUIVALENT
-from gaident.diagnosis.records.lattice import lattice_step, rounding_step
 from gaident.diagnosis.selection.offset import Offset
 from gaident.errors import ModelError, RecordError
 from gaident.estimation.state_space import discretised, disturbed

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import gaident as ga
+import referee_logs
 import servo_referee as referee
 from gaident.control import core
-from gaident.control.ticks import between_lines, straight_part
+from gaident.control.ticks import at_the_clock, between_lines, straight_part
 from gaident.identification.closed_loop import line_equation, with_torque
+from gaident.identification.logged_torque import not_followed
+from referee_logs import GIVEN
+from referee_logs import T as CLOCK
 
 T = 125e-6
 AXIS = referee.Axis(4e-4, 0.004, 9e-4, 0.006, 60.0, 0.02)
@@ -169,3 +174,57 @@ def test_a_log_of_every_eighth_sample_gives_the_drive(noise: float) -> None:
     assert np.sqrt(np.mean(idn.residual(rec) ** 2)) == pytest.approx(idn.rmse, rel=1e-3, abs=1e-6)
     assert ga.Identification.from_dict(idn.to_dict()).controller == cascade
     assert "cascade" in idn.summary()
+
+
+# What the drive has beyond the given controller; given.
+CONTRADICTED: dict[str, tuple[dict[str, Any], ga.Cascade]] = {
+    "low pass": ({"torque_filters": lambda: [referee_logs.low(1e-3)]}, ga.Cascade(GIVEN, CLOCK)),
+    "limit": ({"torque_limit": lambda: 0.8}, ga.Cascade(GIVEN, CLOCK)),
+    "no filter": ({}, ga.Cascade(GIVEN, CLOCK, torque_filters=(ga.LowPass(1e-3),))),
+    "no weight": ({}, ga.Cascade(ga.PI(GIVEN.kp, GIVEN.ki, command_weight=0.0), CLOCK)),
+}
+
+
+@pytest.mark.parametrize("name", CONTRADICTED)
+def test_a_loop_that_the_logged_torque_contradicts_is_not_closed(name: str) -> None:
+    more, given = CONTRADICTED[name]
+    rec = referee_logs.slower(2, **{key: make() for key, make in more.items()})
+    assert line_equation([rec], given, None)
+    (doubt,) = not_followed([rec], given)
+    assert "does not follow from command and velocity through this controller" in doubt
+    assert not_followed([rec.with_channels(torque=None)], given) == ()
+    idn = ga.identify(rec, given, seed=1, workers=1)
+    assert idn.controller is None and doubt in idn.warnings and str(doubt) in " ".join(idn.summary().split())
+    # The resonance of the true drive, although its loop is another one.
+    resonance = max(abs(np.imag(idn.model.poles)), key=lambda w: -abs(w - 463.6))
+    assert resonance == pytest.approx(463.6, rel=0.01)
+
+
+@pytest.mark.parametrize("every", [2, 4])
+def test_gains_that_the_logged_torque_contradicts_are_corrected(every: int) -> None:
+    rec = referee_logs.slower(every, torque_filters=[referee_logs.low(4e-4)])
+    given = ga.Cascade(ga.PI(0.9 * GIVEN.kp, 1.1 * GIVEN.ki), CLOCK, torque_filters=(ga.LowPass(4e-4),))
+    assert len(not_followed([rec], given)) == 1
+    idn = ga.identify(rec, given, seed=1, workers=1)
+    assert idn.controller is not None and idn.controller.gains.kp == pytest.approx(GIVEN.kp, rel=5e-3)
+    assert any("instead of the given ones" in note for note in idn.warnings)
+    assert (idn.p, idn.q) == (1, 2) and not idn.falsified
+    assert np.abs(idn.model.poles).max() == pytest.approx(465.4, rel=5e-3)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02, 0.3])
+@pytest.mark.parametrize("every", [2, 4, 8])
+def test_the_loop_that_made_the_torque_is_closed(every: int, noise: float) -> None:
+    rec = referee_logs.slower(every, noise, torque_filters=[referee_logs.low(4e-4)])
+    given = ga.Cascade(GIVEN, CLOCK, torque_filters=(ga.LowPass(4e-4),))
+    assert rec.torque is not None
+    measured = rec.torque + 0.02 * np.std(rec.torque) * np.random.default_rng(1).standard_normal(len(rec))
+    for torque in (rec.torque, np.round(rec.torque, 2), measured):
+        assert not_followed([rec.with_channels(torque=torque)], given) == ()
+    path_of = np.cumsum(speed(400)) * T
+    placed = {"position_gain": 10.0, "position_every": every}
+    w, u, p = referee.simulate(AXIS, at_the_clock(path_of, every), T, every, **PI, **placed)
+    place = ga.Cascade(ga.PI(**PI), T, position=ga.P(10.0), position_period=every * T)
+    moved = ga.Record(every * T, position_command=path_of, velocity=w, torque=u, position=p)
+    assert not_followed([moved], place) == ()
+    assert len(not_followed([moved], replace(place, position=ga.P(12.0)))) == 1

@@ -12,6 +12,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
 from gaident.diagnosis.controller.form_findings import Loop, driver_of
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
+from gaident.identification.logged_torque import not_followed
 from gaident.models.drive_torque import Driven
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
@@ -51,6 +52,7 @@ def driving_of(
     Raises ControllerError where unknown numbers of the controller do not make the torque, and no other form of it does.
     """
     controller, pi, notes = driven.controller, driven.loop, driven.notes
+    doubts = (*driven.doubts, *not_followed([origin.get(r.digest, r) for r in records], controller))
     moved = aligned(records, held, pi)
     form = None if moved.shifts else driver_of(records, held, pi, tuple(asked.estimates))
     findings, numbers = asked.findings, asked.estimates
@@ -65,4 +67,4 @@ def driving_of(
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
     used = controller if bare_pi(controller) is None else logged.controller
-    return Driving(moved, used, logged, findings, notes, driven.doubts, numbers)
+    return Driving(moved, used, logged, findings, notes, doubts, numbers)

@@ -16,8 +16,8 @@ from gaident.axis import Text, say
 from gaident.control.controller import Controller, Gains
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
+from gaident.data.signals.lattice import lattice_step, rounding_step
 from gaident.diagnosis.controller.replay_causes import explain, rounded_command, white_noise
-from gaident.diagnosis.records.lattice import lattice_step, rounding_step
 from gaident.errors import RecordError
 from gaident.policy.table import POLICY
 

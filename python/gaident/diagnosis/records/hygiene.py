@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gaident.control.pi import PI
 from gaident.data.record import Record
-from gaident.diagnosis.records.lattice import lattice_step
+from gaident.data.signals.lattice import lattice_step
 from gaident.models.model import Model
 from gaident.models.simulate import simulate
 from gaident.policy.table import POLICY

@@ -1,0 +1,93 @@
+"""Whether the torque of a log that is slower than its controller follows from command and velocity through that controller.
+
+The controller runs at its own clock on the logged signals; d is the logged torque minus what it makes at the lines of the log.
+What the velocity did between the lines is lost: d is compared with what other courses there make of the torque,
+
+    a straight line instead of a cubic spline, and that spline with white noise between the lines, as large as that at the lines,
+
+which the integrator adds up: all three without their correlation from line to line, rho (Cochrane and Orcutt 1949).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.axis import Text, say
+from gaident.control.cascade import cascade_of
+from gaident.control.controller import Controller
+from gaident.data.record import Record
+from gaident.data.signals.lattice import rounding_step
+from gaident.identification.logged_stretches import Log, centred, correlation, log_of, whitened
+from gaident.models.starts import noise_std, starts_moving
+from gaident.policy.table import POLICY
+
+__all__ = ["not_followed"]
+
+Vector = NDArray[np.float64]
+
+
+def not_followed(records: Sequence[Record], controller: Controller | None) -> tuple[Text, ...]:
+    """A sentence for each record whose logged torque does not follow from this controller; () where none can be compared.
+
+    Compared are logs slower than the controller that start at rest and hold what it reads.
+    """
+    if controller is None:
+        return ()
+    doubts = []
+    for rec in records:
+        if not _comparable(rec, controller):
+            continue
+        assert rec.torque is not None
+        off = _off(rec, controller)
+        if off > 0.0:
+            text = (
+                "{}The logged {torque} does not follow from command and velocity through this controller: by {:.2g} {N m} rms, "
+                "of {:.2g} {N m} rms. Is this the controller, and are these the signals it saw?"
+            )
+            size = float(np.sqrt(np.mean(rec.torque**2)))
+            doubts.append(say(text, f"{rec.name}: " if len(records) > 1 and rec.name else "", off, size))
+    return tuple(doubts)
+
+
+def _comparable(rec: Record, controller: Controller) -> bool:
+    needed = (rec.torque, *(getattr(rec, channel) for channel in controller.reads))
+    return (
+        controller.log_every(rec.dt) > 1
+        and all(signal is not None for signal in needed)
+        and len(rec) >= POLICY.least_samples
+        and not starts_moving(rec, controller)
+    )
+
+
+def _off(rec: Record, controller: Controller) -> float:
+    """Root mean square of logged minus made torque [N m], where that is more than the course between the lines can make; or 0."""
+    cascade = cascade_of(controller)
+    log = log_of(rec, len(rec), cascade, whole=True)
+    made = log.made(cascade)
+    left = log.torque - made
+    courses = [one.made(cascade, straight) - made for one, straight in _courses(log, rec)]
+    rho = correlation(np.sum(courses, axis=0), log.stretch)
+
+    def rms(d: Vector, rho: float) -> float:
+        return float(np.sqrt(np.mean(centred(*whitened(d, log.stretch, rho), False) ** 2)))
+
+    possible = float(np.sqrt(sum(rms(course, rho) ** 2 for course in courses)))
+    noise = noise_std(left, rounding_step(log.torque))  # of a measured, or rounded, torque
+    measured = min(noise, POLICY.replay_noise * float(np.std(log.torque)))
+    off, size = rms(left, 0.0), float(np.sqrt(np.mean(log.torque**2)))
+    follows = (
+        rms(left, rho) <= max(POLICY.course * possible, POLICY.undecided_ratio * measured) or off <= POLICY.negligible * size
+    )
+    return 0.0 if follows else off
+
+
+def _courses(log: Log, rec: Record) -> list[tuple[Log, bool]]:
+    """The log with other courses between its lines, and whether the velocity goes straight there."""
+    every = len(log.velocity) // len(log.source)
+    noise = noise_std(rec.velocity) * np.random.default_rng(0).standard_normal(len(log.velocity))
+    noise[::every] = 0.0
+    return [(log, True), (replace(log, velocity=log.velocity + noise), False)]
