@@ -19,7 +19,7 @@ from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import as_read, controller_findings
 from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
-from gaident.diagnosis.experiments.candidates import IN_MOTION, candidates
+from gaident.diagnosis.experiments.candidates import IN_MOTION, NOT_THE_LOOP, candidates
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off, hidden_by_torque_noise
@@ -201,7 +201,10 @@ class _Work:
             t: np.array(list(limits[t.name].values())) for t in in_controller() if t.name in limits
         }
         shown = self.at_controller.controller or self.controller
-        data = replace(data, controller=shown, loop_follows=self.at_controller.follows, known_noise=self.noise)
+        self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
+        if self.at_controller.follows and not self.follows:
+            self.notes.append(NOT_THE_LOOP)
+        data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
         self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
@@ -212,7 +215,7 @@ class _Work:
         """The selected model, its rivals, what is left."""
         allowed, self.not_testable = candidates(self.records, self.clean, self.data, self.excited, self.at_controller)
         self.notes += [ADVICE] * any(folded(r) for r in self.records)
-        self.notes += [IN_MOTION] * (self.data.slower and any(self.data.moving))
+        self.notes += [IN_MOTION] * (self.data.slower and self.follows and any(self.data.moving))
         found = selected(self.objective, self.scales, self.idn.model, allowed, self._equivalent_here, self._say)
         self.note(0.85, "looking for what is left")
         self.take(found)
@@ -259,7 +262,8 @@ class _Work:
             causes = [e for e in causes if self._determined(e, estimates[e])]
             mechanics = mechanics_of(self.under, self.estimate)
             model = with_effects(self.estimate.parameters.model(self.estimate.x), self.at_controller.effects)
-            check = by_second_method(self.clean, gains, model, mechanics, estimates, self.pi is None, self.axis)
+            driven = self.pi is None and not self.data.loopable
+            check = by_second_method(self.clean, gains, model, mechanics, estimates, driven, self.axis)
             causes, why = standing(causes, gains, check, self._equivalent_here)
             if why:
                 driver = driver or self.left.strongest or "time"
@@ -344,7 +348,7 @@ class _Work:
             digests=tuple(r.digest for r in self.records),
             validation_digests=tuple(r.digest for r in self.held),
             torque_logged=self.data.torque_logged,
-            loop_follows=self.at_controller.follows,
+            loop_follows=self.follows,
             version=version(),
             axis=self.axis,
             records=self.records,

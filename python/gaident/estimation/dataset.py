@@ -107,7 +107,7 @@ class DataSet:
     @cached_property
     def loopable(self) -> bool:
         """Whether command and controller can drive a model too."""
-        if self.loop is None or any(self.moving):
+        if self.loop is None or any(self.moving) or (self.slower and not self.loop_follows):
             return False
         loop = self.loop
         return all(loop.command_of(r) is not None for r in self.records)

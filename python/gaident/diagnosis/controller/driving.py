@@ -12,6 +12,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
 from gaident.diagnosis.controller.form_findings import Loop, driver_of
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
+from gaident.diagnosis.controller.wrong_number import corrected
 from gaident.identification.logged_torque import not_followed
 from gaident.models.drive_torque import Driven
 from gaident.results.estimate import Estimate
@@ -37,6 +38,11 @@ class Driving:
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
 
     @property
+    def in_doubt(self) -> bool:
+        """Whether the logged torque follows neither from the given controller nor from a form of it that was found."""
+        return bool(self.doubts) and not any(f.place == "controller" for f in self.findings)
+
+    @property
     def read(self) -> tuple[Record, ...]:
         """The records with every signal that the controller read, beside the torque as logged."""
         if self.controller is None or self.controller.one_equation:
@@ -52,12 +58,21 @@ def driving_of(
     Raises ControllerError where unknown numbers of the controller do not make the torque, and no other form of it does.
     """
     controller, pi, notes = driven.controller, driven.loop, driven.notes
-    doubts = (*driven.doubts, *not_followed([origin.get(r.digest, r) for r in records], controller))
+    whole = [origin.get(r.digest, r) for r in records]
+    doubts = (*driven.doubts, *not_followed(whole, controller))
     moved = aligned(records, held, pi)
     form = None if moved.shifts else driver_of(records, held, pi, tuple(asked.estimates))
     findings, numbers = asked.findings, asked.estimates
     if form is None:
         notes = (*(asked.notes or asked.numbers.trusted().notes), *notes)
+        if (
+            doubts
+            and pi is None
+            and controller is not None
+            and not numbers
+            and (other := corrected(whole, controller)) is not None
+        ):
+            controller, numbers, notes, doubts = other.controller, other.estimates, (*notes, *doubts, other.note), ()
     else:
         controller, pi, notes = form.controller, None, (*notes, *form.notes)
         findings, numbers = form.findings, form.estimates

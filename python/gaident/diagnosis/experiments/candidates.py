@@ -13,7 +13,7 @@ from gaident.diagnosis.records.folded import FOLDED, folded
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.term import Term
 
-__all__ = ["IN_MOTION", "candidates"]
+__all__ = ["IN_MOTION", "NOT_THE_LOOP", "candidates"]
 
 IN_MOTION = say(
     "A record starts in motion, and the loop of this controller is simulated from rest only: the {torque}, taken straight from "
@@ -21,6 +21,11 @@ IN_MOTION = say(
     "at rest."
 )
 """Of a log with fewer lines than the controller samples."""
+NOT_THE_LOOP = say(
+    "So no loop is closed over this controller: the logged {torque}, taken straight from line to line, drives the models, and "
+    "the verdict rests on that. Effects inside the controller are not looked for."
+)
+"""The same of a log whose torque does not follow from the controller."""
 
 
 def candidates(
@@ -38,6 +43,8 @@ def candidates(
         why = {name: reason for name, reason in why.items() if name not in at.decided}
     elif data.slower and not data.loopable:
         still = Text("a record starts in motion, and the loop of this controller is simulated from rest only")
+        if not data.loop_follows:
+            still = say("the logged {torque} does not follow from this controller, so that no loop is simulated")
         why |= dict.fromkeys(inside, still)
     out = {*why, *at.decided, *decided_by_the_angle(clean), *(inside if data.loop is None else ())}
     return [t for t in LIBRARY.values() if t.name not in out], why
