@@ -170,8 +170,7 @@ class Record:
             one_of(key, "with_channels: the channel", CHANNELS, RecordError)
         held = {key: getattr(self, key) for key in CHANNELS}
         channels = held | {key: None if values is None else channel(values, key) for key, values in changed.items()}
-        driving = ("command", "torque", "position_command")
-        if channels["velocity"] is None or all(channels[key] is None for key in driving):
+        if channels["velocity"] is None or all(channels[key] is None for key in ("command", "torque", "position_command")):
             listed = ", ".join(f"{key}=None" for key, values in changed.items() if values is None)
             raise RecordError(
                 f"with_channels({listed}) leaves a record without its velocity, or without command and torque; keep what "

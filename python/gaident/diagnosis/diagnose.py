@@ -202,8 +202,7 @@ class _Work:
         }
         shown = self.at_controller.controller or self.controller
         self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
-        if self.at_controller.follows and not self.follows:
-            self.notes.append(NOT_THE_LOOP)
+        self.notes += [NOT_THE_LOOP] * (self.at_controller.follows and not self.follows)
         data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
@@ -262,8 +261,7 @@ class _Work:
             causes = [e for e in causes if self._determined(e, estimates[e])]
             mechanics = mechanics_of(self.under, self.estimate)
             model = with_effects(self.estimate.parameters.model(self.estimate.x), self.at_controller.effects)
-            driven = self.pi is None and not self.data.loopable
-            check = by_second_method(self.clean, gains, model, mechanics, estimates, driven, self.axis)
+            check = by_second_method(self.clean, gains, model, mechanics, estimates, self.data.open_runs, self.axis)
             causes, why = standing(causes, gains, check, self._equivalent_here)
             if why:
                 driver = driver or self.left.strongest or "time"

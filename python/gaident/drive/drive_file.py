@@ -165,15 +165,15 @@ class Drive:
         return dataclasses.replace(derived, **given, source=f"given: {source}; what is not, {derived.source}")
 
 
+_PROPOSAL = re.compile(rb"time \[s\],(command \[(rad|m)/s\]|position_command \[(rad|m)\])\r?\n")
+
+
 def _is_proposal(path: str) -> bool:
     """Whether a file is a command as `gaident experiment`, --next-command or a report writes it."""
     try:
         with open(path, "rb") as stream:
             # no decision: how such a file begins
-            return (
-                re.fullmatch(rb"time \[s\],(command \[(rad|m)/s\]|position_command \[(rad|m)\])\r?\n", stream.readline(64))
-                is not None
-            )
+            return _PROPOSAL.fullmatch(stream.readline(64)) is not None
     except OSError:
         return False
 

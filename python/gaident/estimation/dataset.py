@@ -123,6 +123,11 @@ class DataSet:
         return bare_pi(self.controller)
 
     @property
+    def open_runs(self) -> bool:
+        """Whether the torque drives a free run, for lack of a loop that can be simulated."""
+        return self.pi is None and not self.loopable
+
+    @property
     def slower(self) -> bool:
         """Whether the log has fewer lines than the controller samples: the torque is then known on the lines only."""
         return self.loop is not None and self.pi is None
