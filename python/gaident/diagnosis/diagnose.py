@@ -19,7 +19,7 @@ from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import as_read, controller_findings
 from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
-from gaident.diagnosis.experiments.candidates import IN_MOTION, NOT_THE_LOOP, candidates
+from gaident.diagnosis.experiments.candidates import candidates, loop_notes
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.wording import basis_of, drives_itself, evidence_of, far_off, hidden_by_torque_noise
@@ -202,7 +202,6 @@ class _Work:
         }
         shown = self.at_controller.controller or self.controller
         self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
-        self.notes += [NOT_THE_LOOP] * (self.at_controller.follows and not self.follows)
         data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
@@ -214,7 +213,7 @@ class _Work:
         """The selected model, its rivals, what is left."""
         allowed, self.not_testable = candidates(self.records, self.clean, self.data, self.excited, self.at_controller)
         self.notes += [ADVICE] * any(folded(r) for r in self.records)
-        self.notes += [IN_MOTION] * (self.data.slower and self.follows and any(self.data.moving))
+        self.notes += loop_notes(self.data)
         found = selected(self.objective, self.scales, self.idn.model, allowed, self._equivalent_here, self._say)
         self.note(0.85, "looking for what is left")
         self.take(found)

@@ -13,7 +13,7 @@ from gaident.diagnosis.records.folded import FOLDED, folded
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.term import Term
 
-__all__ = ["IN_MOTION", "NOT_THE_LOOP", "candidates"]
+__all__ = ["IN_MOTION", "candidates", "loop_notes"]
 
 IN_MOTION = say(
     "A record starts in motion, and the loop of this controller is simulated from rest only: the {torque}, taken straight from "
@@ -26,6 +26,13 @@ NOT_THE_LOOP = say(
     "the verdict rests on that. Effects inside the controller are not looked for."
 )
 """The same of a log whose torque does not follow from the controller."""
+
+
+def loop_notes(data: DataSet) -> list[Text]:
+    """Why no loop is closed for records with fewer lines than their controller samples; empty where it is."""
+    if not data.slower:
+        return []
+    return [NOT_THE_LOOP] if not data.loop_follows else [IN_MOTION] * any(data.moving)
 
 
 def candidates(
