@@ -8,15 +8,16 @@ from collections.abc import Callable
 from typing import Any
 
 from gaident.axis import AXES
+from gaident.control.words import UNKNOWN
 from gaident.data.torque_kind import TORQUE_KINDS
 
-__all__ = ["SHELLS", "add_log_commands", "add_log_options", "number"]
+__all__ = ["SHELLS", "add_log_commands", "add_log_options", "gain", "number"]
 
 SHELLS = ("bash", "zsh", "fish", "tcsh")
 COLUMNS_HELP = """\
 Lists what a log holds: the names of its columns as --columns takes them, units, range, sample time, and what
-stands in the way of their use. Formats: CSV and other text tables (of TwinCAT Scope, MR Configurator2, NI
-or ROS as well), MAT, NPZ, HDF5, Parquet, TDMS, MDF.
+stands in the way of their use. Formats: CSV and other text tables (of TwinCAT Scope, MR Configurator2, EPOS
+Studio, NI or ROS as well), MAT, NPZ, HDF5, Parquet, TDMS, MDF, traces of SINUMERIK (XML).
 """
 INIT_HELP = """\
 Writes a drive.toml for the axis behind LOG: columns, units and sample time as the log shows them, each with
@@ -69,6 +70,17 @@ def number(text: str) -> float:
         point = text.replace(",", ".")
         hint = f": write a decimal point, {point}" if "," in text and re.fullmatch(r"[-+\d.]+(e[-+]?\d+)?", point) else ""
         raise argparse.ArgumentTypeError(f"{text!r} is no number{hint}") from None
+
+
+_WITH_UNIT = re.compile(r"\s*[-+\d.eE]+\s+\S")
+
+
+def gain(text: str) -> float | str:
+    """argparse's number of a controller: with its unit, or the word for one that is not known, as text."""
+    try:
+        return float(text)
+    except ValueError:
+        return text if _WITH_UNIT.match(text) or text == UNKNOWN else number(text)
 
 
 def add_log_options(parser: argparse.ArgumentParser) -> None:

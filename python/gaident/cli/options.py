@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
-from gaident.cli.log_options import add_log_commands, add_log_options, number
+from gaident.cli.log_options import add_log_commands, add_log_options, gain, number
 from gaident.cli.report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
 from gaident.control.words import LOOPS
 from gaident.errors import SettingsError
@@ -52,8 +52,8 @@ drive.toml, every part optional:
   [shift]
   torque = -1                     # samples, for a channel that the log wrote on another line than the rest
   [controller]
-  kp = 0.0232                     # N m s/rad
-  ki = 1.367                      # N m/rad; also loop, torque_limit, integrator_limit; of other loops: drive
+  kp = 0.0232                     # N m s/rad, "0.12 A s/rad" or "unknown"
+  ki = 1.367                      # N m/rad, or tn = "10 ms"; also loop, torque_limit, integrator_limit; drive
                                   # with its own gains, rule, command_weight, anti_windup, tracking_time,
                                   # period, delay, torque_filters, velocity_filters, command_filters, ...
   [space]
@@ -234,15 +234,15 @@ def _whole_range(text: str) -> tuple[int, int]:
 def _add_controller_options(parser: argparse.ArgumentParser) -> None:
     """The velocity loop."""
     g = parser.add_argument_group("the velocity controller", "without one: open loop, torque to velocity")
-    g.add_argument("--kp", type=number, metavar="X", help="proportional gain [N m s/rad]")
-    g.add_argument("--ki", type=number, metavar="X", help="integral gain [N m/rad]")
+    g.add_argument("--kp", type=gain, metavar="X", help="proportional gain [N m s/rad], 'X UNIT', or unknown")
+    g.add_argument("--ki", type=gain, metavar="X", help="integral gain [N m/rad], 'X UNIT', or unknown")
     g.add_argument(
         "--loop",
         choices=(*LOOPS, "open"),
         help="sampled: a digital drive (default); continuous: everything bilinear, as in the paper; open: "
         "leave the controller out",
     )
-    g.add_argument("--torque-limit", type=number, metavar="X", help="the controller's torque limit [N m]")
+    g.add_argument("--torque-limit", type=gain, metavar="X", help="the controller's torque limit [N m], or 'X UNIT'")
     g.add_argument("--integrator-limit", type=number, metavar="X", help="limit of its integral part [N m]")
 
 

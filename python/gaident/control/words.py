@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-__all__ = ["ANTI_WINDUP", "LOOPS"]
+__all__ = ["ANTI_WINDUP", "LOOPS", "UNKNOWN"]
 
 LOOPS = ("sampled", "continuous")
 ANTI_WINDUP = ("none", "hold", "tracking")
+
+UNKNOWN = "unknown"
+"""What stands in a drive file in the place of a number that is not known: None in Python."""

@@ -16,7 +16,7 @@ from gaident.data.signals.arrays import MINIMUM_SAMPLES
 from gaident.data.signals.conditioning import differentiate, low_pass
 from gaident.data.signals.decimation import Decimator, decimated, factor_of
 from gaident.data.signals.resampling import resampled
-from gaident.data.timeaxis import TimeAxis
+from gaident.data.timeaxis import SLOW_STEP, TimeAxis
 from gaident.data.torque_kind import COMMANDED, kind_of_torque
 from gaident.data.wanted import Wanted, si_factor
 from gaident.data.winding_torque import ELECTRICAL, torque_of_winding
@@ -48,6 +48,7 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
         dt, values = _on_even_axis(table, wanted, named, scales, counters)
     else:
         dt, values = _block_by_block(table, wanted, named, scales, counters)
+    said += _slow_clock(table, wanted, named, dt)
     try:
         if "velocity" not in values and "position" not in values:
             values["velocity"] = np.zeros(len(next(iter(values.values()))))
@@ -77,6 +78,19 @@ def _torque_kind(table: Table, wanted: Wanted, column: Column | None) -> str:
             f"with {arg('columns', '...', 'torque')}, or leave torque_is out"
         )
     return wanted.torque_is
+
+
+def _slow_clock(table: Table, wanted: Wanted, named: dict[str, Column], dt: float) -> list[str]:
+    """What to say of a time column without a unit whose steps, taken as seconds, are long ones: it may count milliseconds."""
+    if wanted.dt is not None or wanted.resample is not None or "time" in wanted.units:
+        return []
+    time = common_clock(table, wanted, named)
+    if time is None or time.unit is not None or dt / factor_of(wanted.decimate) < SLOW_STEP:
+        return []
+    return [
+        f"The time column {time.key!r} says no unit, and s was taken: a sample time of {dt:g} s. Where it counts milliseconds, "
+        "give units={'time': 'ms'} (--units time=ms)."
+    ]
 
 
 _Values = dict[str, NDArray[np.float64]]
@@ -172,7 +186,7 @@ def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
         }
     if wanted.measured and "velocity" not in found and "position" not in found:
         raise ReadError(_say_missing(table, wanted, "velocity", "the velocity (or the position, to derive it from)"))
-    if "command" not in found and "torque" not in found and ELECTRICAL.isdisjoint(found):
+    if found.keys().isdisjoint(("command", "torque", *(() if wanted.measured else ("position_command",)), *ELECTRICAL)):
         raise ReadError(_say_missing(table, wanted, "torque", "the command or the torque"))
     if "velocity" in found and wanted.velocity_cutoff_hz is not None:
         raise ReadError(

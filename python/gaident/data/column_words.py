@@ -1,4 +1,7 @@
-"""The words in the names of a log's columns, English and German, and what they say of a column."""
+"""The words in the names of a log's columns, and what they say of a column.
+
+English and German, the commonest ones of French, Italian, Spanish and romanised Japanese.
+"""
 
 from __future__ import annotations
 
@@ -8,26 +11,41 @@ from functools import cache
 __all__ = ["COMMAND_WORDS", "FOREIGN_WORDS", "MEASURED_WORDS", "QUANTITY_WORDS", "words_of"]
 
 COMMAND_WORDS = frozenset(
-    {"r", "ref", "reference", "cmd", "command", "soll", "sollwert", "set", "setpoint", "sp", "target", "desired", "demand", "des"}
+    (
+        *("r", "ref", "reference", "cmd", "command", "soll", "sollwert", "set", "setpoint", "setpt", "sp", "target"),
+        *("desired", "demand", "des", "demanded", "commanded", "vcmd", "pcmd", "icmd"),
+        *("consigne", "riferimento", "consigna", "referencia", "shirei"),
+    )
 )
-"""It is a command."""
+"""It is a command; r only as the whole name."""
 
-MEASURED_WORDS = frozenset({"act", "actual", "ist", "istwert", "meas", "measured", "fb", "feedback", "real", "motor", "servo"})
+MEASURED_WORDS = frozenset(
+    (
+        *("act", "actual", "ist", "istwert", "meas", "measured", "gemessen", "fb", "fbk", "feedback", "est", "estimate"),
+        *("estimated", "real", "motor", "servo", "vfb", "pfb"),
+        *("mesure", "mesurée", "mesuré", "réelle", "reelle", "attuale", "misurata", "actuel", "actuelle", "medida"),
+    )
+)
 """It is of the motor, and what happened rather than what was asked for."""
 
 QUANTITY_WORDS: dict[str, dict[str, int]] = {
     "velocity": {
-        **dict.fromkeys(("velocity", "vel", "speed", "spd", "omega", "drehzahl", "geschwindigkeit", "rpm"), 4),
-        **dict.fromkeys(("w", "wm", "n", "v", "dq", "qd"), 2),
+        **dict.fromkeys(("velocity", "vel", "velo", "speed", "spd", "omega", "drehzahl", "geschwindigkeit", "rpm"), 4),
+        **dict.fromkeys(("vitesse", "velocità", "velocita", "velocidad", "sokudo", "vcmd", "vfb"), 4),
+        **dict.fromkeys(("w", "wm", "n", "v", "vl", "dq", "qd"), 2),
     },
     "torque": {
-        **dict.fromkeys(("torque", "trq", "moment", "drehmoment", "tau", "force", "kraft", "effort"), 4),
-        **dict.fromkeys(("current", "strom", "iq", "thrust"), 3),
-        **dict.fromkeys(("u", "m", "i"), 2),
+        **dict.fromkeys(("torque", "trq", "moment", "momenten", "drehmoment", "tau", "force", "kraft", "effort"), 4),
+        **dict.fromkeys(("couple", "coppia", "toruku"), 4),
+        **dict.fromkeys(("current", "strom", "iq", "thrust", "icmd"), 3),
+        **dict.fromkeys(("u", "m", "i", "il", "par"), 2),
     },
     "position": {
-        **dict.fromkeys(("position", "pos", "angle", "theta", "phi", "lage", "winkel", "encoder"), 4),
-        **dict.fromkeys(("q", "qm", "enc", "weg", "x"), 2),
+        **dict.fromkeys(
+            ("position", "pos", "angle", "theta", "phi", "lage", "winkel", "posizione", "posición", "pcmd", "pfb"), 4
+        ),
+        **dict.fromkeys(("encoder",), 3),
+        **dict.fromkeys(("q", "qm", "enc", "weg", "x", "pl"), 2),
     },
 }
 """How much each speaks for a quantity."""
@@ -36,12 +54,16 @@ FOREIGN_WORDS = frozenset(
     (
         *("error", "err", "deviation", "droop", "following", "limit", "max", "min", "load", "ratio", "temp", "temperature"),
         *("abweichung", "regelabweichung", "schleppfehler", "fehler", "grenze", "last", "temperatur", "beschleunigung"),
+        *("feedforward", "ffw", "precontrol", "vorsteuerung", "setting"),
         *("status", "state", "seq", "id", "acc", "acceleration", "jerk", "counter", "digital", "selected", "power"),
     )
 )
 """It is no channel of a record."""
 
 
+_NUMBERED = re.compile(
+    r"^\s*[a-zA-Z](?:\d+(?:\[\d+\])?|(?:-\d+)+)(?=[\s:]+\S)"
+)  # a parameter's number before its name: r63, S-0-0040
 _JOINTS = ("", "s", "en")  # Geschwindigkeit-s-sollwert, Moment-en-sollwert
 _LETTERS = 3  # no decision: shorter words would be found in any name
 
@@ -55,7 +77,7 @@ def words_of(name: str) -> list[str]:
     [['motor', 'speed'], ['soll', 'drehzahl'], ['geschwindigkeit', 'istwert'], ['torsion']]
     """
     spaced = re.sub(r"([a-z])([A-Z])", r"\1 \2", re.sub(r"[\[(<{].*", "", name))
-    found = [word.casefold() for word in re.findall(r"[^\W\d_]+", spaced)]
+    found = [word.casefold() for word in re.findall(r"[^\W\d_]+", _NUMBERED.sub("", spaced))]
     return [part for word in found for part in _parts(word) or (word,)]
 
 

@@ -80,7 +80,12 @@ def _score(column: ColumnInfo, channel: str) -> tuple[int, str]:
     fits = _is_unit_of(column.unit, quantity)
     if column.unit is not None and not fits and not _converts(column.unit, quantity):
         return 0, ""
-    commanded, measured = bool(COMMAND_WORDS & set(words)), bool(MEASURED_WORDS & set(words))
+    others = (held for other, held in QUANTITY_WORDS.items() if other != quantity)
+    if max((held.get(word, 0) for held in others for word in words), default=0) > max(by_name, _LEAST):
+        return 0, ""  # the set value of a position is no velocity command
+    commands = COMMAND_WORDS & set(words)
+    commanded = bool(commands) and (commands != {"r"} or len(set(words)) == 1)
+    measured = bool(MEASURED_WORDS & set(words))
     score = by_name + (3 if fits else 0)
     if channel in COMMANDED_QUANTITY:
         score = score + 3 if commanded else 0

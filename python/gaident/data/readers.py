@@ -20,7 +20,9 @@ from gaident.data.formats.delimited import TextOptions, open_text
 from gaident.data.formats.frames import frame_table, is_frame, open_parquet
 from gaident.data.formats.hdf import open_hdf
 from gaident.data.formats.instruments import open_mdf, open_tdms
-from gaident.data.formats.table import Table
+from gaident.data.formats.sinumerik import open_sinumerik
+from gaident.data.formats.table import Column, Table
+from gaident.data.formats.time_names import time_and_unit
 from gaident.data.record import Record
 from gaident.data.wanted import wanted_of
 from gaident.errors import ReadError
@@ -50,6 +52,7 @@ READERS = (
     Reader("Parquet", (".parquet", ".pq"), (b"PAR1",), lambda path, file, _, stack: open_parquet(path, file, stack)),
     Reader("TDMS", (".tdms",), (b"TDSm",), lambda path, file, _, stack: open_tdms(path, file, stack)),
     Reader("MDF", (".mf4", ".mdf"), (b"MDF ", b"UnFinMF"), lambda path, file, _, stack: open_mdf(path, file, stack)),
+    Reader("SINUMERIK trace", (".xml",), (b"<?xml", b"\xef\xbb\xbf<?xml", b"<traceSession"), open_sinumerik),
     Reader("NPZ", (".npz",), (), lambda path, file, *_: read_npz(path, file.read_bytes())),
     Reader(
         "text",
@@ -98,7 +101,7 @@ def read(
     skip: int | None = None,
     encoding: str | None = None,
 ) -> Record:
-    """Read a log to a Record in SI units: text tables, MAT, HDF5, NPZ, Parquet, TDMS, MDF, a pandas DataFrame.
+    """Read a log to a Record in SI units: text tables, MAT, HDF5, NPZ, Parquet, TDMS, MDF, traces of SINUMERIK, a DataFrame.
 
     Text longer than 32 MB, HDF5, Parquet, TDMS and MDF are read block by block.
 
@@ -274,7 +277,8 @@ def open_log(source: str | os.PathLike[str] | Any, options: TextOptions) -> Iter
     with ExitStack() as stack:
         if is_frame(source):
             _only_for_text("a DataFrame", "no file", options)
-            yield frame_table(source)
+            table = frame_table(source)
+            yield replace(table, columns=tuple(map(_timed, table.columns)))
             return
         file, shown = _file(source)
         with open(file, "rb") as stream:
@@ -283,7 +287,13 @@ def open_log(source: str | os.PathLike[str] | Any, options: TextOptions) -> Iter
         if reader.name != "text":
             _only_for_text(shown, reader.name, options)
         table = reader.open(shown, file, options, stack)
-        yield table if table.form else replace(table, form=reader.name)
+        yield replace(table, form=table.form or reader.name, columns=tuple(map(_timed, table.columns)))
+
+
+def _timed(column: Column) -> Column:
+    """The column with the unit of time that its name ends with, in a file that says no unit of it."""
+    found = time_and_unit(column.key) if column.unit is None else None
+    return column if found is None else replace(column, unit=found[1], names=(*column.names, found[0]))
 
 
 def _only_for_text(shown: str, form: str, options: TextOptions) -> None:

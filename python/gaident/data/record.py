@@ -117,8 +117,10 @@ class Record:
                 "velocity=None, but a record needs the measured velocity; give velocity=, "
                 "or derive it with differentiate(position, dt, cutoff_hz)"
             )
-        if command is None and torque is None:
-            raise RecordError("command=None and torque=None, but a record needs what drove the motor; give one of them")
+        if command is None and torque is None and position_command is None:
+            raise RecordError(
+                "command=None and torque=None, but a record needs what drove the motor; give one of them, or position_command="
+            )
         if not isinstance(name, str):
             raise RecordError(f"name={name!r} is no text; give a str")
         given = {key: value for key, value in zip(CHANNELS, (command, velocity, torque, position, position_command), strict=True)}
@@ -168,7 +170,7 @@ class Record:
             one_of(key, "with_channels: the channel", CHANNELS, RecordError)
         held = {key: getattr(self, key) for key in CHANNELS}
         channels = held | {key: None if values is None else channel(values, key) for key, values in changed.items()}
-        if channels["velocity"] is None or (channels["command"] is None and channels["torque"] is None):
+        if channels["velocity"] is None or all(channels[key] is None for key in ("command", "torque", "position_command")):
             listed = ", ".join(f"{key}=None" for key, values in changed.items() if values is None)
             raise RecordError(
                 f"with_channels({listed}) leaves a record without its velocity, or without command and torque; keep what "

@@ -7,10 +7,13 @@ from numpy.typing import NDArray
 
 from gaident.arguments import NO_TIME, arg
 from gaident.data.formats.table import Column, Table
+from gaident.data.formats.time_names import TIME_NAMES
 from gaident.errors import ReadError
 from gaident.policy.table import POLICY
 
-__all__ = ["TimeAxis", "stamp_unit", "time_column"]
+__all__ = ["SLOW_STEP", "TimeAxis", "stamp_unit", "time_column"]
+
+SLOW_STEP = 0.5  # no decision: what is asked and said; s, longer steps of a column without a unit may be milliseconds
 
 _BLOCK = 64  # no decision: work; stamps of a block
 _DIGITS = 16  # no decision: decimals of a double
@@ -121,9 +124,6 @@ def stamp_unit(first: float) -> float:
     return next((size for low, high, size in _EPOCHS if low < first < high), 1.0)
 
 
-_TIME_NAMES = ("time", "t", "__time", "timestamp", "stamp", "header.stamp", "field.header.stamp", "header/stamp", "zeit", "index")
-
-
 def time_column(table: Table, strict: bool = True) -> Column | None:
     """The column that is called as time is: in SI's language, ROS's or German. None if there is none.
 
@@ -140,7 +140,7 @@ def time_column(table: Table, strict: bool = True) -> Column | None:
             return None
         if column is not None:
             return column
-    for name in _TIME_NAMES:
+    for name in TIME_NAMES:
         found = [c for c in table.columns if any(_bare(n) == name or _bare(n).endswith(f"/{name}") for n in (c.key, *c.names))]
         if len(found) == 1:
             return found[0]

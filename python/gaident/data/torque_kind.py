@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from itertools import pairwise
 
-from gaident.data.column_words import COMMAND_WORDS, FOREIGN_WORDS, QUANTITY_WORDS, words_of
+from gaident.data.column_words import COMMAND_WORDS, FOREIGN_WORDS, MEASURED_WORDS, QUANTITY_WORDS, words_of
 
 __all__ = ["COMMANDED", "MEASURED", "TORQUE_KINDS", "kind_of_torque", "kind_of_column"]
 
@@ -14,9 +14,7 @@ COMMANDED, MEASURED = "commanded", "measured"
 TORQUE_KINDS = (COMMANDED, MEASURED)
 """What a logged torque may be: the controller's command, or a measured current times a constant."""
 
-_BEHIND_ACTUATOR = frozenset(
-    {"act", "actual", "ist", "istwert", "meas", "measured", "gemessen", "fb", "fbk", "feedback", "sensor"}
-)
+_BEHIND_ACTUATOR = (MEASURED_WORDS - {"motor", "servo", "real", "est", "estimate", "estimated"}) | {"sensor"}
 _QUADRATURE = frozenset({"iq"})  # a drive's name for the torque-forming current that its transducers see
 _SYMBOL = re.compile(r"(?:current|torque|strom|moment|trq|tau|iq|i|m|t)(?=\w\w)")
 

@@ -19,7 +19,7 @@ from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import as_read, controller_findings
 from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
-from gaident.diagnosis.experiments.candidates import IN_MOTION, candidates
+from gaident.diagnosis.experiments.candidates import candidates, loop_notes
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.alternatives import alternatives_of
 from gaident.diagnosis.explain.held_out import standing
@@ -202,7 +202,8 @@ class _Work:
             t: np.array(list(limits[t.name].values())) for t in in_controller() if t.name in limits
         }
         shown = self.at_controller.controller or self.controller
-        data = replace(data, controller=shown, loop_follows=self.at_controller.follows, known_noise=self.noise)
+        self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
+        data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
         self.objective, older = as_old_as_shown(
@@ -216,7 +217,7 @@ class _Work:
         """The selected model, its rivals, what is left."""
         allowed, self.not_testable = candidates(self.records, self.clean, self.data, self.excited, self.at_controller)
         self.notes += [ADVICE] * any(folded(r) for r in self.records)
-        self.notes += [IN_MOTION] * (self.data.slower and any(self.data.moving))
+        self.notes += loop_notes(self.data)
         found = selected(self.objective, self.scales, self.idn.model, allowed, self._equivalent_here, self._say)
         self.note(0.85, "looking for what is left")
         self.take(found)
@@ -262,7 +263,7 @@ class _Work:
             causes = [e for e in causes if self._determined(e, estimates[e])]
             mechanics = mechanics_of(self.under, self.estimate)
             model = with_effects(self.estimate.parameters.model(self.estimate.x), self.at_controller.effects)
-            check = by_second_method(self.clean, gains, model, mechanics, estimates, self.pi is None, self.axis)
+            check = by_second_method(self.clean, gains, model, mechanics, estimates, self.data.open_runs, self.axis)
             causes, why = standing(causes, gains, check, self._equivalent_here)
             if why:
                 driver = driver or self.left.strongest or "time"
@@ -347,7 +348,7 @@ class _Work:
             digests=tuple(r.digest for r in self.records),
             validation_digests=tuple(r.digest for r in self.held),
             torque_logged=self.data.torque_logged,
-            loop_follows=self.at_controller.follows,
+            loop_follows=self.follows,
             version=version(),
             axis=self.axis,
             records=self.records,
@@ -379,7 +380,7 @@ class _Work:
         """Rivals, equivalent effects and, where the loop is not the drive's, the controller; no untestable ones."""
         shown = shown_by_the_records(self.found.space, self.final, effect)
         here = sorted(self._equivalent_here(effect))
-        names = alternatives_of(effect, rivals, here, bool(shown), offset, self.driving.follows)
+        names = alternatives_of(effect, rivals, here, bool(shown), offset, not (self.data.slower and self.driving.in_doubt))
         return tuple(name for name in names if name not in self.not_testable)
 
     def _equivalent_here(self, effect: str) -> set[str]:

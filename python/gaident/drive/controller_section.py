@@ -10,7 +10,9 @@ from gaident.control.controller import Controller
 from gaident.control.drive_parameters import CONSTANTS, DRIVES, drive_row
 from gaident.control.filters import LowPass, Notch, filter_of
 from gaident.control.pi import DIGITAL, PI
+from gaident.control.words import UNKNOWN
 from gaident.drive.kinds import Check, number, text
+from gaident.drive.quantities import INERTIA, INTEGRAL_TIME, number_or_unit, si_number
 from gaident.errors import ControllerError, ReadError
 
 __all__ = ["CONTROLLER_KEYS", "controller_of", "proportional_gain_of"]
@@ -18,37 +20,50 @@ __all__ = ["CONTROLLER_KEYS", "controller_of", "proportional_gain_of"]
 Values = Mapping[str, Any]
 
 
-def _filters(value: object, name: str) -> tuple[LowPass | Notch, ...]:
+def _filters(value: object, name: str) -> tuple[Mapping[str, Any], ...]:
     if not isinstance(value, Sequence) or not all(isinstance(one, Mapping) for one in value):
         example = '[{ kind = "low pass", time_constant = 0.4e-3 }]'
         raise ReadError(f"{name} is {value!r}: give a list of filters, {name} = {example}")
     try:
-        return tuple(filter_of(one) for one in value)
+        for one in value:
+            _filter(one)
     except ControllerError as error:
         raise ReadError(f"{name}: {error}") from None
+    return tuple(value)
+
+
+def _filter(data: Mapping[str, Any]) -> LowPass | Notch:
+    return filter_of({key: value if key == "kind" else si_number(value, key, {}) for key, value in data.items()})
 
 
 PI_KEYS: dict[str, Check] = {
-    "kp": number,
-    "ki": number,
+    "kp": number_or_unit,
+    "ki": number_or_unit,
     "loop": text,
-    "torque_limit": number,
-    "integrator_limit": number,
-    **{key: text if key in ("rule", "anti_windup") else number for key in DIGITAL},
+    "torque_limit": number_or_unit,
+    "integrator_limit": number_or_unit,
+    **{key: text if key in ("rule", "anti_windup") else number_or_unit for key in DIGITAL},
 }
 AROUND: dict[str, Check] = {
-    **dict.fromkeys(("period", "position_gain", "position_period", *FEEDFORWARDS, "delay"), number),
+    **dict.fromkeys(("period", "position_gain", "position_period", *FEEDFORWARDS, "delay"), number_or_unit),
     **dict.fromkeys(FILTERS, _filters),
 }
 # What the motor has stands above the first section, where the units of the log need it too.
 OF_DRIVES = tuple(
     dict.fromkeys(p.name for row in DRIVES.values() for p in (*row.velocity, *row.position) if p.name not in CONSTANTS)
 )
-CONTROLLER_KEYS: dict[str, Check] = {**PI_KEYS, "drive": text, **AROUND, **dict.fromkeys(OF_DRIVES, number)}
+CONTROLLER_KEYS: dict[str, Check] = {
+    **PI_KEYS,
+    **dict.fromkeys((INTEGRAL_TIME, INERTIA), number_or_unit),
+    "drive": text,
+    **AROUND,
+    **dict.fromkeys(OF_DRIVES, number),
+}
 
 
-def controller_of(values: Values, general: Values) -> Controller:
+def controller_of(given: Values, general: Values) -> Controller:
     """The controller of a section's values; general: the keys above the first section. Raises ControllerError."""
+    values = _in_si(given, general)
     velocity = _velocity(values, general)
     position = _position(values)
     around = {key: values[key] for key in AROUND if key in values and key != "position_gain"}
@@ -57,9 +72,38 @@ def controller_of(values: Values, general: Values) -> Controller:
     return Cascade(velocity, position=position, **around)
 
 
+def _in_si(given: Values, general: Values) -> dict[str, Any]:
+    """The values with units taken off, filters made, and ki of the integral time; what is not known is None."""
+    constants = {**general, INERTIA: si_number(given[INERTIA], INERTIA, {}) if INERTIA in given else None}
+    values: dict[str, Any] = {
+        key: tuple(map(_filter, value))
+        if key in FILTERS
+        else si_number(value, key, constants)
+        if (PI_KEYS | AROUND).get(key) is number_or_unit
+        else value
+        for key, value in given.items()
+        if key not in (INTEGRAL_TIME, INERTIA)
+    }
+    if INTEGRAL_TIME in given:
+        if "ki" in values or "drive" in values:
+            other = "ki" if "ki" in values else "the gains of a drive"
+            raise ControllerError(f"the controller has {INTEGRAL_TIME} and {other}: give the one or the other")
+        kp, time = values.get("kp"), si_number(given[INTEGRAL_TIME], INTEGRAL_TIME, constants)
+        assert time is not None
+        if kp is None:
+            raise ControllerError(
+                f'{INTEGRAL_TIME} is given without kp, of which ki = kp/{INTEGRAL_TIME}: give kp, or ki = "{UNKNOWN}"'
+            )
+        if not time > 0.0:
+            raise ControllerError(f"{INTEGRAL_TIME} is {given[INTEGRAL_TIME]!r}: give a time > 0, or ki = 0 without an integral")
+        values["ki"] = kp / time
+    return values
+
+
 def proportional_gain_of(values: Values, general: Values) -> float | None:
     """kp [N m s/rad] of a section's values, None where they say nothing of it; raises ControllerError."""
-    return _velocity(values, general).kp if "drive" in values else values.get("kp")
+    found = _in_si(values, general)
+    return _velocity(found, general).kp if "drive" in found else found.get("kp")
 
 
 def _velocity(values: Values, general: Values) -> PI:
@@ -71,8 +115,8 @@ def _velocity(values: Values, general: Values) -> PI:
         missing = [name for name in ("kp", "ki") if name not in values]
         if missing:
             raise ControllerError(
-                f"the controller lacks {' and '.join(missing)}: give --kp and --ki (or [controller] in "
-                "the drive file), or --loop open to work from torque to velocity"
+                f"the controller lacks {' and '.join(missing)}: give --kp and --ki (or [controller] in the drive file; "
+                f'"{UNKNOWN}" where a torque is logged), or --loop open to work from torque to velocity'
             )
         return PI(**pi)
     twice = [name for name in ("kp", "ki") if name in pi]

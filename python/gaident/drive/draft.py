@@ -15,7 +15,7 @@ from gaident.axis import Text, said, say, unit, word
 from gaident.data.formats.units import Constants, factor, needed_constant
 from gaident.data.guess import Guess, guess_channels, position_and_velocity, unit_from_position, unit_from_velocity
 from gaident.data.listing import Listing
-from gaident.data.timeaxis import stamp_unit
+from gaident.data.timeaxis import SLOW_STEP, stamp_unit
 from gaident.data.torque_kind import kind_of_torque
 from gaident.errors import ReadError
 
@@ -237,19 +237,25 @@ class _Draft:
                 )
         time = self.guess.time
         if time is not None and time.unit is None and (time.lowest is None or stamp_unit(time.lowest) == 1.0):
-            lines.append(_line('# time = "s"', "the log does not say it; s is taken"))
+            if self.dt is not None and self.dt >= SLOW_STEP:
+                text = f"the log does not say it; with s its lines would be {self.dt:g} s apart"
+                lines.append(self._todo('# time = "ms"', "units.time", text))
+            else:
+                lines.append(_line('# time = "s"', "the log does not say it; s is taken"))
         return lines
 
     def _controller(self) -> list[str]:
         text = "as set in the drive"
         if "torque" in self.guess.channels:
-            text += '; or loop = "open"'
+            text += ', "unknown", or loop = "open"'
         mark = self._todo if "command" in self.guess.channels else lambda line, _, comment: _line(line, comment)
         torque = word("torque", self.axis)
+        positioned = "position_command" in self.guess.channels
         return [
             "[controller]",
             mark("# kp = 0.0232", "controller.kp", f"{unit('N m s/rad', self.axis)}; proportional gain {text}"),
             mark("# ki = 1.367", "controller.ki", f"{unit('N m/rad', self.axis)}; integral gain"),
+            *([_line("# position_gain = 40.0", "1/s; without it the velocity command drives the loop")] if positioned else []),
             _line('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model'),
             _line("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
             _line('# drive = "sinamics"', "with p1460 and p1462 in place of kp and ki: gains as the drive shows them"),

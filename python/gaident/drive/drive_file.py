@@ -17,6 +17,7 @@ from gaident.data.readers import read
 from gaident.data.record import CHANNELS, Record
 from gaident.drive import kinds
 from gaident.drive.controller_section import CONTROLLER_KEYS, controller_of, proportional_gain_of
+from gaident.drive.quantities import INTEGRAL_TIME
 from gaident.errors import ReadError, SettingsError, SpaceError
 from gaident.identification.closed_loop import looped_over, space_of
 from gaident.models.search_space import SearchSpace
@@ -92,7 +93,8 @@ class Drive:
         left_out = {k for k, v in columns.items() if v is None}
         not_read = {"axis", "dt"} | ({"torque_is"} if "torque" in left_out else set())
         more = {k: v for k, v in self.general.items() if k not in not_read}
-        self._refuse_unfilled("units", [k for k in CHANNELS if k not in left_out], "or give it with --units CHANNEL=UNIT")
+        asked = [k for k in (*CHANNELS, *([] if "dt" in self.general else ["time"])) if k not in left_out]
+        self._refuse_unfilled("units", asked, "or give it with --units CHANNEL=UNIT")
         units = {k: v for k, v in self.units.items() if k not in left_out}
         shift = {k: v for k, v in self.shift.items() if k not in left_out}
         return read(path, columns or None, units or None, self.general.get("dt"), measured=measured, shift=shift, **more)
@@ -103,8 +105,8 @@ class Drive:
         if values.get("loop") == "open":
             return None
         if self.columns.get("command") != "" and "drive" not in values:
-            remedy = "or give --kp and --ki, or --loop open to work from torque to velocity"
-            self._refuse_unfilled("controller", ("kp", "ki"), remedy)
+            remedy = 'or give --kp and --ki ("unknown" where a torque is logged), or --loop open to work from torque to velocity'
+            self._refuse_unfilled("controller", ("kp", *(() if INTEGRAL_TIME in values else ("ki",))), remedy)
         return controller_of(values, self.general) if values else None
 
     def proportional_gain(self) -> float | None:
@@ -163,12 +165,15 @@ class Drive:
         return dataclasses.replace(derived, **given, source=f"given: {source}; what is not, {derived.source}")
 
 
+_PROPOSAL = re.compile(rb"time \[s\],(command \[(rad|m)/s\]|position_command \[(rad|m)\])\r?\n")
+
+
 def _is_proposal(path: str) -> bool:
     """Whether a file is a command as `gaident experiment`, --next-command or a report writes it."""
     try:
         with open(path, "rb") as stream:
             # no decision: how such a file begins
-            return re.fullmatch(rb"time \[s\],command \[(rad|m)/s\]\r?\n", stream.readline(64)) is not None
+            return _PROPOSAL.fullmatch(stream.readline(64)) is not None
     except OSError:
         return False
 

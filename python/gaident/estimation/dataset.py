@@ -158,7 +158,7 @@ class DataSet:
     @cached_property
     def loopable(self) -> bool:
         """Whether command and controller can drive a model too."""
-        if self.loop is None or any(self.moving):
+        if self.loop is None or any(self.moving) or (self.slower and not self.loop_follows):
             return False
         loop = self.loop
         return all(loop.command_of(r) is not None for r in self.records)
@@ -172,6 +172,11 @@ class DataSet:
     def pi(self) -> PI | None:
         """What a simulated loop is closed over, where it is a bare PI."""
         return bare_pi(self.controller)
+
+    @property
+    def open_runs(self) -> bool:
+        """Whether the torque drives a free run, for lack of a loop that can be simulated."""
+        return self.pi is None and not self.loopable
 
     @property
     def slower(self) -> bool:

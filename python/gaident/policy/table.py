@@ -246,9 +246,6 @@ class Policy:
         "of a filter's number, by which a form may move it along its slope; beyond, the filter is fitted by itself",
         FORMS,
     )
-    other_loop: float = loop(
-        0.1, "1", "of the logged torque's rms, that a controller run on a slow log leaves: more, and it is not the drive's", FORMS
-    )
     quiet_torque: float = loop(0.5, "1", "of the largest torque: below, no limit acts, whatever it limits", FORMS)
     filter_memory: int = loop(
         200, "samples", "after which no filter remembers a limit; a quarter of it where too few are left", FORMS

@@ -99,7 +99,7 @@ class Proposal:
     Attributes
     ----------
     command : ndarray, shape (n,)
-        Velocity command [rad/s].
+        Velocity command [rad/s]; where a position drives the loop, the velocity of that.
     dt : float
         Time from value to value [s].
     separates : tuple of str
@@ -108,6 +108,8 @@ class Proposal:
         BIC units by which the wrong one of two rivals would be worse (10 tell them apart); nan where nothing was compared.
     reason : str
         Why this experiment, in plain sentences.
+    position_command : ndarray of shape (n,) or None
+        Position command [rad] from the start, of a loop that a position drives; None for every other.
 
     See Also
     --------
@@ -120,6 +122,7 @@ class Proposal:
     separates: tuple[str, ...]
     margin: float
     reason: str
+    position_command: Vector | None = None
 
     @property
     def duration(self) -> float:
@@ -128,8 +131,10 @@ class Proposal:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
+        place = {} if self.position_command is None else {"position_command": self.position_command.tolist()}
         return {
             "command": self.command.tolist(),
+            **place,
             "dt": self.dt,
             "separates": list(self.separates),
             "margin": self.margin,
@@ -142,7 +147,9 @@ class Proposal:
         """Return the proposal of what `to_dict` gave."""
         command = np.asarray(data["command"], dtype=np.float64)
         reason = restored(str(data["reason"]), data.get("linear_axis", {}))
-        return cls(command, float(data["dt"]), tuple(data["separates"]), float(data["margin"]), reason)
+        place = data.get("position_command")
+        path = None if place is None else np.asarray(place, dtype=np.float64)
+        return cls(command, float(data["dt"]), tuple(data["separates"]), float(data["margin"]), reason, path)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Proposal):

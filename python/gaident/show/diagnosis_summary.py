@@ -176,14 +176,22 @@ def _gain(dia: Diagnosis, axis: str) -> list[str]:
     where = "IN-SAMPLE: too little data to hold any out" if in_sample else f"on {dia.held_out}"
     lines = [f"Free-run simulation, {where}", *table(rows if extended else [rows[0], rows[1], rows[3]])]
     if not dia.loop_follows:
-        text = "The simulated controller is not the drive's (see above): these figures include its errors."
-        lines += _wrapped(text, "  ")
+        lines += _wrapped(said(not_the_loop_words(dia), axis), "  ")
     if extended and dia.before.rmse > 0.0:
         lines += _wrapped(said(fall_words(dia), axis), "  ")
         steps = [f"{words(f.effect)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
         if len(steps) > 1:
             lines += _wrapped(f"One after the other, each of what was left before it: {', '.join(steps)}.", "  ")
     return lines
+
+
+def not_the_loop_words(dia: Diagnosis) -> Text:
+    """What the free runs are, where the given controller is not the drive's."""
+    if dia.torque_logged:
+        return say(
+            "The given controller is not the drive's (see above): the logged {torque} drives these models, no loop is closed."
+        )
+    return Text("The simulated controller is not the drive's (see above): these figures include its errors.")
 
 
 def _force(dia: Diagnosis, axis: str) -> list[str]:
@@ -296,7 +304,8 @@ def _next(dia: Diagnosis, axis: str) -> list[str]:
     p = dia.next_experiment
     if p is None:
         return []
-    size = f"The command: {len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s."
+    driving = "command" if p.position_command is None else "position command"
+    size = f"The {driving}: {len(p.command)} samples of {1e3 * p.dt:.4g} ms, {len(p.command) * p.dt:.3g} s."
     return ["Next experiment", *_wrapped(said(next_words(dia, p), axis), "  "), f"  {size}"]
 
 

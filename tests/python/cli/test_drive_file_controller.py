@@ -52,6 +52,34 @@ CASES: dict[str, tuple[str, ga.PI | ga.Cascade]] = {
         ga.Cascade(SINAMICS, position=ga.P(25.0)),
     ),
     "delay": ("[controller]\nkp = 0.02\nki = 2\ndelay = 60e-6\n", ga.Cascade(SINAMICS, delay=60e-6)),
+    "unknown": (
+        '[controller]\nkp = "unknown"\nki = "unknown"\nposition_gain = "unknown"\nvelocity_feedforward = "unknown"\n'
+        'torque_filters = [{ kind = "low pass", time_constant = "unknown" }]\n',
+        ga.Cascade(
+            ga.PI(None, None), position=ga.P(None), velocity_feedforward=None, torque_filters=(ga.LowPass(time_constant=None),)
+        ),
+    ),
+    "a cascade in drive units": (
+        'torque_constant = 0.5\nrated_torque = 2.0\n[controller]\nkp = "0.04 A s/rad"\ntn = "10 ms"\ntorque_limit = "150 %"\n'
+        'period = "125 us"\nposition_gain = "1.5 1000/min"\nposition_period = "1 ms"\nvelocity_feedforward = "100 %"\n'
+        'torque_filters = [{ kind = "low pass", time_constant = "0.4 ms" }]\n',
+        ga.Cascade(
+            ga.PI(0.02, 2.0, torque_limit=3.0),
+            period=125e-6,
+            position=ga.P(25.0),
+            position_period=1e-3,
+            velocity_feedforward=1.0,
+            torque_filters=(ga.LowPass(4e-4),),
+        ),
+    ),
+    "a bandwidth and an inertia": (
+        '[controller]\nkp = "200 1/s"\ntotal_inertia = "1 kg cm^2"\ntn = 0.01\n',
+        ga.PI(0.02, 2.0),
+    ),
+    "percent of the rated torque per rpm": (
+        'rated_torque = 3.0\n[controller]\nkp = "0.5 %/rpm"\nki = "0.01 N·m/rad"\n',
+        ga.PI(0.005 * 3.0 / (2 * np.pi / 60), 0.01),
+    ),
 }
 
 
@@ -80,6 +108,17 @@ WRONG = {
     "filter": ('kp = 1\nki = 1\ntorque_filters = [{ kind = "low pas" }]', 'is a "low pass" or a "notch"'),
     "no list": ("kp = 1\nki = 1\ntorque_filters = 3", "give a list of filters"),
     "delay": ("kp = 1\nki = 1\ndelay = -1", "delay is -1: give seconds, from 0 to 1"),
+    "unit": ('kp = "0.12 A s/rd"\nki = 1', "'A s/rd' is none of its units (did you mean 'A s/rad'?)"),
+    "unit of another": ('kp = 1\nki = 1\ntorque_limit = "3 Nm s"', "give one of N m, A, mA"),
+    "no torque constant": ('kp = "0.12 A s/rad"\nki = 1', "which needs torque_constant: give it above the first section"),
+    "no inertia": ('kp = "200 1/s"\nki = 1', "which needs total_inertia: give it in [controller]"),
+    "unkown": ('kp = "unkown"\nki = 1', "did you mean 'unknown'?"),
+    "no number": ('kp = "much"\nki = 1', "a number with its unit (N m s/rad, A s/rad, mA s/rad, % s/rad"),
+    "a limit is known": ('kp = 1\nki = 1\ntorque_limit = "unknown"', "torque_limit is 'unknown': give one number"),
+    "ki and tn": ('kp = 1\nki = 1\ntn = "10 ms"', "the controller has tn and ki"),
+    "tn alone": ('kp = "unknown"\ntn = "10 ms"', "tn is given without kp"),
+    "no time": ("kp = 1\ntn = 0", "tn is 0.0: give a time > 0"),
+    "typing error": ("kp = 1\nki = 1\nposition_gian = 3", "did you mean 'position_gain'?"),
     "rule": ('kp = 1\nki = 1\nrule = "backwards"', "did you mean 'backward'"),
 }
 

@@ -15,6 +15,7 @@ from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.controller.slow_forms import limited
 from gaident.diagnosis.explain.alternatives import alternatives_of
+from gaident.identification.logged_torque import not_followed
 from referee_logs import GIVEN, KI, KP, NOTCH, T, command, dip, log, low, slower
 
 
@@ -176,8 +177,9 @@ def test_a_form_is_found_although_an_unknown_limit_acts(form: str) -> None:
 
 
 def test_a_slow_log_shows_the_rule_of_integration() -> None:
-    loop = loop_of([slower(noise=0.002, rule="backward")], ga.Cascade(GIVEN, T))
-    assert [f.effect for f in loop.findings] == ["integration_rule"] and loop.follows
+    rec = slower(noise=0.002, rule="backward")
+    loop = loop_of([rec], ga.Cascade(GIVEN, T))
+    assert [f.effect for f in loop.findings] == ["integration_rule"] and not not_followed([rec], loop.controller)
     assert loop_of([slower(noise=0.002)], ga.Cascade(GIVEN, T)).findings == ()
 
 
@@ -188,7 +190,7 @@ def test_a_rule_of_integration_is_found_before_gains_that_differ_by_little() -> 
 
 def test_a_controller_that_is_not_the_drives_is_a_rival_of_mechanics() -> None:
     rec = slower(weight=0.5, torque_filters=[low(1e-3), dip()], command_filters=[low(3e-3)], torque_limit=0.4, windup="hold")
-    assert not loop_of([rec], ga.Cascade(GIVEN, T)).follows
+    assert not_followed([rec], loop_of([rec], ga.Cascade(GIVEN, T)).controller)
     assert alternatives_of("extra_resonance", [], [], False, None, True) == []
     assert "torque_filter" in alternatives_of("extra_resonance", [], [], False, None, False)
     assert alternatives_of("coulomb_friction", [], [], True, None, False) == []  # the records show its jump

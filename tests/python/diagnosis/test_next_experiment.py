@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +11,11 @@ import pytest
 import gaident as ga
 from drive_cases import Truth, random_case
 from drive_rig import rig, skip_without_library
+from gaident.cli import main
 from gaident.diagnosis.library.equivalences import EQUIVALENT
 from gaident.policy.table import POLICY
+from gaident.results.experiment import Proposal
+from gaident.show.report.command import proposal_csv
 
 skip_without_library()
 
@@ -67,3 +71,58 @@ def test_without_a_controller_there_is_no_command_to_propose() -> None:
     assert statistical(dia) and dia.next_experiment is None
     (note,) = [note for note in dia.notes if "give the controller, and a log" in note]
     assert " and " in note and " apart: " in note and "a log with the velocity command" in note
+
+
+def one_way(controller: ga.Cascade) -> ga.Record:
+    """Runs in one direction: friction and load cannot be told apart. 0.02 rad/s of noise on the velocity."""
+    n, dt = 700, 1e-3
+    speed = np.convolve(np.repeat([0.0, 10.0, 25.0, 5.0, 40.0, 15.0, 30.0], 100), np.full(15, 1 / 15), "same")
+    path = dt * (np.cumsum(speed) - speed)
+    placed = controller.position is not None
+    asked = {"position_command": path} if placed else {"command": speed}
+    drive = ga.OneMass(J=4e-4, D=2e-3).model().with_effect("coulomb_friction", torque=0.15)
+    done = ga.run(drive, ga.Record(dt, velocity=np.zeros(n), **asked), controller)
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * dt * (done.velocity[1:] + done.velocity[:-1]))])
+    noise = 0.02 * np.random.default_rng(0).standard_normal(n)
+    position = angle if placed else None
+    return ga.Record(dt, velocity=done.velocity + noise, torque=done.torque, position=position, **asked)
+
+
+@pytest.mark.parametrize("period", [1e-3, 0.25e-3])
+@pytest.mark.parametrize("placed", [True, False])
+def test_the_command_is_one_that_the_loop_takes(placed: bool, period: float) -> None:
+    """A path for a position loop, and never more torque than the record or the controller's limit shows to be there."""
+    around = {"position": ga.P(30.0), "velocity_feedforward": 1.0, "acceleration_feedforward": 4e-4} if placed else {}
+    filters = (ga.LowPass(1e-3),)
+    controller = ga.Cascade(ga.PI(0.03, 1.0, torque_limit=1.0), period, torque_filters=filters, **around)  # type: ignore[arg-type]
+    dia = ga.diagnose(one_way(controller), controller)
+    proposal = dia.next_experiment
+    assert proposal is not None and not any("Without a controller" in note for note in dia.notes)
+    still = np.zeros(len(proposal.command))
+    if placed:
+        assert proposal.position_command is not None
+        np.testing.assert_allclose(np.diff(proposal.position_command), proposal.dt * proposal.command[:-1], atol=1e-9)
+        asked = ga.Record(proposal.dt, velocity=still, position_command=proposal.position_command)
+    else:
+        assert proposal.position_command is None
+        asked = ga.Record(proposal.dt, velocity=still, command=proposal.command)
+    torque = ga.run(dia.model, asked, controller.with_limits(None, None)).torque
+    assert np.abs(torque).max() <= 1.0
+    assert ("The position command:" in dia.summary()) == placed
+    assert type(proposal).from_dict(proposal.to_dict()) == proposal
+
+
+def test_a_proposed_path_is_read_and_simulated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = np.sin(np.linspace(0.0, 6.0, 300))
+    proposal = Proposal(np.gradient(path, 1e-3), 1e-3, ("load_torque",), 20.0, "why", path)
+    Path("next.csv").write_text(proposal_csv(proposal))
+    rec = ga.read("next.csv", measured=False)
+    assert rec.position_command is not None and rec.command is None
+    np.testing.assert_allclose(rec.position_command, path, atol=1e-8)
+    Path("model.json").write_text('{"structure": "one mass", "J": 4e-4, "D": 2e-3}')
+    Path("drive.toml").write_text(
+        '[columns]\nposition_command = "x_soll"\nposition = "x"\n[controller]\nkp = 0.03\nki = 1.0\nposition_gain = 30\n'
+    )
+    assert main(["simulate", "model.json", "next.csv", "--drive", "drive.toml", "--out", "made.csv"]) == 0
+    assert ga.columns("made.csv").columns[0].samples == 300

@@ -192,6 +192,9 @@ def test_an_error_that_grows_is_said_to_and_not_to_be_compared() -> None:
     result.loop_follows = False
     text = flat(summary(result))
     assert "not valid, the simulated controller is not the drive's." in text
+    assert "(see above): the logged torque drives these models, no loop is closed." in text
+    result.torque_logged = False
+    text = flat(summary(result))
     assert "The simulated controller is not the drive's (see above): these figures include its errors." in text
 
 

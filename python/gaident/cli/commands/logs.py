@@ -50,9 +50,10 @@ def init_command(args: argparse.Namespace) -> None:
         })  # fmt: skip
         return
     print(f"written: {target}")
+    width = 1 + max(map(len, found.channels), default=0)
     for channel, name in found.channels.items():
         kind = f" ({found.torque_is})" if channel == "torque" and found.torque_is is not None else ""
-        print(f"  {channel.ljust(9)}{printable(name)}{kind}")
+        print(f"  {channel.ljust(width)}{printable(name)}{kind}")
     if found.fill_in:
         print("to be filled in, marked FILL IN (write the value, remove the # before it):")
         for line in found.fill_in:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from gaident.data.formats.dialect import Dialect, parse_number, split
 from gaident.data.formats.text import Line
+from gaident.data.formats.time_names import NO_NAME
 from gaident.data.formats.units import is_any_unit, is_unit
 
 __all__ = ["COMMENT", "Header", "Heading", "find_header"]
@@ -17,7 +18,10 @@ COMMENT = re.compile(r"\s*(#|//|%)")
 """How a comment line starts."""
 
 _BRACKETS = re.compile(r"(.*\S)\s*[\[(<{]([^\])>}]+)[\])>}]")
+_NOTED = re.compile(r"(.*\S)\s*\[([^\]]+)\]\s*\S.*")  # n_ist [1/min] (smoothed)
 _AFTER = re.compile(r"(.*\S)\s+(?:/|in)\s+(\S.*)")
+_PLAIN = re.compile(r"(.*[^\s_])[\s_]+(rpm|nm|rad/s|deg/s|1/min|r/min|u/min|min-1|m/s|mm/s|m/min|mm/min)", re.IGNORECASE)
+"""A unit behind a blank or underline, of those that are no word beside: speed_rpm, torque_Nm."""
 _ENCLOSED = re.compile(r"[\[(<{](.*)[\])>}]")
 
 
@@ -141,8 +145,10 @@ def _has_number(cells: list[str], dialect: Dialect) -> bool:
 
 
 def _is_unit_row(cells: list[str], above: list[str]) -> bool:
-    """Every cell is a unit below something that is none."""
+    """Every cell is a unit below something that is none; the first, of a time, may stand below no name (EPOS Studio)."""
     filled = [(cell, over) for cell, over in zip(cells, above, strict=True) if cell]
+    if filled and not above[0] and is_unit(cells[0], "time"):
+        filled = filled[1:]
     if not filled or not all(over for _, over in filled) or all(is_unit(over) for _, over in filled):
         return False
     return all(is_any_unit(cell) or _ENCLOSED.fullmatch(cell) for cell, _ in filled)
@@ -156,6 +162,8 @@ def _headings(names: list[str], above: list[str] | None, below: list[str] | None
         # One cell of the row of names may be the unit of a name above it: `Time` over `ms`.
         if over and is_unit(cell) and not is_unit(over):
             cell, over, unit = over, "", unit or _bare_unit(cell)
+        if k == 0 and not cell and unit is not None and is_unit(unit, "time"):
+            cell = NO_NAME
         name, inline = _split_unit(cell)
         others = {name, over, _split_unit(over)[0]} - {"", cell}
         found.append(Heading(cell, tuple(sorted(others)), unit or inline))
@@ -186,12 +194,12 @@ def _split_unit(cell: str) -> tuple[str, str | None]:
     Square brackets always hold a unit, unless a number (`w[0]`); what else is enclosed counts if it is a
     known unit.
     """
-    for pattern in (_BRACKETS, _AFTER):
+    for pattern in (_BRACKETS, _NOTED, _AFTER, _PLAIN):
         match = pattern.fullmatch(cell)
         if match is None:
             continue
         name, unit = match[1].strip(), match[2].strip()
-        square = cell.endswith("]") and not unit.lstrip("+-").isdigit()
+        square = pattern is _BRACKETS and cell.endswith("]") and not unit.lstrip("+-").isdigit()
         if is_any_unit(unit) or square:
             return name, _bare_unit(unit)
     return cell, None

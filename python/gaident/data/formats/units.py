@@ -33,7 +33,9 @@ class _Unit:
 # First spelling of each row is what messages list.
 _VELOCITY: dict[tuple[str, ...], _Unit] = {
     ("rad/s", "rad/sec", "rad s-1", "rad s^-1"): _Unit(1.0),
-    ("rpm", "1/min", "r/min", "rev/min", "u/min", "min-1", "min^-1", "min⁻¹", "turns/min"): _Unit(_TURN / 60.0),
+    ("rpm", "1/min", "r/min", "rev/min", "u/min", "min-1", "min^-1", "min⁻¹", "turns/min", "tr/min", "giri/min", "upm"): _Unit(
+        _TURN / 60.0
+    ),
     ("rps", "rev/s", "turn/s", "turns/s"): _Unit(_TURN),
     ("deg/s", "°/s", "deg/sec", "degree/s", "degrees/s"): _Unit(_TURN / 360.0),
     ("counts/s", "count/s", "cnt/s", "inc/s", "pulses/s", "ticks/s"): _Unit(_TURN, _COUNTS, divide=True),
@@ -59,7 +61,8 @@ _TORQUE: dict[tuple[str, ...], _Unit] = {
     ("N", "newton"): _Unit(1.0),
     ("mN",): _Unit(1e-3),
     ("kN",): _Unit(1e3),
-    ("%", "percent"): _Unit(0.01, _RATED),
+    ("%", "percent", "% rated", "% of rated", "% of rated torque"): _Unit(0.01, _RATED),
+    ("‰", "per mille", "0.1 %", "promille"): _Unit(1e-3, _RATED),
     ("A", "amp", "ampere", "arms"): _Unit(1.0, _AMPERE),
     ("mA",): _Unit(1e-3, _AMPERE),
     ("V", "volt"): _Unit(1.0, _VOLT),
@@ -146,9 +149,9 @@ def known_units(quantity: str) -> tuple[str, ...]:
     return tuple(names[0] for names in _TABLES[quantity])
 
 
-def is_unit(text: str) -> bool:
-    """Whether `text` is the spelling of a unit from the table."""
-    return _spelling(text) in _OURS
+def is_unit(text: str, quantity: str | None = None) -> bool:
+    """Whether `text` is the spelling of a unit from the table; quantity: of that one alone."""
+    return _spelling(text) in (_OURS if quantity is None else _UNITS[quantity])
 
 
 def is_any_unit(text: str) -> bool:

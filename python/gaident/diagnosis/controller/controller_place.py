@@ -170,7 +170,9 @@ def controller_findings(
     effect = term.name
     n, before = len(plain), float(plain @ plain)
     left = data.replayed_error({term: np.array([value])})
-    if cost < POLICY.replay_left * before or cost < POLICY.replay_rms**2 * floor or white_noise(left, logged):
+    std = _std(data, term, value, cost)
+    better = cost < POLICY.better_reason**2 * before and np.isfinite(std)  # a limit that cuts nothing explains nothing
+    if cost < POLICY.replay_left * before or (better and (cost < POLICY.replay_rms**2 * floor or white_noise(left, logged))):
         parameter = next(r for r in table() if r.name == effect).parameters[0]
         name, unit = parameter.name, parameter.unit
         text = say(
@@ -183,7 +185,7 @@ def controller_findings(
             effect.replace("_", " "),
             np.sqrt(cost / n),
         )
-        finding = _finding(effect, name, Estimate(value, _std(data, term, value, cost), unit), before, cost, floor, n, text)
+        finding = _finding(effect, name, Estimate(value, std, unit), before, cost, floor, n, text)
         at = AtController(_decided(), {effect: {name: value}})
         limits = controller.limits
         if effect == OF_SETTING["integrator_limit"]:

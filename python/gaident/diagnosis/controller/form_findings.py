@@ -14,7 +14,6 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.replay import replay
-from gaident.diagnosis.controller.slow_forms import run_error
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.identification.controller_numbers import Numbers, with_estimates
 from gaident.models.drive_torque import driven_by
@@ -73,40 +72,16 @@ def driver_of(
 
 @dataclass(frozen=True)
 class Loop:
-    """The controller that a diagnosis works with: the given one, with its numbers, or the one that a slower log shows.
-
-    follows: False where a slower log's torque is not what it makes, so that the simulated loop is not the drive's.
-    """
+    """The controller that a diagnosis works with: the given one, with its numbers, or the one that a slower log shows."""
 
     controller: Controller | None
     numbers: Numbers
     findings: tuple[Finding, ...] = ()
     notes: tuple[Text, ...] = ()
     estimates: Mapping[str, Estimate] = field(default_factory=dict)
-    follows: bool = True
 
 
 def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
-    """The controller in the form that the logged torque shows, and whether the torque follows from it."""
-    loop = _shown_loop(records, given)
-    cascade, torques = loop.controller, [r.torque for r in records if r.torque is not None]
-    if not isinstance(cascade, Cascade) or any(cascade.log_every(r.dt) == 1 or cascade.command_of(r) is None for r in records):
-        return loop
-    if len(torques) < len(records):
-        return loop
-    size = float(np.sqrt(np.mean(np.concatenate(torques) ** 2)))
-    off = run_error(records, cascade)
-    if not off > POLICY.other_loop * size:
-        return loop
-    text = (
-        "The logged {torque} does not follow from command and velocity through this controller (rms {:.2g} of {:.2g} {N m}), and "
-        "no other form of it explains that: the simulated loop is not the drive's. What is found of the mechanics may be the "
-        "controller's; give all of the controller, or log every sample of it."
-    )
-    return replace(loop, notes=(*loop.notes, say(text, off, size)), follows=False)
-
-
-def _shown_loop(records: Sequence[Record], given: Controller | None) -> Loop:
     """The controller with estimates for what is None and, where a log has fewer lines than a bare PI in a Cascade has samples,
     in the form that the logged torque shows."""
     numbers = with_estimates(records, given)

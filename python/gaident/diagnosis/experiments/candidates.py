@@ -13,7 +13,7 @@ from gaident.diagnosis.records.folded import FOLDED, folded
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.term import Term
 
-__all__ = ["IN_MOTION", "candidates"]
+__all__ = ["IN_MOTION", "candidates", "loop_notes"]
 
 IN_MOTION = say(
     "A record starts in motion, and the loop of this controller is simulated from rest only: the logged {torque} drives the "
@@ -21,6 +21,18 @@ IN_MOTION = say(
     "that starts at rest."
 )
 """Of a log with fewer lines than the controller samples."""
+NOT_THE_LOOP = say(
+    "So no loop is closed over this controller: the logged {torque}, taken straight from line to line, drives the models, and "
+    "the verdict rests on that. Effects inside the controller are not looked for."
+)
+"""The same of a log whose torque does not follow from the controller."""
+
+
+def loop_notes(data: DataSet) -> list[Text]:
+    """Why no loop is closed for records with fewer lines than their controller samples; empty where it is."""
+    if not data.slower:
+        return []
+    return [NOT_THE_LOOP] if not data.loop_follows else [IN_MOTION] * any(data.moving)
 
 
 def candidates(
@@ -38,6 +50,8 @@ def candidates(
         why = {name: reason for name, reason in why.items() if name not in at.decided}
     elif data.slower and not data.loopable:
         still = Text("a record starts in motion, and the loop of this controller is simulated from rest only")
+        if not data.loop_follows:
+            still = say("the logged {torque} does not follow from this controller, so that no loop is simulated")
         why |= dict.fromkeys(inside, still)
     out = {*why, *at.decided, *decided_by_the_angle(clean), *(inside if data.loop is None else ())}
     return [t for t in LIBRARY.values() if t.name not in out], why

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from gaident.axis import Text, checked_axis, joined, say
 from gaident.checks import real_number
+from gaident.control.filtering import rate_limited
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.diagnosis.experiments.commands import largest_jump
@@ -44,18 +45,36 @@ LEAST_SAMPLES = 400  # no decision: that the shape of the command needs
 
 @dataclass(frozen=True, eq=False)
 class MenuItem:
-    """One experiment of the menu: name, command [rad/s] (n,), the effects it is good at, why: it goes on from the name."""
+    """One experiment of the menu: name, command [rad/s] (n,), the effects it is good at, why: it goes on from the name.
+
+    position_command: the path [rad] (n,), where a position drives the loop.
+    """
 
     name: str
     command: Vector
     dt: float
     separates: tuple[str, ...]
     reason: Text
+    position_command: Vector | None = None
+
+    def scaled(self, factor: float) -> MenuItem:
+        """The same, so many times as large."""
+        path = None if self.position_command is None else factor * self.position_command
+        return replace(self, command=factor * self.command, position_command=path)
+
+    def along_a_path(self, slope: float) -> MenuItem:
+        """The same for a loop that a position drives: its velocity within a slope [rad/s^2], and the path that this makes.
+
+        x(n) = dt sum_(k < n) v(k)
+        """
+        command = rate_limited(self.command, slope, self.dt, 0.0)
+        path = self.dt * (np.cumsum(command) - command)
+        return replace(self, command=command, position_command=path)
 
     def proposal(self, separates: Sequence[str], margin: float) -> Proposal:
         """This item as a proposal for the rivals `separates`."""
         reason = say("{}: {}", self.name.capitalize(), self.reason)
-        return Proposal(self.command, self.dt, tuple(separates), margin, reason)
+        return Proposal(self.command, self.dt, tuple(separates), margin, reason, self.position_command)
 
 
 def first_experiment(

@@ -9,6 +9,9 @@ v whitened by the noise filter of the diagnosed record, V and N of its final fit
 directions, as nobody knows which is true; where B contains A only B is simulated, as it can follow anything that A does. The
 command's T is that of its worst pair. Without the fit of the rival every experiment would look good (T-optimal design, Atkinson
 and Fedorov).
+
+A loop that a position drives gets the path that a command makes. Under what is no bare PI every command is simulated first, and
+made smaller until it asks for no more torque than there is.
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, say
-from gaident.control.pi import PI
+from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.data.torque_kind import COMMANDED, MEASURED
 from gaident.diagnosis.experiments.first_experiment import MenuItem, candidate_commands
@@ -34,6 +37,7 @@ from gaident.estimation.noise_model import NoiseFilter
 from gaident.estimation.objective import Fit, Hypothesis, Objective
 from gaident.estimation.prediction import ClosedLoop, OpenLoop
 from gaident.estimation.projection import WORST, project_out
+from gaident.models.drive_torque import driven_by
 from gaident.models.simulate import run
 from gaident.policy.table import POLICY
 from gaident.results.experiment import Limits, Proposal
@@ -42,6 +46,10 @@ from gaident.results.finding import Finding
 __all__ = ["propose"]
 
 Vector = NDArray[np.float64]
+
+TRIES = 4  # no decision: work; how often a command is made smaller
+ROOM = 0.9  # no decision: of the torque, what a smaller command is made for
+RAMP = 0.6  # no decision: of the torque, what the ramps of a path ask for
 
 
 def _listed(effects: Sequence[str]) -> str:
@@ -54,7 +62,7 @@ def _listed(effects: Sequence[str]) -> str:
 class _Bench:
     """What a proposed command is tried on."""
 
-    controller: PI
+    controller: Controller
     noise: NoiseFilter
     variance: float  # of the whitened noise
     torque_is: str | None  # "commanded" or "measured", as in the diagnosed records; None where they log none
@@ -65,13 +73,36 @@ class _Bench:
         model = fit.parameters.model(fit.x)
         for name, values in self.elsewhere.items():
             model = model.with_effect(name, **values)
-        command = Record(item.dt, command=item.command, velocity=np.zeros(len(item.command)))
+        asked = self._asked(item)
         with np.errstate(over="ignore", invalid="ignore"):
-            done = run(model, command, self.controller)
+            done = run(model, asked, self.controller)
         if not (np.all(np.isfinite(done.velocity)) and np.all(np.isfinite(done.torque))):
             return None
-        made = Record(item.dt, command=item.command, velocity=done.velocity)
-        return made if self.torque_is is None else made.with_channels(torque=done.torque, torque_is=self.torque_is)
+        made = asked.with_channels(velocity=done.velocity)
+        if self.torque_is is not None:
+            made = made.with_channels(torque=done.torque, torque_is=self.torque_is)
+        # The torque behind a known delay is what drives a model, as it was in the diagnosed records.
+        return made if self.controller.one_equation else driven_by(made.with_channels(torque=done.torque), self.controller)
+
+    def _asked(self, item: MenuItem) -> Record:
+        """A record of the signal that drives the loop, at rest."""
+        still = np.zeros(len(item.command))
+        if item.position_command is None:
+            return Record(item.dt, command=item.command, velocity=still)
+        return Record(item.dt, position_command=item.position_command, velocity=still)
+
+    def within(self, item: MenuItem, fit: Fit, torque: float) -> MenuItem | None:
+        """The item, made smaller until the loop asks for no more than this torque [N m]; None where none is small enough."""
+        model, free = fit.parameters.model(fit.x), self.controller.with_limits(None, None)
+        for _ in range(TRIES):
+            with np.errstate(over="ignore", invalid="ignore"):
+                most = float(np.abs(run(model, self._asked(item), free).torque).max())
+            if most <= torque:
+                return item
+            if not np.isfinite(most):
+                return None
+            item = item.scaled(ROOM * torque / most)
+        return None
 
     def left(self, record: Record, rival: Fit, refitted: bool) -> float:
         """T of the rival, fitted to the other explanation's record (or its linearised fit, which costs one step)."""
@@ -112,15 +143,19 @@ def propose(
     if not pairs:
         return None, notes
     names = tuple(dict.fromkeys(name for effect, rival in pairs for name in (effect, rival.effect)))
-    if data.pi is None or data.command is None:
+    controller = data.controller
+    if controller is None or (data.pi is not None and data.command is None):
         text = (
             "Without a controller no command can be worked out that tells {} apart: give the controller, and a log with the "
             "velocity command."
         )
         return None, [*notes, say(text, _listed(names))]
     kind = None if not data.torque_logged else MEASURED if data.torque_measured else COMMANDED
-    bench = _Bench(data.pi, final.noise, max(final.cost / count, 1e-300), kind, elsewhere)
+    bench = _Bench(controller, final.noise, max(final.cost / count, 1e-300), kind, elsewhere)
     items = menu(data, final)
+    if data.pi is None:
+        torque = allowed(data).torque if items else 0.0
+        items = [found for item in items if (found := bench.within(item, final, torque)) is not None]
     # A generalisation that was fitted as its neutral case is the same drive: such a pair no command separates.
     table = [
         (pair, trial, [_tried(bench, item, trial, False) for item in items]) for pair in pairs for trial in _trials([pair], final)
@@ -158,14 +193,24 @@ def at_rest(fit: Fit, data: DataSet) -> tuple[Hypothesis, Vector]:
 
 def menu(data: DataSet, fit: Fit) -> list[MenuItem]:
     """The menu within the limits that the records show, for the mechanism that was found."""
-    dt = data.dt
+    assert data.controller is not None
+    inertia = inertia_of(fit)
     try:
-        limits = Limits.of(data.records, data.pi, data.axis)
-        limits = replace(limits, duration=max(limits.duration, POLICY.proposed_samples * dt))
-        assert data.pi is not None
-        return candidate_commands(dt, limits, inertia_of(fit), data.pi.kp or None)
+        limits = allowed(data)
+        items = candidate_commands(data.dt, limits, inertia, data.controller.gains.kp or None)
     except GaidentError:
         return []  # nothing moves, or nothing may
+    if data.controller.driven_by == "position_command":
+        return [item.along_a_path(RAMP * limits.torque / inertia) for item in items]
+    return items
+
+
+def allowed(data: DataSet) -> Limits:
+    """What the records show to be allowed; a torque limit of the controller counts before their highest torque."""
+    limits = Limits.of(data.driven if data.pi is None else data.records, data.pi, data.axis)
+    most = data.controller.limits[0] if data.controller is not None else np.inf
+    torque = most if np.isfinite(most) else limits.torque
+    return replace(limits, torque=torque, duration=max(limits.duration, POLICY.proposed_samples * data.dt))
 
 
 def inertia_of(fit: Fit) -> float:

@@ -15,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 
 from gaident.axis import TURN, Text, say
+from gaident.data.signals.lattice import encoder_lines
 from gaident.diagnosis.library.terms import LIBRARY
-from gaident.diagnosis.records.lattice import encoder_lines
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.mechanisms import one_mass, reduced
 from gaident.estimation.noise_model import WHITE

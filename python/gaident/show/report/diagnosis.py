@@ -22,6 +22,7 @@ from gaident.show.diagnosis_summary import (
     mechanical_name,
     moved_words,
     next_words,
+    not_the_loop_words,
     parameter_row,
     words,
 )
@@ -217,7 +218,7 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
         parts.append(tag("p", "Free-run simulation on ", dia.held_out, "."))
     parts.append(table(("", f"rmse [{v}]", "fit [%]"), [rows]))
     if not dia.loop_follows:
-        parts.append(box(tag("p", "The simulated controller is not the drive's: these figures include its errors."), kind="warn"))
+        parts.append(box(tag("p", typeset(said(not_the_loop_words(dia), axis))), kind="warn"))
     if extended and dia.before.rmse > 0.0:
         parts.append(tag("p", typeset(said(fall_words(dia), axis))))
     parts += _force(dia, axis)

@@ -1,0 +1,123 @@
+"""Numbers of a controller as a drive shows them, `"0.12 A s/rad"`, `"10 ms"`, `"300 %"`, and the word for one that is not known.
+
+One table says for each key which units it may have, the factor to SI, and the constant of the axis that belongs to it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from gaident.checks import real_number
+from gaident.control.unknown import UNITS
+from gaident.control.words import UNKNOWN
+from gaident.errors import ControllerError, GaidentError, ReadError
+
+__all__ = ["INERTIA", "INTEGRAL_TIME", "number_or_unit", "si_number"]
+
+INTEGRAL_TIME, INERTIA = "tn", "total_inertia"
+"""Keys of the file that are no arguments of a controller: ki = kp/tn, and the inertia of a gain in 1/s."""
+
+Factor = tuple[float, str]  # to SI, and the constant that it is multiplied by; "": none
+_LISTED = 10  # no decision: how many units a message names
+_RPM = math.tau / 60.0  # no decision: rad/s
+_CURRENTS: dict[str, Factor] = {"A": (1.0, "torque_constant"), "mA": (1e-3, "torque_constant")}
+_SHARES_OF_RATED: dict[str, Factor] = {"%": (1e-2, "rated_torque"), "‰": (1e-3, "rated_torque")}
+_TORQUES: dict[str, Factor] = {"N m": (1.0, ""), **_CURRENTS, **_SHARES_OF_RATED, "mN m": (1e-3, "")}
+_FORCES: dict[str, Factor] = {"N": (1.0, ""), **_CURRENTS, **_SHARES_OF_RATED}
+_TIMES: dict[str, Factor] = {"s": (1.0, ""), "ms": (1e-3, ""), "us": (1e-6, "")}
+_SHARES: dict[str, Factor] = {"1": (1.0, ""), "%": (1e-2, "")}
+_PER_SPEED = {" s/rad": 1.0, "/rpm": 1.0 / _RPM, "/(rad/s)": 1.0, "/(1/min)": 1.0 / _RPM}
+_PER_LINEAR_SPEED = {" s/m": 1.0, "/(m/s)": 1.0}
+
+
+def _per(numerators: Mapping[str, Factor], denominators: Mapping[str, float]) -> dict[str, Factor]:
+    """Each of these over each of those."""
+    return {one + over: (size * per, name) for over, per in denominators.items() for one, (size, name) in numerators.items()}
+
+
+_UNITS: dict[str, dict[str, Factor]] = {
+    "kp": {
+        **_per(_TORQUES, _PER_SPEED),
+        **_per(_FORCES, _PER_LINEAR_SPEED),
+        **{"1/s": (1.0, INERTIA), "rad/s": (1.0, INERTIA), "Hz": (math.tau, INERTIA)},
+    },
+    "ki": {**_per(_TORQUES, {"/rad": 1.0, "/(rad/s s)": 1.0, "/(rpm s)": 1.0 / _RPM}), **_per(_FORCES, {"/m": 1.0})},
+    INTEGRAL_TIME: _TIMES,
+    "command_weight": _SHARES,
+    **{key: {**_TORQUES, **_FORCES} for key in ("torque_limit", "integrator_limit", "friction_feedforward")},
+    **dict.fromkeys(("period", "position_period", "delay", "tracking_time", "time_constant"), _TIMES),
+    "position_gain": {
+        **{"1/s": (1.0, ""), "(rad/s)/rad": (1.0, ""), "1000/min": (1000.0 / 60.0, "")},
+        **{"(m/min)/mm": (1000.0 / 60.0, ""), "m/min/mm": (1000.0 / 60.0, "")},
+    },
+    "velocity_feedforward": _SHARES,
+    "acceleration_feedforward": {"kg m^2": (1.0, ""), "kg cm^2": (1e-4, ""), "kg": (1.0, "")},
+    "frequency": {"Hz": (1.0, ""), "rad/s": (1.0 / math.tau, "")},
+    INERTIA: {"kg m^2": (1.0, ""), "kg cm^2": (1e-4, ""), "kg": (1.0, "")},
+}
+_MAY_BE_UNKNOWN = frozenset({*UNITS, "position_gain"} - {"gain"})
+_NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
+
+
+def number_or_unit(value: object, name: str) -> float | str:
+    """A number, or text that `si_number` reads: what a drive file takes. Raises ReadError."""
+    if isinstance(value, str):
+        return _checked(value, name, ReadError)
+    return real_number(value, name, ReadError, "give one number, or a number with its unit in quotes")
+
+
+def si_number(value: Any, name: str, constants: Mapping[str, Any]) -> float | None:
+    """The number in SI of what stands below a key; None where it is not known.
+
+    constants: what of torque_constant [N m/A], rated_torque [N m] and total_inertia [kg m^2] is given. Raises ControllerError.
+    """
+    if not isinstance(value, str):
+        return real_number(value, name, ControllerError)
+    if _checked(value, name, ControllerError).strip() == UNKNOWN:
+        return None
+    number, unit = _parts(value)
+    size, constant = _units(name)[_spelling(unit)]
+    if constant and constants.get(constant) is None:
+        where = "in [controller]" if constant == INERTIA else "above the first section"
+        raise ControllerError(f"{name} is {value!r}, which needs {constant}: give it {where}")
+    return number * size * (float(constants[constant]) if constant else 1.0)
+
+
+def _checked(value: str, name: str, error: type[GaidentError]) -> str:
+    """The text, where it is a number with a unit of the key, or the word for one that is not known."""
+    if value.strip() == UNKNOWN and name in _MAY_BE_UNKNOWN:
+        return value
+    names = tuple(_UNITS.get(name, {}))
+    listed = ", ".join(names) if len(names) <= _LISTED else f"{', '.join(names[:_LISTED])}, ..."
+    word = f', or "{UNKNOWN}"' if name in _MAY_BE_UNKNOWN else ""
+    number, unit = _parts(value)
+    if math.isnan(number):
+        near = f" (did you mean {UNKNOWN!r}?)" if word and difflib.get_close_matches(value.strip().lower(), [UNKNOWN]) else ""
+        raise error(f"{name} is {value!r}{near}: give one number, a number with its unit ({listed}){word}")
+    if _spelling(unit) not in _units(name):
+        close = difflib.get_close_matches(_spelling(unit), _units(name), n=1)
+        near = next((f" (did you mean {known!r}?)" for known in _UNITS[name] if close and _spelling(known) == close[0]), "")
+        raise error(f"{name} is {value!r}: {unit!r} is none of its units{near}; give one of {listed}")
+    return value
+
+
+def _parts(text: str) -> tuple[float, str]:
+    """(number, unit); NaN where it begins with no number."""
+    found = _NUMBER.fullmatch(text.strip())
+    return (math.nan, "") if found is None or not found[2] else (float(found[1]), found[2])
+
+
+def _units(name: str) -> dict[str, Factor]:
+    return {_spelling(unit): factor for unit, factor in _UNITS.get(name, {}).items()}
+
+
+def _spelling(unit: str) -> str:
+    """One spelling of `N m s/rad`, `Nm s/rad`, `N·m·s/rad`, `N*m*s/rad`."""
+    plain = unit.replace("\N{MICRO SIGN}", "u").replace("²", "^2")
+    for mark in (" ", "*", "·", "⋅"):
+        plain = plain.replace(mark, "")
+    return plain.casefold()

@@ -1,0 +1,108 @@
+"""Which column is which channel, by headers as drives and tools write them; in doubt none, never another quantity."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from gaident.data.guess import guess_channels
+
+# Columns of a trace, the time aside -> what is taken for (command, velocity, torque, position, position_command).
+HEADERS: dict[str, tuple[str | None, ...]] = {
+    # German
+    "Drehzahlsollwert [1/min];Drehzahlistwert [1/min];Drehmomentsollwert [%]": ("c", "v", "t"),
+    "n_soll [1/min];n_ist [1/min] (geglättet);M_ist [%]": ("c", "v", "t"),
+    "Drehzahlsollwert [1/min]": ("c",),
+    "Lagesollwert;Lageistwert;Stromistwert": ("pc", "p", "t"),
+    "r62: Drehzahlsollwert nach Filter;r63: Drehzahlistwert geglättet;r80: Momentenistwert": ("c", "v", "t"),
+    "Solldrehzahl;Istdrehzahl;Sollmoment": ("c", "v", "t"),
+    "Geschwindigkeitssollwert;Geschwindigkeitsistwert;Kraftsollwert": ("c", "v", "t"),
+    "Drehzahl-/Geschwindigkeitsistwert Motor;Momenten-/Kraft-Sollwert (begrenzt)": ("v", "t"),
+    "S-0-0036 Drehzahl-Sollwert;S-0-0040 Drehzahl-Istwert;S-0-0084 Drehmoment-Istwert": ("c", "v", "t"),
+    "v_soll;v_ist;Schleppfehler;I_ist": ("c", "v", None, "t"),
+    # English
+    "r0062 Speed setpoint after filter;r0063 Speed actual value;r0080 Torque actual value": ("c", "v", "t"),
+    "S-0-0047 Position command value;S-0-0051 Position feedback value;S-0-0084 Torque feedback value": ("pc", "p", "t"),
+    "S-0-0036 Velocity command value;S-0-0040 Velocity feedback value": ("c", "v"),
+    "Motor speed;Speed command;Torque command": ("v", "c", "t"),
+    "Servo motor speed [r/min];Speed command [r/min];Torque [%];Droop pulses": ("v", "c", "t", None),
+    "Feedback speed [r/min];Reference speed [r/min];Torque reference [%]": ("v", "c", "t"),
+    "Velocity demand value;Velocity actual value averaged;Torque actual value averaged": ("c", "v", "t"),
+    "Position demand value [inc];Position actual value [inc];Current actual value": ("pc", "p", "t"),
+    "Target velocity;Actual velocity;Actual torque": ("c", "v", "t"),
+    "Act. Velocity;Ref. Velocity;Act. Current": ("v", "c", "t"),
+    "Velocity setpoint controller input (64 bit);Speed / velocity act. Value motor (32 bit);Following Error (64 bit)": (
+        *("c", "v"),
+        None,
+    ),
+    # names in programs
+    "Axis1.SetVelo;Axis1.ActVelo;Axis1.ActTorque": ("c", "v", "t"),
+    "fSetVelo;fActVelo;fActTorque": ("c", "v", "t"),
+    "lrSetVelocity;lrActVelocity;lrActTorque": ("c", "v", "t"),
+    "MC_Velocity.Setpoint;MC_Velocity.Actual": ("c", "v"),
+    "axis0.controller.vel_setpoint;axis0.encoder.vel_estimate;axis0.controller.torque_setpoint": ("c", "v", "t"),
+    "axis0.controller.input_vel;axis0.encoder.vel_estimate": (None, "v"),
+    "velocity_setpoint;velocity_estimate;Iq_measured": ("c", "v", "t"),
+    "joint.0.motor-pos-cmd;joint.0.motor-pos-fb;joint.0.torque": ("pc", "p", "t"),
+    "VelCmd;VelFbk;TrqCmd": ("c", "v", "t"),
+    "PosRef;PosFbk;IqRef": ("pc", "p", "t"),
+    "PCMD;PFB;VCMD;VFB;ICMD": ("pc", "p", "c", "v", "t"),
+    "speed_ref_rpm;speed_rpm;torque_Nm": ("c", "v", "t"),
+    "omega_ref;omega_m;T_e": ("c", "v", None),
+    "w_ref;w;M": ("c", "v", "t"),
+    "r;w;u": ("c", "v", "t"),
+    "q;qd;tau": ("p", "v", "t"),
+    # French, Italian, Spanish, romanised Japanese
+    "consigne de vitesse [tr/min];vitesse mesurée [tr/min];couple [Nm]": ("c", "v", "t"),
+    "velocità di riferimento;velocità attuale;coppia": ("c", "v", "t"),
+    "velocidad de consigna;velocidad real;par": ("c", "v", "t"),
+    "sokudo shirei;sokudo;toruku": ("c", "v", "t"),
+    # what is no channel, or open
+    "Lagesollwert;Drehzahlvorsteuerung;Stromistwert": ("pc", None, "t"),
+    "Iq setpoint;Speed feedforward;Actual speed": ("t", None, "v"),
+    "Speed 1;Speed 2;Torque": (None, None, "t"),
+    "Acceleration;Jerk;Temperature": (None, None, None),
+}
+CHANNELS = {"c": "command", "v": "velocity", "t": "torque", "p": "position", "pc": "position_command"}
+
+
+@pytest.mark.parametrize("header", HEADERS)
+def test_a_header_says_the_channels(header: str, tmp_path: Path) -> None:
+    names = header.split(";")
+    rng = np.random.default_rng(1)
+    rows = "\n".join(";".join(f"{x:.4f}" for x in (1e-3 * k, *rng.normal(size=len(names)))) for k in range(30))
+    (tmp_path / "log.csv").write_text(f"Time [s];{header}\n{rows}\n", encoding="utf-8")
+    found = guess_channels(ga.columns(tmp_path / "log.csv")).channels
+    expected = {CHANNELS[key]: name for key, name in zip(HEADERS[header], names, strict=True) if key is not None}
+    assert {channel: column.name for channel, column in found.items()} == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("n_ist [1/min] (geglättet)", "1/min"),
+        ("vitesse [tr/min]", "tr/min"),
+        ("speed_rpm", "rpm"),
+        ("torque_Nm", "Nm"),
+        ("Speed rad/s", "rad/s"),
+        ("Torque [% of rated torque]", "% of rated torque"),
+        ("M [‰]", "‰"),
+        ("turn count", None),
+        ("w_m", None),
+        ("axis[0]", None),
+    ],
+)
+def test_a_unit_in_the_name(name: str, unit: str | None, tmp_path: Path) -> None:
+    rows = "".join(f"{k};{np.sin(k):.4f}\n" for k in range(30))
+    (tmp_path / "log.csv").write_text(f"t;{name}\n{rows}", encoding="utf-8")
+    assert ga.columns(tmp_path / "log.csv").columns[1].unit == unit
+
+
+def test_per_mille_of_the_rated_torque(tmp_path: Path) -> None:
+    rows = "".join(f"{k};{k};{10 * k}\n" for k in range(30))
+    (tmp_path / "log.csv").write_text(f"t_ms;w_rpm;M [‰]\n{rows}", encoding="utf-8")
+    rec = ga.read(tmp_path / "log.csv", columns={"velocity": "w_rpm", "torque": "M [‰]"}, rated_torque=2.4)
+    assert rec.torque is not None and rec.torque[10] == pytest.approx(0.24)
