@@ -9,7 +9,7 @@ import gaident as ga
 from drive_rig import Noise, Plant, rig, skip_without_library
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.records.hygiene import unexplained
-from gaident.diagnosis.records.lattice import encoder_lines
+from gaident.data.signals.lattice import encoder_lines
 from gaident.estimation.mean_velocity import means, with_middles
 from gaident.models.drive_torque import late
 

@@ -165,7 +165,7 @@ def _offered(by_output: _Found, whitened: Fit) -> _Found:
 def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callable[[str], None]) -> _Found:
     """Step 2: the search under output errors.
 
-    The information is that of the errors which the best linear model or the regressed axis leaves, whichever leaves less.
+    The information is that of the errors which the best linear model leaves, or the regressed axis where that leaves less.
     """
     note("looking at the output errors")
     starts = output_error_bases(output.task, bases)
@@ -179,10 +179,13 @@ def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callab
     return _Found(space, base, base).of(final)
 
 
-def _informed(output: ByOutputErrors, *fits: Fit | None) -> Task:
-    """The task under output errors, with as many independent samples as the errors of the best of these fits hold."""
-    best = min((f for f in fits if f is not None), key=lambda f: f.cost)
-    return output.informed(effective_samples(output.objective.unwhitened_errors(best)))
+def _informed(output: ByOutputErrors, linear: Fit, axis: Fit | None) -> Task:
+    """The task under output errors, with as many independent samples as the errors of the linear model hold.
+
+    Or those of the regressed axis, where it leaves less: the errors of a better model are more independent.
+    """
+    fits = [f for f in (linear, axis) if f is not None and f.cost <= linear.cost]
+    return output.informed(max(effective_samples(output.objective.unwhitened_errors(f)) for f in fits))
 
 
 def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]:
