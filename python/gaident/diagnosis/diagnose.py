@@ -256,9 +256,11 @@ class _Work:
             if driver is None and self.data.torque_measured:
                 self.notes.append(hidden_by_torque_noise(floor))
             space = self.found.space
-            causes = [
-                e for e in self.final.effects if not only_describes(space, self.final, e, self.rivals[e][0], driver, self.left)
-            ]
+            causes = []
+            for e in self.final.effects:
+                of_class = bool(self._equivalent_here(e))
+                if not only_describes(space, self.final, e, self.rivals[e][0], driver, self.left, of_class):
+                    causes.append(e)
             estimates = estimates_of(self.under, self.estimate)
             causes = [e for e in causes if self._determined(e, estimates[e])]
             mechanics = mechanics_of(self.under, self.estimate)

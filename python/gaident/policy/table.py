@@ -124,7 +124,7 @@ class Policy:
     most_effects: int = gain(4, "1", "effects in one model at most", DRIVES)
     harm: float = gain(0.02, "1", "part of the held-out error that an effect may add before it is refused", REAL)
     fitted_share: float = gain(0.7, "1", "part of a record to which parameters are fitted where the rest is held out", REAL)
-    least_fitted: float = gain(0.25, "1", "the same at least, where the cut follows the path because the end hardly moves", LOOP)
+    least_fitted: float = gain(0.25, "1", "the same at least, where the cut follows the path because the end hardly moves", REAL)
     least_held: int = gain(600, "samples", "length of a record from which a part of it is held out", REAL)
     interval_level: float = gain(
         0.05, "probability", "outside the interval of a fall of the error: below 0 as a whole, it is harm", REAL
@@ -169,6 +169,7 @@ class Policy:
         "least part that a cause explains of what a free function does; drag by friction 0.87, a joint's friction 0.946",
         DRIVES,
     )
+    class_stands: float = cause(0.5, "1", "the same for effects that no record tells apart: they are no single name", DRIVES)
     jump_deviations: float = cause(
         4.0,
         "1",
