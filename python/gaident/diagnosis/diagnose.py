@@ -246,21 +246,15 @@ class _Work:
             self.notes += basis_of(self.found)
             gains = self._accepted_gains()
             driver = self.left.driver if self.adequate else self.left.strongest
-            after = gains.after
             adds_up = self.data.slower and not self.data.loopable  # what the torque lacks between the lines of the log
-            beyond = after.rmse / floor if (floor := gains.floor) > 0.0 else 0.0
+            beyond = gains.after.rmse / floor if (floor := gains.floor) > 0.0 else 0.0
             if driver is None and not adds_up and beyond > POLICY.free_run_ratio:
                 # A noise filter removes a slow misfit completely; the free run shows it.
                 driver = self.left.strongest or "time"
                 self.notes.append(far_off(beyond))
             if driver is None and self.data.torque_measured:
                 self.notes.append(hidden_by_torque_noise(floor))
-            space = self.found.space
-            causes = []
-            for e in self.final.effects:
-                of_class = bool(self._equivalent_here(e))
-                if not only_describes(space, self.final, e, self.rivals[e][0], driver, self.left, of_class):
-                    causes.append(e)
+            causes = [e for e in self.final.effects if not self._only_describes(e, driver)]
             estimates = estimates_of(self.under, self.estimate)
             causes = [e for e in causes if self._determined(e, estimates[e])]
             mechanics = mechanics_of(self.under, self.estimate)
@@ -272,7 +266,7 @@ class _Work:
                 self.notes += why
             instead = None if causes else by_whitened_errors(self.found, self._equivalent_here, self._say)
             if instead is None:
-                return _Judged(gains, driver, causes, estimates, offset_of(space, self.final), mechanics, model, check)
+                return _Judged(gains, driver, causes, estimates, offset_of(self.found.space, self.final), mechanics, model, check)
             self.notes = said
             self.take(instead)
 
@@ -384,6 +378,10 @@ class _Work:
         here = sorted(self._equivalent_here(effect))
         names = alternatives_of(effect, rivals, here, bool(shown), offset, not (self.data.slower and self.driving.in_doubt))
         return tuple(name for name in names if name not in self.not_testable)
+
+    def _only_describes(self, effect: str, driver: str | None) -> bool:
+        of_class = bool(self._equivalent_here(effect))
+        return only_describes(self.found.space, self.final, effect, self.rivals[effect][0], driver, self.left, of_class)
 
     def _equivalent_here(self, effect: str) -> set[str]:
         """What these records cannot tell from an effect, whatever their noise, for lack of reversals or of sizes of steps."""

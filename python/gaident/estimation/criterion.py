@@ -105,8 +105,8 @@ def effective_samples(*errors: Vector) -> float:
     if swinging > max(slow, SWINGS):
         lowest = sum(float(np.sum(np.abs(np.fft.rfft(e - mean)[1 : 1 + LOWEST]) ** 2)) for e in errors)
         spectral = lowest / (products[0] * sum(min(LOWEST, len(e) // 2) * len(e) for e in errors) / count)
-        memory = max(1.0 + 2.0 * swinging, spectral)
-    return float(np.clip(count / memory, 1.0, count))
+        memory = max(1.0 + 2.0 * swinging, spectral)  # no decision: as below
+    return float(np.clip(count / memory, 1.0, count))  # no decision: variances of means of correlated samples
 
 
 class Specification(NamedTuple):

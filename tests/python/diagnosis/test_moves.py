@@ -30,6 +30,7 @@ from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.term import Scales, Term
+from gaident.models.simulate_many import LoadedRecord
 from gaident.policy.table import POLICY, rows
 
 Vector = NDArray[np.float64]
@@ -131,7 +132,7 @@ def _no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("a move on the toy has asked the simulator")
 
     monkeypatch.setattr(prediction, "simulate_values", simulated)
-    monkeypatch.setattr(prediction.LoadedRecord, "velocities", simulated)
+    monkeypatch.setattr(LoadedRecord, "velocities", simulated)
     for module in (moves, model_space):
         monkeypatch.setattr(module, "LIBRARY", LIBRARY)
         monkeypatch.setattr(module, "equivalents", lambda effect: {"lag": ("seen",), "seen": ("lag",)}.get(effect, ()))

@@ -7,9 +7,9 @@ import pytest
 
 import gaident as ga
 from drive_rig import Noise, Plant, rig, skip_without_library
+from gaident.data.signals.lattice import encoder_lines
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.records.hygiene import unexplained
-from gaident.data.signals.lattice import encoder_lines
 from gaident.estimation.mean_velocity import means, with_middles
 from gaident.models.drive_torque import late
 

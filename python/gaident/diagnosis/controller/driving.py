@@ -12,7 +12,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
 from gaident.diagnosis.controller.form_findings import Loop, driver_of
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
-from gaident.diagnosis.controller.wrong_number import corrected
+from gaident.diagnosis.controller.wrong_number import by_a_limit, corrected
 from gaident.identification.logged_torque import not_followed
 from gaident.models.drive_torque import Driven
 from gaident.results.estimate import Estimate
@@ -27,6 +27,7 @@ class Driving:
 
     logged: the bare PI with the gains that the torques show. findings: of the controller's form. notes: what to keep in mind.
     doubts: notes on torques that do not follow from a controller that is no bare PI. numbers: those that were not given.
+    limited: whether a limit of the controller, which was not given either, makes the torques follow.
     """
 
     moved: Aligned
@@ -36,11 +37,12 @@ class Driving:
     notes: tuple[Text, ...] = ()
     doubts: tuple[Text, ...] = ()
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
+    limited: bool = False
 
     @property
     def in_doubt(self) -> bool:
-        """Whether the logged torque follows neither from the given controller nor from a form of it that was found."""
-        return bool(self.doubts) and not any(f.place == "controller" for f in self.findings)
+        """Whether the logged torque follows neither from the given controller nor from a form of it, nor from a limit more."""
+        return bool(self.doubts) and not self.limited and not any(f.place == "controller" for f in self.findings)
 
     @property
     def read(self) -> tuple[Record, ...]:
@@ -62,17 +64,14 @@ def driving_of(
     doubts = (*driven.doubts, *not_followed(whole, controller))
     moved = aligned(records, held, pi)
     form = None if moved.shifts else driver_of(records, held, pi, tuple(asked.estimates))
-    findings, numbers = asked.findings, asked.estimates
+    findings, numbers, limited = asked.findings, asked.estimates, False
     if form is None:
         notes = (*(asked.notes or asked.numbers.trusted().notes), *notes)
-        if (
-            doubts
-            and pi is None
-            and controller is not None
-            and not numbers
-            and (other := corrected(whole, controller)) is not None
-        ):
-            controller, numbers, notes, doubts = other.controller, other.estimates, (*notes, *doubts, other.note), ()
+        if doubts and pi is None and controller is not None and not numbers:
+            other = corrected(whole, controller)
+            limited = other is None and by_a_limit(whole, controller)
+            if other is not None:
+                controller, numbers, notes, doubts = other.controller, other.estimates, (*notes, *doubts, other.note), ()
     else:
         controller, pi, notes = form.controller, None, (*notes, *form.notes)
         findings, numbers = form.findings, form.estimates
@@ -82,4 +81,4 @@ def driving_of(
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
     used = controller if bare_pi(controller) is None else logged.controller
-    return Driving(moved, used, logged, findings, notes, doubts, numbers)
+    return Driving(moved, used, logged, findings, notes, doubts, numbers, limited)

@@ -22,7 +22,7 @@ IN_MOTION = say(
 )
 """Of a log with fewer lines than the controller samples."""
 NOT_THE_LOOP = say(
-    "So no loop is closed over this controller: the logged {torque}, taken straight from line to line, drives the models, and "
+    "So no loop is closed over this controller: the logged {torque}, put right at the lines of the log, drives the models, and "
     "the verdict rests on that. Effects inside the controller are not looked for."
 )
 """The same of a log whose torque does not follow from the controller."""

@@ -25,7 +25,7 @@ from gaident.diagnosis.selection.bases import ByOutputErrors, Task, linear_bases
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
-from gaident.diagnosis.selection.mechanisms import resonance
+from gaident.diagnosis.selection.mechanisms import resonance, swings
 from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.rivals import Replacement, rivals_of
@@ -165,7 +165,7 @@ def _offered(by_output: _Found, whitened: Fit) -> _Found:
 def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callable[[str], None]) -> _Found:
     """Step 2: the search under output errors.
 
-    The information is that of the errors which the best linear model leaves, or the regressed axis where that leaves less.
+    The information is that of the errors which the best linear model or the regressed axis leaves.
     """
     note("looking at the output errors")
     starts = output_error_bases(output.task, bases)
@@ -182,9 +182,12 @@ def _by_output_errors(output: ByOutputErrors, bases: Sequence[Fit], note: Callab
 def _informed(output: ByOutputErrors, linear: Fit, axis: Fit | None) -> Task:
     """The task under output errors, with as many independent samples as the errors of the linear model hold.
 
-    Or those of the regressed axis, where it leaves less: the errors of a better model are more independent.
+    Or those of the regressed axis, if they are more: the errors of a better model are more independent. But a rigid axis in the
+    place of a shaft that swings only leaves its ringing.
     """
-    fits = [f for f in (linear, axis) if f is not None and f.cost <= linear.cost]
+    fits = [linear]
+    if axis is not None and (axis.cost <= linear.cost or linear.parameters.masses == 1 or not swings(linear)):
+        fits.append(axis)
     return output.informed(max(effective_samples(output.objective.unwhitened_errors(f)) for f in fits))
 
 

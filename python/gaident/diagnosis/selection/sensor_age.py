@@ -44,16 +44,12 @@ def as_old_as_shown(objective: Objective, scales: Scales, model: Model) -> tuple
     older = Objective(data.aged(HALF / every), objective.weight, counter=objective.counter)
     if _score(objective, scales, model) < _score(older, scales, model) - POLICY.rival_margin:
         return objective, []
+    each = Text("a turn", "a metre")
     text = (
-        "The velocity is the difference of an encoder's {angle} over one sample of the controller ({} lines a turn), and with it "
+        "The velocity is the difference of an encoder's {angle} over one sample of the controller ({} lines {}), and with it "
         "half a sample old ({:.3g} ms). This is part of the simulated drive, and no finding."
     )
-    linear = (
-        "The velocity is the difference of an encoder's {angle} over one sample of the controller ({} lines a metre), and with "
-        "it half a sample old ({:.3g} ms). This is part of the simulated drive, and no finding."
-    )
-    text = text if data.axis == "rotary" else linear
-    return older, [say(text, lines, 1e3 * HALF * data.dt / every)]
+    return older, [say(text, lines, each, 1e3 * HALF * data.dt / every)]
 
 
 def _score(objective: Objective, scales: Scales, model: Model) -> float:
