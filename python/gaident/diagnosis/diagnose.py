@@ -252,7 +252,7 @@ class _Work:
                 # A noise filter removes a slow misfit completely; the free run shows it.
                 driver = self.left.strongest or "time"
                 self.notes.append(far_off(beyond))
-            if driver is None and self.data.torque_measured:
+            if driver is None and self.data.torque_measured and not gains.closed:
                 self.notes.append(hidden_by_torque_noise(floor))
             causes = [e for e in self.final.effects if not self._only_describes(e, driver)]
             estimates = estimates_of(self.under, self.estimate)

@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
-from gaident.data.torque_kind import MEASURED
 from gaident.diagnosis.records.hygiene import quantisation
 from gaident.estimation.criterion import effective_samples
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit
 from gaident.estimation.objective import Fit, Objective
-from gaident.estimation.regression.motion import torque_noise
+from gaident.estimation.prediction import torque_noise_in
 from gaident.models import simulate
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
@@ -52,6 +51,7 @@ class Gains:
 
     harmful: effects without which the extended model is better on the held-out data, beyond chance. scored: records, each with
     the first sample that is held out; mechanism, extended: the models, without and with the effects, fitted to the rest.
+    closed: whether the runs were closed over the controller; the torque drives them else.
     """
 
     before: Fitness
@@ -62,6 +62,7 @@ class Gains:
     scored: tuple[tuple[Record, int], ...]
     mechanism: Model
     extended: Model
+    closed: bool
     harmful: tuple[str, ...] = ()
 
     def of(self, effect: str) -> float:
@@ -70,10 +71,9 @@ class Gains:
 
     @property
     def floor(self) -> float:
-        """Rms error [rad/s] that noise leaves of a free run: of the velocity, and of a measured torque that adds up."""
-        measured = [r for r, _ in self.scored if r.torque is not None and r.torque_is == MEASURED]
-        power = sum(len(r) * added_up(self.mechanism, r) for r in measured) / max(sum(len(r) for r, _ in self.scored), 1)
-        return float(np.hypot(self.after.noise_floor, np.sqrt(power)))
+        """Rms error [rad/s] that noise leaves of a free run: of the velocity, and of a measured torque that drives the model."""
+        driving = [] if self.closed else [r for r, _ in self.scored]
+        return float(np.hypot(self.after.noise_floor, torque_noise_in(self.mechanism, driving)))
 
 
 def measured_gains(
@@ -150,6 +150,7 @@ def measured_gains(
         scored=tuple(scored),
         mechanism=bare,
         extended=chain[-1],
+        closed=driver is not None,
         harmful=tuple(harmful),
     )
 
@@ -163,15 +164,6 @@ def closed_over(controller: Controller | None, records: Sequence[Record]) -> Con
     if loop is not None and not loop.one_equation and any(starts_moving(r, None) for r in records):
         return None
     return loop
-
-
-def added_up(mechanism: Model, rec: Record) -> float:
-    """Variance [(rad/s)^2] that white noise of a record's torque, of its level at high frequencies, makes of the free run."""
-    unit = np.zeros(len(rec))
-    unit[0] = 1.0
-    response = simulate(mechanism.linear, Record(rec.dt, torque=unit, velocity=np.zeros(len(rec))))
-    highest = 0.499 / rec.dt  # no decision: next to the Nyquist frequency, so that nothing is filtered
-    return torque_noise(rec, highest, 1) ** 2 * float(np.mean(np.cumsum(response**2)))
 
 
 def _turned(rec: Record, controller: Controller | None, final: Fit) -> Record:

@@ -100,7 +100,9 @@ def _checked(value: str, name: str, error: type[GaidentError]) -> str:
         raise error(f"{name} is {value!r}{near}: give one number, a number with its unit ({listed}){word}")
     if _spelling(unit) not in _units(name):
         close = difflib.get_close_matches(_spelling(unit), _units(name), n=1)
-        near = next((f" (did you mean {known!r}?)" for known in _UNITS[name] if close and _spelling(known) == close[0]), "")
+        near = next(
+            (f" (did you mean {known!r}?)" for known in _UNITS.get(name, {}) if close and _spelling(known) == close[0]), ""
+        )
         raise error(f"{name} is {value!r}: {unit!r} is none of its units{near}; give one of {listed}")
     return value
 

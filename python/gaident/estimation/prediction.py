@@ -24,6 +24,7 @@ from gaident.control.controller import Controller
 from gaident.control.filtering import filtered
 from gaident.control.pi import PI
 from gaident.data.record import Record
+from gaident.data.torque_kind import MEASURED
 from gaident.estimation.dataset import DataSet, angle_of, with_angle
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.term import Term
@@ -31,9 +32,11 @@ from gaident.models.effects import place_of
 from gaident.models.model import Model
 from gaident.models.own_effects import OWN
 from gaident.models.roots import quadratic_roots
+from gaident.models.simulate import simulate
 from gaident.models.simulate_many import simulate_values
+from gaident.models.starts import noise_std
 
-__all__ = ["ClosedLoop", "OpenLoop", "Predictor", "coupling_response", "twist"]
+__all__ = ["ClosedLoop", "OpenLoop", "Predictor", "coupling_response", "torque_noise_in", "twist"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -206,6 +209,23 @@ def _of_true_angle(
         run = simulate_values(parameters.structure, names, values, ready, controller, initial_states=states, substeps=taken)
         parts.append(data.seen(run) if controller is None else run)
     return np.concatenate(parts, axis=1)
+
+
+def torque_noise_in(mechanism: Model, records: Sequence[Record]) -> float:
+    """Rms error [rad/s] that the noise of measured torques makes of a free run; 0 where none was measured.
+
+    White noise of the standard deviation s on a torque that is held makes s^2 mean_n sum_(k<n) h(k)^2, with h the response to one
+    sample of torque. s is that of the torque's third differences: a command that goes in steps is no noise.
+    """
+    power, count = 0.0, sum(len(r) for r in records)
+    for rec in records:
+        if rec.torque is None or rec.torque_is != MEASURED:
+            continue
+        unit = np.zeros(len(rec))
+        unit[0] = 1.0
+        response = simulate(mechanism.linear, Record(rec.dt, torque=unit, velocity=np.zeros(len(rec))))
+        power += noise_std(rec.torque) ** 2 * float(np.sum(np.cumsum(response**2)))
+    return float(np.sqrt(power / max(count, 1)))
 
 
 def twist(data: DataSet, parameters: Parameterisation, x: Vector) -> Vector:

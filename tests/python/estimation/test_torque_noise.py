@@ -9,9 +9,8 @@ import pytest
 
 import gaident as ga
 from drive_cases import random_case
-from gaident.diagnosis.gains import added_up
 from gaident.estimation.criterion import effective_samples
-from gaident.estimation.regression.motion import torque_noise
+from gaident.estimation.prediction import torque_noise_in
 
 
 def noisy(record: ga.Record, share: float, seed: int) -> ga.Record:
@@ -64,5 +63,23 @@ def test_added_up_is_what_white_torque_noise_makes_of_a_free_run() -> None:
     rng, dt, count = np.random.default_rng(2), 1e-3, 4000
     noise = [ga.Record(dt, torque=0.1 * rng.standard_normal(count), velocity=np.zeros(count)) for _ in range(40)]
     measured = float(np.mean([np.mean(ga.simulate(model, r) ** 2) for r in noise]))
-    per_power = added_up(model, noise[0]) / torque_noise(noise[0], 0.499 / dt, 1) ** 2
-    assert abs(0.1**2 * per_power - measured) < 0.15 * measured
+    said = float(np.mean([torque_noise_in(model, [replace(r, torque_is="measured")]) ** 2 for r in noise]))
+    assert abs(said - measured) < 0.15 * measured
+    assert torque_noise_in(model, noise) == 0.0  # commanded torques have no noise
+    steps = np.repeat(np.random.default_rng(3).choice([-1.0, 1.0], count // 10), 10)
+    quiet = ga.Record(dt, torque=steps, velocity=np.zeros(count), torque_is="measured")
+    assert torque_noise_in(model, [quiet]) == 0.0  # a command in steps is no noise
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_load_that_comes_on_is_no_torque_noise(seed: int) -> None:
+    """A noise model of torques takes it for noise; the free run says that no noise of this torque is so large."""
+    load, count, dt = (0.05, 0.1, 0.03)[seed], 3000, 0.5e-3
+    rng = np.random.default_rng(seed)
+    command = 0.1 * np.repeat(rng.choice([-1.0, 1.0], count // 10), 10)
+    torque = command + np.where(dt * np.arange(count) > 0.7, load, 0.0)
+    model = ga.OneMass(J=3e-4, D=1.5e-3).model()
+    velocity = ga.simulate(model, ga.Record(dt, torque=torque, velocity=np.zeros(count))) + 0.01 * rng.standard_normal(count)
+    logged = command + 0.002 * rng.standard_normal(count)
+    dia = ga.diagnose(ga.Record(dt, torque=logged, velocity=velocity, torque_is="measured"))
+    assert (dia.verdict, dia.causes) == ("unexplained", ()), dia.summary()

@@ -95,7 +95,7 @@ class _Trace:
             if self.frames > 1:
                 raise ReadError(f"{self.path}: the file holds several recordings; save each in a file of its own")
             return
-        if element.tag == "frameHeader" and float(element.get("dropOuts", "0")) != 0.0:
+        if element.tag == "frameHeader" and _number(self.path, element.get("dropOuts", "0"), "dropOuts") != 0.0:
             lost = element.get("dropOuts")
             raise ReadError(f"{self.path}: {lost} points of the trace were lost (dropOuts); record fewer signals, or slower")
         if element.tag == "dataSignal":

@@ -100,7 +100,8 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
             controller.ki,
         )
     shown = replace(controller, kp=kp, ki=ki)
-    return AsLogged(shown, (off[0].sentence, used), {}, (_gains_finding(records, shown, off),))
+    of_each = [replays[r.digest] for r in records]
+    return AsLogged(shown, (off[0].sentence, used), {}, (_gains_finding(records, shown, of_each),))
 
 
 def _gains_finding(records: Sequence[Record], shown: PI, off: Sequence[Replay]) -> Finding:

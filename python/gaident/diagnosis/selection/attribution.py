@@ -28,12 +28,13 @@ from dataclasses import replace
 import numpy as np
 
 from gaident.diagnosis.library.terms import LIBRARY
-from gaident.diagnosis.selection.dependence import Dependence, beside_torque_noise, dependence
+from gaident.diagnosis.selection.dependence import Dependence, beside_torque_noise, dependence, without_torque
 from gaident.diagnosis.selection.moves import Moves
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit
+from gaident.estimation.prediction import torque_noise_in
 from gaident.estimation.regression.force_error import band_of
 from gaident.estimation.regression.reversal import jump_at_reversal, torque_held_at_rest
 from gaident.models.model import Model
@@ -47,15 +48,20 @@ __all__ = ["friction_shown", "only_describes", "share", "shown_by_the_records", 
 def what_is_left(space: Moves, final: Fit) -> tuple[bool, Dependence]:
     """(whether a model leaves noise, what its error depends on).
 
-    The variance-ratio test knows the velocity's noise. Of a measured torque's noise nothing is known: it is noise where no driver
-    explains more beside it than in records without effects.
+    The variance-ratio test knows the velocity's noise alone. Behind a measured torque it is noise where no driver explains more
+    beside a noise model of that torque than in records without effects, and where the free run misses no more than both noises
+    make of it: a noise model takes a load that changes in time for noise, and its error is far larger than that.
     """
-    if space.data.torque_measured:
-        beside = beside_torque_noise(space.objective, final)
-        if beside.driver is None:
-            return True, beside
-    left = dependence(space.objective, final)
-    return not space.data.torque_measured and space.is_noise(final), left
+    if not space.data.torque_measured:
+        return space.is_noise(final), dependence(space.objective, final)
+    used = space.objective.weight > 0.0
+    error = float(np.sqrt(np.mean(space.objective.error(final)[used] ** 2)))
+    mechanism = final.parameters.linear(final.x)
+    noise = float(np.hypot(space.data.noise, torque_noise_in(mechanism, space.data.records)))
+    beside = beside_torque_noise(space.objective, final)
+    if beside.driver is None and error < space.policy.free_run_ratio * noise:
+        return True, beside
+    return False, without_torque(dependence(space.objective, final))
 
 
 def only_describes(

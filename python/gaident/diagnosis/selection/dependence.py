@@ -23,7 +23,7 @@ from gaident.estimation.prediction import coupling_response, twist
 from gaident.estimation.projection import project_out
 from gaident.policy.table import POLICY
 
-__all__ = ["Dependence", "beside_torque_noise", "dependence"]
+__all__ = ["Dependence", "beside_torque_noise", "dependence", "without_torque"]
 
 ROOM, LEAST = 16, 4  # no decision: samples for each function of a driver's family, and the functions that any record has room for
 LINES = (64, 31, 4)  # no decision: samples of a spectrum that peaks are looked for in, lines of its running mean, half a peak's
@@ -112,7 +112,11 @@ def beside_torque_noise(objective: Objective, fit: Fit) -> Dependence:
     """
     shaft = ShaftNoise(fit.parameters.linear(fit.x), objective.data.dt, None)
     whitened = objective.under(Innovations(shaft))
-    left = dependence(whitened, scored(whitened, fit))
+    return without_torque(dependence(whitened, scored(whitened, fit)))
+
+
+def without_torque(left: Dependence) -> Dependence:
+    """The same without the torque as a driver."""
     gains, least, unwhitened = (
         {d: value for d, value in values.items() if d != "torque"} for values in (left.gains, left.least, left.unwhitened)
     )

@@ -46,8 +46,8 @@ def as_old_as_shown(objective: Objective, scales: Scales, model: Model) -> tuple
         return objective, []
     each = Text("a turn", "a metre")
     text = (
-        "The velocity is the difference of an encoder's {angle} over one sample of the controller ({} lines {}), and with it "
-        "half a sample old ({:.3g} ms). This is part of the simulated drive, and no finding."
+        "The velocities lie on the lattice of an encoder's {angle} ({} lines {}), differenced over one sample, and "
+        "nothing speaks against it: they are taken for half a sample old ({:.3g} ms). The simulation has it; it is no finding."
     )
     return older, [say(text, lines, each, 1e3 * HALF * data.dt / every)]
 
