@@ -62,8 +62,8 @@ class Gains:
     scored: tuple[tuple[Record, int], ...]
     mechanism: Model
     extended: Model
-    closed: bool
     harmful: tuple[str, ...] = ()
+    closed: bool = False
 
     def of(self, effect: str) -> float:
         """Fall of the error that one effect brought, as a fraction of the error before it."""
