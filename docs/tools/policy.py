@@ -76,7 +76,8 @@ It is asked of two errors, because they hold different things.
   adequate, and, of the linear model, whether output errors are searched first.
 - `free_run_ratio`, of errors before whitening, in the loop where it is the drive's: what a free run misses. A noise model takes
   a slow misfit for noise, and then it shows here alone. It decides whether output errors are searched beside, whether a cause
-  was hidden, and whether the free run is noted as far off.
+  was hidden, and whether the free run is noted as far off. Behind a measured torque, whose noise the free run adds up, the noise
+  of both counts, and it decides whether a model is adequate.
 
 Four numbers ask something else, and no level of that test answers it:
 

@@ -19,6 +19,7 @@ from gaident.control.filters import LowPass, Notch, filter_of
 from gaident.control.pi import PI
 from gaident.control.ticks import Feedforward, Ticks, ticks_of
 from gaident.control.unknown import known, with_own
+from gaident.control.words import UNKNOWN
 from gaident.errors import ControllerError
 
 __all__ = ["Cascade", "Filter", "P", "cascade_of", "controller_of"]
@@ -31,7 +32,6 @@ FEEDFORWARDS = ("velocity_feedforward", "acceleration_feedforward", "friction_fe
 FILTERS = ("torque_filters", "velocity_filters", "command_filters")
 MOST_FILTERS = 8  # no decision: what an argument may be
 LONGEST_DELAY = 1.0  # no decision: s, as of the effect transport_delay; what an argument may be
-NOT_KNOWN = "unknown"  # the gain of P(None) as data, where None is no position controller
 
 
 @dataclass(frozen=True)
@@ -350,7 +350,7 @@ class Cascade(Controller):
         """Return plain data for JSON or TOML; position_gain: None without a position controller, "unknown" of P(None)."""
         filters = {name: [f.to_dict() for f in getattr(self, name)] for name in FILTERS}
         numbers = {name: getattr(self, name) for name in ("period", "position_period", *FEEDFORWARDS, "delay")}
-        position = None if self.position is None else NOT_KNOWN if self.position.gain is None else self.position.gain
+        position = None if self.position is None else UNKNOWN if self.position.gain is None else self.position.gain
         return {"velocity": self.velocity.to_dict(), "position_gain": position, **numbers, **filters}
 
     @classmethod
@@ -359,7 +359,7 @@ class Cascade(Controller):
         allowed = ("velocity", "position_gain", "period", "position_period", *FEEDFORWARDS, *FILTERS, "delay")
         values: dict[str, Any] = known_keys(data, "the cascade", allowed, ("velocity",), ControllerError)
         gain = values.pop("position_gain", None)
-        position = None if gain is None else P(None if gain == NOT_KNOWN else gain)
+        position = None if gain is None else P(None if gain == UNKNOWN else gain)
         values["velocity"] = PI.from_dict(values["velocity"])
         for name in FILTERS:
             values[name] = tuple(filter_of(one) for one in values.get(name, ()))

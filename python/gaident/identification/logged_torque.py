@@ -16,12 +16,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, say
+from gaident.axis import Text
 from gaident.control.cascade import cascade_of
 from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.data.signals.lattice import rounding_step
 from gaident.identification.logged_stretches import Log, centred, correlation, log_of, whitened
+from gaident.models.drive_torque import follows_not
 from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
 
@@ -44,12 +45,8 @@ def not_followed(records: Sequence[Record], controller: Controller | None) -> tu
         assert rec.torque is not None
         off = _off(rec, controller)
         if off > 0.0:
-            text = (
-                "{}The logged {torque} does not follow from command and velocity through this controller: by {:.2g} {N m} rms, "
-                "of {:.2g} {N m} rms. Is this the controller, and are these the signals it saw?"
-            )
             size = float(np.sqrt(np.mean(rec.torque**2)))
-            doubts.append(say(text, f"{rec.name}: " if len(records) > 1 and rec.name else "", off, size))
+            doubts.append(follows_not(rec.name if len(records) > 1 else "", off, size))
     return tuple(doubts)
 
 

@@ -20,7 +20,7 @@ from gaident.errors import RecordError
 from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
 
-__all__ = ["Driven", "driven_by", "late", "made_by", "torque_blocks", "torque_driven", "torque_of"]
+__all__ = ["Driven", "driven_by", "follows_not", "late", "made_by", "torque_blocks", "torque_driven", "torque_of"]
 
 Vector = NDArray[np.float64]
 
@@ -65,12 +65,17 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
         off = float(np.sqrt(np.mean((rec.torque - controller.torque_of(rec))[:known] ** 2)))
         size = float(np.sqrt(np.mean(rec.torque**2)))
         if off > POLICY.negligible * size:
-            text = (
-                "{}The logged {torque} does not follow from command and velocity through this controller: by {:.2g} {N m} rms, "
-                "of {:.2g} {N m} rms. Is this the controller, and are these the signals it saw?"
-            )
-            doubts.append(say(text, f"{rec.name}: " if len(records) > 1 and rec.name else "", off, size))
+            doubts.append(follows_not(rec.name if len(records) > 1 else "", off, size))
     return Driven(tuple(driven_by(r, controller) for r in records), controller, (note,), tuple(doubts), every > 1)
+
+
+def follows_not(name: str, off: float, size: float) -> Text:
+    """What is said of a logged torque that a controller does not make; name: of the record, off, size: rms [N m]."""
+    text = (
+        "{}The logged {torque} does not follow from command and velocity through this controller: by {:.2g} {N m} rms, "
+        "of {:.2g} {N m} rms. Is this the controller, and are these the signals it saw?"
+    )
+    return say(text, f"{name}: " if name else "", off, size)
 
 
 def driven_by(rec: Record, controller: Controller) -> Record:

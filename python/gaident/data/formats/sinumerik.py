@@ -18,6 +18,7 @@ slope of the position in degrees is 6 times it), another one for a linear axis. 
 
 from __future__ import annotations
 
+import math
 from contextlib import ExitStack
 from pathlib import Path
 from xml.etree import ElementTree
@@ -133,6 +134,9 @@ class _Trace:
 
 def _number(path: str, text: str, what: str) -> float:
     try:
-        return float(text)
+        number = float(text)
     except ValueError:
-        raise ReadError(f"{path}: the {what} is {text!r}, no number; copy the file again") from None
+        number = math.nan
+    if not math.isfinite(number):
+        raise ReadError(f"{path}: the {what} is {text!r}, no finite number; copy the file again")
+    return number
