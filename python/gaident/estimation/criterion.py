@@ -12,7 +12,8 @@ exact are slow: neighbouring samples say the same, and
 
 with rho the autocorrelation of the errors about their mean, up to the first pair rho(2m-1) + rho(2m) that is not positive
 (Geyer 1992): from there on it is its own error.
-Errors of a shaft that swings have a rho that changes its sign, and hardly any sum. ln V is uncertain by sqrt(2/I) with
+Errors of a shaft that swings have a rho that changes its sign, and hardly any sum; the sum of rho^2 is then above it and above
+`swings`, which white errors do not reach by chance. ln V is uncertain by sqrt(2/I) with
 
     I = N / (1 + 2 sum_k rho(k)^2)            (variance of a mean square; Bartlett 1946)
 
@@ -48,12 +49,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.policy.table import POLICY
+
 __all__ = ["Specification", "bic", "chi_square_bound", "cost_of", "effective_samples", "gained", "specification_statistic"]
 
 Vector = NDArray[np.float64]
 
 LOWEST = 8  # no decision: frequencies of a record's spectrum whose mean is S(0); that is uncertain by 1/sqrt(8)
-SWINGS = 0.5  # no decision: of sum rho^2, from which errors swing where it is above sum rho; of white ones it is near 0
 LAGS = 10  # no decision: of the samples, one in so many is a lag at which rho^2 is taken; at more it is mostly its own error
 
 
@@ -102,7 +104,7 @@ def effective_samples(*errors: Vector) -> float:
     chance = (count - np.arange(1, len(squares) + 1)) / count**2  # what rho^2 of white errors is in the mean
     swinging = float(np.sum(squares - chance))
     memory = 1.0 + 2.0 * slow  # no decision: as below
-    if swinging > max(slow, SWINGS):
+    if swinging > max(slow, POLICY.swings):
         lowest = sum(float(np.sum(np.abs(np.fft.rfft(e - mean)[1 : 1 + LOWEST]) ** 2)) for e in errors)
         spectral = lowest / (products[0] * sum(min(LOWEST, len(e) // 2) * len(e) for e in errors) / count)
         memory = max(1.0 + 2.0 * swinging, spectral)  # no decision: as below

@@ -160,6 +160,7 @@ class Policy:
     grid_loss: float = noise(
         0.02, "1", "part of the linear model's squared error beyond the noise that lies between the lines of a coarser grid", REAL
     )
+    swings: float = noise(0.5, "1", "sum of rho^2 of errors, from which they swing where it is above the sum of rho", REAL)
 
     # Is a finding a cause, or does it only describe what the library does not hold?
     of_its_size: float = cause(0.25, "1", "part of a finding's gain that a free function beside it may still find", DRIVES)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
+from gaident.models.starts import noise_std
 
 __all__ = ["BAND", "Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "torque_noise"]
 
@@ -128,11 +129,10 @@ def _velocity_noise(rec: Record, spectrum: Spectrum, cutoff_hz: float, order: in
 
 
 def torque_noise(rec: Record, cutoff_hz: float, order: int) -> float:
-    """Standard deviation of the filtered torque's noise [N m], white with the level of its spectrum at high frequencies."""
+    """Standard deviation of the filtered torque's noise [N m], white with that of its third differences: steps are no noise."""
     assert rec.torque is not None
-    f, _, level = _spectrum_of(rec.torque, rec.dt)
-    weight = _twice(rec, f, cutoff_hz, order) ** 2
-    return float(np.sqrt(level * np.sum(weight) * (f[1] - f[0])))
+    f: Vector = np.fft.rfftfreq(len(rec), rec.dt).astype(np.float64)
+    return noise_std(rec.torque) * float(np.sqrt(np.mean(_twice(rec, f, cutoff_hz, order) ** 2)))
 
 
 def _twice(rec: Record, f: Vector, cutoff_hz: float, order: int) -> Vector:
@@ -152,15 +152,12 @@ def _gain(rec: Record, f: Vector, cutoff_hz: float, order: int, derivative: int)
 
 def _spectrum(rec: Record) -> Spectrum:
     """(frequencies [Hz], power density of the sensor's signal, level of its noise)."""
-    return _spectrum_of(rec.velocity if rec.position is None else rec.position, rec.dt)
-
-
-def _spectrum_of(x: Vector, dt: float) -> Spectrum:
     from scipy.signal import welch
 
+    x = rec.velocity if rec.position is None else rec.position
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
-    f, power = welch(x - line, 1.0 / dt, nperseg=min(x.size, 2048))  # no decision: the resolution of a spectrum
-    high = (f >= HIGH[0] / dt) & (f <= HIGH[1] / dt)
+    f, power = welch(x - line, 1.0 / rec.dt, nperseg=min(x.size, 2048))  # no decision: the resolution of a spectrum
+    high = (f >= HIGH[0] / rec.dt) & (f <= HIGH[1] / rec.dt)
     return f, power, float(np.median(power[high])) if np.any(high) else 0.0
 
 
