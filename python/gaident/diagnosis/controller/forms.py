@@ -242,10 +242,13 @@ def _shown_quietly(records: Sequence[Record], law: Law, given: PI, floor: float,
 def _with_limit(
     records: Sequence[Record], law: Law, given: PI, candidates: Sequence[Candidate], fitted: tuple[Vector, Vector, Matrix]
 ) -> Shown | None:
-    """A form that was shown where no limit acts, and the limit; None where there is neither."""
+    """A form that was shown where no limit acts, and the limit; None where there is neither, or the whole torque is no nearer."""
     best, (numbers, filters, cov) = candidates[0], fitted
     at_limit = limited(records, replace(_controller(best, numbers, filters, given, law.period), period=law.period))
     if not best.names and at_limit.limit is None:
+        return None
+    before, after = run_error(records, Cascade(given, law.period)), run_error(records, at_limit.controller)
+    if not after < POLICY.better_reason * before:
         return None
     named, gains = _named(best, numbers, filters, cov, law.period), _gains(candidates)
     if at_limit.limit is not None:
@@ -256,8 +259,8 @@ def _with_limit(
         numbers=named,
         gains=gains,
         rivals=_rivals(candidates),
-        before=run_error(records, Cascade(given, law.period)),
-        rms=run_error(records, at_limit.controller),
+        before=before,
+        rms=after,
         starts=0.0,
         estimated=_estimated(best, numbers, cov),
     )
