@@ -205,13 +205,13 @@ class _Work:
         self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
         data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
+        self.excited = excitation(self.clean, self.data.loop, axis=self.axis)
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
         self.objective, older = as_old_as_shown(
             Objective(self.data, np.concatenate(kept).astype(np.float64)), self.scales, self.idn.model
         )
         self.data = self.objective.data
         self.notes += older
-        self.excited = excitation(self.clean, self.data.loop, axis=self.axis)
 
     def search(self) -> None:
         """The selected model, its rivals, what is left."""

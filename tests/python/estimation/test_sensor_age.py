@@ -68,6 +68,14 @@ def test_a_differenced_angle_is_no_finding(lag: float) -> None:
     assert found.parameters["time_constant"].value == pytest.approx(lag, rel=0.01)
 
 
+def test_a_differenced_angle_without_a_logged_torque_is_no_finding() -> None:
+    with_effect, bare = (record(1, effects).with_channels(torque=None) for effects in ({"torque_saturation": {"limit": 0.5}}, {}))
+    dia = ga.diagnose(bare, DRIVE.controller)
+    assert any(f"({LINES} lines a turn)" in note for note in dia.notes) and dia.causes == (), dia.summary()
+    dia = ga.diagnose(with_effect, DRIVE.controller)
+    assert any("torque_saturation" in (f.effect, *f.alternatives) for f in dia.causes), dia.summary()
+
+
 def test_a_rounded_velocity_that_is_no_difference_is_not_taken_for_one() -> None:
     dia = ga.diagnose(record(1, {}, differenced=False), DRIVE.controller, validation=record(2, {}, differenced=False))
     assert dia.causes == () and not any("lines a turn" in note for note in dia.notes), dia.summary()
