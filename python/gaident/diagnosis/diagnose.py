@@ -203,7 +203,9 @@ class _Work:
         }
         shown = self.at_controller.controller or self.controller
         self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
-        data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise)
+        data = replace(
+            data, controller=shown, loop_follows=self.follows, from_rest=self.driving.from_rest, known_noise=self.noise
+        )
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         self.excited = excitation(self.clean, self.data.loop, axis=self.axis)
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
+from gaident.diagnosis.controller.replay import stored_torque
 from gaident.diagnosis.records.hygiene import quantisation
 from gaident.estimation.criterion import effective_samples
 from gaident.estimation.dataset import DataSet
@@ -235,11 +236,15 @@ def free_run_errors(model: Model, scored: Sequence[tuple[Record, int]], controll
 
 
 def start_state(model: Model, rec: Record, controller: Controller | None) -> Vector | None:
-    """Initial state of the model at the record's start; None where it starts at rest, or the loop has limits.
+    """Initial state of the model at the record's start; None where it starts from rest, or moves and the loop has limits.
 
-    A model with effects is not linear in it: two steps of Gauss and Newton over the record's head, from the first velocity.
+    At rest the integrator may hold a load's torque, which the logged torque shows. In motion a model with effects is not linear
+    in its state: two steps of Gauss and Newton over the record's head, from the first velocity.
     """
-    if not starts_moving(rec, bare_pi(controller)) or (controller is not None and (controller.limited or model.effects)):
+    pi = bare_pi(controller)
+    if pi is not None and (held := stored_torque(rec, pi)):
+        return np.append(np.zeros(model.linear.order), held)
+    if not starts_moving(rec, pi) or (controller is not None and (controller.limited or model.effects)):
         return None
     if not model.effects:
         return np.asarray(initial_state(model, rec, controller))

@@ -46,7 +46,8 @@ class DataSet:
     as the controller read them, which may hold samples that the fit leaves out. finest: no substep of a simulation is much
     shorter [s]; resolution: step of the lattice that all velocities lie on [rad/s], 0: none; known_noise: standard deviation
     of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
-    makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear".
+    makes; from_rest: whether its integrator held no torque before a record; torque_measured: whether it is a measured one, with
+    noise on it, behind the actuator; axis: "rotary" or "linear".
     age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample old. What
     drives a model is late by as much, here and in the loop that is simulated.
     """
@@ -63,6 +64,7 @@ class DataSet:
     resolution: float = 0.0
     known_noise: float | None = None
     loop_follows: bool = True
+    from_rest: bool = True
     torque_measured: bool = False
     axis: str = "rotary"
     age: float = 0.0
@@ -157,8 +159,8 @@ class DataSet:
 
     @cached_property
     def loopable(self) -> bool:
-        """Whether command and controller can drive a model too."""
-        if self.loop is None or any(self.moving) or (self.slower and not self.loop_follows):
+        """Whether command and controller can drive a model too, from rest."""
+        if self.loop is None or any(self.moving) or not self.from_rest or (self.slower and not self.loop_follows):
             return False
         loop = self.loop
         return all(loop.command_of(r) is not None for r in self.records)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from drive_cases import random_case
+from drive_rig import skip_without_library
 from gaident.axis import Text
 from gaident.diagnosis.check import Check
 from gaident.diagnosis.explain.held_out import standing
@@ -74,3 +76,12 @@ def test_the_interval_of_a_fall_is_wide_where_errors_are_slow() -> None:
     low, high = interval_of_fall(white, [0.9 * white[0][RNG.permutation(4000)]])
     assert 0.05 < low < 0.1 < high < 0.15
     assert interval_of_fall(slow, [0.9 * slow[0][::-1]])[0] < 0.0
+
+
+def test_a_load_that_the_integrator_carries_before_the_record_is_named() -> None:
+    skip_without_library()
+    rec, validation, controller, truth = random_case(10, "load_torque", settle=1500)
+    assert abs(rec.torque[0]) > 0.5 * truth.effects["load_torque"]["torque"] and rec.command[0] == 0.0
+    dia = ga.diagnose(rec, controller, validation=validation)
+    assert [{f.effect, *f.alternatives} >= {"load_torque"} for f in dia.causes] == [True], dia.summary()
+    assert dia.verdict == "explained" and dia.after.rmse < dia.before.rmse
