@@ -224,7 +224,7 @@ class Objective:
     def whitened(self, E: Matrix, noise: NoiseFilter, inertias: Vector | None = None) -> Matrix:
         """Rows of whitened errors, of models with these inertias [kg m^2]; samples that do not count are 0."""
         V = noise.of(self.family.prefiltered(self.bridged(E), self.lengths, inertias), self.lengths)
-        V = V.copy() if V is E else V
+        V = V.copy() if V is E else np.asarray(V)
         V[:, self._uncounted] = 0.0
         return V
 
