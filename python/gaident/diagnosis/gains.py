@@ -103,8 +103,8 @@ def measured_gains(
     stages = _stages(final, objective, part)
     named = list(at_controller.items())
     bare = stages[0].parameters.model(stages[0].x)
-    # What the torque did between the lines of a slower log is lost to the identification, not to a fit of the whole loop.
-    chain = [linear if not objective.data.slower else bare]
+    # Not known to the identification: the velocity's age, and what the torque did between the lines of a slower log.
+    chain = [bare if objective.data.slower or objective.data.age else linear]
     chain += [with_effects(bare, dict(named[:k])) for k in range(1, len(named) + 1)]
     chain += [with_effects(f.parameters.model(f.x), at_controller) for f in stages[1:]]
     # Where the simulated loop is known not to be the drive's, the torque drives the models that are compared and printed.

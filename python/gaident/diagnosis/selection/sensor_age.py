@@ -5,9 +5,13 @@
 is the mean over that sample, to second order in T the velocity in its middle. That is no cause: every drive that differences its
 encoder has it. Left out, it is fitted as a delay or, beside a current loop, as a resonance.
 
-The lattice of the velocities says how many lines the encoder had. Not every velocity on such a lattice is a difference: one that
-an observer or the drive's firmware rounds to the lattice is not. So both ages are fitted, with the linear mechanism alone and
-with the lag of a current loop, and the velocity is no difference where that scores better beyond the margin of two rivals.
+Both ages are fitted, with the linear mechanism alone and with the lag of a current loop beside it.
+
+- The lattice of the velocities says how many lines the encoder had. Where they are a whole number, the velocity is taken for a
+  difference. Not every velocity on such a lattice is one: an observer or the drive's firmware may round to it. So it is none
+  where the age of 0 scores better beyond the margin of two rivals.
+- On another lattice (a gear, a scale, a unit between), the velocity is a difference where half a sample alone scores better than
+  the age of 0 with and without a lag: the records show half a sample, and no other delay.
 """
 
 from __future__ import annotations
@@ -39,21 +43,32 @@ def as_old_as_shown(objective: Objective, scales: Scales, model: Model) -> tuple
         return objective, []
     turn = TURN if data.axis == "rotary" else 1.0
     lines = encoder_lines(data.velocity, data.dt / every, turn)
-    if not lines:
+    if not lines and not data.resolution > 0.0:
         return objective, []
     older = Objective(data.aged(HALF / every), objective.weight, counter=objective.counter)
-    if _score(objective, scales, model) < _score(older, scales, model) - POLICY.rival_margin:
+    now, (alone, lagged) = min(_scores(objective, scales, model)), _scores(older, scales, model)
+    age = 1e3 * HALF * data.dt / every
+    if lines:
+        if now < min(alone, lagged) - POLICY.rival_margin:
+            return objective, []
+        each = Text("a turn", "a metre")
+        text = (
+            "The velocities lie on the lattice of an encoder's {angle} ({} lines {}), differenced over one sample, "
+            "and nothing speaks against it: they are taken for half a sample old ({:.3g} ms). The simulation has it; it is no "
+            "finding."
+        )
+        return older, [say(text, lines, each, age)]
+    if not alone < now:
         return objective, []
-    each = Text("a turn", "a metre")
     text = (
-        "The velocities lie on the lattice of an encoder's {angle} ({} lines {}), differenced over one sample, and "
-        "nothing speaks against it: they are taken for half a sample old ({:.3g} ms). The simulation has it; it is no finding."
+        "The velocities lie on a lattice of {:.4g} {rad/s} and are half a sample old ({:.3g} ms), as those are that are the "
+        "difference of an encoder's {angle} over one sample. The simulation has it; it is no finding."
     )
-    return older, [say(text, lines, each, 1e3 * HALF * data.dt / every)]
+    return older, [say(text, data.resolution, age)]
 
 
-def _score(objective: Objective, scales: Scales, model: Model) -> float:
-    """BIC of the best linear mechanism with and without a lag of the torque, each under a noise filter of its own."""
+def _scores(objective: Objective, scales: Scales, model: Model) -> tuple[float, float]:
+    """BIC of the best linear mechanism without and with a lag of the torque, each under a noise filter of its own."""
     task = Task(objective, scales, model, (), lambda message: None).under(Innovations())
     space, lag = task.space(), next(t for t in LIBRARY.values() if t.late)  # the same as a lag of the torque, see `EQUIVALENT`
     starts = [task.start(m, POLICY.short) for m in (one_mass(task.data, model), *reduced(model))]
@@ -61,4 +76,4 @@ def _score(objective: Objective, scales: Scales, model: Model) -> float:
     longer = base.hypothesis.extended(lag)
     X = np.array([base.parameters.inserted(base.x, np.array(row)) for row in lag.starts(longer.parameters.scales)])
     x = X[int(np.argmin(task.objective.costs(longer, X, WHITE)))]
-    return min(space.refitted(base.hypothesis, base.x).bic, space.refitted(longer, x).bic)
+    return space.refitted(base.hypothesis, base.x).bic, space.refitted(longer, x).bic
