@@ -37,7 +37,7 @@ from gaident.diagnosis.selection.attribution import only_describes, shown_by_the
 from gaident.diagnosis.selection.offset import Offset, offset_of
 from gaident.diagnosis.selection.rivals import Replacement
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
-from gaident.diagnosis.selection.sensor_age import as_old_as_shown
+from gaident.diagnosis.selection.sensor_age import searched
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.term import Term
@@ -209,18 +209,16 @@ class _Work:
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         self.excited = excitation(self.clean, self.data.loop, axis=self.axis)
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
-        self.objective, older = as_old_as_shown(
-            Objective(self.data, np.concatenate(kept).astype(np.float64)), self.scales, self.idn.model
-        )
-        self.data = self.objective.data
-        self.notes += older
+        self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
 
     def search(self) -> None:
         """The selected model, its rivals, what is left."""
         allowed, self.not_testable = candidates(self.records, self.clean, self.data, self.excited, self.at_controller)
         self.notes += [ADVICE] * any(folded(r) for r in self.records)
         self.notes += loop_notes(self.data)
-        found = selected(self.objective, self.scales, self.idn.model, allowed, self._equivalent_here, self._say)
+        rest = self.scales, self.idn.model, allowed, self._equivalent_here, self._say
+        found, older = searched(self.objective, self.scales, self.idn.model, lambda objective: selected(objective, *rest))
+        self.notes += older
         self.note(0.85, "looking for what is left")
         self.take(found)
         simpler = simplified(found.space, found.final, self.left)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from drive_cases import random_case
 from drive_rig import Noise, Plant, rig, skip_without_library
 from gaident.data.signals.lattice import encoder_lines
 from gaident.diagnosis.library.terms import LIBRARY
@@ -74,6 +75,15 @@ def test_a_differenced_angle_without_a_logged_torque_is_no_finding() -> None:
     assert any(f"({LINES} lines a turn)" in note for note in dia.notes) and dia.causes == (), dia.summary()
     dia = ga.diagnose(with_effect, DRIVE.controller)
     assert any("torque_saturation" in (f.effect, *f.alternatives) for f in dia.causes), dia.summary()
+
+
+@pytest.mark.parametrize("effect", ["", "stribeck_friction", "torque_lag"])
+def test_the_search_finds_the_age_where_the_lines_of_a_turn_are_no_whole_number(effect: str) -> None:
+    skip_without_library()
+    rec, validation, controller, truth = random_case(314, effect or None, noise="differenced")
+    dia = ga.diagnose(rec, controller, validation=validation)
+    assert any("half a sample old" in note for note in dia.notes), dia.summary()
+    assert [effect in {f.effect, *f.alternatives} for f in dia.causes] == [True] * len(truth.effects), dia.summary()
 
 
 def test_a_rounded_velocity_that_is_no_difference_is_not_taken_for_one() -> None:
