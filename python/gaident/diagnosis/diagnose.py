@@ -203,9 +203,7 @@ class _Work:
         }
         shown = self.at_controller.controller or self.controller
         self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
-        data = replace(
-            data, controller=shown, loop_follows=self.follows, from_rest=self.driving.from_rest, known_noise=self.noise
-        )
+        data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         self.excited = excitation(self.clean, self.data.loop, axis=self.axis)
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
@@ -259,7 +257,7 @@ class _Work:
             causes = [e for e in causes if self._determined(e, estimates[e])]
             mechanics = mechanics_of(self.under, self.estimate)
             model = with_effects(self.estimate.parameters.model(self.estimate.x), self.at_controller.effects)
-            check = by_second_method(self.clean, gains, model, mechanics, estimates, self.data.open_runs, self.axis)
+            check = by_second_method(self.data, gains, model, mechanics, estimates)
             causes, why = standing(causes, gains, check, self._equivalent_here)
             if why:
                 driver = driver or self.left.strongest or "time"

@@ -26,7 +26,7 @@ from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.term import Term
 from gaident.models.drive_torque import late, torque_of
 from gaident.models.simulate_many import LoadedRecord
-from gaident.models.starts import noise_std, starts_moving
+from gaident.models.starts import noise_std, starts_moving, stored_torque
 
 __all__ = ["DataSet", "with_angle"]
 
@@ -46,8 +46,7 @@ class DataSet:
     as the controller read them, which may hold samples that the fit leaves out. finest: no substep of a simulation is much
     shorter [s]; resolution: step of the lattice that all velocities lie on [rad/s], 0: none; known_noise: standard deviation
     of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
-    makes; from_rest: whether its integrator held no torque before a record; torque_measured: whether it is a measured one, with
-    noise on it, behind the actuator; axis: "rotary" or "linear".
+    makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear".
     age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample old. What
     drives a model is late by as much, here and in the loop that is simulated.
     """
@@ -64,7 +63,6 @@ class DataSet:
     resolution: float = 0.0
     known_noise: float | None = None
     loop_follows: bool = True
-    from_rest: bool = True
     torque_measured: bool = False
     axis: str = "rotary"
     age: float = 0.0
@@ -105,8 +103,10 @@ class DataSet:
 
         That is the mean of the velocities at the ends of a line; `gaident.estimation.mean_velocity` has what is nearer.
         """
-        torque = torque_in(rec)
-        return rec.with_channels(torque=late(torque, self.age, torque[0] if starts_moving(rec, None) else 0.0))
+        if not self.age or rec.torque is None:
+            return rec
+        start = rec.torque[0] if starts_moving(rec, None) else 0.0
+        return rec.with_channels(torque=late(rec.torque, self.age, start))
 
     def ready(self, rec: Record) -> Record:
         """A record whose simulation `seen` takes for the velocity that the sensor shows."""
@@ -164,6 +164,11 @@ class DataSet:
             return False
         loop = self.loop
         return all(loop.command_of(r) is not None for r in self.records)
+
+    @cached_property
+    def from_rest(self) -> bool:
+        """Whether the integrator held no torque before any of the records."""
+        return self.pi is None or not any(stored_torque(r, self.pi) for r in self.records)
 
     @cached_property
     def loop(self) -> Controller | None:

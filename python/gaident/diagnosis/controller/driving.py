@@ -45,11 +45,6 @@ class Driving:
         return bool(self.doubts) and not self.limited and not any(f.place == "controller" for f in self.findings)
 
     @property
-    def from_rest(self) -> bool:
-        """Whether no integrator held a torque before a record."""
-        return all(r.cause != "initial_integral" for r in self.logged.replays.values())
-
-    @property
     def read(self) -> tuple[Record, ...]:
         """The records with every signal that the controller read, beside the torque as logged."""
         if self.controller is None or self.controller.one_equation:
