@@ -87,7 +87,8 @@ def measured_gains(
     at_controller: dict[str, dict[str, float]],
 ) -> Gains:
     """Errors of the linear model, of each stage and of the extended model, closed over the controller where they can be."""
-    controller = objective.data.older(closed_over(controller, (*records, *held)))
+    loop = closed_over(controller, (*records, *held))
+    controller = objective.data.older(loop)
     part: tuple[int, ...] | None
     if held:
         scored, words, part = [(r, 0) for r in held], "validation records", None
@@ -98,7 +99,7 @@ def measured_gains(
         words = f"the last 30 % of {'the record' if by_time else 'its path'}, parameters fitted to the first 70 %"
     else:
         scored, words, part = [(r, 0) for r in records], IN_SAMPLE, None
-    scored = [(_turned(r, controller, final), first) for r, first in scored]
+    scored = [(_turned(r, loop, final), first) for r, first in scored]
     stages = _stages(final, objective, part)
     named = list(at_controller.items())
     bare = stages[0].parameters.model(stages[0].x)

@@ -112,7 +112,11 @@ class DataSet:
         """A record whose simulation `seen` takes for the velocity that the sensor shows."""
         if not self.age:
             return rec
-        return with_middles(rec) if self.differenced else self.as_old(rec)
+        if not self.differenced:
+            return self.as_old(rec)
+        if rec.position is not None and self.records[0].position is None:  # integrated from the velocity, the angle is as old
+            rec = rec.with_channels(position=rec.position + self.age * self.dt * rec.velocity)
+        return with_middles(rec)
 
     def seen(self, rows: Matrix) -> Matrix:
         """Rows of velocities that the sensor shows, of those that a record made `ready` gives."""
