@@ -131,6 +131,8 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
     for name, text in CONSTANT_HELP.items():
         g.add_argument(f"--{name.replace('_', '-')}", type=number, metavar="X", help=text)
     _add_text_options(g)
+    pitch = "of a linear axis, the length with which its cogging returns [m]: pitch of the screw or of the poles"
+    g.add_argument("--pitch", type=number, metavar="M", help=pitch)
     g.add_argument("--axis", choices=AXES, help="linear: print m, m/s, N, kg (default: rotary)")
 
 

@@ -151,6 +151,8 @@ class _Draft:
                 'or "linear": m, m/s, N, kg' if self.axis == "rotary" else 'or "rotary"',
             )
         ]
+        if self.axis == "linear":
+            lines.append(_line('# pitch = "24 mm"', "with which a cogging returns: pitch of the screw, or of the poles"))
         time = self.guess.time
         if time is None and self.dt is None:
             lines.append(self._todo("# dt = 1e-3", "dt", "s; no column looks like time"))

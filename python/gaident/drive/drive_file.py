@@ -37,6 +37,7 @@ RANGES = ("inertia", "resonance_hz", "damping", "gain", "real", "imaginary", "p"
 KEYS: dict[str, dict[str, kinds.Check]] = {
     "": {
         "axis": kinds.axis,
+        "pitch": kinds.length,
         "dt": kinds.number,
         "velocity_cutoff_hz": kinds.number,
         **dict.fromkeys(CONSTANTS, kinds.number),
@@ -82,6 +83,11 @@ class Drive:
         """ "rotary" or "linear": which units are printed."""
         return str(self.general.get("axis", "rotary"))
 
+    @property
+    def pitch(self) -> float | None:
+        """Of a linear axis, the length with which its cogging returns [m]; None: not known."""
+        return self.general.get("pitch")
+
     def read(self, path: str, measured: bool = True) -> Record:
         """The log as a Record; measured: as `gaident.read` takes it. Raises ReadError or RecordError.
 
@@ -91,7 +97,7 @@ class Drive:
             return read(path, measured=False)
         columns = {k: None if v == "" else v for k, v in self.columns.items()}
         left_out = {k for k, v in columns.items() if v is None}
-        not_read = {"axis", "dt"} | ({"torque_is"} if "torque" in left_out else set())
+        not_read = {"axis", "pitch", "dt"} | ({"torque_is"} if "torque" in left_out else set())
         more = {k: v for k, v in self.general.items() if k not in not_read}
         asked = [k for k in (*CHANNELS, *([] if "dt" in self.general else ["time"])) if k not in left_out]
         self._refuse_unfilled("units", asked, "or give it with --units CHANNEL=UNIT")

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import textwrap
 
-from gaident.axis import Text, identifier_words, said, say, unit, velocity_unit, word
+from gaident.axis import Text, called, identifier_words, joined, said, say, unit, velocity_unit, word
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
+from gaident.show.cause_words import either, missing_words, words
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
 from gaident.show.wording import certainty, controller_lines, number, table, with_std
 
@@ -19,7 +20,6 @@ __all__ = [
     "chance_words",
     "diagnosis_summary",
     "driver_counts",
-    "either",
     "fall_words",
     "left_words",
     "mechanical_name",
@@ -27,7 +27,6 @@ __all__ = [
     "next_words",
     "parameter_row",
     "verdict_words",
-    "words",
 ]
 
 WIDTH = 100  # no decision: letters of a line
@@ -66,24 +65,13 @@ def diagnosis_summary(dia: Diagnosis, axis: str = "rotary") -> str:
     return "\n\n".join("\n".join(lines) for lines in sections if lines)
 
 
-def words(effect: str) -> str:
-    """The name of an effect as it is written."""
-    return effect.replace("_", " ")
-
-
 def _wrapped(text: str, indent: str = "", hanging: str = "") -> list[str]:
     lines = textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent + hanging, break_on_hyphens=False)
     return lines or [""]
 
 
-def either(finding: Finding) -> str:
-    """ "a, b or c" of a finding and what these data cannot tell from it."""
-    names = [words(name) for name in (finding.effect, *finding.alternatives)]
-    return f"{', '.join(names[:-1])} or {names[-1]}"
-
-
 def _verdict(dia: Diagnosis, axis: str) -> list[str]:
-    head = " ".join(filter(None, (verdict_words(dia), left_words(dia, axis))))
+    head = " ".join(filter(None, (verdict_words(dia, axis), left_words(dia, axis))))
     lines = [f"Verdict: {dia.verdict}", *_wrapped(head)]
     for note in dia.notes:
         lines += _wrapped(said(note, axis))
@@ -109,16 +97,18 @@ def driver_counts(dia: Diagnosis) -> bool:
     return dia.driver is not None and dia.left.get(dia.driver, 0.0) > dia.left_needed
 
 
-def verdict_words(dia: Diagnosis) -> str:
+def verdict_words(dia: Diagnosis, axis: str) -> str:
     """The verdict in words, with the names."""
     if dia.verdict == "adequate":
         return "The linear model is adequate: nothing significant is left that could be blamed on the drive."
     if dia.verdict == "unexplained":
         return "The model is wrong, and no effect of the library fits what is left."
     causes = [f for f in dia.findings if not f.is_noise]
-    named = [words(f.effect) for f in causes if not f.alternatives]
-    open_ = [either(f) for f in causes if f.alternatives]
+    named = list(dict.fromkeys(words(f.effect, axis) for f in causes if not f.alternatives))
+    kinds = dict.fromkeys(filter(None, (missing_words(f, axis) for f in causes if f.alternatives)))
+    open_ = dict.fromkeys(either(f, axis) for f in causes if f.alternatives and not missing_words(f, axis))
     parts = [f"{'Cause' if len(named) == 1 else 'Causes'}: {', '.join(named)}."] if named else []
+    parts += [f"{text[0].upper()}{text[1:]}." for text in kinds]
     parts += [
         f"What is {'also ' if named else ''}missing is one of: {names}. These data do not tell them apart." for names in open_
     ]
@@ -136,7 +126,7 @@ def _causes(dia: Diagnosis, axis: str) -> list[str]:
         if f.is_noise:
             continue
         place = ", in the controller" if f.place == "controller" else ""
-        lines.append(words(f.effect) + place + "".join(f", or {words(a)}" for a in f.alternatives))
+        lines.append(words(f.effect, axis) + place + "".join(f", or {words(a, axis)}" for a in f.alternatives))
         lines += table([parameter_row(n, e, axis) for n, e in f.parameters.items()], "    ")
         lines += _wrapped(said(f.evidence, axis), "    ")
         if f.p_value is not None:
@@ -157,6 +147,7 @@ def parameter_row(name: str, e: Estimate, axis: str) -> tuple[str, str, str, str
     value, std, u = e.value, e.std, e.unit
     if axis == "linear" and u == "1/turn":  # a turn is 2 pi m
         value, std, u = value / math.tau, std / math.tau, "1/m"
+        return identifier_words(name, axis), with_std(value, std), u, f"every {number(1e3 / value)} mm" if value > 0.0 else ""
     elif name not in NOT_OF_THE_AXIS:
         u = unit(u, axis)
     remark = "at a bound" if e.at_bound else "" if e.identifiable else "not determined"
@@ -179,7 +170,7 @@ def _gain(dia: Diagnosis, axis: str) -> list[str]:
         lines += _wrapped(said(not_the_loop_words(dia), axis), "  ")
     if extended and dia.before.rmse > 0.0:
         lines += _wrapped(said(fall_words(dia), axis), "  ")
-        steps = [f"{words(f.effect)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
+        steps = [f"{words(f.effect, axis)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
         if len(steps) > 1:
             lines += _wrapped(f"One after the other, each of what was left before it: {', '.join(steps)}.", "  ")
     return lines
@@ -282,21 +273,21 @@ def _record(dia: Diagnosis, axis: str) -> list[str]:
     lines = []
     for f in dia.findings:
         if f.is_noise:
-            lines += _wrapped(f"{words(f.effect)}: {said(f.evidence, axis)}", "  ", "  ")
+            lines += _wrapped(f"{words(f.effect, axis)}: {said(f.evidence, axis)}", "  ", "  ")
     return ["About the record", *lines] if lines else []
 
 
 def _untested(dia: Diagnosis, axis: str) -> list[str]:
     lines = []
     for effect, reason in dia.not_testable.items():
-        lines += _wrapped(f"{words(effect)}: {said(reason, axis)}", "  ", "  ")
+        lines += _wrapped(f"{words(effect, axis)}: {said(reason, axis)}", "  ", "  ")
     return ["Not testable with this record", *lines] if lines else []
 
 
 def _tested_up_to(dia: Diagnosis, axis: str) -> list[str]:
     lines = []
     for effect, sizes in dia.one_sided.items():
-        lines += _wrapped(f"{words(effect)}: {said(sizes, axis)}", "  ", "  ")
+        lines += _wrapped(f"{words(effect, axis)}: {said(sizes, axis)}", "  ", "  ")
     return [TESTED_UP_TO, *lines] if lines else []
 
 
@@ -312,9 +303,9 @@ def _next(dia: Diagnosis, axis: str) -> list[str]:
 def next_words(dia: Diagnosis, p: Proposal) -> Text:
     """Why the experiment p comes next, what it tells apart and how surely."""
     margin = f", {certainty(p.margin)} ({p.margin:.0f} BIC units, 10 are enough)" if math.isfinite(p.margin) else ""
-    text = say("{} It tells {}{}.", p.reason, " from ".join(map(words, p.separates)), margin)
+    text = say("{} It tells {}{}.", p.reason, joined(" from ", map(called, p.separates)), margin)
     rest = dict.fromkeys(a for f in dia.findings for a in f.alternatives if a not in p.separates)
-    return say("{} It was not chosen for {}.", text, " or ".join(map(words, rest))) if rest else text
+    return say("{} It was not chosen for {}.", text, joined(" or ", map(called, rest))) if rest else text
 
 
 def _how(dia: Diagnosis) -> list[str]:

@@ -22,7 +22,7 @@ from gaident.models.drive_torque import torque_driven
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.results.store import load
-from gaident.show.diagnosis_summary import either, words
+from gaident.show.cause_words import either, words
 from gaident.show.progress_bar import Progress
 from gaident.show.wording import number, table
 
@@ -81,7 +81,7 @@ def _row(name: str, result: tuple[Drive, Diagnosis] | GaidentError) -> tuple[str
     if isinstance(result, GaidentError):
         return name, "not diagnosed", in_options(result), "", "", ""
     drive, dia = result
-    causes = ", ".join(either(f) if f.alternatives else words(f.effect) for f in dia.causes) or "none"
+    causes = ", ".join(either(f, drive.axis) if f.alternatives else words(f.effect, drive.axis) for f in dia.causes) or "none"
     return name, dia.verdict, causes, number(dia.before.rmse), number(dia.after.rmse), velocity_unit(drive.axis)
 
 
@@ -114,6 +114,7 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
             seed=args.seed,
             progress=progress,
             axis=drive.axis,
+            pitch=drive.pitch,
         )
     dia = replace(dia, notes=(*reading_notes(drive, [*records, *(validation or ())]), *dia.notes))
     written = files.write(dia, records, validation or (), drive.axis, lambda: dia.plot(axis=drive.axis))

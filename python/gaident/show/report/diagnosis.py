@@ -10,13 +10,14 @@ from gaident.axis import said, unit, velocity_unit, word
 from gaident.models.factors import gain_unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
+from gaident.results.finding import Finding
+from gaident.show.cause_words import either, missing_words, size_words, words
 from gaident.show.controller_words import controller_words
 from gaident.show.diagnosis_summary import (
     DRIVERS,
     TESTED_UP_TO,
     chance_words,
     driver_counts,
-    either,
     fall_words,
     left_words,
     mechanical_name,
@@ -24,7 +25,6 @@ from gaident.show.diagnosis_summary import (
     next_words,
     not_the_loop_words,
     parameter_row,
-    words,
 )
 from gaident.show.html import Html, Row, joined, number, table, tag, typeset
 from gaident.show.report import charts
@@ -59,26 +59,35 @@ GOOD, HALF, BAD = ("good", "✓"), ("half", "◐"), ("bad", "✗")
 MARKS = {"adequate": GOOD, "explained": GOOD, "partly explained": HALF, "unexplained": BAD}
 
 
-def head(dia: Diagnosis) -> Head:
+def head(dia: Diagnosis, axis: str) -> Head:
     """What stands at the top of the page."""
-    return Head("Diagnosis", *mark(dia), headline(dia), dia.notes)
+    return Head("Diagnosis", *mark(dia), headline(dia, axis), dia.notes)
 
 
-def headline(dia: Diagnosis) -> str:
-    """The verdict in one sentence."""
+def headline(dia: Diagnosis, axis: str) -> str:
+    """The verdict in one sentence, with the size of each cause."""
     if dia.verdict == "adequate":
         return "The linear model is adequate: nothing significant is left that could be blamed on the drive."
     causes = [f for f in dia.findings if not f.is_noise]
     if not causes:
         return "The model is wrong, and no effect of the library fits what is left."
-    named = [words(f.effect) for f in causes if not f.alternatives]
+    named = list(dict.fromkeys(_sized(f, axis) for f in causes if not f.alternatives))
     listed = " and ".join(filter(None, (", ".join(named[:-1]), *named[-1:])))
     lacks = [listed] if named else []
-    lacks += [f"one of {either(f)}, which these data do not tell apart" for f in causes if f.alternatives]
+    lacks += list(dict.fromkeys(_open(f, axis) for f in causes if f.alternatives))
     text = f"The model lacks {'; and '.join(lacks)}"
     if dia.verdict == "partly explained":
         return f"{text}; this explains a part of what it gets wrong, and something significant is left."
     return f"{text}; with {'it' if len(causes) == 1 else 'them'} nothing significant is left."
+
+
+def _sized(f: Finding, axis: str) -> str:
+    size = size_words(f, axis)
+    return f"{words(f.effect, axis)} ({size})" if size else words(f.effect, axis)
+
+
+def _open(f: Finding, axis: str) -> str:
+    return missing_words(f, axis) or f"one of {either(f, axis)}, which these data do not tell apart"
 
 
 def mark(dia: Diagnosis) -> tuple[str, str, str]:
@@ -137,7 +146,7 @@ def _causes(dia: Diagnosis, view: View) -> Section:
         )
         parts.append(tag("p", text))
     for f in causes:
-        name = joined((tag("b", words(f.effect)), *(joined((" or ", tag("b", words(a)))) for a in f.alternatives)))
+        name = joined((tag("b", words(f.effect, axis)), *(joined((" or ", tag("b", words(a, axis)))) for a in f.alternatives)))
         rows: list[Row] = [
             (n, typeset(value), typeset(u), remark) for n, value, u, remark in map(_row(axis), f.parameters.items())
         ]
@@ -159,7 +168,9 @@ def _causes(dia: Diagnosis, view: View) -> Section:
     noise = [f for f in dia.findings if f.is_noise]
     if noise:
         parts.append(tag("h3", "About the record"))
-        parts.append(tag("ul", *(tag("li", tag("b", words(f.effect)), ": ", typeset(said(f.evidence, axis))) for f in noise)))
+        parts.append(
+            tag("ul", *(tag("li", tag("b", words(f.effect, axis)), ": ", typeset(said(f.evidence, axis))) for f in noise))
+        )
     return Section("cause", "Cause and evidence", *parts)
 
 
@@ -280,7 +291,7 @@ def _untested(dia: Diagnosis, view: View) -> Section:
 
 def _reasons(why: Mapping[str, str], head: str, axis: str) -> Html:
     """A table of effects with a sentence on each."""
-    rows: list[Row] = [(words(effect), typeset(said(reason, axis))) for effect, reason in why.items()]
+    rows: list[Row] = [(words(effect, axis), typeset(said(reason, axis))) for effect, reason in why.items()]
     return tag("div", table(("effect", head), [rows]), class_="text")
 
 

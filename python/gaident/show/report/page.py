@@ -24,7 +24,11 @@ def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
     """The whole page of a Diagnosis or an Identification; plotly_js: the library's text."""
     drawn = Charts()
     if isinstance(result, Diagnosis):
-        head_of, tiles, chapters = diagnosis.head(result), diagnosis.tiles(result, view), diagnosis.chapters(result, view, drawn)
+        head_of, tiles, chapters = (
+            diagnosis.head(result, view.axis),
+            diagnosis.tiles(result, view),
+            diagnosis.chapters(result, view, drawn),
+        )
     else:
         head_of, tiles = identification.head(result), identification.tiles(result, view)
         chapters = identification.chapters(result, view, drawn)
