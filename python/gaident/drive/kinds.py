@@ -12,21 +12,8 @@ from gaident.data.torque_kind import TORQUE_KINDS
 from gaident.errors import ReadError
 
 __all__ = [
-    *(
-        "Check",
-        "axis",
-        "channels",
-        "column",
-        "length",
-        "number",
-        "pair",
-        "pair_or_one",
-        "positive",
-        "text",
-        "torque_is",
-        "unit",
-        "whole",
-    ),
+    *("Check", "axis", "channels", "column", "length", "number", "pair", "pair_or_one", "positive", "text"),
+    *("torque_is", "unit", "whole", "yes_or_no"),
 ]
 
 Check = Callable[[object, str], object]
@@ -41,6 +28,12 @@ def number(value: object, name: str) -> float:
 def whole(value: object, name: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise ReadError(f"{name} is {value!r}: give a whole number")
+    return value
+
+
+def yes_or_no(value: object, name: str) -> bool:
+    if not isinstance(value, bool):
+        raise ReadError(f"{name} is {value!r}: give true or false, without quotes")
     return value
 
 
