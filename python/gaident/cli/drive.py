@@ -48,6 +48,8 @@ def drive_of(args: argparse.Namespace) -> Drive:
         sections["space"],
         sections["limits"],
         sections["shift"],
+        sections["show"],
+        {key: value for key, value in sections["report"].items() if value},
         unfilled,
     )
 

@@ -110,11 +110,11 @@ def naming(target: Path) -> Iterator[None]:
         raise OSError(f"cannot write {target}: {error.strerror or error}") from error
 
 
-def summary_of(idn: Identification, axis: str) -> str:
+def summary_of(idn: Identification, axis: str, units: Mapping[str, Any] | None = None) -> str:
     """The summary, its remedies as options."""
     from gaident.show.summary import identification_summary
 
-    return identification_summary(idn, axis)
+    return identification_summary(idn, axis, units)
 
 
 def save_figure(figure: Figure, path: Path) -> None:

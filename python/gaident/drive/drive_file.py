@@ -66,6 +66,8 @@ KEYS: dict[str, dict[str, kinds.Check]] = {
         "bits": kinds.whole,
     },
     "limits": dict.fromkeys(("speed", "torque", "travel", "duration"), kinds.positive),
+    "show": dict.fromkeys(("velocity", "torque", "position"), kinds.text),
+    "report": dict.fromkeys(("date", "machine", "customer", "text"), kinds.text),
 }
 
 
@@ -80,12 +82,19 @@ class Drive:
     space_values: Mapping[str, Any]
     limit_values: Mapping[str, Any] = field(default_factory=dict)
     shift: Mapping[str, int] = field(default_factory=dict)
+    show: Mapping[str, str] = field(default_factory=dict)
+    about: Mapping[str, str] = field(default_factory=dict)
     unfilled: Mapping[tuple[str, str], str] = field(default_factory=dict)  # (section, key) -> file and line, see `unfilled_of`
 
     @property
     def axis(self) -> str:
         """ "rotary" or "linear": which units are printed."""
         return str(self.general.get("axis", "rotary"))
+
+    @property
+    def units_shown(self) -> dict[str, Any]:
+        """The units of [show] with the constants that they need; {} where none are asked for."""
+        return {**self.show, **{key: self.general[key] for key in CONSTANTS if key in self.general}} if self.show else {}
 
     @property
     def pitch(self) -> float | None:

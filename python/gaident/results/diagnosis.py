@@ -197,9 +197,9 @@ class Diagnosis(SavedResult):
         rec = rec.shifted(**moves) if (moves := self.log_shifts.get(rec.digest)) else rec
         return rec if self.controller is None or self.controller.one_equation else driven_by(rec, self.controller)
 
-    def summary(self, axis: str | None = None) -> str:
-        """Return the result as text, in the units of its axis; axis="linear" for m and N, "rotary" for rad and N m."""
-        text: str = provided("diagnosis_summary")(self, axis or self.axis)
+    def summary(self, axis: str | None = None, units: Mapping[str, Any] | None = None) -> str:
+        """Return the result as text, in SI units of its axis ("linear": m, N); units: yours beside them, as in `report`."""
+        text: str = provided("diagnosis_summary")(self, axis or self.axis, units)
         return text
 
     def plot(self, records: Record | Sequence[Record] | None = None, axis: str | None = None) -> Figure:

@@ -168,9 +168,9 @@ class Identification(SavedResult):
         """Return measured minus simulated velocity [rad/s], shape (n,)."""
         return rec.velocity - self.simulate(rec)
 
-    def summary(self, axis: str = "rotary") -> str:
-        """Return the result as text; axis="linear" for units of m and N."""
-        text: str = provided("identification_summary")(self, axis)
+    def summary(self, axis: str = "rotary", units: Mapping[str, Any] | None = None) -> str:
+        """Return the result as text; axis="linear" for units of m and N; units: yours beside SI, as `report` has them."""
+        text: str = provided("identification_summary")(self, axis, units)
         return text
 
     def plot(self, records: Record | Sequence[Record] | None = None, axis: str = "rotary") -> Figure:

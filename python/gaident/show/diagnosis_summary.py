@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Mapping
+from typing import Any
 
 from gaident.axis import Text, called, identifier_words, joined, said, say, unit, velocity_unit, word
 from gaident.policy.table import POLICY
@@ -13,6 +15,7 @@ from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
 from gaident.show.cause_words import either, missing_words, words
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
+from gaident.show.units import Scales, beside, scales_of
 from gaident.show.wording import certainty, controller_lines, number, table, with_std
 
 __all__ = [
@@ -42,15 +45,17 @@ DRIVERS = {
 }
 
 
-def diagnosis_summary(dia: Diagnosis, axis: str = "rotary") -> str:
+def diagnosis_summary(dia: Diagnosis, axis: str = "rotary", units: Mapping[str, Any] | None = None) -> str:
     """What is wrong, why, the gain, what could not be tested, what to measure next; no line break at the end.
 
     dia: a Diagnosis, or anything with its attributes. axis: "rotary", or "linear" for words and units of m and N.
+    units: of the user, shown beside SI in the tables, as `scales_of` takes them.
     """
+    scales = scales_of(units, axis)
     sections = [
         _verdict(dia, axis),
-        _causes(dia, axis),
-        _gain(dia, axis),
+        _causes(dia, axis, scales),
+        _gain(dia, axis, scales),
         _force(dia, axis),
         _second_method(dia, axis),
         _next(dia, axis),
@@ -120,14 +125,14 @@ def verdict_words(dia: Diagnosis, axis: str) -> str:
     return " ".join([f"The model was wrong, {found} nothing significant is left.", *parts])
 
 
-def _causes(dia: Diagnosis, axis: str) -> list[str]:
+def _causes(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
     lines: list[str] = []
     for f in dia.findings:
         if f.is_noise:
             continue
         place = ", in the controller" if f.place == "controller" else ""
         lines.append(words(f.effect, axis) + place + "".join(f", or {words(a, axis)}" for a in f.alternatives))
-        lines += table([parameter_row(n, e, axis) for n, e in f.parameters.items()], "    ")
+        lines += table([parameter_row(n, e, axis, scales) for n, e in f.parameters.items()], "    ")
         lines += _wrapped(said(f.evidence, axis), "    ")
         if f.p_value is not None:
             lines += _wrapped(chance_words(f, dia.bootstrap), "    ")
@@ -142,27 +147,31 @@ def chance_words(finding: Finding, bootstrap: int) -> str:
     return f"Chance of such a finding where there is no effect at all (bootstrap): {most}{finding.p_value:.2g}."
 
 
-def parameter_row(name: str, e: Estimate, axis: str) -> tuple[str, str, str, str]:
-    """Name, value with its standard deviation, unit, remark."""
+def parameter_row(name: str, e: Estimate, axis: str, scales: Scales) -> tuple[str, str, str, str, str]:
+    """Name, value with its standard deviation, unit, the same in the user's unit, remark."""
     value, std, u = e.value, e.std, e.unit
     if axis == "linear" and u == "1/turn":  # a turn is 2 pi m
         value, std, u = value / math.tau, std / math.tau, "1/m"
-        return identifier_words(name, axis), with_std(value, std), u, f"every {number(1e3 / value)} mm" if value > 0.0 else ""
+        return identifier_words(name, axis), with_std(value, std), u, "", f"every {number(1e3 / value)} mm" if value > 0.0 else ""
     elif name not in NOT_OF_THE_AXIS:
         u = unit(u, axis)
     remark = "at a bound" if e.at_bound else "" if e.identifiable else "not determined"
-    return identifier_words(name, axis), with_std(value, std), "" if u == "1" else u, remark
+    return identifier_words(name, axis), with_std(value, std), "" if u == "1" else u, beside(scales, name, value, std, u), remark
 
 
-def _gain(dia: Diagnosis, axis: str) -> list[str]:
+def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
     v = velocity_unit(axis)
     extended = bool(dia.model.effects)
-    rows = [
+    rows: list[tuple[str, ...]] = [
         ("", f"rmse [{v}]", "fit [%]"),
         ("linear model", number(dia.before.rmse), f"{dia.before.fit_percent:.2f}"),
         ("extended model", number(dia.after.rmse), f"{dia.after.fit_percent:.2f}"),
         ("noise of the measured velocity", number(dia.after.noise_floor), ""),
     ]
+    if v in scales:
+        shown, size = scales[v]
+        sizes = (dia.before.rmse, dia.after.rmse, dia.after.noise_floor)
+        rows = [(*row, more) for row, more in zip(rows, (f"rmse [{shown}]", *(number(size * x) for x in sizes)), strict=True)]
     in_sample = dia.held_out == "in-sample"
     where = "IN-SAMPLE: too little data to hold any out" if in_sample else f"on {dia.held_out}"
     lines = [f"Free-run simulation, {where}", *table(rows if extended else [rows[0], rows[1], rows[3]])]

@@ -13,7 +13,7 @@ from gaident.axis import velocity_unit
 from gaident.cli.drive import drive_of, read_all, reading_notes
 from gaident.cli.output import print_json, proposal_csv, target_of, write
 from gaident.cli.remedies import in_options
-from gaident.cli.result_files import ResultFiles
+from gaident.cli.result_files import ResultFiles, shown_block
 from gaident.diagnosis.diagnose import diagnose
 from gaident.drive.drive_file import Drive, axes_in
 from gaident.errors import GaidentError, SettingsError
@@ -35,9 +35,9 @@ def diagnose_command(args: Namespace) -> int | None:
         return _several(args, args.select or names)
     drive, dia, written = _diagnosed(args)
     if args.json:
-        print_json(dia.to_dict())
+        print_json({**dia.to_dict(), **shown_block(dia, drive)})
         return None
-    print(dia.summary(drive.axis))
+    print(dia.summary(drive.axis, drive.units_shown))
     if args.next_command is not None and dia.next_experiment is None:
         print(f"\nnot written: {args.next_command}, as there is no next experiment to propose")
     if written:
@@ -71,7 +71,7 @@ def _several(args: Namespace, names: Sequence[str]) -> int | None:
     print("\n".join(table([("axis", "verdict", "cause", "rmse, linear", "extended", ""), *starmap(_row, found.items())], "")))
     for name, result in found.items():
         if not isinstance(result, GaidentError):
-            print(f"\n--- {name}\n\n{result[1].summary(result[0].axis)}")
+            print(f"\n--- {name}\n\n{result[1].summary(result[0].axis, result[0].units_shown)}")
     if written:
         print(f"\nwritten: {', '.join(map(str, written))}")
     return 1 if failed else None
@@ -117,7 +117,7 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
             pitch=drive.pitch,
         )
     dia = replace(dia, notes=(*reading_notes(drive, [*records, *(validation or ())]), *dia.notes))
-    written = files.write(dia, records, validation or (), drive.axis, lambda: dia.plot(axis=drive.axis))
+    written = files.write(dia, records, validation or (), drive, lambda: dia.plot(axis=drive.axis))
     if following is not None and dia.next_experiment is not None:
         write(following, proposal_csv(dia.next_experiment, drive.axis).encode())
         written.append(following)

@@ -98,11 +98,18 @@ def mark(dia: Diagnosis) -> tuple[str, str, str]:
 def tiles(dia: Diagnosis, view: View) -> Html:
     """The figures seen first."""
     v = velocity_unit(view.axis)
+    _, size = view.scales.get(v, (v, 1.0))
     where = "in-sample" if dia.held_out == "in-sample" else "held-out data"
-    shown = [tile(f"error, linear model ({where})", number(dia.before.rmse), v)]
+    shown = [tile(f"error, linear model ({where})", number(size * dia.before.rmse), _unit_of(dia.before.rmse, v, view))]
     if dia.model.effects:
-        shown.append(tile(f"error, extended model ({where})", number(dia.after.rmse), v))
-    shown.append(tile("noise of the measured velocity", number(dia.after.noise_floor), v))
+        shown.append(tile(f"error, extended model ({where})", number(size * dia.after.rmse), _unit_of(dia.after.rmse, v, view)))
+    shown.append(
+        tile(
+            "noise of the measured velocity",
+            number(size * dia.after.noise_floor),
+            _unit_of(dia.after.noise_floor, v, view),
+        )
+    )
     if dia.model.effects and dia.before.rmse > 0.0:
         low, high = dia.gain_interval
         interval = typeset(f"95 % interval of the fall: {percent(low)} to {percent(high)} %") if math.isfinite(low) else ""
@@ -110,6 +117,11 @@ def tiles(dia: Diagnosis, view: View) -> Html:
         label = "the error grows by" if fall < -0.005 else "the error falls by"  # no decision: what is printed as 0 %
         shown.append(tile(label, typeset(f"{percent(abs(fall))} %"), interval))
     return joined(shown)
+
+
+def _unit_of(value: float, si: str, view: View) -> str:
+    """The unit in which a value is shown, with the value in SI behind where that is another."""
+    return f"{view.scales[si][0]} ({number(value)} {si})" if si in view.scales else si
 
 
 def percent(share: float) -> str:
@@ -147,9 +159,7 @@ def _causes(dia: Diagnosis, view: View) -> Section:
         parts.append(tag("p", text))
     for f in causes:
         name = joined((tag("b", words(f.effect, axis)), *(joined((" or ", tag("b", words(a, axis)))) for a in f.alternatives)))
-        rows: list[Row] = [
-            (n, typeset(value), typeset(u), remark) for n, value, u, remark in map(_row(axis), f.parameters.items())
-        ]
+        rows: list[Row] = [(n, *map(typeset, cells), remark) for n, *cells, remark in map(_row(view), f.parameters.items())]
         held = "in-sample" if dia.held_out == "in-sample" else "held-out"
         place = f"Place: {f.place}. " if f.place else ""
         figures = f"{place}{f.delta_bic:.0f} BIC units; the {held} error falls by {percent(f.gain)} % of what was left before it."
@@ -157,7 +167,7 @@ def _causes(dia: Diagnosis, view: View) -> Section:
             box(
                 tag("h3", name, " ", tag("small", "cannot be told apart" if f.alternatives else "named")),
                 tag("p", typeset(said(f.evidence, axis))),
-                table(("parameter", "value", "unit", ""), [rows]) if rows else "",
+                table(("parameter", "value", "unit", "", ""), [rows]) if rows else "",
                 tag("p", tag("small", typeset(figures))),
                 tag("p", tag("small", typeset(chance_words(f, dia.bootstrap)))) if f.p_value is not None else "",
                 kind="cause" if not f.alternatives else "cause warn",
@@ -174,8 +184,8 @@ def _causes(dia: Diagnosis, view: View) -> Section:
     return Section("cause", "Cause and evidence", *parts)
 
 
-def _row(axis: str) -> Callable[[tuple[str, Estimate]], tuple[str, str, str, str]]:
-    return lambda item: parameter_row(item[0], item[1], axis)
+def _row(view: View) -> Callable[[tuple[str, Estimate]], tuple[str, str, str, str, str]]:
+    return lambda item: parameter_row(item[0], item[1], view.axis, view.scales)
 
 
 def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:

@@ -22,7 +22,7 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inli
 
 def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
     """The whole page of a Diagnosis or an Identification; plotly_js: the library's text."""
-    drawn = Charts()
+    drawn = Charts(view.scales)
     if isinstance(result, Diagnosis):
         head_of, tiles, chapters = (
             diagnosis.head(result, view.axis),
@@ -55,7 +55,7 @@ def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
         tag("script", Html('document.documentElement.classList.add("js");')),
     )
     body = (
-        tag("header", tag("div", tag("p", "gaident report", class_="brand"), tag("h1", title)), _switch()),
+        tag("header", tag("div", tag("p", "gaident report", class_="brand"), tag("h1", title), _about(view)), _switch()),
         tag("main", verdict, contents, *(tag("section", tag("h2", c.title), c.body, id=c.key) for c in chapters)),
         tag("footer", tag("p", "Everything in this page is in this file: it needs no network. Figures: plotly.js, MIT licence.")),
         tag("script", Html(plotly_js.replace("</script", "<\\/script"))) if drawn.all else "",
@@ -64,6 +64,13 @@ def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
     )
     whole = tag("html", Html("\n"), tag("head", joined(head, "\n")), Html("\n"), tag("body", joined(body, "\n")), lang="en")
     return f"<!DOCTYPE html>\n{whole}\n"
+
+
+def _about(view: View) -> Html:
+    """Date, axis, customer, what the user says besides."""
+    rows = [joined((tag("b", key), ": ", text)) for key, text in view.about.items() if key != "text"]
+    free = tag("p", view.about["text"]) if view.about.get("text") else Html()
+    return joined((tag("p", joined(rows, " · ")) if rows else Html(), free))
 
 
 def _switch() -> Html:
