@@ -110,7 +110,7 @@ def naming(target: Path) -> Iterator[None]:
         raise OSError(f"cannot write {target}: {error.strerror or error}") from error
 
 
-def summary_of(idn: Identification, axis: str, units: Mapping[str, Any] | None = None) -> str:
+def summary_of(idn: Identification, axis: str, units: Mapping[str, str | float] | None = None) -> str:
     """The summary, its remedies as options."""
     from gaident.show.summary import identification_summary
 

@@ -29,6 +29,7 @@ class ResultFiles:
     result: Path | None
     picture: Path | None
     page: Path | None
+    live: bool = True
 
     @classmethod
     def of(cls, args: Namespace, sources: Sequence[str], **others: Path | None) -> ResultFiles:
@@ -37,6 +38,7 @@ class ResultFiles:
             target_of(args.out, sources),
             target_of(args.plot, sources, PICTURES),
             target_of(args.report, sources),
+            not args.pictures,
         )
         apart({"--out": files.result, "--plot": files.picture, "--report": files.page, **others})
         return files
@@ -58,17 +60,22 @@ class ResultFiles:
 
             save_figure(figure_in_units(figure(), scales_of(drive.units_shown, drive.axis)), self.picture)
         if self.page is not None:
-            write_report(result, self.page, records, validation, drive)
+            write_report(result, self.page, records, validation, drive, self.live)
         return [path for path in (self.result, self.picture, self.page) if path is not None]
 
 
 def write_report(
-    result: Diagnosis | Identification, target: Path, records: Sequence[Record], validation: Sequence[Record], drive: Drive
+    result: Diagnosis | Identification,
+    target: Path,
+    records: Sequence[Record],
+    validation: Sequence[Record],
+    drive: Drive,
+    live: bool,
 ) -> int:
     """The page; returns its size [bytes]."""
     from gaident.reporting.report import report_page
 
-    page = report_page(result, records, validation, drive.axis, drive.units_shown, drive.about).encode()
+    page = report_page(result, records, validation, drive.axis, drive.units_shown, drive.about, live).encode()
     write(target, page)
     return len(page)
 

@@ -6,7 +6,6 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +37,9 @@ def report(
     records: Records = None,
     validation: Records = None,
     axis: str | None = None,
-    units: Mapping[str, Any] | None = None,
+    units: Mapping[str, str | float] | None = None,
     about: Mapping[str, str] | None = None,
+    live: bool = True,
 ) -> None:
     """Write a result as one HTML page that needs nothing else: no network, no other file, no Python.
 
@@ -65,6 +65,8 @@ def report(
         ``{"velocity": "rpm", "torque": "%", "position": "deg", "rated_torque": 2.4}``.
     about : mapping of str to str, optional
         What stands below the title: ``{"date": "2026-11-22", "machine": "X1", "customer": "...", "text": "..."}``, any keys.
+    live : bool
+        False: pictures in place of figures that zoom; a page of some 0.3 MB, to be mailed or printed.
 
     Raises
     ------
@@ -88,7 +90,7 @@ def report(
     >>> "<html" in pathlib.Path("report.html").read_text(encoding="utf-8")
     True
     """
-    write_whole(path, report_page(result, records, validation, axis, units, about).encode())
+    write_whole(path, report_page(result, records, validation, axis, units, about, live).encode())
 
 
 def report_page(
@@ -96,8 +98,9 @@ def report_page(
     records: Records = None,
     validation: Records = None,
     axis: str | None = None,
-    units: Mapping[str, Any] | None = None,
+    units: Mapping[str, str | float] | None = None,
     about: Mapping[str, str] | None = None,
+    live: bool = True,
 ) -> str:
     """The text of what `report` writes."""
     from plotly.offline import get_plotlyjs
@@ -106,7 +109,9 @@ def report_page(
     for key, value in (about or {}).items():
         if not isinstance(value, str):
             raise GaidentError(f"about: {key} is {value!r}: give text")
-    return page(result, replace(view, scales=scales_of(units, view.axis), about=dict(about or {})), get_plotlyjs())
+    return page(
+        result, replace(view, scales=scales_of(units, view.axis), about=dict(about or {})), get_plotlyjs() if live else ""
+    )
 
 
 def view_of(result: Diagnosis | Identification, records: Records, validation: Records, axis: str | None) -> View:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Mapping
-from typing import Any
 
 from gaident.axis import Text, called, identifier_words, joined, said, say, unit, velocity_unit, word
 from gaident.policy.table import POLICY
@@ -13,10 +12,9 @@ from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
-from gaident.show.cause_words import either, missing_words, words
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
 from gaident.show.units import Scales, beside, scales_of
-from gaident.show.wording import certainty, controller_lines, number, table, with_std
+from gaident.show.wording import certainty, controller_lines, either, missing_words, number, table, with_std, words
 
 __all__ = [
     "TESTED_UP_TO",
@@ -45,7 +43,7 @@ DRIVERS = {
 }
 
 
-def diagnosis_summary(dia: Diagnosis, axis: str = "rotary", units: Mapping[str, Any] | None = None) -> str:
+def diagnosis_summary(dia: Diagnosis, axis: str = "rotary", units: Mapping[str, str | float] | None = None) -> str:
     """What is wrong, why, the gain, what could not be tested, what to measure next; no line break at the end.
 
     dia: a Diagnosis, or anything with its attributes. axis: "rotary", or "linear" for words and units of m and N.

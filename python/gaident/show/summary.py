@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Mapping
-from typing import Any
 
 from gaident.axis import identifier_words, said, unit, velocity_unit, word
 from gaident.control.controller import Controller
@@ -29,7 +28,7 @@ WIDTH = 100  # no decision: letters of a line
 SHOWN_STRUCTURES = 5  # no decision: how many are listed
 
 
-def identification_summary(idn: Identification, axis: str = "rotary", units: Mapping[str, Any] | None = None) -> str:
+def identification_summary(idn: Identification, axis: str = "rotary", units: Mapping[str, str | float] | None = None) -> str:
     """What was found and what it is worth; plain text, verdict first, no line break at the end.
 
     idn: an Identification, or anything with its attributes. axis: "rotary", or "linear" for units of m and N.

@@ -6,14 +6,14 @@ Values in sentences stay in SI; tables have a column beside, and axes of picture
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gaident.axis import unit as unit_of
-from gaident.checks import one_of
+from gaident.checks import one_of, real_number
 from gaident.data.formats.units import Constants, factor
 from gaident.errors import SettingsError
 from gaident.results.diagnosis import Diagnosis
@@ -36,7 +36,7 @@ _ANGULAR = ("frequency", "zero_frequency", "bandwidth")  # angular frequencies: 
 _TITLE = re.compile(r"\[([^\]]+)\]$")
 
 
-def scales_of(units: Mapping[str, Any] | None, axis: str) -> Scales:
+def scales_of(units: Mapping[str, str | float] | None, axis: str) -> Scales:
     """The user's units: {"velocity": "rpm", "torque": "%", "position": "deg"}, and the constants that they need.
 
     Constants are those of `gaident.read` (rated_torque, torque_constant, counts_per_turn).
@@ -47,7 +47,8 @@ def scales_of(units: Mapping[str, Any] | None, axis: str) -> Scales:
     named = [f.name for f in fields(Constants)]
     for key in units:
         one_of(key, "units: the quantity", (*_SI, *named), SettingsError)
-    constants = Constants(**{key: value for key, value in units.items() if key in named})
+    given = {key: real_number(value, key, SettingsError) for key, value in units.items() if key in named}
+    constants = Constants(**given)
     found = {}
     for quantity, rotary in _SI.items():
         wanted = units.get(quantity)
@@ -69,13 +70,13 @@ def beside(scales: Scales, name: str, value: float, std: float | None, si: str) 
     return f"{with_std(size * value, None if std is None else size * std) if std else number(size * value)} {shown}"
 
 
-def shown_in(result: Diagnosis | Identification, scales: Scales, axis: str) -> dict[str, Any]:
+def shown_in(result: Diagnosis | Identification, scales: Scales, axis: str) -> dict[str, object]:
     """The figures of a result in the user's units, for JSON; {} where none was asked for."""
     if not scales:
         return {}
     v = unit_of("rad/s", axis)
     name, size = scales.get(v, (v, 1.0))
-    data: dict[str, Any] = {"units": {si: {"unit": shown, "per_si": per} for si, (shown, per) in scales.items()}}
+    data: dict[str, object] = {"units": {si: {"unit": shown, "per_si": per} for si, (shown, per) in scales.items()}}
     if isinstance(result, Identification):
         return {**data, "rmse": {"value": size * result.rmse, "unit": name}}
     data |= {when: {"rmse": size * fit.rmse, "unit": name} for when, fit in (("before", result.before), ("after", result.after))}
@@ -86,7 +87,7 @@ def shown_in(result: Diagnosis | Identification, scales: Scales, axis: str) -> d
     return data
 
 
-def _estimate(name: str, e: Estimate, scales: Scales, axis: str) -> dict[str, Any]:
+def _estimate(name: str, e: Estimate, scales: Scales, axis: str) -> dict[str, object]:
     si = unit_of(e.unit, axis)
     shown, size = (si, 1.0) if name in _ANGULAR else scales.get(si, (si, 1.0))
     return {"value": size * e.value, "std": None if e.std is None else size * e.std, "unit": shown}
@@ -144,8 +145,8 @@ def _rescale(axis: Axis, size: float) -> None:
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     class Round(MaxNLocator):
-        def tick_values(self, vmin: float, vmax: float) -> Any:
-            return np.asarray(super().tick_values(vmin * size, vmax * size)) / size
+        def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
+            return [tick / size for tick in super().tick_values(vmin * size, vmax * size)]
 
     axis.set_major_locator(Round(nbins=8, steps=[1, 2, 2.5, 5, 10]))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{size * value + 0.0:.6g}"))

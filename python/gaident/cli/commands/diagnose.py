@@ -22,9 +22,8 @@ from gaident.models.drive_torque import torque_driven
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.results.store import load
-from gaident.show.cause_words import either, words
 from gaident.show.progress_bar import Progress
-from gaident.show.wording import number, table
+from gaident.show.wording import either, number, table, words
 
 __all__ = ["diagnose_command"]
 

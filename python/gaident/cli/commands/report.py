@@ -25,7 +25,7 @@ def report_command(args: argparse.Namespace) -> None:
     if not isinstance(result, (Diagnosis, Identification)):
         raise GaidentError(f"{args.result}: a record, no result; give what `gaident identify` or `diagnose` wrote with --out")
     records, validation = ([rec for log in logs for rec in drive.records(log)] for logs in (args.logs, held))
-    size = write_report(result, target, records, validation, drive)
+    size = write_report(result, target, records, validation, drive, not args.pictures)
     if args.json:
         print_json({"schema": "gaident/report", "schema_version": 1, "path": str(target), "bytes": size})
         return

@@ -11,7 +11,6 @@ from gaident.models.factors import gain_unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
-from gaident.show.cause_words import either, missing_words, size_words, words
 from gaident.show.controller_words import controller_words
 from gaident.show.diagnosis_summary import (
     DRIVERS,
@@ -46,6 +45,7 @@ from gaident.show.report.parts import (
 )
 from gaident.show.report.views import View
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
+from gaident.show.wording import either, missing_words, size_words, words
 
 __all__ = ["chapters", "headline", "mark", "tiles"]
 

@@ -62,10 +62,11 @@ class Section:
 class Charts:
     """The charts of a page, gathered as they are put in."""
 
-    def __init__(self, scales: Scales | None = None) -> None:
-        """scales: to the user's units, in which the axes are drawn."""
+    def __init__(self, scales: Scales | None = None, live: bool = True) -> None:
+        """scales: to the user's units, in which the axes are drawn. live: False: pictures alone."""
         self.all: list[Chart] = []
         self.scales: Scales = scales or {}
+        self.live = live
 
     def put(self, chart: Chart | None) -> Html:
         """The place of a chart: the live figure, and the picture for print and where no script runs."""
@@ -75,7 +76,7 @@ class Charts:
         self.all.append(chart)
         live = tag("div", class_="live", data_chart=chart.key, role="img", aria_label=chart.caption)
         still = tag("img", class_="still", alt=chart.caption, src=png_uri(picture(chart)))
-        return tag("figure", live, still, tag("figcaption", chart.caption), id=f"figure-{chart.key}")
+        return tag("figure", live if self.live else "", still, tag("figcaption", chart.caption), id=f"figure-{chart.key}")
 
 
 def box(*inside: str, kind: str = "") -> Html:
