@@ -12,6 +12,7 @@ import pytest
 
 import gaident as ga
 from gaident.cli import main
+from gaident.cli.output import program
 
 
 @pytest.fixture(scope="module")
@@ -69,3 +70,16 @@ def test_a_record_is_no_result(here: Path, result: ga.Diagnosis, capsys: pytest.
     result.records[0].save("record.json")
     assert main(["export", "record.json", "--to", "csv"]) == 2
     assert "holds a record, no model" in capsys.readouterr().err
+
+
+def test_a_printed_command_can_be_pasted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the folder of the program, where the shell would not find it."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr("sys.argv", [".my env/bin/gaident", "demo"])
+    assert program() == "'.my env/bin/gaident'"
+    monkeypatch.setattr("sys.argv", ["/usr/lib/python3/site-packages/gaident/__main__.py"])
+    assert program() == "gaident"
+    (tmp_path / "gaident").write_text("#!/bin/sh\n")
+    (tmp_path / "gaident").chmod(0o755)
+    monkeypatch.setattr("sys.argv", [str(tmp_path / "gaident")])
+    assert program() == "gaident"
