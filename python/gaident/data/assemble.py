@@ -22,7 +22,7 @@ from gaident.data.wanted import Wanted, si_factor
 from gaident.data.winding_torque import ELECTRICAL, torque_of_winding
 from gaident.errors import ReadError, RecordError
 
-__all__ = ["assemble"]
+__all__ = ["assemble", "channels_of"]
 
 
 def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
@@ -30,7 +30,7 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
 
     The rows come block by block, so that a log longer than memory can be decimated on its way in.
     """
-    named = _channels(table, wanted)
+    named = channels_of(table, wanted)
     for quantity in wanted.units:
         if quantity not in named and quantity != "time":
             raise ReadError(
@@ -168,7 +168,7 @@ def _on_even_axis(
     return dt * factor, even
 
 
-def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
+def channels_of(table: Table, wanted: Wanted) -> dict[str, Column]:
     """Channel -> column, complete enough for a Record; time is not among them."""
     if len(table.columns) == 1 and wanted.measured:
         hint = "" if table.form == "DataFrame" else f"; if other columns were not recognised, give {arg('delimiter')}"

@@ -5,16 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, say
+from gaident.axis import Text, called, say
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
-from gaident.diagnosis.check import Check
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import as_read, controller_findings
 from gaident.diagnosis.controller.driving import Driving, driving_of
@@ -25,6 +23,7 @@ from gaident.diagnosis.explain.alternatives import alternatives_of
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.wording import basis_of, closest, drives_itself, evidence_of, far_off, hidden_by_torque_noise
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
+from gaident.diagnosis.judged import Judged
 from gaident.diagnosis.library.record import findings_of_the_record
 from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, in_controller
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
@@ -45,7 +44,6 @@ from gaident.estimation.uncertainty import estimates_of
 from gaident.identification.identify import identify
 from gaident.identification.notes import open_loop_notes
 from gaident.models.drive_torque import torque_driven
-from gaident.models.model import Model
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
@@ -66,6 +64,7 @@ def diagnose(
     seed: int = 0,
     progress: ProgressCallback | None = None,
     axis: str = "rotary",
+    pitch: float | None = None,
 ) -> Diagnosis:
     """Show what the model of an axis gets wrong, name the physical cause where the data allow it, and measure the gain.
 
@@ -93,7 +92,9 @@ def diagnose(
     progress : callable, optional
         Called now and then with (fraction done, message), see `gaident.progress`.
     axis : {"rotary", "linear"}
-        "linear" (m, m/s, N): positions are lengths, and no effect that returns with every turn is tried.
+        "linear" (m, m/s, N): positions are lengths, and what returns with every turn is tried where a `pitch` is given.
+    pitch : float, optional
+        Of a linear axis, the length with which its cogging returns: pitch of the screw or of the poles [m].
 
     Returns
     -------
@@ -126,7 +127,7 @@ def diagnose(
     driven = torque_driven(given, asked.controller)
     kept = () if validation is None else records_of(validation, "validation")
     records, held = driven.records, torque_driven(kept, asked.controller).records if kept else ()
-    checked(records, held, driven.loop, identification, bootstrap, seed, progress, axis)
+    checked(records, held, driven.loop, identification, bootstrap, seed, progress, axis, pitch)
     origin = {r.digest: whole for r, whole in zip((*records, *held), (*given, *kept), strict=True)}
     records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
@@ -140,7 +141,7 @@ def diagnose(
         note(0.02, "identifying the linear model")
         moved, pi = driving.moved, bare_pi(driving.controller)
         idn = identification if identification is not None else identify(list(moved.records), pi, seed=seed)
-        work = _Work(moved.records, moved.held, driving, idn, noise_std, note, axis)
+        work = _Work(moved.records, moved.held, driving, idn, noise_std, note, axis, pitch)
         work.search()
         result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
         result = moved.noted(result)
@@ -154,19 +155,6 @@ def diagnose(
     return replace(result, seconds=time.perf_counter() - began)
 
 
-class _Judged(NamedTuple):
-    """What is reported of a search: figures, what the error that is left depends on, effects that count, all numbers."""
-
-    gains: Gains
-    driver: str | None
-    causes: list[str]
-    estimates: dict[str, dict[str, Estimate]]
-    offset: Offset | None
-    mechanics: dict[str, Estimate]
-    model: Model
-    check: Check
-
-
 @dataclass
 class _Work:
     """One diagnosis on its way."""
@@ -178,6 +166,7 @@ class _Work:
     noise: float | None
     note: Note
     axis: str
+    pitch: float | None
 
     def __post_init__(self) -> None:
         self.controller = self.driving.controller
@@ -191,7 +180,7 @@ class _Work:
         self.step = quantisation(self.records)
         whole = self.driving.read
         read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, hit, strict=True)], self.controller)
-        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis)
+        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis, self.pitch)
         self.scales = scales_of(data)
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.driving.logged.replays)
         self.notes += notes
@@ -205,7 +194,7 @@ class _Work:
         self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
         data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
-        self.excited = excitation(self.clean, self.data.loop, axis=self.axis)
+        self.excited = excitation(self.clean, self.data.loop, axis=self.axis, pitch=self.pitch)
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
         self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
 
@@ -237,7 +226,7 @@ class _Work:
         self.adequate, self.left = what_is_left(self.found.space, final)
         self.under, self.estimate = self.found.estimated()
 
-    def judged(self) -> _Judged:
+    def judged(self) -> Judged:
         """What is shown, and what it gains; where no effect is, that of a search by whitened errors instead."""
         while True:
             said = list(self.notes)
@@ -264,7 +253,7 @@ class _Work:
                 self.notes += why
             instead = None if causes else by_whitened_errors(self.found, self._equivalent_here, self._say)
             if instead is None:
-                return _Judged(gains, driver, causes, estimates, offset_of(self.found.space, self.final), mechanics, model, check)
+                return Judged(gains, driver, causes, estimates, offset_of(self.found.space, self.final), mechanics, model, check)
             self.notes = said
             self.take(instead)
 
@@ -366,7 +355,7 @@ class _Work:
                 return gains
             effect = gains.harmful[-1]
             text = "{} would come closer to these records, but makes the held-out data worse: it is not accepted."
-            self.notes.append(say(text, effect.replace("_", " ").capitalize()))
+            self.notes.append(say(text, called(effect).begun()))
             shorter = self.found.space.without(self.final, effect)
             self.take(compared(self.found, shorter, self._equivalent_here, self._say))
 
@@ -394,5 +383,5 @@ class _Work:
         if any(e.identifiable and not e.at_bound for e in parameters.values()):
             return True
         text = "{} comes closer to these records, but they do not determine one of its parameters: it is not named."
-        self.notes.append(say(text, effect.replace("_", " ").capitalize()))
+        self.notes.append(say(text, called(effect).begun()))
         return False

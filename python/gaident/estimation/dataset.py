@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import TURN, period_of
 from gaident.control.cascade import cascade_of
 from gaident.control.controller import Controller, Limiting
 from gaident.control.filtering import rate_limited
@@ -47,6 +48,7 @@ class DataSet:
     shorter [s]; resolution: step of the lattice that all velocities lie on [rad/s], 0: none; known_noise: standard deviation
     of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
     makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear".
+    period: with which returns what is tied to the place [rad, m], of which orders count; None: not known.
     age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample old. What
     drives a model is late by as much, here and in the loop that is simulated.
     """
@@ -65,6 +67,7 @@ class DataSet:
     loop_follows: bool = True
     torque_measured: bool = False
     axis: str = "rotary"
+    period: float | None = TURN
     age: float = 0.0
 
     @classmethod
@@ -76,6 +79,7 @@ class DataSet:
         read: Sequence[Record] | None = None,
         resolution: float = 0.0,
         axis: str = "rotary",
+        pitch: float | None = None,
     ) -> DataSet:
         """The records as driven by their torque; spoiled: some velocities are not what the controller read."""
         driven = tuple(_driven(r, torque_of(r, bare_pi(controller))) for r in records)
@@ -85,7 +89,7 @@ class DataSet:
         seen = tuple(records if read is None else read)
         measured = any(r.torque_is == MEASURED for r in records)
         found = cls(tuple(records), controller, driven, turned, free, moving, spoiled, seen, resolution=resolution)
-        return replace(found, torque_measured=measured, axis=axis)
+        return replace(found, torque_measured=measured, axis=axis, period=period_of(axis, pitch))
 
     def aged(self, lines: float) -> DataSet:
         """The same with a measured velocity that is so many lines of the log old."""

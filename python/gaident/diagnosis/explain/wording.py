@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gaident.axis import Text, called, say
+from gaident.axis import Text, called, joined, say
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
 from gaident.models.effects import table
@@ -20,7 +20,7 @@ def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: O
     what = next(row.says for row in table() if row.name == effect).begun()
     sure, worse = certainty(gain), f"(the model without it is {gain:.0f} BIC units worse)"
     if alternatives:
-        others = " or ".join(a.replace("_", " ") for a in alternatives)
+        others = joined(" or ", map(called, alternatives))
         return say("{}, or {}: one of these is there, {} {}; these data do not say which.", what, others, sure, worse)
     if offset is not None and effect == offset.effect:
         return say("{}: {} {}. {}", what, sure, worse, offset.sentence)
@@ -57,7 +57,7 @@ def closest(effects: Sequence[str], driver: str | None, named: bool) -> Text:
         text = "With {} the model would come closer still, but an error{} stays: this fits no effect of the library."
     else:
         text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
-    return say(text, " and ".join(e.replace("_", " ") for e in effects), on)
+    return say(text, joined(" and ", map(called, effects)), on)
 
 
 def far_off(ratio: float) -> Text:
