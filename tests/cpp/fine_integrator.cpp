@@ -53,6 +53,8 @@ struct Case {  // SI units, rad; neutral values; effect_parameter
     double cogging_phase = 0;
     double friction_drift_torque = 0;
     double friction_drift_rate = 0;
+    double load_dependent_friction_torque = 0;
+    double load_dependent_friction_share = 0;
     double backlash_gap = 0;
     double hardening_stiffness_cubic_stiffness = 0;
     double torque_saturation_limit = inf;
@@ -109,14 +111,14 @@ public:
 
     // One fine step under the torque command v, its middle at time t.
     void step(double v, double t) {
-        const double T =
-            shaft_torque(resonant(lagged(late(beyond(clip(v, c.torque_saturation_limit), c.torque_dead_band_width)))));
+        const double braking = shaft_torque();
+        const double T = resonant(lagged(late(beyond(clip(v, c.torque_saturation_limit), c.torque_dead_band_width)))) - braking;
         const bool load = c.JL > 0;
         twist += 0.5 * h * (w - wL);
         const double Tc = load ? coupling() : 0;
         const double damp = 0.5 * h * c.DM / c.JM;
         const double free = ((1 - damp) * w + h / c.JM * (T - Tc - smooth())) / (1 + damp);
-        const double next = beyond(free, h / c.JM * level(free, t));
+        const double next = beyond(free, h / c.JM * level(free, t, braking));
         if (load) {
             const double damp_L = 0.5 * h * c.DL / c.JL;
             wL = ((1 - damp_L) * wL + h / c.JL * Tc) / (1 + damp_L);
@@ -166,11 +168,11 @@ private:
         return (wp / wz) * (wp / wz) * (T + (zz * wz - zp * wp) * (old2 + x2) + (wz * wz - wp * wp) * x1_mean);
     }
 
-    double shaft_torque(double T) const {
+    double shaft_torque() const {
         const double theta = angle + 0.5 * h * w;
-        T -= c.load_torque_torque;
-        if (c.unbalance_amplitude != 0) T -= c.unbalance_amplitude * std::sin(theta + c.unbalance_phase);
-        if (c.cogging_amplitude != 0) T -= c.cogging_amplitude * std::sin(c.cogging_order * theta + c.cogging_phase);
+        double T = c.load_torque_torque;
+        if (c.unbalance_amplitude != 0) T += c.unbalance_amplitude * std::sin(theta + c.unbalance_phase);
+        if (c.cogging_amplitude != 0) T += c.cogging_amplitude * std::sin(c.cogging_order * theta + c.cogging_phase);
         return T;
     }
 
@@ -201,10 +203,11 @@ private:
         return T;
     }
 
-    // Dry friction, where the other torques bring the velocity `free`.
-    double level(double free, double t) const {
+    // Dry friction, where the other torques bring the velocity `free`, under a load [N m].
+    double level(double free, double t, double load) const {
         double T =
             c.coulomb_friction_torque + c.stribeck_friction_torque + c.friction_drift_torque * (1 + c.friction_drift_rate * t);
+        T += c.load_dependent_friction_torque + c.load_dependent_friction_share * std::abs(load);
         if (const double more = c.stribeck_friction_static_torque - c.stribeck_friction_torque; more != 0) {
             const double ratio = 0.5 * (w + free) / c.stribeck_friction_stribeck_velocity;
             T += more * std::exp(-ratio * ratio);

@@ -24,16 +24,12 @@ class EffectLoop {
 
 public:
     [[gnu::always_inline]] EffectLoop(const EffectRun& run, const EffectConstants<R>& constants)
-        : run_(run),
-          c_(constants),
-          plant_(constants, run.order),
-          pi_(controller_of(run)),
-          own_(run, plant_.velocity()) {
+        : run_(run), c_(constants), plant_(constants, run.order), pi_(controller_of(run)), own_(run, plant_.velocity()) {
         const bool continuous = run.loop.kind == LoopKind::continuous;
         h_ = run.sample_time / run.substeps;
         if constexpr (!is_servo)
             if (continuous) pi_ = ControllerState<R>(run.loop.controller, Clock{h_});
-        dry_ = run.effects.meets(effects_with(Hooks::law | Hooks::level | Hooks::friction)) || own_.friction();
+        dry_ = run.effects.meets(effects_with(Hooks::law | Hooks::level | Hooks::loaded | Hooks::friction)) || own_.friction();
         turning_ = run.effects.meets(effects_that_turn()) || own_.there();
         looking_back_ = run.effects.meets(effects_with(Hooks::tabulate));
         const Beginning<R> start{plant_.velocity(), c_.before, first_command()};
@@ -260,6 +256,15 @@ private:
         angle_ = angle_ + (w + w_next) * R(0.5 * h_);
     }
 
+    // What the effects at the shaft brake with [N m].
+    [[gnu::always_inline]] R load() const {
+        return Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::torque<E>)
+                if (run_.effects.has<E>()) return x + E::torque(c_.effects.template of<E>(), theta_);
+            return x;
+        });
+    }
+
     [[gnu::always_inline]] R under_friction(R w, R w_free, double t) {
         FrictionStep<R> step{R(h_), w, w_free, plant_.beta(), law_};
         const auto add = [&](R level) __attribute__((always_inline)) {
@@ -270,6 +275,9 @@ private:
         Effects::each([&]<class E>() __attribute__((always_inline)) {
             if constexpr (hook::level<E>)
                 if (run_.effects.has<E>()) add(E::level(c_.effects.template of<E>(), R(t > 0.0 ? t : 0.0)));
+            if constexpr (hook::loaded<E>)
+                if (run_.effects.has<E>()) [[unlikely]]
+                    add(E::loaded(c_.effects.template of<E>(), load()));
         });
         Effects::each([&]<class E>() __attribute__((always_inline)) {
             if constexpr (hook::friction<E>)

@@ -163,9 +163,9 @@ def _of_diagnosis(mechanics: Mapping[str, Estimate], effects: Effects) -> dict[s
     found |= {name.replace("_", " "): e for name, e in mechanics.items() if name.replace("_", " ") in NONE}
     for effect, parameters in effects.items():
         term = LIBRARY[effect]
-        if term.levels and not term.time_varying:
+        if term.levels and not (term.time_varying or term.beside):
             found["dry friction"] = _level(parameters)
-        elif term.levels:
+        elif term.levels:  # no one number: it changes in time, or with the load
             del found["dry friction"]
         elif _is_gravity(term):
             found["gravity"] = parameters["amplitude"]

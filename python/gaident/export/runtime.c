@@ -93,6 +93,12 @@ static void gaident_lugre(const gaident_drive *k, gaident_memory *s, gaident_fri
     s->lugre_friction.w_before = f->w;
 }
 
+/* What the effects at the shaft brake with [N m]. */
+static double gaident_load(const gaident_drive *k, const gaident_memory *s) {
+    return k->load_torque.load + k->unbalance.amplitude * sin(s->middle + k->unbalance.phase) +
+           k->cogging.amplitude * sin(k->cogging.order * s->middle + k->cogging.phase);
+}
+
 /* w+ of a motor at w, and w_free without friction; t: time in the middle of the substep. */
 static double gaident_dry(const gaident_drive *k, gaident_memory *s, double w, double w_free, double beta, double t) {
     gaident_friction f = {0.0, 0.0, 0.0, {0.0, 0.0}, {0.0, 0.0}, 0.0, 0.0};
@@ -108,6 +114,8 @@ static double gaident_dry(const gaident_drive *k, gaident_memory *s, double w, d
     f.drag = k->quadratic_drag.coefficient;
     if (k->effects & GAIDENT_FRICTION_DRIFT)
         gaident_add_level(&f, k->friction_drift.torque * fmax(1.0 + k->friction_drift.rate * t, 0.0));
+    if (k->effects & GAIDENT_LOAD_DEPENDENT_FRICTION)
+        gaident_add_level(&f, k->load_dependent_friction.torque + k->load_dependent_friction.share * fabs(gaident_load(k, s)));
     if (k->effects & GAIDENT_STRIBECK_FRICTION) gaident_stribeck(k, s, &f);
     if (k->effects & GAIDENT_PRESLIDING_FRICTION) gaident_presliding(k, s, &f);
     if (k->effects & GAIDENT_LUGRE_FRICTION) gaident_lugre(k, s, &f);
@@ -239,9 +247,10 @@ static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, do
             s->torque_lag.T = T + gap * k->torque_lag.decay;
             T += gap * k->torque_lag.mean;
         }
+        s->middle = s->theta;
         if (k->effects & GAIDENT_LOAD_TORQUE) T -= k->load_torque.load;
-        if (k->effects & GAIDENT_UNBALANCE) T -= k->unbalance.amplitude * sin(s->theta + k->unbalance.phase);
-        if (k->effects & GAIDENT_COGGING) T -= k->cogging.amplitude * sin(k->cogging.order * s->theta + k->cogging.phase);
+        if (k->effects & GAIDENT_UNBALANCE) T -= k->unbalance.amplitude * sin(s->middle + k->unbalance.phase);
+        if (k->effects & GAIDENT_COGGING) T -= k->cogging.amplitude * sin(k->cogging.order * s->middle + k->cogging.phase);
         s->theta = s->angle + 1.5 * k->h * w;
         if (k->two_masses) gaident_masses(k, s, T, s->time + 0.5 * k->h);
         else gaident_observer(k, s, T, s->time + 0.5 * k->h);

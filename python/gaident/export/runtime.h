@@ -29,8 +29,10 @@ enum { /* the effects that act */
     GAIDENT_VELOCITY_RIPPLE = 1 << 18,
     GAIDENT_VELOCITY_QUANTISATION = 1 << 19,
     GAIDENT_LUGRE_FRICTION = 1 << 20,
+    GAIDENT_LOAD_DEPENDENT_FRICTION = 1 << 21,
     GAIDENT_DRY = GAIDENT_COULOMB_FRICTION | GAIDENT_STRIBECK_FRICTION | GAIDENT_ASYMMETRIC_FRICTION |
-                  GAIDENT_PRESLIDING_FRICTION | GAIDENT_LUGRE_FRICTION | GAIDENT_QUADRATIC_DRAG | GAIDENT_FRICTION_DRIFT
+                  GAIDENT_PRESLIDING_FRICTION | GAIDENT_LUGRE_FRICTION | GAIDENT_QUADRATIC_DRAG |
+                  GAIDENT_FRICTION_DRIFT | GAIDENT_LOAD_DEPENDENT_FRICTION
 };
 
 typedef struct {
@@ -57,6 +59,7 @@ typedef struct {
     struct { double amplitude, phase; } unbalance;
     struct { double amplitude, order, phase; } cogging;
     struct { double torque, rate; } friction_drift;
+    struct { double torque, share; } load_dependent_friction;
     struct { double half_gap; } backlash;
     struct { double cubic; } hardening_stiffness;
     struct { double limit; } torque_saturation;
@@ -78,7 +81,8 @@ typedef struct {
 typedef struct {
     double x[GAIDENT_ORDER]; /* the mechanism */
     double stored;           /* of the controller [N m] */
-    double angle, theta;     /* of the motor; in the middle of the substep, foreseen [rad] */
+    double angle, theta;     /* of the motor; in the middle of the next substep, foreseen [rad] */
+    double middle;           /* the same of this one */
     double friction;         /* of the substep before [N m] */
     double time;             /* s */
     int newest;              /* of the torques on their way */

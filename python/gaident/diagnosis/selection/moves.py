@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.terms import LIBRARY
@@ -49,6 +50,13 @@ MISSED = 0.05  # no decision: of the largest torque, a level of friction to star
 LEAST = 1e-4  # no decision: the same, of a level that was fitted as 0
 
 
+def _nested(hypothesis: Hypothesis, x: NDArray[np.float64], term: Term, simple: Term) -> tuple[Hypothesis, NDArray[np.float64]]:
+    """A hypothesis with a simpler effect in the place of one that contains it, at its level."""
+    level = x[hypothesis.parameters.slot(term.name)][list(term.shared.get(simple.name, (0,)))]
+    shorter = hypothesis.without(term.name)
+    return shorter.extended(simple), shorter.parameters.inserted(hypothesis.parameters.removed(x, term.name), level)
+
+
 @dataclass(frozen=True, eq=False)
 class Moves(ModelSpace):
     """The models over one objective, and the moves between them."""
@@ -65,6 +73,7 @@ class Moves(ModelSpace):
             for t in self.allowed
             if t.name not in blocked
             and t.family not in families
+            and t.stands_with(fit.effects)
             and (fit.parameters.masses == 2 or not t.in_coupling)
             and (self.whitens or not t.in_controller or fit.predictor.closed)
         ]
@@ -143,7 +152,7 @@ class Moves(ModelSpace):
         """
         parameters = source.parameters.without(simple.name)
         x = source.parameters.removed(source.x, simple.name)
-        wanted = [t for t in self.allowed if t.family == simple.family and simple.name in t.nested]
+        wanted = [t for t in self.allowed if t.family == simple.family and simple.name in t.nested and t.stands_with(now.effects)]
         level = abs(float(source.x[source.parameters.slot(simple.name)][0]))
         torque = parameters.scales.torque
         for friction in {max(level, LEAST * torque), max(level, MISSED * torque)}:
@@ -216,8 +225,14 @@ class Moves(ModelSpace):
         return [self.without(fit, e) for e in fit.effects]
 
     def without(self, fit: Fit, effect: str) -> Fit:
-        """The model refitted without one of its effects; beside stops and impacts after a search of its own."""
-        less = self.continued(fit.hypothesis.without(effect), fit, fit.parameters.removed(fit.x, effect))
+        """The model refitted without one of its effects; beside stops and impacts after a search of its own.
+
+        What depended on its torque becomes the simplest that it contains.
+        """
+        hypothesis, x = fit.hypothesis.without(effect), fit.parameters.removed(fit.x, effect)
+        for term in [t for t in hypothesis.parameters.terms if not t.stands_with(hypothesis.effects)]:
+            hypothesis, x = _nested(hypothesis, x, term, LIBRARY[term.nested[0]])
+        less = self.continued(hypothesis, fit, x)
         if any(t.multimodal and t.in_coupling for t in less.parameters.terms) and self.data.loopable and not self.quiet(less):
             less = min((less, self.evolved(less)), key=lambda f: f.bic)
         return less
@@ -233,9 +248,7 @@ class Moves(ModelSpace):
 
     def as_nested(self, fit: Fit, term: Term, simple: Term) -> Fit:
         """The model refitted with a simpler effect in the place of one that contains it, at its level."""
-        level = fit.x[fit.parameters.slot(term.name)][list(term.shared.get(simple.name, (0,)))]
-        hypothesis = fit.hypothesis.without(term.name).extended(simple)
-        x = hypothesis.parameters.without(simple.name).inserted(fit.parameters.removed(fit.x, term.name), level)
+        hypothesis, x = _nested(fit.hypothesis, fit.x, term, simple)
         return self.continued(hypothesis, fit, x)
 
     def demote(self, fit: Fit) -> list[Fit]:

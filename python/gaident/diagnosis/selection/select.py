@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.diagnosis.selection.bases import ByOutputErrors, Task, linear_bases, noise_floor, output_error_bases
+from gaident.diagnosis.selection.bases import ByOutputErrors, Task, heaviest, linear_bases, noise_floor, output_error_bases
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
@@ -64,7 +64,8 @@ class Selection:
 
         Output errors weighed as torques show a cause best. But a torque that the model lacks biases the inertia there: the slope
         of its error is the smaller, the heavier the axis. So the velocity is nearly all of the error that is minimised
-        (`velocity_part`), and the torque the rest.
+        (`velocity_part`), and the torque the rest. Of a measured torque an inertia is free up to that of the regression with the
+        terms of this model, and not of those that the records suggest before anything is selected.
         """
         objective, final = self.space.objective, self.final
         family = objective.family
@@ -72,6 +73,8 @@ class Selection:
             return objective, final
         ratio = float(np.sqrt(POLICY.velocity_part / (1.0 - POLICY.velocity_part)))
         family = replace(family, prefilter=replace(family.prefilter, corner=ratio * family.prefilter.corner))
+        if family.inertia is not None:
+            family = replace(family, inertia=heaviest(objective.data, final) or family.inertia)
         fit = ls.fit(objective.under(family), final.hypothesis, final.x, WHITE, POLICY.usual)
         samples = effective_samples(objective.under(family).unwhitened_errors(fit))
         objective = objective.under(replace(family, samples=samples))
