@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 import gaident as ga
 import servo_referee as referee
 from gaident.diagnosis.controller.form_findings import driver_of, loop_of
+from gaident.diagnosis.controller.form_regression import fitted_shape, law_of
 from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.controller.slow_forms import limited
@@ -204,3 +205,15 @@ def test_a_slow_log_whose_torque_does_not_follow_is_doubted() -> None:
     found = ga.diagnose(rec, ga.Cascade(GIVEN, T))
     assert [f.effect for f in found.causes] == ["torque_filter"]
     assert not any("does not follow" in note for note in found.notes)
+
+
+def test_what_a_slow_log_does_not_show_between_its_lines_counts_behind_a_filter() -> None:
+    """A bare PI answers on the line; a filter also to the samples between the lines, and leaves that much more."""
+    regression = law_of([slower(4, torque_filters=[dip()])], GIVEN, 4)
+    assert regression is not None
+    law, floor = regression
+    notched = fitted_shape(law, (("torque_filters", ga.Notch),), floor)
+    bare = fitted_shape(law, (), floor)
+    assert law.unseen(notched) > 3.0 * law.unseen(bare) > 0.0
+    every = law_of([log(torque_filters=[dip()])], GIVEN)
+    assert every is not None and every[0].unseen(fitted_shape(every[0], (), 0.0)) == 0.0
