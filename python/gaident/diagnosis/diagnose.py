@@ -291,11 +291,9 @@ class _Work:
         real = [f for f in findings if not f.is_noise]
         answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
         verdict = verdict_of(bool(real), driver is not None, self.data.slower and self.driving.in_doubt)
-        if driver is not None:
-            dropped = [e for e in self.final.effects if e not in causes]
-            if dropped:
-                shown = driver if self.left.gains[driver] > self.left.needed else None
-                self.notes.append(closest(dropped, shown, bool(real)))
+        if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
+            shown = driver if self.left.gains[driver] > self.left.needed else None
+            self.notes.append(closest(dropped, shown, bool(real)))
         self.notes += check.notes
         if self.final.parameters.held and any(LIBRARY[e].constant for e in self.final.effects):
             self.notes.append(
