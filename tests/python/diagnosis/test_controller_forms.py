@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 import gaident as ga
 import servo_referee as referee
+from gaident.diagnosis.controller.driving import driving_of
 from gaident.diagnosis.controller.form_findings import driver_of, loop_of
 from gaident.diagnosis.controller.form_regression import fitted_shape, law_of
 from gaident.diagnosis.controller.forms import Shown, form_shown
@@ -19,6 +20,7 @@ from gaident.diagnosis.controller.slow_forms import limited
 from gaident.diagnosis.explain.alternatives import alternatives_of
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.identification.logged_torque import not_followed
+from gaident.models.drive_torque import torque_driven
 from referee_logs import GIVEN, KI, KP, NOTCH, T, command, dip, log, low, slower
 
 
@@ -246,3 +248,14 @@ def test_what_a_slow_log_does_not_show_between_its_lines_counts_behind_a_filter(
     assert law.unseen(notched) > 3.0 * law.unseen(bare) > 0.0
     every = law_of([log(torque_filters=[dip()])], GIVEN)
     assert every is not None and every[0].unseen(fitted_shape(every[0], (), 0.0)) == 0.0
+
+
+def test_a_form_that_was_found_is_not_looked_for_again() -> None:
+    """The scheme that comes closest at the limit is in doubt, the limit is not."""
+    rec = slower(4, torque_limit=0.6, windup="tracking", tracking=4e-3, weight=0.5)
+    with threadpool_limits(1, user_api="blas"):
+        asked = loop_of([rec], ga.Cascade(GIVEN, T))
+        driven = torque_driven([rec], asked.controller)
+        found = driving_of(driven.records, (), asked, driven, {driven.records[0].digest: rec})
+    assert {f.effect for f in asked.findings} == {"torque_saturation", "command_weight"}
+    assert found.findings == asked.findings and found.controller == asked.controller

@@ -73,7 +73,7 @@ def driving_of(
             limited = other is None and by_a_limit(whole, controller)
             if other is not None:
                 controller, numbers, notes, doubts = other.controller, other.estimates, (*notes, *doubts, other.note), ()
-            elif not limited:
+            elif not limited and not asked.findings:  # a form that a bare PI lacked was found already
                 form = other_form(whole, [origin.get(r.digest, r) for r in held], controller)
     if form is not None:
         controller, pi, notes, doubts = form.controller, None, (*notes, *form.notes), ()
