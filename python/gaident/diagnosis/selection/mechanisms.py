@@ -39,7 +39,7 @@ __all__ = [
 
 Vector = NDArray[np.float64]
 SHAFTS, SHAFT_RATIOS, SHAFT_DAMPING = 48, (0.6, 0.75, 0.87), 0.05  # no decision: a grid; zeros below the poles, as on a shaft
-SLOWEST_SHAFT, SHAFT_SPAN, HIGHEST_SHAFT = 4.0, 0.02, 0.9  # no decision: its ends, in periods, of the highest, of Nyquist's
+SLOWEST_SHAFT, SHAFT_SPAN, HIGHEST_SHAFT = 8.0, 0.02, 0.9  # no decision: its ends, in half periods, of the highest, of Nyquist's
 AT_BOUND = 0.999  # no decision: of a bound, what a fit that ends there has
 Matrix = NDArray[np.float64]
 
@@ -143,7 +143,7 @@ def on_a_shaft(objective: Objective, one: Fit) -> list[tuple[Hypothesis, Vector]
     """
     s = one.parameters.scales
     highest = HIGHEST_SHAFT * np.pi / s.dt
-    poles = np.geomspace(max(SLOWEST_SHAFT * 2.0 * np.pi / s.duration, SHAFT_SPAN * highest), highest, SHAFTS)
+    poles = np.geomspace(max(SLOWEST_SHAFT * np.pi / s.duration, SHAFT_SPAN * highest), highest, SHAFTS)
     z = SHAFT_DAMPING
     rows = np.array([(np.log(w), z, np.log(w * r), z) for w in poles for r in SHAFT_RATIOS])
     longer, X = _helpful(objective, one, rows)
