@@ -21,6 +21,7 @@ from gaident.diagnosis.experiments.candidates import candidates, loop_notes
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.alternatives import alternatives_of
 from gaident.diagnosis.explain.held_out import standing
+from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import basis_of, closest, drives_itself, evidence_of, far_off, hidden_by_torque_noise
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
 from gaident.diagnosis.judged import Judged
@@ -278,14 +279,10 @@ class _Work:
             self.notes.append(drives_itself(damping))
         real = [f for f in findings if not f.is_noise]
         answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
-        if driver is None:
-            verdict = "explained" if real else "adequate"
-        else:
-            verdict = "partly explained" if real else "unexplained"
-            dropped = [e for e in self.final.effects if e not in causes]
-            if dropped:
-                shown = driver if self.left.gains[driver] > self.left.needed else None
-                self.notes.append(closest(dropped, shown, bool(real)))
+        verdict = verdict_of(bool(real), driver is not None, self.data.slower and self.driving.in_doubt)
+        if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
+            shown = driver if self.left.gains[driver] > self.left.needed else None
+            self.notes.append(closest(dropped, shown, bool(real)))
         self.notes += check.notes
         if self.final.parameters.held and any(LIBRARY[e].constant for e in self.final.effects):
             self.notes.append(

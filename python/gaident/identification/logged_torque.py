@@ -26,7 +26,7 @@ from gaident.models.drive_torque import follows_not
 from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
 
-__all__ = ["not_followed"]
+__all__ = ["noise_between", "not_followed"]
 
 Vector = NDArray[np.float64]
 
@@ -82,9 +82,14 @@ def _off(rec: Record, controller: Controller) -> float:
     return 0.0 if follows else off
 
 
+def noise_between(rec: Record, count: int, every: int) -> Vector:
+    """White noise (count,) as large as the velocity's at the lines [rad/s], on the controller's samples between them."""
+    noise: Vector = noise_std(rec.velocity) * np.random.default_rng(0).standard_normal(count)
+    noise[::every] = 0.0
+    return noise
+
+
 def _courses(log: Log, rec: Record) -> list[tuple[Log, bool]]:
     """The log with other courses between its lines, and whether the velocity goes straight there."""
-    every = len(log.velocity) // len(log.source)
-    noise = noise_std(rec.velocity) * np.random.default_rng(0).standard_normal(len(log.velocity))
-    noise[::every] = 0.0
+    noise = noise_between(rec, len(log.velocity), len(log.velocity) // len(log.source))
     return [(log, True), (replace(log, velocity=log.velocity + noise), False)]

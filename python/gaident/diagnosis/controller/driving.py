@@ -12,6 +12,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
 from gaident.diagnosis.controller.form_findings import Loop, driver_of
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
+from gaident.diagnosis.controller.other_form import other_form
 from gaident.diagnosis.controller.wrong_number import by_a_limit, corrected
 from gaident.identification.logged_torque import not_followed
 from gaident.models.drive_torque import Driven
@@ -72,8 +73,10 @@ def driving_of(
             limited = other is None and by_a_limit(whole, controller)
             if other is not None:
                 controller, numbers, notes, doubts = other.controller, other.estimates, (*notes, *doubts, other.note), ()
-    else:
-        controller, pi, notes = form.controller, None, (*notes, *form.notes)
+            elif not limited and not asked.findings:  # a form that a bare PI lacked was found already
+                form = other_form(whole, [origin.get(r.digest, r) for r in held], controller)
+    if form is not None:
+        controller, pi, notes, doubts = form.controller, None, (*notes, *form.notes), ()
         findings, numbers = form.findings, form.estimates
         pairs = zip((*form.records, *form.held), (*records, *held), strict=True)
         origin = {changed.digest: origin.get(given.digest, given) for changed, given in pairs}

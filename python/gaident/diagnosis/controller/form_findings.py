@@ -21,7 +21,7 @@ from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
-__all__ = ["Driver", "Loop", "driver_of", "loop_of"]
+__all__ = ["Driver", "Loop", "driver_of", "findings_of", "loop_of", "notes_of", "parts_of"]
 
 UNITS = {
     "kp": "N m s/rad",
@@ -67,7 +67,7 @@ def driver_of(
     if shown is None:
         return None
     driven, held = (tuple(driven_by(r, shown.controller) for r in part) for part in (records, held))
-    return Driver(driven, held, shown.controller, _findings(shown), _notes(shown, records), _estimates(shown.estimated))
+    return Driver(driven, held, shown.controller, findings_of(shown), notes_of(shown, records), _estimates(shown.estimated))
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     if shown is None:
         return replace(as_given, numbers=numbers.trusted())
     estimates = {f"velocity.{name}": e for name, e in _estimates(shown.estimated).items()}
-    return Loop(shown.controller, replace(numbers, doubt=""), _findings(shown), _notes(shown, records), estimates)
+    return Loop(shown.controller, replace(numbers, doubt=""), findings_of(shown), notes_of(shown, records), estimates)
 
 
 def _alone(controller: Controller | None, records: Sequence[Record]) -> tuple[PI | None, int]:
@@ -107,7 +107,7 @@ def _alone(controller: Controller | None, records: Sequence[Record]) -> tuple[PI
     return (pi if bare else None), controller.log_every(records[0].dt)
 
 
-def _findings(shown: Shown) -> tuple[Finding, ...]:
+def findings_of(shown: Shown) -> tuple[Finding, ...]:
     return tuple(
         Finding(name, _estimates(numbers), (), 0.0, shown.gains[name], None, _evidence(shown, name), place="controller")
         for name, numbers in shown.numbers.items()
@@ -126,7 +126,7 @@ def _estimates(numbers: Mapping[str, tuple[float, float]]) -> dict[str, Estimate
     return {name: Estimate(value, std, unit, identifiable=std < abs(value) or value == 0.0) for name, value, std, unit in units}
 
 
-def _words(shown: Shown) -> Text:
+def parts_of(shown: Shown) -> Text:
     """What differs from the bare PI."""
     return joined(", ", (_part(shown, name) for name in shown.numbers))
 
@@ -144,13 +144,13 @@ def _unit(parameter: str) -> Text:
     return joined("", (" ", unit_text(UNITS[parameter]))) if parameter in UNITS else Text("")
 
 
-def _notes(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
+def notes_of(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
     notes = [
         say(
             "The controller is not the given PI, which does not make the logged {torque} (rms {:.2g} {N m}). One with {} does, "
             "to {:.1g} {N m} rms{}.",
             shown.before,
-            _words(shown),
+            parts_of(shown),
             shown.rms,
             say(": its {torque} drives the model, and no loop is simulated") if shown.controller.period is None else "",
         )

@@ -114,9 +114,10 @@ def _compared(law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> li
         if followed is not None and len(places) > followed:
             break  # what leaves no more than rounding or white noise is not improved by another filter
         shape = fitted_shape(law, places, floor)
-        if shape.rms <= POLICY.near_rounding * floor or white_noise(shape.left, law.logged):
+        least = float(np.hypot(floor, law.unseen(shape)))
+        if shape.rms <= POLICY.near_rounding * least or white_noise(shape.left, law.logged):
             followed = len(places)
-        candidates += _candidates(law, shape, given, floor, unknown)
+        candidates += _candidates(law, shape, given, least, unknown)
     return sorted(candidates, key=lambda c: c.criterion)
 
 
@@ -205,14 +206,15 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
 
 def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[Candidate], floor: float) -> Shown | None:
     """The same of a log with fewer lines: None where it leaves more than another course between them could make."""
-    allowed = max(POLICY.near_rounding * floor, POLICY.negligible * float(np.abs(law.torque).max()))
+    negligible = POLICY.negligible * float(np.abs(law.torque).max())
     # Where the given controller leaves no more, no other one is looked for; only a setting without a number of its own.
     plain = [c for c in candidates if not c.names]
     as_free = [c for c in candidates if plain and c.count == plain[0].count and c.shape is plain[0].shape and not c.form.free]
     for best in (*as_free[:1], *plain[:1], candidates[0]):
         numbers, filters, cov = _fitted(law, best, given)
         left = law.logged - law.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
-        if _rms([left]) <= allowed:
+        least = float(np.hypot(floor, law.unseen(best.shape)))
+        if _rms([left]) <= max(POLICY.near_rounding * least, negligible):
             break
     else:
         return None

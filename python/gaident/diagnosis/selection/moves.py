@@ -32,6 +32,7 @@ from gaident.diagnosis.selection.mechanisms import (
     held,
     is_mechanism,
     moved_to,
+    on_a_shaft,
     released,
 )
 from gaident.diagnosis.selection.model_space import ModelSpace, words
@@ -306,7 +307,32 @@ class Moves(ModelSpace):
             fit = min((fit, self.restarted(fit, term)), key=lambda f: f.bic)
             if term.multimodal and not self.quiet(fit):
                 fit = min((fit, self.evolved(fit)), key=lambda f: f.bic)
-        return fit
+        return self.settled(fit)
+
+    def settled(self, fit: Fit) -> Fit:
+        """The fit or, where these score better, two masses with another resonance.
+
+        A fit at the wrong resonance may leave little: a noise filter takes the ringing that it misses for noise.
+        """
+        return min((fit, *self.elsewhere(fit)), key=self.score)
+
+    def elsewhere(self, fit: Fit) -> list[Fit]:
+        """Two masses with the same effects, their resonance looked for beside these: that of the fit was found before them.
+
+        What stands for a resonance at the wrong place, another resonance or an effect of the shaft, is left out.
+        """
+        bare, x = fit.hypothesis, fit.x
+        for t in fit.parameters.terms:
+            if t.in_coupling or t.resonates:
+                x, bare = bare.parameters.removed(x, t.name), bare.without(t.name)
+        if fit.parameters.masses == 1 or not bare.parameters.terms:
+            return []
+        bare, x = as_one_mass(replace(fit, hypothesis=bare, x=x))
+        one = ls.fit(self.objective, bare, x, WHITE, self.policy.usual)
+        starts = on_a_shaft(self.objective, one) if one.cost < WORST else []
+        short = [ls.fit(self.objective, h, x, WHITE, self.policy.short) for h, x in starts]
+        best = min(short, key=lambda f: f.cost, default=None)
+        return [] if best is None else [self.refitted(best.hypothesis, best.x, self.policy.long)]
 
     def restarted(self, fit: Fit, term: Term) -> Fit:
         """The best fit from an effect's starts, with the rest as it stands: the first began far from the rest's final values."""
