@@ -7,12 +7,13 @@ from dataclasses import dataclass, field, replace
 
 from gaident.axis import Text
 from gaident.control.controller import Controller
-from gaident.control.pi import bare_pi
+from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
 from gaident.diagnosis.controller.form_findings import Loop, driver_of
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.diagnosis.controller.wrong_number import by_a_limit, corrected
+from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains
 from gaident.identification.logged_torque import not_followed
 from gaident.models.drive_torque import Driven
 from gaident.results.estimate import Estimate
@@ -28,6 +29,7 @@ class Driving:
     logged: the bare PI with the gains that the torques show. findings: of the controller's form. notes: what to keep in mind.
     doubts: notes on torques that do not follow from a controller that is no bare PI. numbers: those that were not given.
     limited: whether a limit of the controller, which was not given either, makes the torques follow.
+    regained_from: the PI that was given, where records without a torque show other gains.
     """
 
     moved: Aligned
@@ -38,6 +40,25 @@ class Driving:
     doubts: tuple[Text, ...] = ()
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
     limited: bool = False
+    regained_from: PI | None = None
+
+    def regained(self, other: OtherGains) -> Driving:
+        """The same under other gains, which command and velocity show where no torque is logged; a finding says so."""
+        given = self.regained_from or self.logged.controller
+        assert given is not None
+        kept = tuple(f for f in self.findings if f.effect != OTHER_GAINS)
+        return replace(
+            self,
+            controller=other.controller,
+            logged=replace(self.logged, controller=other.controller),
+            findings=(*kept, other.finding(given)),
+            regained_from=given,
+        )
+
+    @property
+    def regained_by(self) -> int:
+        """How many gains are not the given ones."""
+        return sum(len(f.parameters) for f in self.findings if f.effect == OTHER_GAINS)
 
     @property
     def in_doubt(self) -> bool:
