@@ -154,7 +154,9 @@ def identify(
             f"In {settings.arithmetic} {overflows} of {evaluations} candidates left its range or diverged; they count as worst."
         )
     seconds = time.perf_counter() - began
-    return replace(result, warnings=tuple(warnings), controller_numbers=numbers.estimates, seconds=seconds)
+    return replace(
+        result, warnings=tuple(warnings), controller_numbers={**numbers.estimates, **looped.estimates}, seconds=seconds
+    )
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
 from gaident.diagnosis.controller.form_findings import Loop, driver_of
+from gaident.diagnosis.controller.limit_not_given import by_a_limit
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
-from gaident.diagnosis.controller.wrong_number import by_a_limit, corrected
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains
-from gaident.identification.logged_torque import not_followed
-from gaident.models.drive_torque import Driven
+from gaident.identification.logged_torque import corrected, not_followed
+from gaident.models.drive_torque import Driven, straight_driven
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
@@ -93,6 +93,10 @@ def driving_of(
             limited = other is None and by_a_limit(whole, controller)
             if other is not None:
                 controller, numbers, notes, doubts = other.controller, other.estimates, (*notes, *doubts, other.note), ()
+        if doubts and driven.slower and not limited:
+            # What this controller would make between the lines is not what the drive's made there.
+            records, held, origin = _straight((*records,), (*held,), origin, driven.controller)
+            moved = aligned(records, held, None)
     else:
         controller, pi, notes = form.controller, None, (*notes, *form.notes)
         findings, numbers = form.findings, form.estimates
@@ -103,3 +107,14 @@ def driving_of(
     logged = as_logged(moved.records, pi)
     used = controller if bare_pi(controller) is None else logged.controller
     return Driving(moved, used, logged, findings, notes, doubts, numbers, limited)
+
+
+def _straight(
+    records: Sequence[Record], held: Sequence[Record], origin: Mapping[str, Record], controller: Controller | None
+) -> tuple[tuple[Record, ...], tuple[Record, ...], dict[str, Record]]:
+    """Records, held ones and origin with the logged torque straight between the lines."""
+    assert controller is not None
+    given = [[origin.get(r.digest, r) for r in part] for part in (records, held)]
+    changed = [tuple(straight_driven(r, controller) for r in part) for part in given]
+    pairs = zip((*changed[0], *changed[1]), (*given[0], *given[1]), strict=True)
+    return changed[0], changed[1], {now.digest: whole for now, whole in pairs}
