@@ -84,7 +84,7 @@ def driving_of(
     whole = [origin.get(r.digest, r) for r in records]
     doubts = (*driven.doubts, *not_followed(whole, controller))
     moved = aligned(records, held, pi)
-    form = None if moved.shifts else driver_of(records, held, pi, tuple(asked.estimates))
+    form = None if moved.shifts else driver_of(records, held, pi, tuple(n.removeprefix("velocity.") for n in asked.estimates))
     findings, numbers, limited = asked.findings, asked.estimates, False
     if form is None:
         notes = (*(asked.notes or asked.numbers.trusted().notes), *notes)
