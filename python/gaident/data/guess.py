@@ -8,18 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.column_names import name_says
-from gaident.data.formats.units import Constants, factor, is_any_unit
+from gaident.data.column_score import LEAST, spoken_for
+from gaident.data.formats.units import factor
 from gaident.data.listing import ColumnInfo, Listing
 from gaident.data.record import CHANNELS
-from gaident.errors import ReadError
 from gaident.policy.table import POLICY
 
 __all__ = ["Guess", "guess_channels", "position_and_velocity", "unit_from_position", "unit_from_velocity"]
-
-COMMANDED_QUANTITY = {"command": "velocity", "position_command": "position"}
-"""Channel that is a command -> the quantity that it commands."""
-_LEAST = 2  # no decision: words that speak for a column
 
 
 @dataclass(frozen=True)
@@ -44,10 +39,10 @@ def guess_channels(listing: Listing) -> Guess:
     asked: dict[str, list[ColumnInfo]] = {channel: [] for channel in CHANNELS}
     for column in usable:
         for channel in CHANNELS:
-            score, reason, unsure = _score(column, channel)
-            if score >= _LEAST and unsure:
+            score, reason, unsure = spoken_for((column.name, *column.names), column.unit, channel)
+            if score >= LEAST and unsure:
                 asked[channel].append(column)
-            elif score >= _LEAST:
+            elif score >= LEAST:
                 scored[channel].append((score, column, reason))
     channels: dict[str, ColumnInfo] = {}
     reasons: dict[str, str] = {}
@@ -71,44 +66,6 @@ def _time(listing: Listing, longest: int) -> ColumnInfo | None:
         return named[0]
     even = [c for c in listing.columns if c.rises_evenly and c.samples == longest and c.lowest is not None]
     return even[0] if len(even) == 1 else None
-
-
-def _score(column: ColumnInfo, channel: str) -> tuple[int, str, bool]:
-    """How much speaks for it (words of the name, the unit), which words, and whether the user has to be asked."""
-    quantity = COMMANDED_QUANTITY.get(channel, channel)
-    said = name_says((column.name, *column.names), column.unit)
-    by_name, fits = said.quantities.get(quantity, 0), _is_unit_of(column.unit, quantity)
-    elsewhere = column.unit is not None and not fits and not _converts(column.unit, quantity) and is_any_unit(column.unit)
-    if said.foreign or elsewhere or not (by_name or fits):
-        return 0, "", False
-    if max((much for other, much in said.quantities.items() if other != quantity), default=0) > max(by_name, _LEAST):
-        return 0, "", False  # the set value of a position is no velocity command
-    score = by_name + (3 if fits else 0)
-    if channel in COMMANDED_QUANTITY:
-        score = score + 3 if said.commanded else 0
-    elif channel in ("velocity", "position"):
-        score = 0 if said.commanded else score + (1 if said.measured else 0)  # a command is no measurement, whatever its unit
-    else:
-        score += 1 if said.commanded else 0  # what the controller issued rather than what was measured
-    why = [f"its name says {quantity}" if by_name else "", f"its unit is one of {quantity}" if fits else ""]
-    if channel in COMMANDED_QUANTITY and said.commanded:
-        why.append("its name says that it is a command")
-    return score, ", ".join(filter(None, why)), said.unsure
-
-
-def _is_unit_of(unit: str | None, quantity: str) -> bool:
-    if unit is None or not _converts(unit, quantity):
-        return False
-    # V and 1 stand for many things.
-    return unit.strip().casefold() not in ("v", "mv", "m", "1", "-") or quantity == "position"
-
-
-def _converts(unit: str, quantity: str) -> bool:
-    try:
-        factor(quantity, unit, Constants(1.0, 1.0, 1.0, 1.0))
-    except ReadError:
-        return False
-    return True
 
 
 _VELOCITY_UNITS = ("rad/s", "rpm", "deg/s", "rps", "m/s", "mm/s", "m/min", "mm/min")

@@ -91,6 +91,11 @@ class DataSet:
         found = cls(tuple(records), controller, driven, turned, free, moving, spoiled, seen, resolution=resolution)
         return replace(found, torque_measured=measured, axis=axis, period=period_of(axis, pitch))
 
+    def under(self, controller: PI) -> DataSet:
+        """The same records, whose torque is not logged, under a PI with other gains."""
+        driven = tuple(_driven(r, torque_of(r, controller)) for r in self.records)
+        return replace(self, controller=controller, driven=driven, free=_freed(self.records, driven))
+
     def aged(self, lines: float) -> DataSet:
         """The same with a measured velocity that is so many lines of the log old."""
         return replace(self, age=lines)

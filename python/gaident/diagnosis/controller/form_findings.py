@@ -11,6 +11,7 @@ from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller
 from gaident.control.pi import PI
+from gaident.control.simplest import simplest
 from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.replay import replay
@@ -85,6 +86,7 @@ def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     """The controller with estimates for what is None and, where a log has fewer lines than a bare PI in a Cascade has samples,
     in the form that the logged torque shows."""
     numbers = with_estimates(records, given)
+    numbers = replace(numbers, controller=simplest(numbers.controller, (r.dt for r in records)))
     as_given = Loop(numbers.controller, numbers, (), (), numbers.estimates)
     pi, every = _alone(numbers.controller, records)
     if pi is None or every == 1 or any(r.torque is None or r.command is None for r in records):

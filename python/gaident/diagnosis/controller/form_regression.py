@@ -80,6 +80,7 @@ class Law:
     Of a log with r = 1 all used lines count alike, and a start of the integrator is one of the numbers. Of a slower one, what is
     fitted is x(k) - rho x(k-1) of each signal without its mean in each stretch between two limits, see `logged_stretches`.
     courses: other velocities that have the same lines [rad/s] (n r,) each; () where the log has all samples.
+    straight: the velocity straight between its lines [rad/s] (n r,).
     """
 
     command: Vector
@@ -92,6 +93,12 @@ class Law:
     stretch: NDArray[np.intp] | None = None
     rho: float = 0.0
     courses: tuple[Vector, ...] = ()
+    straight: Vector | None = None
+
+    @property
+    def others(self) -> tuple[Law, ...]:
+        """The same of a slower log with what is not known: the velocity straight between the lines, and no correlation."""
+        return () if self.straight is None else (replace(self, velocity=self.straight), replace(self, rho=0.0))
 
     def columns(self, places: Sequence[Place], numbers: Vector) -> Matrix:
         """(n used, 5 + records) [-w, r, integral of e by the trapezoidal rule, slope of r, sign of r, starts], filtered."""
@@ -186,7 +193,7 @@ def law_of(records: Sequence[Record], given: PI, every: int = 1) -> tuple[Law, f
         smooth = np.concatenate([log.velocity for log in logs])
         straight = np.concatenate([at_the_clock(log.velocity[::every], every) for log in logs])
         used = stretch >= 0
-        law = Law(command, smooth, torque, used, lengths, period, every, stretch)
+        law = Law(command, smooth, torque, used, lengths, period, every, stretch, straight=straight)
         coefficients = np.array([given.kp, given.kp, given.ki, *np.zeros(2 + len(records))])
         off, own = law.of_course(replace(law, velocity=straight), coefficients)
         law = replace(law, rho=correlation_of(off, own))

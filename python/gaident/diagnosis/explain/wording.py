@@ -7,10 +7,20 @@ from collections.abc import Sequence
 from gaident.axis import Text, called, joined, say
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
+from gaident.estimation.dataset import DataSet
 from gaident.models.effects import table
 from gaident.results.estimate import Estimate
 
-__all__ = ["basis_of", "closest", "drives_itself", "evidence_of", "far_off", "hidden_by_torque_noise"]
+__all__ = [
+    "basis_of",
+    "closest",
+    "drives_itself",
+    "evidence_of",
+    "far_off",
+    "hidden_by_torque_noise",
+    "or_other_gains",
+    "torque_unlogged",
+]
 
 
 def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None) -> Text:
@@ -85,3 +95,20 @@ def drives_itself(damping: Estimate) -> Text:
         "does not depend on it, or a lag, is in its place. {Inertia} and friction are not to be trusted."
     )
     return say(text, damping.value)
+
+
+def torque_unlogged(data: DataSet) -> list[Text]:
+    """What stays open where the gains alone say which torque drove the motor."""
+    if data.pi is None or any(r.torque is not None for r in data.records):
+        return []
+    text = (
+        "No {torque} is logged: the given gains make it of command and velocity. Where both are wrong by one factor, every "
+        "{inertia} and {torque} found here is wrong by that factor, and nothing shows it: log the {torque}."
+    )
+    return [say(text)]
+
+
+def or_other_gains(effect: str) -> Text:
+    """What is said of a finding in whose place other gains would explain as much."""
+    text = "Other gains than the given ones would explain these records as well as the {}: log the {torque}, it shows the gains."
+    return say(text, effect.replace("_", " "))
