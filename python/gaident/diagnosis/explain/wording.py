@@ -111,4 +111,4 @@ def torque_unlogged(data: DataSet) -> list[Text]:
 def or_other_gains(effect: str) -> Text:
     """What is said of a finding in whose place other gains would explain as much."""
     text = "Other gains than the given ones would explain these records as well as the {}: log the {torque}, it shows the gains."
-    return say(text, effect.replace("_", " "))
+    return say(text, called(effect))

@@ -11,7 +11,7 @@ encoder has it. Left out, it is fitted as a delay or, beside a current loop, as 
   beyond the margin of two rivals.
 - On another lattice (a gear, a scale, a unit between) the velocity may be a difference. Where the search finds something linear
   in series with the mechanism, a delay, a lag or a resonance, it is made again with the age of half a sample, which is no effect
-  and costs nothing; the better score decides.
+  and costs nothing; it is there where fewer effects score better with it.
 """
 
 from __future__ import annotations
@@ -62,7 +62,8 @@ def searched(
     if not data.resolution > 0.0 or not any(_in_series(t) for t in found.final.parameters.terms):
         return found, []
     again = search(older)
-    if again.space.whitens != found.space.whitens or not again.space.score(again.final) < found.space.score(found.final):
+    fewer = again.space.whitens == found.space.whitens and len(again.final.effects) < len(found.final.effects)
+    if not fewer or not again.space.score(again.final) < found.space.score(found.final):
         return found, []
     text = (
         "The velocities lie on a lattice of {:.4g} {rad/s} and are half a sample old ({:.3g} ms), as those are that are the "
