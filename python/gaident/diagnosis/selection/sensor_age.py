@@ -21,7 +21,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gaident.axis import TURN, Text, say
-from gaident.data.signals.lattice import encoder_lines
+from gaident.data.signals.lattice import encoder_lines, encoder_step
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.mechanisms import is_mechanism, on_a_shaft, one_mass, reduced, resonance, swings
@@ -59,7 +59,8 @@ def searched(
         )
         return search(older), [say(text, lines, each, age)]
     found = search(objective)
-    if not data.resolution > 0.0 or not any(_in_series(t) for t in found.final.parameters.terms):
+    step = encoder_step(data.velocity) if any(_in_series(t) for t in found.final.parameters.terms) else 0.0
+    if not step > 0.0:
         return found, []
     again = search(older)
     fewer = again.space.whitens == found.space.whitens and len(again.final.effects) < len(found.final.effects)
@@ -69,7 +70,7 @@ def searched(
         "The velocities lie on a lattice of {:.4g} {rad/s} and are half a sample old ({:.3g} ms), as those are that are the "
         "difference of an encoder's {angle} over one sample. The simulation has it; it is no finding."
     )
-    return again, [say(text, data.resolution, age)]
+    return again, [say(text, step, age)]
 
 
 def _in_series(term: Term) -> bool:
