@@ -133,3 +133,17 @@ def test_poles_below_the_zeros_are_no_two_masses() -> None:
     found = moved(fit(below), fit(below))
     assert list(found) == ["inertia", "viscous_friction"]
     assert found["viscous_friction"][1] == pytest.approx(1.0 * (60.0**2 + 4.0) / (2000.0 * (90.0**2 + 4.0)))
+
+
+@pytest.mark.parametrize("frequency", [1250.0, 1450.0])
+def test_a_narrow_resonance_between_the_frequencies_of_the_starts_is_found(frequency: float) -> None:
+    """On a step of 250 samples a start as far away as the coarse grid allows promises nothing; ringing passes for noise."""
+    two = ga.TwoMass(JM=2.4e-4, DM=1.2e-3, JL=3.1e-4, DL=1.2e-3, KG=53.0, DG=0.01).model()
+    pair = {"frequency": frequency, "damping": 0.015, "zero_frequency": 0.9 * frequency, "zero_damping": 0.013}
+    noise, command = 0.1 * np.random.default_rng(2).standard_normal(250), np.full(250, 40.0)
+    controller = ga.PI(kp=0.13, ki=7.6)
+    drive = two.with_effect("extra_resonance", **pair)
+    velocity = ga.run(drive, ga.Record(4.44e-4, command=command - noise, velocity=noise), controller).velocity + noise
+    found = ga.diagnose(ga.Record(4.44e-4, command=command, velocity=velocity), controller).causes
+    assert [f.effect for f in found] == ["extra_resonance"]
+    assert found[0].parameters["frequency"].value == pytest.approx(frequency, rel=0.02)

@@ -10,13 +10,15 @@ encoder has it. Left out, it is fitted as a delay or, beside a current loop, as 
   fitted, with the linear mechanism alone and with the lag of a current loop, and it is none where the age of 0 scores better
   beyond the margin of two rivals.
 - On another lattice (a gear, a scale, a unit between) the velocity may be a difference. Where the search finds something linear
-  in series with the mechanism, a delay, a lag or a resonance, it is made again with the age of half a sample, which is no effect
-  and costs nothing; it is there where fewer effects score better with it.
+  in series with the mechanism, a delay, a lag or a resonance, and the model with half a sample of age in its place is within the
+  reach of a search, it is made again with that age, which is no effect and costs nothing; it is there where fewer effects score
+  better with it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -60,7 +62,7 @@ def searched(
         return search(older), [say(text, lines, each, age)]
     found = search(objective)
     step = encoder_step(data.velocity) if any(_in_series(t) for t in found.final.parameters.terms) else 0.0
-    if not step > 0.0:
+    if not step > 0.0 or not _near(found, older):
         return found, []
     again = search(older)
     fewer = again.space.whitens == found.space.whitens and len(again.final.effects) < len(found.final.effects)
@@ -76,6 +78,16 @@ def searched(
 def _in_series(term: Term) -> bool:
     """Whether an effect is linear: a delay, a lag, a filter or a resonance between the torque and the measured velocity."""
     return not (term.domains or term.harmonic or term.in_controller)
+
+
+def _near(found: Selection, older: Objective) -> bool:
+    """Whether a model with the age in the place of what it has in series comes as near as a search follows other models."""
+    space, final = found.space, found.final
+    aged = replace(space, objective=replace(space.objective, data=older.data), grown={})
+    hypothesis, x = final.hypothesis.driven_by(replace(final.predictor, data=older.data)), final.x  # type: ignore[type-var]
+    for term in [t for t in final.parameters.terms if _in_series(t)]:
+        x, hypothesis = hypothesis.parameters.removed(x, term.name), hypothesis.without(term.name)
+    return aged.score(aged.refitted(hypothesis, x)) < space.score(final) + POLICY.beam_reach * space.penalty
 
 
 def _score(objective: Objective, scales: Scales, model: Model) -> float:
