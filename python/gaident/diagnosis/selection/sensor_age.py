@@ -10,7 +10,7 @@ encoder has it. Left out, it is fitted as a delay or, beside a current loop, as 
   fitted, with the linear mechanism alone and with the lag of a current loop, and it is none where the age of 0 scores better
   beyond the margin of two rivals.
 - On another lattice (a gear, a scale, a unit between) the velocity may be a difference. Where the search finds something linear
-  in series with the mechanism, a delay, a lag or a resonance, and the model with half a sample of age in its place is within the
+  in series with the mechanism, a delay, a lag or a resonance, and a model with half a sample of age in the place of one of these is within the
   reach of a search, it is made again with that age, which is no effect and costs nothing; it is there where fewer effects score
   better with it.
 """
@@ -81,13 +81,16 @@ def _in_series(term: Term) -> bool:
 
 
 def _near(found: Selection, older: Objective) -> bool:
-    """Whether a model with the age in the place of what it has in series comes as near as a search follows other models."""
+    """Whether a model with the age in the place of one effect in series comes as near as a search follows other models."""
     space, final = found.space, found.final
     aged = replace(space, objective=replace(space.objective, data=older.data), grown={})
-    hypothesis, x = final.hypothesis.driven_by(replace(final.predictor, data=older.data)), final.x  # type: ignore[type-var]
-    for term in [t for t in final.parameters.terms if _in_series(t)]:
-        x, hypothesis = hypothesis.parameters.removed(x, term.name), hypothesis.without(term.name)
-    return aged.score(aged.refitted(hypothesis, x)) < space.score(final) + POLICY.beam_reach * space.penalty
+    hypothesis = final.hypothesis.driven_by(replace(final.predictor, data=older.data))  # type: ignore[type-var]
+    reach = space.score(final) + POLICY.beam_reach * space.penalty
+    return any(
+        aged.score(aged.refitted(hypothesis.without(t.name), final.parameters.removed(final.x, t.name))) < reach
+        for t in final.parameters.terms
+        if _in_series(t)
+    )
 
 
 def _score(objective: Objective, scales: Scales, model: Model) -> float:
