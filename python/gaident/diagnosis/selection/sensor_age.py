@@ -10,15 +10,13 @@ encoder has it. Left out, it is fitted as a delay or, beside a current loop, as 
   fitted, with the linear mechanism alone and with the lag of a current loop, and it is none where the age of 0 scores better
   beyond the margin of two rivals.
 - On another lattice (a gear, a scale, a unit between) the velocity may be a difference. Where the search finds something linear
-  in series with the mechanism, a delay, a lag or a resonance, and a model with half a sample of age in the place of one of these is within the
-  reach of a search, it is made again with that age, which is no effect and costs nothing; it is there where fewer effects score
-  better with it.
+  in series with the mechanism, a delay, a lag or a resonance, it is made again with the age of half a sample, which is no effect
+  and costs nothing; it is there where fewer effects score better with it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -62,7 +60,7 @@ def searched(
         return search(older), [say(text, lines, each, age)]
     found = search(objective)
     step = encoder_step(data.velocity) if any(_in_series(t) for t in found.final.parameters.terms) else 0.0
-    if not step > 0.0 or not _near(found, older):
+    if not step > 0.0:
         return found, []
     again = search(older)
     fewer = again.space.whitens == found.space.whitens and len(again.final.effects) < len(found.final.effects)
@@ -78,19 +76,6 @@ def searched(
 def _in_series(term: Term) -> bool:
     """Whether an effect is linear: a delay, a lag, a filter or a resonance between the torque and the measured velocity."""
     return not (term.domains or term.harmonic or term.in_controller)
-
-
-def _near(found: Selection, older: Objective) -> bool:
-    """Whether a model with the age in the place of one effect in series comes as near as a search follows other models."""
-    space, final = found.space, found.final
-    aged = replace(space, objective=replace(space.objective, data=older.data), grown={})
-    hypothesis = final.hypothesis.driven_by(replace(final.predictor, data=older.data))  # type: ignore[type-var]
-    reach = space.score(final) + POLICY.beam_reach * space.penalty
-    return any(
-        aged.score(aged.refitted(hypothesis.without(t.name), final.parameters.removed(final.x, t.name))) < reach
-        for t in final.parameters.terms
-        if _in_series(t)
-    )
 
 
 def _score(objective: Objective, scales: Scales, model: Model) -> float:
