@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from gaident.diagnosis.controller.controller_place import as_read, controller_fi
 from gaident.diagnosis.controller.driving import Driving
 from gaident.diagnosis.experiments.candidates import candidates, loop_notes
 from gaident.diagnosis.experiments.excitation import excitation
-from gaident.diagnosis.explain.alternatives import alternatives_of
+from gaident.diagnosis.explain.alternatives import alternatives_of, impossible_here
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import (
@@ -27,6 +27,7 @@ from gaident.diagnosis.explain.wording import (
     far_off,
     hidden_by_torque_noise,
     or_other_gains,
+    period_seen,
     torque_unlogged,
 )
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
@@ -85,6 +86,8 @@ class Work:
         whole = self.driving.read
         read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, hit, strict=True)], self.controller)
         data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis, self.pitch)
+        data = data.with_its_period()
+        self.notes += period_seen(data)
         self.scales = scales_of(data)
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.driving.logged.replays)
         self.notes += notes
@@ -98,7 +101,9 @@ class Work:
         self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
         data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
-        self.excited = excitation(self.clean, self.data.loop, axis=self.axis, pitch=self.pitch)
+        self.excited = excitation(
+            self.clean, self.data.loop, axis=self.axis, pitch=data.period if data.period_seen else self.pitch
+        )
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
         self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
         self.notes += torque_unlogged(self.data)
@@ -126,9 +131,18 @@ class Work:
     def _doubt_gains(self) -> None:
         self.gain_doubt = gain_doubt(self.found.space, self.final, self.driving.regained_from is not None)
 
-    def other_gains(self) -> OtherGains | None:
-        """Gains with which these records are explained better, where no torque shows which they are."""
-        return self.gain_doubt.better
+    def other_gains(self, first: Work | None = None) -> OtherGains | None:
+        """Gains with which these records are explained better, where no torque shows which they are.
+
+        first: the work under the given gains, where this one is under others already: its model is the one that is worse.
+        """
+        better = self.gain_doubt.better
+        if better is None or first is None or first is self:
+            return better
+        same = first.found.space.whitens == self.found.space.whitens  # else the two are no BIC of the same errors
+        before = first.gain_doubt.better
+        worse = first.final.bic - better.bic if same or before is None else before.gain
+        return replace(better, gain=worse)
 
     def under_given(self) -> Selection | None:
         """What was found under other gains, under the given ones, where it explains the records as well there; else None."""
@@ -191,7 +205,8 @@ class Work:
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         for effect in causes:
             gain, rivals = self.rivals[effect]
-            alternatives = self._alternatives(effect, rivals, offset)
+            never = impossible_here(effect, {e: estimates[e] for e in causes})
+            alternatives = self._alternatives(effect, rivals, offset, never)
             if effect in self.gain_doubt.rivals:
                 self.notes.append(or_other_gains(effect))
             said_by = evidence_of(effect, gain, alternatives, offset)
@@ -282,11 +297,14 @@ class Work:
             shorter = self.found.space.without(self.final, effect)
             self.take(compared(self.found, shorter, self._equivalent_here, self._say))
 
-    def _alternatives(self, effect: str, rivals: Sequence[Replacement], offset: Offset | None) -> tuple[str, ...]:
+    def _alternatives(
+        self, effect: str, rivals: Sequence[Replacement], offset: Offset | None, never: Collection[str]
+    ) -> tuple[str, ...]:
         """Rivals, equivalent effects and, where the loop is not the drive's, the controller; no untestable ones."""
         shown = shown_by_the_records(self.found.space, self.final, effect)
         here = sorted(self._equivalent_here(effect))
-        names = alternatives_of(effect, rivals, here, bool(shown), offset, not (self.data.slower and self.driving.in_doubt))
+        follows = not (self.data.slower and self.driving.in_doubt)
+        names = alternatives_of(effect, rivals, here, bool(shown), offset, follows, never)
         names += [OTHER_GAINS] * (effect in self.gain_doubt.rivals)
         return tuple(dict.fromkeys(name for name in names if name not in self.not_testable))
 
