@@ -79,7 +79,8 @@ def checked(data: DataSet, gains: Gains, model: Model, mechanics: Mapping[str, E
 
     data: the records as they were fitted; model: the extended one; mechanics: name -> Estimate; effects: effect -> parameters.
     """
-    records, driven = [data.as_old(r) for r in data.records], data.open_runs
+    # A logged angle gives the motion as it was, and not as old as the velocity.
+    records, driven = [data.as_old(r) if r.position is None else r for r in data.records], data.open_runs
     nothing = Check(None, None, (), gains.before, gains.after, (), Text(""))
     if not all(r.torque is not None for r in records):
         return nothing

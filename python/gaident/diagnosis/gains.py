@@ -100,6 +100,7 @@ def measured_gains(
         words = f"the last 30 % of {'the record' if by_time else 'its path'}, parameters fitted to the first 70 %"
     else:
         scored, words, part = [(r, 0) for r in records], IN_SAMPLE, None
+    angles = [r.position is not None for r, _ in scored]
     scored = [(_turned(r, loop, final), first) for r, first in scored]
     stages = _stages(final, objective, part)
     named = list(at_controller.items())
@@ -111,6 +112,7 @@ def measured_gains(
     # Where the simulated loop is known not to be the drive's, the torque drives the models that are compared and printed.
     driver = controller if objective.data.loop_follows or not objective.data.torque_logged else None
     shaft = [(objective.data.as_old(r), first) for r, first in scored]
+    timed = [one if logged else old for logged, one, old in zip(angles, scored, shaft, strict=True)]
     scored = shaft if driver is None else scored
     errors = [free_run_errors(m, scored, driver, loop) for m in chain]
     levels = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in errors]
@@ -149,7 +151,7 @@ def measured_gains(
         interval=interval_of_fall(errors[0], errors[-1]),
         held_out=words,
         steps=steps,
-        scored=tuple(shaft),
+        scored=tuple(timed),
         mechanism=bare,
         extended=chain[-1],
         closed=driver is not None,

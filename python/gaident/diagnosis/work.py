@@ -26,6 +26,7 @@ from gaident.diagnosis.explain.wording import (
     evidence_of,
     far_off,
     hidden_by_torque_noise,
+    or_other_form,
     or_other_gains,
     period_seen,
     torque_unlogged,
@@ -45,6 +46,7 @@ from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains, gai
 from gaident.diagnosis.selection.rivals import Replacement
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
 from gaident.diagnosis.selection.sensor_age import searched
+from gaident.diagnosis.selection.unlogged_form import UnloggedForm, in_series, leaves_noise, unlogged_form
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.term import Term
@@ -121,15 +123,35 @@ class Work:
         simpler = simplified(found.space, found.final, self.left)
         if simpler is not found.final:
             self.take(compared(found, simpler, self._equivalent_here, self._say))
-        self._doubt_gains()
+        self._doubt_controller()
 
     def settle(self, found: Selection) -> None:
-        """The result of the search, and whether other gains would explain the records better."""
+        """The result of the search, and whether another controller would explain the records better."""
         self.take(found)
-        self._doubt_gains()
+        self._doubt_controller()
 
-    def _doubt_gains(self) -> None:
-        self.gain_doubt = gain_doubt(self.found.space, self.final, self.driving.regained_from is not None)
+    def _doubt_controller(self) -> None:
+        again = self.driving.regained_from is not None
+        self.gain_doubt = gain_doubt(self.found.space, self.final, again)
+        self.form = None if again else unlogged_form(self.found.space, self.final)
+
+    def other_form(self) -> UnloggedForm | None:
+        """A form of controller with which these records are explained better, also than with other gains; no torque shows it."""
+        gains, margin = self.gain_doubt.better, self.found.space.margin
+        if self.form is None or not self.form.better(margin):
+            return None
+        return self.form if gains is None or self.form.score < gains.score - margin else None
+
+    def confirms(self, given: Work) -> bool:
+        """Whether a search under another form of controller leaves noise, and fewer effects or less than under the given one."""
+        if not leaves_noise(self.found.space, self.final):
+            return False
+        return not leaves_noise(given.found.space, given.final) or len(self.final.effects) < len(given.final.effects)
+
+    def refused(self, form: UnloggedForm) -> None:
+        """Another form comes closer, but a search under it does not end in noise: what is known is said."""
+        self.form = None
+        self.notes.append(or_other_form(form.finding.effect))
 
     def other_gains(self, first: Work | None = None) -> OtherGains | None:
         """Gains with which these records are explained better, where no torque shows which they are.
@@ -306,6 +328,8 @@ class Work:
         follows = not (self.data.slower and self.driving.in_doubt)
         names = alternatives_of(effect, rivals, here, bool(shown), offset, follows, never)
         names += [OTHER_GAINS] * (effect in self.gain_doubt.rivals)
+        if self.form is not None and self.form.as_good(self.found.space.margin) and effect in in_series(self.final):
+            names.append(self.form.finding.effect)
         return tuple(dict.fromkeys(name for name in names if name not in self.not_testable))
 
     def _only_describes(self, effect: str, driver: str | None) -> bool:

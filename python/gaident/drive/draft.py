@@ -241,13 +241,18 @@ class _Draft:
             if channel not in self.guess.channels:
                 either = self._either(channel)
                 told = f"{text}: {either}" if either else f"{text}{others}"
-                needed = bool(either) or other not in self.guess.channels
+                needed = bool(either) or (other not in self.guess.channels and not self._placed)
                 line = f'# {channel} = "..."'
                 lines.append(self._todo(line, channel, told) if needed else _line(line, told))
         for channel in ("position", "position_command"):
             if channel not in self.guess.channels and (either := self._either(channel)):
                 lines.append(_line(f'# {channel} = "..."', either))
         return lines
+
+    @property
+    def _placed(self) -> bool:
+        """Whether a position controller drives the axis: what it is given and what it reads are logged."""
+        return {"position", "position_command"} <= self.guess.channels.keys()
 
     def _either(self, *channels: str) -> str:
         """The columns of which one may be the channel, where only the user knows; "" where there are none."""
@@ -292,13 +297,19 @@ class _Draft:
         text = "as set in the drive"
         if "torque" in self.guess.channels:
             text += ', "unknown", or loop = "open"'
-        mark = self._todo if "command" in self.guess.channels else lambda line, _, comment: _line(line, comment)
+        alone = self._placed and not {"command", "torque"} & self.guess.channels.keys()
+        mark = self._todo if alone or "command" in self.guess.channels else lambda line, _, comment: _line(line, comment)
         torque = word("torque", self.axis)
         positioned = "position_command" in self.guess.channels
+        place = "# position_gain = 40.0"
+        if alone:
+            gain = self._todo(place, "controller.position_gain", "1/s; position command and position drive the loop")
+        else:
+            gain = _line(place, "1/s; without it the velocity command drives the loop")
         return [
             mark("# kp = 0.0232", "controller.kp", f"{unit('N m s/rad', self.axis)}; proportional gain {text}"),
             mark("# ki = 1.367", "controller.ki", f"{unit('N m/rad', self.axis)}; integral gain"),
-            *([_line("# position_gain = 40.0", "1/s; without it the velocity command drives the loop")] if positioned else []),
+            *([gain] if positioned else []),
             _line('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model'),
             _line("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
             _line('# drive = "sinamics"', "with p1460 and p1462 in place of kp and ki: gains as the drive shows them"),

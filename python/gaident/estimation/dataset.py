@@ -95,9 +95,10 @@ class DataSet:
         found = cls(tuple(records), controller, driven, turned, free, moving, spoiled, seen, resolution=resolution)
         return replace(found, torque_measured=measured, axis=axis, period=period_of(axis, pitch))
 
-    def under(self, controller: PI) -> DataSet:
-        """The same records, whose torque is not logged, under a PI with other gains."""
-        driven = tuple(_driven(r, torque_of(r, controller)) for r in self.records)
+    def under(self, controller: Controller) -> DataSet:
+        """The same records, whose torque is not logged, under another controller."""
+        pi = bare_pi(controller)
+        driven = tuple(_driven(r, controller.torque_of(r) if pi is None else torque_of(r, pi)) for r in self.records)
         return replace(self, controller=controller, driven=driven, free=_freed(self.records, driven))
 
     def with_its_period(self) -> DataSet:
@@ -161,8 +162,8 @@ class DataSet:
 
     @cached_property
     def torque_logged(self) -> bool:
-        """Whether every record holds the controller's torque."""
-        return all(r.torque is not None for r in self.records)
+        """Whether every record holds the controller's torque, and not one that the given controller was made to give."""
+        return all(r.torque is not None for r in (self.read or self.records))
 
     @cached_property
     def substeps(self) -> int:

@@ -117,6 +117,11 @@ class Term:
         return self.limiting is not None
 
     @property
+    def in_series(self) -> bool:
+        """Whether it is linear: a delay, a lag, a filter or a resonance between the torque and the measured velocity."""
+        return not (self.domains or self.harmonic or self.in_controller)
+
+    @property
     def in_coupling(self) -> bool:
         """Whether it needs two masses, between which it acts."""
         return self.place == "coupling"

@@ -16,12 +16,14 @@ from gaident.control.pi import PI, bare_pi
 from gaident.control.pi_torque import pi_block
 from gaident.control.ticks import at_the_clock, smooth_between
 from gaident.data.record import Record
+from gaident.data.signals.difference import is_backward_difference
 from gaident.errors import RecordError
 from gaident.models.starts import constant_beside, starts_moving
 from gaident.policy.table import POLICY
 
 __all__ = [
     "Driven",
+    "as_old_as_its_velocity",
     "driven_by",
     "follows_not",
     "late",
@@ -34,6 +36,8 @@ __all__ = [
 ]
 
 Vector = NDArray[np.float64]
+
+HALF = 0.5  # no decision: of a sample, the age of a mean over it
 
 
 class Driven(NamedTuple):
@@ -157,6 +161,17 @@ def late(torque: Vector, delay: float, before: float) -> Vector:
     f = delay - m
     padded = np.concatenate([np.full(m + 1, before), torque])
     return f * padded[: len(torque)] + (1.0 - f) * padded[1 : 1 + len(torque)] if delay > 0.0 else torque
+
+
+def as_old_as_its_velocity(rec: Record) -> Record:
+    """The record with a torque that is half a sample late where its velocity is the difference of its last two positions.
+
+    Such a velocity is the mean over the last sample: under that torque a linear model gives it to second order in dt.
+    """
+    if rec.torque is None or not is_backward_difference(rec.velocity, rec.position, rec.dt):
+        return rec
+    before = rec.torque[0] if starts_moving(rec, None) else 0.0
+    return rec.with_channels(torque=late(rec.torque, HALF, before))
 
 
 def made_by(rec: Record, controller: Controller) -> Vector:

@@ -18,6 +18,7 @@ __all__ = [
     "evidence_of",
     "far_off",
     "hidden_by_torque_noise",
+    "or_other_form",
     "or_other_gains",
     "period_seen",
     "torque_unlogged",
@@ -100,7 +101,7 @@ def drives_itself(damping: Estimate) -> Text:
 
 def torque_unlogged(data: DataSet) -> list[Text]:
     """What stays open where the gains alone say which torque drove the motor."""
-    if data.pi is None or any(r.torque is not None for r in data.records):
+    if data.controller is None or any(r.torque is not None for r in data.read):
         return []
     text = (
         "No {torque} is logged: the given gains make it of command and velocity. Where both are wrong by one factor, every "
@@ -124,3 +125,12 @@ def or_other_gains(effect: str) -> Text:
     """What is said of a finding in whose place other gains would explain as much."""
     text = "Other gains than the given ones would explain these records as well as the {}: log the {torque}, it shows the gains."
     return say(text, called(effect))
+
+
+def or_other_form(form: str) -> Text:
+    """What is said where another form of controller comes closer, but does not explain the records either."""
+    text = (
+        "No {torque} is logged; a controller with another {} than the given one would come closer to these records, but does not "
+        "explain them by itself: {inertia} and causes are not to be trusted. Log the {torque}, it shows what the controller does."
+    )
+    return say(text, called(form))
