@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.data.torque_kind import COMMANDED
-from gaident.models.simulation_input import sampled_between
+from gaident.models.simulation_input import kind_of_held, sampled_between
 
 __all__ = ["means", "with_middles"]
 
@@ -32,12 +31,13 @@ def with_middles(rec: Record) -> Record:
 
     def between(name: str, x: NDArray[np.float64]) -> NDArray[np.float64]:
         if name != "torque":
-            return np.interp(at, np.arange(len(rec)), x)
+            return np.asarray(np.interp(at, np.arange(len(rec)), x))
         # no decision: a quarter of the line is the middle of its half
-        return np.interp(at + 0.25, np.arange(len(rec)), x) if sampled_between(rec) else np.repeat(x, 2)
+        return np.asarray(np.interp(at + 0.25, np.arange(len(rec)), x) if sampled_between(rec) else np.repeat(x, 2))
 
     channels: dict[str, Any] = {name: between(name, x) for name, x in rec.channels()}
-    return rec.with_channels(dt=0.5 * rec.dt, torque_is=COMMANDED, **channels)  # no decision: half the sample
+    half = 0.5 * rec.dt  # no decision: half the sample
+    return rec.with_channels(dt=half, torque_is=kind_of_held(rec, half), **channels)
 
 
 def means(W: Matrix) -> Matrix:

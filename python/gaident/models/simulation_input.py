@@ -10,7 +10,7 @@ from gaident.arguments import A_CONTROLLER, COMMAND, NO_CONTROLLER, TORQUE
 from gaident.control import core
 from gaident.control.controller import Controller, checked_controller
 from gaident.data.record import Record
-from gaident.data.torque_kind import MEASURED
+from gaident.data.torque_kind import COMMANDED, MEASURED
 from gaident.errors import ModelError, RecordError
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Model, require_strictly_proper
@@ -64,6 +64,11 @@ def input_for(p: int, rec: Record, controller: Controller | None) -> tuple[Signa
 def sampled_between(rec: Record) -> bool:
     """Whether the torque is a sample, at each line, of one that changes between the lines: no drive holds it that long."""
     return rec.torque_is == MEASURED and rec.dt > POLICY.longest_hold
+
+
+def kind_of_held(rec: Record, dt: float) -> str:
+    """`torque_is` of a record with lines of dt [s], made of `rec`, whose torque is held over each: none is drawn straight."""
+    return COMMANDED if dt > POLICY.longest_hold else rec.torque_is
 
 
 def held_torque(rec: Record) -> Signal:

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.data.torque_kind import COMMANDED
 from gaident.estimation.dataset import FINEST, DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Objective
@@ -26,7 +25,7 @@ from gaident.estimation.parameterisation import Parameterisation, parameter_name
 from gaident.estimation.prediction import OpenLoop
 from gaident.estimation.projection import WORST
 from gaident.estimation.term import Scales
-from gaident.models.simulation_input import held_torque
+from gaident.models.simulation_input import held_torque, kind_of_held
 from gaident.policy.table import POLICY
 
 __all__ = ["blocks_of", "decimated", "decimated_record", "moved"]
@@ -73,7 +72,7 @@ def decimated_record(rec: Record, blocks: int) -> Record:
     k, count = blocks, len(rec) // blocks
     torque = held_torque(rec)[: count * k].reshape(count, k).mean(axis=1)
     kept = {name: x[: count * k : k] for name, x in rec.channels()}
-    return rec.with_channels(dt=rec.dt * k, torque_is=COMMANDED, **kept | {"torque": torque})
+    return rec.with_channels(dt=rec.dt * k, torque_is=kind_of_held(rec, rec.dt * k), **kept | {"torque": torque})
 
 
 def moved(data: DataSet, scales: Scales, fit: Fit) -> Fit:
