@@ -15,7 +15,7 @@ Vector = NDArray[np.float64]
 
 def open_loop(rec: ga.Record) -> ga.Record:
     """The record as a model sees it that is driven by the torque."""
-    return ga.Record(rec.dt, velocity=rec.velocity, torque=rec.torque, position=rec.position, name=rec.name)
+    return rec.with_channels(command=None, position_command=None)
 
 
 def free_run(model: ga.Model, rec: ga.Record) -> Vector:

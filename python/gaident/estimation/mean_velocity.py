@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
+from gaident.models.simulation_input import kind_of_held, sampled_between
 
 __all__ = ["means", "with_middles"]
 
@@ -24,15 +25,19 @@ Matrix = NDArray[np.float64]
 
 @lru_cache(maxsize=16)
 def with_middles(rec: Record) -> Record:
-    """The record with twice the samples: its torque held on, everything else half way between."""
+    """The record with twice the samples: its torque as it is held, everything else half way between."""
     n = 2 * len(rec)
     at = 0.5 * np.arange(n)  # no decision: the middle
 
     def between(name: str, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.repeat(x, 2) if name == "torque" else np.interp(at, np.arange(len(rec)), x)
+        if name != "torque":
+            return np.asarray(np.interp(at, np.arange(len(rec)), x))
+        # no decision: a quarter of the line is the middle of its half
+        return np.asarray(np.interp(at + 0.25, np.arange(len(rec)), x) if sampled_between(rec) else np.repeat(x, 2))
 
     channels: dict[str, Any] = {name: between(name, x) for name, x in rec.channels()}
-    return rec.with_channels(dt=0.5 * rec.dt, **channels)  # no decision: half the sample
+    half = 0.5 * rec.dt  # no decision: half the sample
+    return rec.with_channels(dt=half, torque_is=kind_of_held(rec, half), **channels)
 
 
 def means(W: Matrix) -> Matrix:

@@ -278,6 +278,7 @@ class Policy:
     wrap_spared: float = reading(0.999, "1", "of the steps are no jumps then; the rest may be lost samples")
     overlap: float = reading(0.3, "1", "of the shorter of two logs, that both have at least")
     aligned: float = reading(0.5, "1", "correlation of two logs of one motion at least")
+    longest_hold: float = reading(4e-3, "s", "sample time of a controller at most: a torque measured less often is no held one")
     rate_seen: float = reading(3.0, "1", "standard deviations from 0, from which two clocks run at different rates")
 
     # What does a record show? What is spoiled in it, and what it could not have shown.

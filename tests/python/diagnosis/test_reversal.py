@@ -10,7 +10,8 @@ from drive_rig import Effects, Plant, run_drive
 from gaident.estimation.regression.reversal import jump_at_reversal, torque_held_at_rest
 from gaident.estimation.regression.sensor_lag import velocity_lag
 
-JOINT = Plant(J=15.0, D=18.0, kp=300.0, ki=1500.0, dt=0.01)
+JOINT = Plant(J=15.0, D=18.0, kp=300.0, ki=1500.0, dt=1e-3)
+EVERY = 10  # samples of the controller in a line of the log
 GRAVITY = {"unbalance": {"amplitude": 113.0, "phase": -1.57}}
 LOADED = {**GRAVITY, "load_dependent_friction": {"torque": 10.5, "share": 0.07}}
 ROOT = {"root_drag": {"coefficient": 20.0}}
@@ -18,12 +19,13 @@ ROOT = {"root_drag": {"coefficient": 20.0}}
 
 def joint(effects: Effects, n: int = 3000) -> ga.Record:
     """A robot joint under slow sines, with a measured torque and 2 % of noise on it."""
-    t, rng = JOINT.dt * np.arange(n), np.random.default_rng(0)
+    t, rng = JOINT.dt * np.arange(EVERY * n), np.random.default_rng(0)
     command = sum(a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in ((0.5, 0.11, 0.0), (0.35, 0.29, 1.0), (0.2, 0.83, 0.0)))
     log = run_drive(JOINT, np.asarray(command), effects)
-    velocity = log.velocity + 1e-3 * rng.standard_normal(n)
-    torque = log.torque + 0.02 * float(np.std(log.torque)) * rng.standard_normal(n)
-    return ga.Record(JOINT.dt, velocity=velocity, torque=torque, position=log.position, torque_is="measured")
+    velocity, torque, position = (x[::EVERY] for x in (log.velocity, log.torque, log.position))
+    velocity = velocity + 1e-3 * rng.standard_normal(n)
+    torque = torque + 0.02 * float(np.std(torque)) * rng.standard_normal(n)
+    return ga.Record(EVERY * JOINT.dt, velocity=velocity, torque=torque, position=position, torque_is="measured")
 
 
 def test_the_torque_jumps_at_a_reversal_with_dry_friction_and_not_with_a_steep_drag() -> None:
@@ -36,7 +38,7 @@ def test_the_torque_jumps_at_a_reversal_with_dry_friction_and_not_with_a_steep_d
 
 
 def test_the_jump_is_seen_beside_friction_that_grows_with_the_load() -> None:
-    jump = jump_at_reversal([joint(LOADED)])
+    jump = jump_at_reversal([joint(LOADED, 6000)])
     assert jump is not None and jump.value > 4.0 * jump.std
     assert jump.value == pytest.approx(10.5, abs=2.0 * jump.std)
 

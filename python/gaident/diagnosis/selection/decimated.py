@@ -25,6 +25,7 @@ from gaident.estimation.parameterisation import Parameterisation, parameter_name
 from gaident.estimation.prediction import OpenLoop
 from gaident.estimation.projection import WORST
 from gaident.estimation.term import Scales
+from gaident.models.simulation_input import held_torque, kind_of_held
 from gaident.policy.table import POLICY
 
 __all__ = ["blocks_of", "decimated", "decimated_record", "moved"]
@@ -67,12 +68,11 @@ def blocks_of(data: DataSet, error: Vector) -> int:
 
 
 def decimated_record(rec: Record, blocks: int) -> Record:
-    """The record on the coarse grid; what is left over at its end is not used."""
-    assert rec.torque is not None
+    """The record on the coarse grid, its torque as it is held there; what is left over at its end is not used."""
     k, count = blocks, len(rec) // blocks
-    torque = rec.torque[: count * k].reshape(count, k).mean(axis=1)
+    torque = held_torque(rec)[: count * k].reshape(count, k).mean(axis=1)
     kept = {name: x[: count * k : k] for name, x in rec.channels()}
-    return rec.with_channels(dt=rec.dt * k, **kept | {"torque": torque})
+    return rec.with_channels(dt=rec.dt * k, torque_is=kind_of_held(rec, rec.dt * k), **kept | {"torque": torque})
 
 
 def moved(data: DataSet, scales: Scales, fit: Fit) -> Fit:

@@ -1,0 +1,59 @@
+"""A measured torque of a slow log is a sample of one that changes between the lines, and not held from its line on.
+
+Truth: a fine simulation of a rigid axis with dry friction under a smooth torque, logged every 40th sample.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import gaident as ga
+from gaident.diagnosis.selection.decimated import decimated_record
+from gaident.estimation.mean_velocity import with_middles
+from gaident.models.simulation_input import held_torque
+from gaident.policy.table import POLICY
+
+J, B, C = 5.5, 22.0, 13.0
+FINE, EVERY = 1e-3, 40
+TRUTH = ga.OneMass(J=J, D=B).model().with_effect("coulomb_friction", torque=C)
+
+
+def logged(kind: str, every: int = EVERY) -> ga.Record:
+    t = FINE * np.arange(40_000)
+    u = 25.0 * np.sin(1.9 * t) + 14.0 * np.sin(5.3 * t + 1.0)
+    w = ga.simulate(TRUTH, ga.Record(FINE, torque=u, velocity=np.zeros(len(u))))
+    w = w + 1e-3 * np.random.default_rng(1).standard_normal(len(w))
+    return ga.Record(every * FINE, torque=u[::every], velocity=w[::every], torque_is=kind)
+
+
+def rms(x: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(x**2)))
+
+
+def test_a_sampled_torque_goes_straight_between_the_lines() -> None:
+    """Held it would be half a line late: B dt/2 = 0.44 of an inertia of 5.5, and ten times the error of the truth."""
+    held, straight = (rms(ga.simulate(TRUTH, rec) - rec.velocity) for rec in map(logged, ("commanded", "measured")))
+    assert straight < 0.1 * held and held > 0.02
+
+
+def test_a_fast_log_is_as_it_was() -> None:
+    fast = logged("measured", every=4)
+    assert fast.dt <= POLICY.longest_hold
+    assert np.array_equal(held_torque(fast), fast.torque)
+    assert np.array_equal(ga.simulate(TRUTH, fast), ga.simulate(TRUTH, fast.with_channels(torque_is="commanded")))
+
+
+def test_the_mean_over_a_line_is_held() -> None:
+    rec = ga.Record(0.01, torque=np.arange(100.0), velocity=np.zeros(100), torque_is="measured")
+    assert np.array_equal(held_torque(rec), [*(np.arange(99) + 0.5), 99.0])
+    halves = with_middles(rec)
+    assert np.allclose(held_torque(halves)[:198].reshape(-1, 2).mean(axis=1), held_torque(rec)[:99])
+    coarse = decimated_record(rec, 4)
+    assert np.array_equal(held_torque(coarse), held_torque(rec).reshape(-1, 4).mean(axis=1))
+
+
+def test_the_cause_and_the_inertia_behind_a_sampled_torque() -> None:
+    """Half a line late the same data were named otherwise, and B dt/2 is 8 % of the inertia."""
+    dia = ga.diagnose(logged("measured"))
+    assert [f.effect for f in dia.findings if not f.is_noise] == ["coulomb_friction"]
+    assert abs(1.0 / dia.model.gain / J - 1.0) < 0.01
