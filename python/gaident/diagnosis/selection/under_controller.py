@@ -28,8 +28,8 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 STEP = 1e-3  # no decision: of a number of the controller, for a difference
-STEPS = 6  # no decision: work, of Gauss and Newton
-SETTLED = 1e-4  # no decision: of a number of the controller, a step that ends them
+STEPS = 12  # no decision: work, of Gauss and Newton
+SETTLED = 1e-6  # no decision: of a number of the controller, a step that ends them
 
 
 @dataclass(frozen=True, eq=False)
