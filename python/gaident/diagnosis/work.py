@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from gaident.diagnosis.controller.controller_place import as_read, controller_fi
 from gaident.diagnosis.controller.driving import Driving
 from gaident.diagnosis.experiments.candidates import candidates, loop_notes
 from gaident.diagnosis.experiments.excitation import excitation
-from gaident.diagnosis.explain.alternatives import alternatives_of
+from gaident.diagnosis.explain.alternatives import alternatives_of, impossible_here
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import (
@@ -191,7 +191,8 @@ class Work:
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         for effect in causes:
             gain, rivals = self.rivals[effect]
-            alternatives = self._alternatives(effect, rivals, offset)
+            never = impossible_here(effect, {e: estimates[e] for e in causes})
+            alternatives = self._alternatives(effect, rivals, offset, never)
             if effect in self.gain_doubt.rivals:
                 self.notes.append(or_other_gains(effect))
             said_by = evidence_of(effect, gain, alternatives, offset)
@@ -282,11 +283,14 @@ class Work:
             shorter = self.found.space.without(self.final, effect)
             self.take(compared(self.found, shorter, self._equivalent_here, self._say))
 
-    def _alternatives(self, effect: str, rivals: Sequence[Replacement], offset: Offset | None) -> tuple[str, ...]:
+    def _alternatives(
+        self, effect: str, rivals: Sequence[Replacement], offset: Offset | None, never: Collection[str]
+    ) -> tuple[str, ...]:
         """Rivals, equivalent effects and, where the loop is not the drive's, the controller; no untestable ones."""
         shown = shown_by_the_records(self.found.space, self.final, effect)
         here = sorted(self._equivalent_here(effect))
-        names = alternatives_of(effect, rivals, here, bool(shown), offset, not (self.data.slower and self.driving.in_doubt))
+        follows = not (self.data.slower and self.driving.in_doubt)
+        names = alternatives_of(effect, rivals, here, bool(shown), offset, follows, never)
         names += [OTHER_GAINS] * (effect in self.gain_doubt.rivals)
         return tuple(dict.fromkeys(name for name in names if name not in self.not_testable))
 

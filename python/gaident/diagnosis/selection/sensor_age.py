@@ -61,7 +61,8 @@ def searched(
         )
         return search(older), [say(text, lines, each, age)]
     found = search(objective)
-    step = encoder_step(data.velocity) if any(_in_series(t) for t in found.final.parameters.terms) else 0.0
+    in_series = any(_in_series(t) for t in found.final.parameters.terms)
+    step = encoder_step(data.velocity, data.axis == "linear") if in_series else 0.0
     if not step > 0.0 or not _near(found, older):
         return found, []
     again = search(older)
