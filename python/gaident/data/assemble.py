@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 
 import numpy as np
@@ -99,7 +100,7 @@ def _unnamed_torque(table: Table, wanted: Wanted, named: dict[str, Column]) -> l
     which = " or ".join(repr(key) for key in found[:SAID])
     return [
         f"No torque is read, but by its name {which} may be it: give columns={{'torque': {found[0]!r}}} "
-        f"(--columns torque={found[0]}). A logged torque shows what the controller does."
+        f"(--columns {shlex.quote(f'torque={found[0]}')}). A logged torque shows what the controller does."
     ]
 
 

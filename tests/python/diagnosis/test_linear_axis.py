@@ -138,11 +138,14 @@ def test_the_command_line_takes_the_axis_of_the_drive_file(
     assert main(["diagnose", "axis.csv", "--drive", "drive.toml", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["axis"] == "linear" and set(data["not_testable"]) >= PERIODIC
-    assert main(["diagnose", "axis.csv", "--drive", "drive.toml", "--pitch", "0.5", "--json"]) == 0
+    assert main(["diagnose", "axis.csv", "--drive", "drive.toml", "--pitch", "500 mm", "--json"]) == 0
     assert set(json.loads(capsys.readouterr().out)["not_testable"]) & PERIODIC == {"unbalance"}
-    Path("drive.toml").write_text('axis = "linear"\npitch = "24 parsec"\n')
-    assert main(["diagnose", "axis.csv", "--drive", "drive.toml"]) == 2
-    assert "pitch is '24 parsec': give a length in m" in capsys.readouterr().err
+    assert main(["diagnose", "axis.csv", "--drive", "drive.toml", "--pitch", "ten"]) == 2
+    assert "argument --pitch: 'ten' is no number" in capsys.readouterr().err
+    for wrong in ("24 parsec", "24 deg", "1 turn"):
+        Path("drive.toml").write_text(f'axis = "linear"\npitch = "{wrong}"\n')
+        assert main(["diagnose", "axis.csv", "--drive", "drive.toml"]) == 2
+        assert f"pitch is '{wrong}': give a length in m" in capsys.readouterr().err
     limits = "[limits]\nspeed = 1.0\ntorque = 300.0\ntravel = 2.0\nduration = 20.0\n"
     Path("drive.toml").write_text('axis = "linear"\ndt = 1e-3\n' + limits)
     assert main(["experiment", "--drive", "drive.toml", "--json"]) == 0
