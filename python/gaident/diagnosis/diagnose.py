@@ -65,9 +65,10 @@ def diagnose(
     progress : callable, optional
         Called now and then with (fraction done, message), see `gaident.progress`.
     axis : {"rotary", "linear"}
-        "linear" (m, m/s, N): positions are lengths, and what returns with every turn is tried where a `pitch` is given.
+        "linear" (m, m/s, N): positions are lengths, and what returns with every turn is tried with every `pitch`.
     pitch : float, optional
         Of a linear axis, the length with which its cogging returns: pitch of the screw or of the poles [m].
+        None: what the records show, if they do; a note says so.
 
     Returns
     -------

@@ -27,6 +27,7 @@ from gaident.diagnosis.explain.wording import (
     far_off,
     hidden_by_torque_noise,
     or_other_gains,
+    period_seen,
     torque_unlogged,
 )
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
@@ -85,6 +86,8 @@ class Work:
         whole = self.driving.read
         read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, hit, strict=True)], self.controller)
         data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis, self.pitch)
+        data = data.with_its_period()
+        self.notes += period_seen(data)
         self.scales = scales_of(data)
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.driving.logged.replays)
         self.notes += notes
@@ -98,7 +101,9 @@ class Work:
         self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
         data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
-        self.excited = excitation(self.clean, self.data.loop, axis=self.axis, pitch=self.pitch)
+        self.excited = excitation(
+            self.clean, self.data.loop, axis=self.axis, pitch=data.period if data.period_seen else self.pitch
+        )
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
         self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
         self.notes += torque_unlogged(self.data)

@@ -24,6 +24,7 @@ from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.estimation.mean_velocity import means, with_middles
+from gaident.estimation.period import period_of_place
 from gaident.estimation.term import Term
 from gaident.models.drive_torque import late, torque_of
 from gaident.models.simulate_many import LoadedRecord
@@ -48,7 +49,8 @@ class DataSet:
     shorter [s]; resolution: step of the lattice that all velocities lie on [rad/s], 0: none; known_noise: standard deviation
     of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
     makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear".
-    period: with which returns what is tied to the place [rad, m], of which orders count; None: not known.
+    period: with which returns what is tied to the place [rad, m], of which orders count; None: not known. period_seen: it is the
+    one that the records show.
     age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample old. What
     drives a model is late by as much, here and in the loop that is simulated.
     """
@@ -68,6 +70,7 @@ class DataSet:
     torque_measured: bool = False
     axis: str = "rotary"
     period: float | None = TURN
+    period_seen: bool = False
     age: float = 0.0
 
     @classmethod
@@ -95,6 +98,11 @@ class DataSet:
         """The same records, whose torque is not logged, under a PI with other gains."""
         driven = tuple(_driven(r, torque_of(r, controller)) for r in self.records)
         return replace(self, controller=controller, driven=driven, free=_freed(self.records, driven))
+
+    def with_its_period(self) -> DataSet:
+        """The same with the period that the records show, where none is known."""
+        shown = period_of_place(self.driven) if self.period is None else None
+        return self if shown is None else replace(self, period=shown, period_seen=True)
 
     def aged(self, lines: float) -> DataSet:
         """The same with a measured velocity that is so many lines of the log old."""

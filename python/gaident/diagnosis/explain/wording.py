@@ -19,6 +19,7 @@ __all__ = [
     "far_off",
     "hidden_by_torque_noise",
     "or_other_gains",
+    "period_seen",
     "torque_unlogged",
 ]
 
@@ -106,6 +107,17 @@ def torque_unlogged(data: DataSet) -> list[Text]:
         "{inertia} and {torque} found here is wrong by that factor, and nothing shows it: log the {torque}."
     )
     return [say(text)]
+
+
+def period_seen(data: DataSet) -> list[Text]:
+    """What is said where nobody gave the pitch of a linear axis and the records show one."""
+    if not data.period_seen or data.period is None:
+        return []
+    text = (
+        "No pitch is given, and the {torque} returns with every {:.6g} mm of the path: this was taken for it. Where it is that "
+        "of the screw or of the poles, give it; orders are then exact."
+    )
+    return [say(text, 1e3 * data.period)]
 
 
 def or_other_gains(effect: str) -> Text:
