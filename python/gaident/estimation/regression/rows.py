@@ -71,5 +71,6 @@ def rows_of(rec: Record, terms: tuple[str, ...], cutoff_hz: float, order: int, d
     kept = ~motion.still[::decimation]
     kept[:2] = kept[-2:] = False
     travel = float(np.ptp(motion.position))
-    position, time = motion.position[::decimation][kept], (rec.dt * decimation * np.arange(len(kept)))[kept]
+    position = motion.position[::decimation][kept]
+    time = (rec.dt * decimation * np.arange(len(kept), dtype=np.float64))[kept]
     return Rows(terms, regressor[kept], decimated(torque, decimation)[kept], position, time, motion.threshold, travel)
