@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gaident.axis import say
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
@@ -24,6 +25,10 @@ from gaident.results.identification import Identification
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
 
+IDENTIFIED_AGAIN = say(
+    "The given identification is one under the given gains, which these records contradict: another one, under the gains that "
+    "were found, is in its place."
+)
 ROUNDS = 3  # no decision: work; searches under gains that the one before has shown
 
 
@@ -119,7 +124,7 @@ def diagnose(
         work.search()
         given_work = work
         for _ in range(ROUNDS):
-            other = work.other_gains()
+            other = work.other_gains(given_work)
             if other is None:
                 break
             note(0.03, "once more, under other gains")
@@ -133,6 +138,8 @@ def diagnose(
             work.settle(stands)
         result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
         result = moved.noted(result)
+        if identification is not None and work.idn is not identification:
+            result = replace(result, notes=(IDENTIFIED_AGAIN, *result.notes))
         answered = work.at_controller.decided or any(f.place == "controller" for f in result.findings)
         result = replace(result, notes=(*driving.notes, *(() if answered else driving.doubts), *result.notes))
         if bootstrap:

@@ -131,9 +131,18 @@ class Work:
     def _doubt_gains(self) -> None:
         self.gain_doubt = gain_doubt(self.found.space, self.final, self.driving.regained_from is not None)
 
-    def other_gains(self) -> OtherGains | None:
-        """Gains with which these records are explained better, where no torque shows which they are."""
-        return self.gain_doubt.better
+    def other_gains(self, first: Work | None = None) -> OtherGains | None:
+        """Gains with which these records are explained better, where no torque shows which they are.
+
+        first: the work under the given gains, where this one is under others already: its model is the one that is worse.
+        """
+        better = self.gain_doubt.better
+        if better is None or first is None or first is self:
+            return better
+        same = first.found.space.whitens == self.found.space.whitens  # else the two are no BIC of the same errors
+        before = first.gain_doubt.better
+        worse = first.final.bic - better.bic if same or before is None else before.gain
+        return replace(better, gain=worse)
 
     def under_given(self) -> Selection | None:
         """What was found under other gains, under the given ones, where it explains the records as well there; else None."""

@@ -19,6 +19,7 @@ from gaident.results.json_text import on_axis
 from gaident.show.chart import Band, Chart, Mark, Panel, Trace
 from gaident.show.diagnosis_summary import parameter_row
 from gaident.show.units import beside, in_units, scales_of, shown_in
+from page import unpacked
 
 RPM = 60.0 / math.tau
 UNITS = {"velocity": "rpm", "torque": "%", "position": "deg", "rated_torque": 2.4}
@@ -140,6 +141,8 @@ def test_the_page_says_whose_it_is_and_draws_in_units(record: ga.Record, diagnos
     about = {"date": "2026-11-22", "customer": "Miller & Co", "text": "after <the> repair"}
     ga.report(diagnosis, tmp_path / "page.html", record, units=UNITS, about=about)
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    page = unpacked(page)
+    assert "&amp;times;" not in page and "&times;10<sup>&minus;3</sup> rad/s" in page  # in a tile: a small number beside rpm
     assert "velocity [rpm]" in page and "missing torque [%]" in page and "missing torque [N m]" not in page
     assert "Miller &amp; Co" in page and "after &lt;the&gt; repair" in page and "2026-11-22" in page
     assert "The model lacks coulomb friction (0.3 N m)" in page

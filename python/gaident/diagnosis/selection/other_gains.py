@@ -84,7 +84,7 @@ class OtherGains:
 class GainDoubt:
     """better: the model under other gains that explains the records better than the selected one, None where none does.
 
-    rivals: effects of the selected model in whose place other gains are within reach.
+    rivals: effects of the selected model in whose place other gains are within reach, and those that the better model lacks.
     """
 
     better: OtherGains | None = None
@@ -111,8 +111,9 @@ def gain_doubt(space: Moves, final: Fit, again: bool = False) -> GainDoubt:
     best = min(known, key=lambda g: g.score, default=None)
     if best is not None and not search.better(best, is_more=best is beside):
         best = None
-    rivals = frozenset(e for e, g in instead.items() if g is not None and g.bic - final.bic < space.margin)
-    return GainDoubt(best, frozenset() if best is not None else rivals)
+    rivals = {e for e, g in instead.items() if g is not None and g.bic - final.bic < space.margin}
+    lacking = set() if best is None else set(final.effects) - set(best.fit.effects)
+    return GainDoubt(best, frozenset(rivals | lacking))
 
 
 def _bare(space: Moves, fit: Fit) -> Fit:
