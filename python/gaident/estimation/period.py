@@ -114,7 +114,7 @@ def period_of_place(records: Sequence[Record]) -> float | None:
 def _counts(before: _Left, after: _Left, tried: int) -> bool:
     """Whether a wave is there: two amplitudes and its length, the best of so many."""
     gain = gained(before.power, after.power, effective_samples(*after.errors), 3)  # no decision: numbers of a wave
-    chance = 2.0 * math.log(tried)
+    chance = 2.0 * math.log(tried)  # no decision: 2 ln m, what the best of m costs, see `Term.search_cost`
     return gain - chance > POLICY.dependence_gain and before.power - after.power > POLICY.material_share * before.power
 
 
