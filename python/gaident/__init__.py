@@ -20,6 +20,7 @@ _of_stub, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 provide(
     {
         # Record and its reader, Limits
+        "plot_record": "gaident.show.plots:plot_record",
         "record_html": "gaident.show.record_html:record_html",
         "estimate_winding": "gaident.estimation.regression.winding:estimate_winding",
         "limits_of": "gaident.diagnosis.experiments.first_experiment:limits_of",

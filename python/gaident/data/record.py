@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident.checks import one_of
-from gaident.data.record_checks import check_bounds, equally_long, moved_channels, sample_time, texts, torque_kind
+from gaident.data.record_checks import (
+    check_bounds,
+    complete,
+    digest_of,
+    equally_long,
+    moved_channels,
+    sample_time,
+    slice_bounds,
+    texts,
+    torque_kind,
+)
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel
 from gaident.data.signals.decimation import decimated, factor_of
 from gaident.data.torque_kind import COMMANDED, MEASURED
@@ -22,6 +31,9 @@ from gaident.errors import RecordError, check_schema
 from gaident.files import write_whole
 from gaident.providers import provided
 from gaident.version import version
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["CHANNELS", "Record"]
 
@@ -31,7 +43,6 @@ CHANNELS = ("command", "velocity", "torque", "position", "position_command")
 SCHEMA = "gaident/record"
 SCHEMA_VERSION = 1  # no decision: the version of a format
 
-_HASH_BLOCK = 1 << 18  # no decision: work; values of a block
 # A time given as 0.3 s falls on sample 3 of dt = 0.1 s although 0.3 / 0.1 is 2.9999999999999996.
 _TIME_SLACK = 1e-6  # no decision: rounding of two decimal numbers
 
@@ -112,15 +123,7 @@ class Record:
         torque_is: str = COMMANDED,
         notes: Sequence[str] = (),
     ) -> None:
-        if velocity is None:
-            raise RecordError(
-                "velocity=None, but a record needs the measured velocity; give velocity=, "
-                "or derive it with differentiate(position, dt, cutoff_hz)"
-            )
-        if command is None and torque is None and position_command is None:
-            raise RecordError(
-                "command=None and torque=None, but a record needs what drove the motor; give one of them, or position_command="
-            )
+        complete(velocity, command, torque, position_command)
         if not isinstance(name, str):
             raise RecordError(f"name={name!r} is no text; give a str")
         given = {key: value for key, value in zip(CHANNELS, (command, velocity, torque, position, position_command), strict=True)}
@@ -213,32 +216,11 @@ class Record:
         Equal data give equal digests on every machine; the name does not count.
         It gives records an order that does not depend on how they were passed, and reports a fingerprint.
         """
-        sha = hashlib.sha256(f"gaident record 1 {self.dt.hex()} {len(self)}".encode())
-        for key, values in self.channels():
-            sha.update(f" {key} ".encode())
-            for start in range(0, len(values), _HASH_BLOCK):
-                # + 0.0 makes -0.0 the 0.0 that it equals
-                block = values[start : start + _HASH_BLOCK] + 0.0
-                sha.update(block.astype("<f8", copy=False).tobytes())
-        if self.torque_is != COMMANDED:
-            sha.update(f" torque is {self.torque_is}".encode())
-        return sha.hexdigest()
+        return digest_of(self.dt, dict(self.channels()), self.torque_is)
 
     def __getitem__(self, samples: slice) -> Record:
         """`rec[a:b]`: samples a to b-1, numpy's rules for negative and missing bounds; at least 20 remain."""
-        if not isinstance(samples, slice):
-            raise RecordError(f"rec[{samples!r}]: a record is cut by a slice, rec[a:b]; one value is rec.velocity[n]")
-        text = f"rec[{_bound(samples.start)}:{_bound(samples.stop)}]"
-        if samples.step is not None and samples.step != 1:
-            raise RecordError(
-                f"{text[:-1]}:{samples.step!r}]: the step must be 1, because leaving out samples folds high "
-                f"frequencies down; cut with rec[a:b], and decimate behind a low-pass with rec.decimate({samples.step!r})"
-            )
-        try:
-            start, stop, _ = samples.indices(len(self))
-        except TypeError:
-            raise RecordError(f"{text}: bounds are sample numbers, whole; cut by seconds with rec.between(t0, t1)") from None
-        return self._cut(start, stop, text)
+        return self._cut(*slice_bounds(samples, len(self)))
 
     def between(self, t0: float, t1: float) -> Record:
         """Return the samples with t0 <= time < t1.
@@ -318,6 +300,28 @@ class Record:
         moved: Mapping[str, Any] = moved_channels(dict(self.channels()), samples)
         return self.with_channels(**moved)
 
+    def plot(self, axis: str = "rotary", units: Mapping[str, str | float] | None = None) -> Figure:
+        """Draw the channels over time: what the log holds, before anything is fitted.
+
+        Parameters
+        ----------
+        axis : {"rotary", "linear"}
+            "linear": words and units of m and N.
+        units : mapping, optional
+            Your units in place of SI, as `report` takes them: ``{"velocity": "rpm"}``.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The picture; `savefig` writes it.
+
+        Raises
+        ------
+        SettingsError, ReadError
+            For another axis, or a unit that it does not have.
+        """
+        return provided("plot_record")(self, axis, units)  # type: ignore[no-any-return]
+
     def _sample_at(self, time: float) -> int:
         """First sample not before `time` [s], within 0..n."""
         return math.ceil(min(max(time / self.dt - _TIME_SLACK, 0.0), float(len(self))))
@@ -394,7 +398,3 @@ class Record:
 
 def _rebuilt(kind: type[Record], held: dict[str, Any]) -> Record:
     return kind(**held)
-
-
-def _bound(value: object) -> str:
-    return "" if value is None else repr(value)

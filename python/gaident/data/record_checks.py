@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Mapping, Sequence
 
@@ -14,7 +15,19 @@ from gaident.data.signals.arrays import MINIMUM_SAMPLES, positive_number
 from gaident.data.torque_kind import COMMANDED, TORQUE_KINDS
 from gaident.errors import RecordError
 
-__all__ = ["check_bounds", "equally_long", "moved_channels", "sample_time", "texts", "torque_kind"]
+__all__ = [
+    "check_bounds",
+    "complete",
+    "digest_of",
+    "equally_long",
+    "moved_channels",
+    "sample_time",
+    "slice_bounds",
+    "texts",
+    "torque_kind",
+]
+
+HASH_BLOCK = 1 << 18  # no decision: work; values of a block
 
 
 def sample_time(dt: object) -> float:
@@ -77,3 +90,48 @@ def check_bounds(t0: object, t1: object) -> None:
             raise RecordError(f"between({t0!r}, {t1!r}): {key} is NaN; give seconds")
     if not t0 < t1:  # type: ignore[operator]  # both are numbers
         raise RecordError(f"between({t0!r}, {t1!r}): t0 must be before t1; exchange them")
+
+
+def complete(velocity: object, command: object, torque: object, position_command: object) -> None:
+    """Raises RecordError where a record would lack its velocity, or what drove the motor."""
+    if velocity is None:
+        raise RecordError(
+            "velocity=None, but a record needs the measured velocity; give velocity=, "
+            "or derive it with differentiate(position, dt, cutoff_hz)"
+        )
+    if command is None and torque is None and position_command is None:
+        raise RecordError(
+            "command=None and torque=None, but a record needs what drove the motor; give one of them, or position_command="
+        )
+
+
+def slice_bounds(samples: object, length: int) -> tuple[int, int, str]:
+    """(first sample, the one behind the last, the text `rec[a:b]`) of a slice of a record. Raises RecordError."""
+    if not isinstance(samples, slice):
+        raise RecordError(f"rec[{samples!r}]: a record is cut by a slice, rec[a:b]; one value is rec.velocity[n]")
+    first, last = ("" if bound is None else repr(bound) for bound in (samples.start, samples.stop))
+    text = f"rec[{first}:{last}]"
+    if samples.step is not None and samples.step != 1:
+        raise RecordError(
+            f"{text[:-1]}:{samples.step!r}]: the step must be 1, because leaving out samples folds high "
+            f"frequencies down; cut with rec[a:b], and decimate behind a low-pass with rec.decimate({samples.step!r})"
+        )
+    try:
+        start, stop, _ = samples.indices(length)
+    except TypeError:
+        raise RecordError(f"{text}: bounds are sample numbers, whole; cut by seconds with rec.between(t0, t1)") from None
+    return start, stop, text
+
+
+def digest_of(dt: float, channels: Mapping[str, NDArray[np.float64]], torque_is: str) -> str:
+    """SHA-256 of the data of a record, see `Record.digest`."""
+    sha = hashlib.sha256(f"gaident record 1 {dt.hex()} {len(channels['velocity'])}".encode())
+    for key, values in channels.items():
+        sha.update(f" {key} ".encode())
+        for start in range(0, len(values), HASH_BLOCK):
+            # + 0.0 makes -0.0 the 0.0 that it equals
+            block = values[start : start + HASH_BLOCK] + 0.0
+            sha.update(block.astype("<f8", copy=False).tobytes())
+    if torque_is != COMMANDED:
+        sha.update(f" torque is {torque_is}".encode())
+    return sha.hexdigest()

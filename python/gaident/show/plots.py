@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,21 +11,50 @@ from numpy.typing import NDArray
 
 from gaident.axis import unit, velocity_unit, word
 from gaident.data.record import Record
+from gaident.data.torque_kind import MEASURED
 from gaident.models.model import Model
 from gaident.results.identification import Identification
-from gaident.show.draw import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, chart_figure, line, new_figure, tidy
+from gaident.show.draw import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, chart_figure, headed, line, new_figure, tidy
 from gaident.show.search_charts import convergence_chart, roots_chart, structures_chart
+from gaident.show.units import figure_in_units, scales_of
 from gaident.show.wording import structure_words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot_bode", "plot_convergence", "plot_identification", "plot_poles_zeros", "plot_structures"]
+__all__ = ["plot_bode", "plot_convergence", "plot_identification", "plot_poles_zeros", "plot_record", "plot_structures"]
 
 SERIES = (BLUE, VERMILION, GREEN, ORANGE, SKY, BLACK)
 SHOWN_RECORDS = 3
 
 Vector = NDArray[np.float64]
+
+
+def plot_record(rec: Record, axis: str = "rotary", units: Mapping[str, str | float] | None = None) -> Figure:
+    """The channels of a record over time, velocity and position each with its command; units: the user's, see `scales_of`."""
+    v, u, x = (unit(rotary, axis) for rotary in ("rad/s", "N m", "rad"))
+    measured = " (measured)" if rec.torque_is == MEASURED else ""
+    position = word("angle", axis)
+    rows: list[tuple[str, float, list[tuple[Vector | None, str, str]]]] = [
+        (f"velocity [{v}]", 1.6, [(rec.velocity, "measured", BLUE), (rec.command, "command", GREY)]),
+        (f"{word('torque', axis)}{measured} [{u}]", 1.0, [(rec.torque, "", GREEN)]),
+        (f"{position} [{x}]", 1.0, [(rec.position, "measured", BLUE), (rec.position_command, "command", GREY)]),
+    ]
+    rows = [(title, height, held) for title, height, lines in rows if (held := [row for row in lines if row[0] is not None])]
+    fig = new_figure(8.0, 0.6 + 1.6 * sum(height for _, height, _ in rows))
+    grid = fig.subplots(len(rows), 1, sharex=True, squeeze=False, height_ratios=[height for _, height, _ in rows])[:, 0]
+    for ax, (title, _, lines) in zip(grid, rows, strict=True):
+        for values, label, color in lines:
+            assert values is not None  # such rows are left out above
+            style = "--" if label == "command" else "-"
+            line(ax, rec.time, values, color=color, linewidth=1.0, linestyle=style, label=label if len(lines) > 1 else "")
+        ax.set_ylabel(title)
+        ax.margins(x=0.01)
+        headed(ax, "")
+    grid[-1].set_xlabel("time [s]")
+    tidy(fig)
+    fig.suptitle(f"{rec.name + ': ' if rec.name else ''}{len(rec)} samples of {1e3 * rec.dt:.6g} ms")
+    return figure_in_units(fig, scales_of(units, axis))
 
 
 def plot_identification(idn: Identification, records: Sequence[Record], axis: str = "rotary") -> Figure:

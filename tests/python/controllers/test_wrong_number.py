@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from gaident.identification.logged_torque import period_forgotten
 
 TRUE = ga.Cascade(
     ga.PI(0.03, 1.0),
@@ -71,3 +72,17 @@ def test_a_loop_that_is_not_the_drives_is_not_simulated() -> None:
     assert dia.mechanics["inertia"].value == pytest.approx(4e-4, rel=0.01)
     # Between the lines the logged torque goes straight: 1.6 times the noise; 2.3 as a controller with two wrong numbers makes it.
     assert dia.after.rmse < 2.0 * dia.after.noise_floor
+
+
+def test_a_forgotten_sample_time_of_the_controller_is_asked_for() -> None:
+    """The whole cascade, every fourth sample of which was logged, and nobody said so."""
+    (note,) = period_forgotten([log()], replace(TRUE, period=None))
+    assert "samples 4 times for each line of the log" in note and "period = 0.00025 (s)" in note
+    assert period_forgotten([log()], TRUE) == () == period_forgotten([log()], None)
+    assert period_forgotten([log()], replace(TWO_WRONG, period=None)) == ()  # another number is wrong: no clock mends that
+
+
+def test_a_forgotten_sample_time_is_a_note_of_the_diagnosis() -> None:
+    dia = ga.diagnose(log(), replace(TRUE, period=None))
+    assert any("give its sample time, period = 0.00025 (s)" in note for note in dia.notes)
+    assert not any("give its sample time" in note for note in ga.diagnose(log(), TRUE).notes)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from gaident.errors import SettingsError
 from gaident.show import plot_bode, plot_convergence, plot_identification, plot_poles_zeros, plot_structures
 from gaident.show.chart import envelope
 from one_mass import one_mass_record
@@ -80,6 +81,22 @@ def test_other_pictures_render(result: tuple[ga.Record, Any]) -> None:
         rendered(figure)
     top_of_resonance = np.abs(two.frequency_response(np.linspace(160.0, 185.0, 20001))).max()
     assert np.max(np.asarray(bode.axes[0].lines[0].get_ydata())) == pytest.approx(top_of_resonance, rel=1e-3)
+
+
+def test_a_record_is_drawn_before_anything_is_fitted() -> None:
+    t = 1e-3 * np.arange(400)
+    w = np.sin(20.0 * t)
+    rec = ga.Record(1e-3, command=w, velocity=0.9 * w, torque=2.0 * w, position=0.1 * w, name="run1", torque_is="measured")
+    top, torque, angle = rec.plot().axes
+    assert {line.get_label() for line in top.lines} == {"measured", "command"} and top.get_ylabel() == "velocity [rad/s]"
+    assert (torque.get_ylabel(), angle.get_ylabel()) == ("torque (measured) [N m]", "angle [rad]")
+    figure = rec.plot("linear", {"velocity": "mm/s"})
+    rendered(figure)
+    assert [ax.get_ylabel() for ax in figure.axes] == ["velocity [mm/s]", "force (measured) [N]", "position [m]"]
+    (only,) = ga.Record(1e-3, velocity=w, command=w).plot().axes
+    assert only.get_xlabel() == "time [s]"
+    with pytest.raises(SettingsError, match="which no linear axis is measured in"):
+        rec.plot("linear", {"velocity": "rpm"})
 
 
 def test_long_signals_keep_their_extremes() -> None:

@@ -16,7 +16,7 @@ from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.diagnosis.controller.other_form import other_form
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains
 from gaident.diagnosis.selection.unlogged_form import UnloggedForm
-from gaident.identification.logged_torque import corrected, not_followed
+from gaident.identification.logged_torque import corrected, not_followed, period_forgotten
 from gaident.models.drive_torque import Driven, driven_by, straight_driven
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
@@ -118,6 +118,8 @@ def driving_of(
         moved = aligned(records, held, None)
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
+    if doubts or form is not None or any(r.follows is False for r in logged.replays.values()):
+        notes = (*notes, *period_forgotten(whole, asked.controller))
     used = controller if bare_pi(controller) is None else logged.controller
     return Driving(moved, used, logged, findings, notes, doubts, numbers, limited)
 
