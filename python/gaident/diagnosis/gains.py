@@ -25,7 +25,8 @@ from gaident.estimation.prediction import torque_noise_in
 from gaident.models import simulate
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
-from gaident.models.starts import noise_std, starts_moving, stored_torque
+from gaident.models.starts import noise_std, starts_moving
+from gaident.models.stored_torque import stored_torque
 from gaident.policy.table import POLICY
 from gaident.results.fitness import Fitness
 
@@ -246,9 +247,10 @@ def start_state(model: Model, rec: Record, controller: Controller | None, read: 
     At rest the integrator may hold a load's torque, which the logged torque shows. In motion a model with effects is not linear
     in its state: two steps of Gauss and Newton over the record's head, from the first velocity.
     """
-    pi = bare_pi(read or controller)
-    if controller is not None and pi is not None and (held := stored_torque(rec, pi)):
+    loop = read or controller
+    if controller is not None and loop is not None and (held := stored_torque(rec, loop)):
         return np.append(np.zeros(model.linear.order), held)
+    pi = bare_pi(loop)
     if not starts_moving(rec, pi) or (controller is not None and (controller.limited or model.effects)):
         return None
     if not model.effects:

@@ -27,7 +27,8 @@ from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.term import Term
 from gaident.models.drive_torque import late, torque_of
 from gaident.models.simulate_many import LoadedRecord
-from gaident.models.starts import noise_std, starts_moving, stored_torque
+from gaident.models.starts import noise_std, starts_moving
+from gaident.models.stored_torque import stored_torque
 
 __all__ = ["DataSet", "with_angle"]
 
@@ -172,16 +173,20 @@ class DataSet:
 
     @cached_property
     def loopable(self) -> bool:
-        """Whether command and controller can drive a model too, from rest."""
-        if self.loop is None or any(self.moving) or not self.from_rest or (self.slower and not self.loop_follows):
+        """Whether command and controller can drive a model too, from standstill: of a log at the controller's rate, whose torque
+        is as good, only where the integrator was empty."""
+        if self.loop is None or any(self.moving) or (self.slower and not self.loop_follows):
+            return False
+        if self.pi is not None and any(self.stored):
             return False
         loop = self.loop
         return all(loop.command_of(r) is not None for r in self.records)
 
     @cached_property
-    def from_rest(self) -> bool:
-        """Whether the integrator held no torque before any of the records."""
-        return self.pi is None or not any(stored_torque(r, self.pi) for r in self.records)
+    def stored(self) -> tuple[float, ...]:
+        """What the integrator held before each of the records, for a load [N m]."""
+        loop = None if self.controller is None else self.controller.simulated_with(self.dt)
+        return tuple(0.0 if loop is None else stored_torque(r, loop) for r in self.records)
 
     @cached_property
     def loop(self) -> Controller | None:

@@ -17,7 +17,7 @@ from gaident.control.pi_torque import pi_block
 from gaident.control.ticks import at_the_clock, smooth_between
 from gaident.data.record import Record
 from gaident.errors import RecordError
-from gaident.models.starts import starts_moving
+from gaident.models.starts import constant_beside, starts_moving
 from gaident.policy.table import POLICY
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "driven_by",
     "follows_not",
     "late",
+    "made_at_its_clock",
     "made_by",
     "straight_driven",
     "torque_blocks",
@@ -72,7 +73,9 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
         if rec.torque is None or not controller.replayable(rec):
             continue
         known = len(rec) - controller.ahead(rec.dt)
-        off = float(np.sqrt(np.mean((rec.torque - controller.torque_of(rec))[:known] ** 2)))
+        left = (rec.torque - controller.torque_of(rec))[:known]
+        left = left - constant_beside(left, float(np.abs(rec.torque).max()))
+        off = float(np.sqrt(np.mean(left**2)))
         size = float(np.sqrt(np.mean(rec.torque**2)))
         if off > POLICY.negligible * size:
             doubts.append(follows_not(rec.name if len(records) > 1 else "", off, size))
@@ -125,16 +128,24 @@ def _at_its_clock(rec: Record, torque: Vector, controller: Controller) -> Vector
     straight. Where that changes more from line to line than the torque itself, the torque goes straight.
     """
     every = controller.log_every(rec.dt)
-    source = controller.command_of(rec)
-    if source is not None and all(getattr(rec, channel) is not None for channel in controller.reads):
-        placed = controller.driven_by == "position_command"
-        ticks = controller.ticks(rec.dt, source, rec.position if placed else None)
-        made = core.servo_torque(rec.dt, ticks, smooth_between(rec.velocity, every), controller.core_loop(rec.dt))
+    made = made_at_its_clock(rec, controller)
+    if made is not None:
         off = torque - made[::every]
         if np.sum(np.diff(off) ** 2) < np.sum(np.diff(torque) ** 2):
             between: Vector = made + at_the_clock(off, every)
             return between
     return at_the_clock(torque, every)
+
+
+def made_at_its_clock(rec: Record, controller: Controller) -> Vector | None:
+    """The torque that a controller makes from rest at all of its samples [N m] (n every,), of command and of the velocity smooth
+    between the lines; None where the record lacks what it reads."""
+    source = controller.command_of(rec)
+    if source is None or any(getattr(rec, channel) is None for channel in controller.reads):
+        return None
+    ticks = controller.ticks(rec.dt, source, rec.position if controller.driven_by == "position_command" else None)
+    velocity = smooth_between(rec.velocity, controller.log_every(rec.dt))
+    return core.servo_torque(rec.dt, ticks, velocity, controller.core_loop(rec.dt))
 
 
 def late(torque: Vector, delay: float, before: float) -> Vector:
