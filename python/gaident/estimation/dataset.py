@@ -269,6 +269,16 @@ class DataSet:
             return self.known_noise
         return float(np.mean([noise_std(r.velocity, self.resolution) for r in self.records]))
 
+    def noise_of(self, error: Vector) -> float:
+        """The same as the errors of a model show it, records one after the other [rad/s].
+
+        Of a log that is slower than its controller, whose motion itself has third differences; else it is `noise`.
+        """
+        if not self.slower or self.known_noise is not None or not np.all(np.isfinite(error)):
+            return self.noise
+        parts = np.split(error, np.cumsum(self.lengths)[:-1])
+        return min(self.noise, float(np.mean([noise_std(e, self.resolution) for e in parts])))
+
     def replayed(self, effects: Mapping[Term, Vector]) -> tuple[Record, ...]:
         """The records as driven by the torque that the controller makes with effects of its own, each with its parameters."""
         driven = []
