@@ -1,7 +1,7 @@
 """Which form of controller a diagnosis finds, where only a bare PI is given and the drive's loop is another.
 
     python bench/loops/loop_forms.py --out forms.jsonl [--cases 1] [--seed 1] [--loops NAME ...] [--every 1 2 4 8]
-        [--effects NAME ...]
+        [--effects NAME ...] [--bits 17 24]
     python bench/loops/loop_forms.py --out forms.jsonl --report
 
 Drives as in industry (tests/python/support/loop_cases.py): 60 to 500 Hz, inertia ratio 0.3 to 10, a current loop of 0.1 to
@@ -59,14 +59,14 @@ LAGS = {"torque_lag", "velocity_filter", "transport_delay"}
 """What a current loop and a differenced angle are called; they are there in every case."""
 
 
-def run(loop: str, every: int, effect: str, number: int, given: str) -> dict[str, Any]:
-    """One diagnosis, judged."""
+def run(loop: str, every: int, effect: str, number: int, given: str, bits: tuple[int, int] = INDUSTRY_BITS) -> dict[str, Any]:
+    """One diagnosis, judged; bits: an encoder's of the first and up to below the second."""
     line: dict[str, Any] = {"key": f"{loop}/{every}/{effect}/{number}/{given}", "loop": loop, "every": every, "effect": effect}
     rng = np.random.default_rng([number, zlib.crc32(f"{loop} {every} {effect}".encode())])
     try:
         plant = industrial_plant(loop, every, rng)
         factor = float(rng.uniform(*CURRENT_LOOP)) / 1e-3
-        noise = Noise(white=0.0, encoder=2 * np.pi / 2.0 ** int(rng.integers(*INDUSTRY_BITS)), differenced=True)
+        noise = Noise(white=0.0, encoder=2 * np.pi / 2.0 ** int(rng.integers(*bits)), differenced=True)
         hidden = ("torque_lag", effect) if effect else ("torque_lag",)
         record, validation, whole, truth = random_case(number, hidden, loop_kind(loop), noise, factor=factor, plant=plant)
     except RuntimeError as none:
@@ -152,14 +152,16 @@ def main() -> None:
     parser.add_argument("--bare", action="store_true", help="give the PI alone where the log is slower, too")
     parser.add_argument("--unknown", action="store_true", help="give PI(kp=None, ki=None)")
     parser.add_argument("--whole", action="store_true", help="give all of the controller")
+    parser.add_argument("--bits", nargs=2, type=int, default=(17, 24), metavar=("LEAST", "MOST"), help="of the encoder's turn")
     parser.add_argument("--report", action="store_true")
     options = parser.parse_args()
     options.out.parent.mkdir(parents=True, exist_ok=True)
     given = "whole" if options.whole else "unknown" if options.unknown else "bare" if options.bare else "period"
+    bits = options.bits[0], options.bits[1] + 1
     if not options.report:
         there = read(options.out)
         jobs = [
-            (run, loop, every, effect, options.seed * 1000 + k, given)
+            (run, loop, every, effect, options.seed * 1000 + k, given, bits)
             for k in range(options.cases)
             for loop in options.loops
             for every in options.every

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import TURN, period_of
-from gaident.control.cascade import cascade_of
 from gaident.control.controller import Controller, Limiting
+from gaident.control.differencing import differencing
 from gaident.control.filtering import rate_limited
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
@@ -50,8 +50,8 @@ class DataSet:
     of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
     makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear".
     period: with which returns what is tied to the place [rad, m], of which orders count; None: not known.
-    age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample old. What
-    drives a model is late by as much, here and in the loop that is simulated.
+    age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample of the
+    controller old. What drives a model is late by as much, and in the loop that is simulated it is that difference.
     """
 
     records: tuple[Record, ...]
@@ -102,11 +102,8 @@ class DataSet:
         return replace(self, age=lines)
 
     def older(self, loop: Controller | None) -> Controller | None:
-        """A loop in which the velocity has its age: its torque is late by as much."""
-        if loop is None or not self.age:
-            return loop
-        servo = cascade_of(loop)
-        return replace(servo, delay=servo.delay + self.age * self.dt)
+        """A loop in which the velocity has its age: it is the difference of the angle over a sample of the controller."""
+        return loop if loop is None or not self.age else differencing(loop)
 
     def as_old(self, rec: Record) -> Record:
         """A record whose torque is as late as the velocity is old: a linear model that it drives gives the velocity that is seen.
