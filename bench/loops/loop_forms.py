@@ -1,7 +1,7 @@
 """Which form of controller a diagnosis finds, where only a bare PI is given and the drive's loop is another.
 
     python bench/loops/loop_forms.py --out forms.jsonl [--cases 1] [--seed 1] [--loops NAME ...] [--every 1 2 4 8]
-        [--effects NAME ...] [--drives servo] [--no-torque]
+        [--effects NAME ...] [--drives servo] [--no-torque] [--bits 17 24]
     python bench/loops/loop_forms.py --out forms.jsonl --report
 
 Drives as in industry (tests/python/support/loop_cases.py): 60 to 500 Hz, inertia ratio 0.3 to 10, a current loop of 0.1 to
@@ -75,11 +75,13 @@ class Case:
     given: str = "period"
     drives: str = DRIVES[0]
     torque: bool = True
+    bits: tuple[int, int] = INDUSTRY_BITS  # of an industrial drive's encoder, from the first up to below the second
 
     @property
     def key(self) -> str:
         """Its name in the file; what is as always is left out."""
         more = [*([self.drives] if self.drives != DRIVES[0] else []), *([] if self.torque else ["no torque"])]
+        more += [f"{self.bits[0]} to {self.bits[1] - 1} bits"] if self.bits != INDUSTRY_BITS else []
         return "/".join([self.loop, str(self.every), self.effect, str(self.number), self.given, *more])
 
     @property
@@ -97,7 +99,7 @@ class Case:
             return random_case(number, (effect,) if effect else (), loop_kind(loop), noise, self.torque, plant=plant)
         plant = industrial_plant(loop, every, rng)
         factor = float(rng.uniform(*CURRENT_LOOP)) / 1e-3
-        noise = Noise(white=0.0, encoder=2 * np.pi / 2.0 ** int(rng.integers(*INDUSTRY_BITS)), differenced=True)
+        noise = Noise(white=0.0, encoder=2 * np.pi / 2.0 ** int(rng.integers(*self.bits)), differenced=True)
         hidden = ("torque_lag", effect) if effect else ("torque_lag",)
         return random_case(number, hidden, loop_kind(loop), noise, self.torque, factor, plant)
 
@@ -196,14 +198,16 @@ def main() -> None:
     parser.add_argument("--bare", action="store_true", help="give the PI alone where the log is slower, too")
     parser.add_argument("--unknown", action="store_true", help="give PI(kp=None, ki=None)")
     parser.add_argument("--whole", action="store_true", help="give all of the controller")
+    parser.add_argument("--bits", nargs=2, type=int, default=(17, 24), metavar=("LEAST", "MOST"), help="of the encoder's turn")
     parser.add_argument("--report", action="store_true")
     options = parser.parse_args()
     options.out.parent.mkdir(parents=True, exist_ok=True)
     given = "whole" if options.whole else "unknown" if options.unknown else "bare" if options.bare else "period"
+    bits = options.bits[0], options.bits[1] + 1
     if not options.report:
         there = read(options.out)
         cases = [
-            Case(loop, every, effect, options.seed * 1000 + k, given, options.drives, not options.no_torque)
+            Case(loop, every, effect, options.seed * 1000 + k, given, options.drives, not options.no_torque, bits)
             for k in range(options.cases)
             for loop in options.loops
             for every in options.every

@@ -118,7 +118,8 @@ void bind_control(py::module_& m) {
                                       chain_of(torque_filters, "torque_filters"),
                                       position_gain,
                                       position_every,
-                                      delay};
+                                      delay,
+                                      false};
              }),
              py::kw_only(), py::arg("newest"), py::arg("command_weight"), py::arg("anti_windup"), py::arg("tracking_time"),
              py::arg("command_filters"), py::arg("velocity_filters"), py::arg("torque_filters"), py::arg("position_gain"),
@@ -129,11 +130,16 @@ void bind_control(py::module_& m) {
              }),
              py::kw_only(), py::arg("kp"), py::arg("ki"), py::arg("torque_limit") = endless,
              py::arg("integrator_limit") = endless);
-    py::class_<Loop>(m, "Loop").def(
-        py::init([](const std::string& kind, const Controller& controller, const ServoSettings& servo) {
-            return Loop{loop_named(kind), controller, servo};
-        }),
-        py::kw_only(), py::arg("kind"), py::arg("controller") = Controller{}, py::arg("servo") = ServoSettings{});
+    py::class_<Loop>(m, "Loop")
+        .def(py::init([](const std::string& kind, const Controller& controller, const ServoSettings& servo) {
+                 return Loop{loop_named(kind), controller, servo};
+             }),
+             py::kw_only(), py::arg("kind"), py::arg("controller") = Controller{}, py::arg("servo") = ServoSettings{})
+        .def("differenced", [](Loop loop) {
+            if (loop.kind != LoopKind::servo) throw std::invalid_argument("kind: only a servo reads a differenced angle");
+            loop.servo.differenced = true;
+            return loop;
+        });
     m.def("servo_torque", &servo_torque, py::kw_only(), py::arg("clock"), py::arg("loop"), py::arg("source"), py::arg("velocity"),
           py::arg("position"), py::arg("velocity_feedforward"), py::arg("torque_feedforward"));
     m.attr("MOST_STATES") = max_loop_order;

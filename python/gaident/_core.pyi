@@ -142,6 +142,8 @@ class Loop:
     """How the loop is closed, "continuous", "sampled", "servo" or "open", and over which controller; "open" has none."""
 
     def __init__(self, *, kind: str, controller: Controller = ..., servo: ServoSettings = ...) -> None: ...
+    def differenced(self) -> Loop:
+        """The loop of a servo whose velocity is the difference of an encoder's angle over its sample; ValueError of another."""
 
 class Record:
     """Input (velocity command [rad/s], torque [N m] in the open loop) and measured velocity [rad/s] of an identification.

@@ -43,6 +43,7 @@ public:
         const ServoSettings& s = loop.servo;
         const double T = period_, c0 = c.ki * T, integral = c.ki * T * s.newest;
         if (c.limited()) throw std::invalid_argument("controller: one with a limit is no linear equation");
+        if (s.differenced) throw std::invalid_argument("differenced: no one equation of so many poles");
         const double delay = s.delay / T, whole = std::round(delay);
         if (std::abs(delay - whole) > 1e-9) throw std::invalid_argument("delay must be a whole number of periods");
 

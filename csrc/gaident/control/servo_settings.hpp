@@ -19,6 +19,7 @@ struct ServoSettings {
     double position_gain = 0.0;  // [1/s] kv; 0: no position loop
     int position_every = 1;      // velocity controller's samples from one position controller's to the next
     double delay = 0.0;          // [s] from a sample to its torque at the motor
+    bool differenced = false;    // the velocity that it reads is the difference of an encoder's angle over its sample
 };
 
 }  // namespace gaident

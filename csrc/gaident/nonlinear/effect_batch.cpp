@@ -37,6 +37,7 @@ public:
             if (job.loop.kind == LoopKind::servo && job.loop.servo.delay > 0.0) delay_torque(p.model, job.loop.servo.delay);
             if (p.model.effects.bits != 0 || job.own != nullptr || job.loop.kind == LoopKind::servo)
                 p.substeps = job.substeps > 0 ? job.substeps : substeps_for(p.model, job.record, job.loop, job.own != nullptr);
+            if (job.loop.kind == LoopKind::servo && job.loop.servo.differenced) p.substeps += p.substeps % 2;  // Simpson's pairs
         }
         std::iota(order_.begin(), order_.end(), std::size_t{0});
         std::stable_sort(order_.begin(), order_.end(),

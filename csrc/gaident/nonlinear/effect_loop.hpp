@@ -12,8 +12,11 @@
 #include "../control/servo.hpp"
 #include "effect_run.hpp"
 #include "mechanism.hpp"
+#include "sample_mean.hpp"
 
 #include <span>
+#include <type_traits>
+#include <variant>
 
 namespace gaident {
 
@@ -79,7 +82,7 @@ private:
             const double here = position_at(n), next = position_after(n);
             theta_ = run_.position.empty() ? angle_ : R(here);
             time_ = static_cast<double>(n) * run_.sample_time;
-            const R y = sensor();
+            const R y = sensor_over_sample();
             const R u = open ? R(run_.input[n]) : control_at(n, y);
             if constexpr (!is_servo) write(n, y, u);
             else if (n % static_cast<std::size_t>(run_.log_every) == 0) write(n / static_cast<std::size_t>(run_.log_every), y, u);
@@ -92,8 +95,21 @@ private:
                     time_ = (static_cast<double>(n) + (j + 1) * share) * run_.sample_time;
                     filter();
                 }
+                if constexpr (is_servo) {
+                    if (!run_.loop.servo.differenced || j + 1 == run_.substeps) continue;
+                    theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
+                    time_ = (static_cast<double>(n) + (j + 1) * share) * run_.sample_time;
+                    mean_.behind_substep(j, sensed());
+                }
             }
         }
+    }
+
+    // What the controller reads: of a drive that takes the difference of its encoder's angle for the velocity, the mean over the sample.
+    [[gnu::always_inline]] R sensor_over_sample() {
+        if constexpr (is_servo)
+            if (run_.loop.servo.differenced) return reading(mean_.at_sample(sensed(), run_.substeps));
+        return sensor();
     }
 
     [[gnu::always_inline]] void continuous() {
@@ -180,8 +196,10 @@ private:
         });
     }
 
-    [[gnu::always_inline]] R sensor() const {
-        const R y = filtering() ? filter_output() : measured();
+    // What the sensor shows, before it is rounded.
+    [[gnu::always_inline]] R sensed() const { return filtering() ? filter_output() : measured(); }
+    [[gnu::always_inline]] R sensor() const { return reading(sensed()); }
+    [[gnu::always_inline]] R reading(R y) const {
         return Effects::chain(y, [&]<class E>(R x) __attribute__((always_inline)) {
             if constexpr (hook::reading<E>)
                 if (run_.effects.has<E>()) return E::reading(c_.effects.template of<E>(), x);
@@ -317,6 +335,7 @@ private:
     R angle_, theta_ = R(0.0), theta_middle_;
     R held_ = R(0.0);
     R friction_torque_ = R(0.0), per_beta_;
+    [[no_unique_address]] std::conditional_t<is_servo, SampleMean<R>, std::monostate> mean_;
     std::size_t issued_ = 0;
 };
 

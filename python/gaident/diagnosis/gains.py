@@ -129,6 +129,8 @@ def measured_gains(
     spread = np.concatenate([r.velocity[first:] for r, first in scored])
     step = quantisation(tuple(r for r, _ in scored))
     floor = float(np.mean([noise_std(r.velocity, step) for r, _ in scored])) if noise is None else noise
+    if noise is None and objective.data.slower:  # where the motion itself has third differences, the model has them too
+        floor = min(floor, float(np.mean([noise_std(e, step) for e in errors[-1]])))
     rounding = step / float(np.sqrt(12.0))
     floor = max(floor, rounding)
     size = float(np.sqrt(np.mean((spread - spread.mean()) ** 2)))

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import TURN, period_of
-from gaident.control.cascade import cascade_of
 from gaident.control.controller import Controller, Limiting
+from gaident.control.differencing import differencing
 from gaident.control.filtering import rate_limited
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
@@ -52,8 +52,8 @@ class DataSet:
     makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear".
     period: with which returns what is tied to the place [rad, m], of which orders count; None: not known. period_seen: it is the
     one that the records show.
-    age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample old. What
-    drives a model is late by as much, here and in the loop that is simulated.
+    age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample of the
+    controller old. What drives a model is late by as much, and in the loop that is simulated it is that difference.
     """
 
     records: tuple[Record, ...]
@@ -111,11 +111,8 @@ class DataSet:
         return replace(self, age=lines)
 
     def older(self, loop: Controller | None) -> Controller | None:
-        """A loop in which the velocity has its age: its torque is late by as much."""
-        if loop is None or not self.age:
-            return loop
-        servo = cascade_of(loop)
-        return replace(servo, delay=servo.delay + self.age * self.dt)
+        """A loop in which the velocity has its age: it is the difference of the angle over a sample of the controller."""
+        return loop if loop is None or not self.age else differencing(loop)
 
     def as_old(self, rec: Record) -> Record:
         """A record whose torque is as late as the velocity is old: a linear model that it drives gives the velocity that is seen.
@@ -277,6 +274,16 @@ class DataSet:
         if self.known_noise is not None:
             return self.known_noise
         return float(np.mean([noise_std(r.velocity, self.resolution) for r in self.records]))
+
+    def noise_of(self, error: Vector) -> float:
+        """The same as the errors of a model show it, records one after the other [rad/s].
+
+        Of a log that is slower than its controller, whose motion itself has third differences; else it is `noise`.
+        """
+        if not self.slower or self.known_noise is not None or not np.all(np.isfinite(error)):
+            return self.noise
+        parts = np.split(error, np.cumsum(self.lengths)[:-1])
+        return min(self.noise, float(np.mean([noise_std(e, self.resolution) for e in parts])))
 
     def replayed(self, effects: Mapping[Term, Vector]) -> tuple[Record, ...]:
         """The records as driven by the torque that the controller makes with effects of its own, each with its parameters."""

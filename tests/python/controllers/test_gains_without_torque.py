@@ -9,6 +9,7 @@ import pytest
 
 import gaident as ga
 from drive_cases import random_case
+from gaident.diagnosis.controller.controller_place import as_logged
 
 DT = 1e-3
 TRUE = ga.PI(kp=0.05, ki=1.5)
@@ -98,3 +99,18 @@ def test_a_position_loop_without_a_logged_torque_is_diagnosed() -> None:
     rec = ga.Record(1e-3, position_command=command, position=run.position, velocity=run.velocity + noise)
     dia = ga.diagnose(rec, cascade)
     assert any("coulomb_friction" in (f.effect, *f.alternatives) for f in dia.causes), dia.summary()
+
+
+def test_a_record_with_a_torque_shows_the_gains_of_those_without() -> None:
+    logged, unlogged = record(FRICTION, logged=True), record(FRICTION)
+    given = ga.PI(0.9 * TRUE.kp, 1.15 * TRUE.ki)
+    for records in ([logged, unlogged], [unlogged, logged]):
+        shown = as_logged(records, given)
+        assert shown.controller is not None
+        assert (shown.controller.kp, shown.controller.ki) == pytest.approx((TRUE.kp, TRUE.ki), rel=1e-6)
+        assert [f.effect for f in shown.findings] == ["other_gains"] and not shown.replays
+    assert as_logged([logged, unlogged], TRUE).controller == TRUE
+    assert as_logged([unlogged], given).controller == given
+    dia = ga.diagnose([logged, unlogged], given)
+    assert dia.verdict == "explained" and [f.effect for f in dia.causes] == ["other_gains", "coulomb_friction"]
+    assert dia.mechanics["inertia"].value == pytest.approx(J, rel=5e-3)

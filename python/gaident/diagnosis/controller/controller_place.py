@@ -73,12 +73,14 @@ class AsLogged:
 def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
     """The controller with the gains that all logged torques show where they do not follow from the given ones.
 
+    Where only some records have a torque, theirs says what the gains of the others are.
     A rectangular integral is a trapezoidal one with kp + ki dt/2, or kp - ki dt/2 where it lacks the newest error.
     """
-    if controller is None or any(r.torque is None or r.command is None for r in records):
+    logged = [r for r in records if r.torque is not None]
+    if controller is None or not logged or any(r.command is None for r in records):
         return AsLogged(controller)
-    replays = {r.digest: replay(r, controller) for r in records}
-    as_given = AsLogged(controller, (), replays)
+    replays = {r.digest: replay(r, controller) for r in logged}
+    as_given = AsLogged(controller, (), replays if len(logged) == len(records) else {})
     off = [r for r in replays.values() if r.follows is False]
     found = [r.controller for r in off if r.controller is not None and r.cause in ("gains", "scale", "integration_rule")]
     if not found or len(found) < len(replays):
@@ -100,8 +102,8 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
             controller.ki,
         )
     shown = replace(controller, kp=kp, ki=ki)
-    of_each = [replays[r.digest] for r in records]
-    return AsLogged(shown, (off[0].sentence, used), {}, (_gains_finding(records, shown, of_each),))
+    of_each = [replays[r.digest] for r in logged]
+    return AsLogged(shown, (off[0].sentence, used), {}, (_gains_finding(logged, shown, of_each),))
 
 
 def _gains_finding(records: Sequence[Record], shown: PI, off: Sequence[Replay]) -> Finding:

@@ -57,7 +57,7 @@ def what_is_left(space: Moves, final: Fit) -> tuple[bool, Dependence]:
     used = space.objective.weight > 0.0
     error = float(np.sqrt(np.mean(space.objective.error(final)[used] ** 2)))
     mechanism = final.parameters.linear(final.x)
-    noise = float(np.hypot(space.data.noise, torque_noise_in(mechanism, space.data.records)))
+    noise = float(np.hypot(space.noise_beside(final), torque_noise_in(mechanism, space.data.records)))
     beside = beside_torque_noise(space.objective, final)
     if beside.driver is None and error < space.policy.free_run_ratio * noise:
         return True, beside

@@ -102,8 +102,15 @@ class ModelSpace:
         return fit.parameters.kind, frozenset(_representative(t) for t in fit.parameters.terms)
 
     def ratio(self, fit: Fit) -> float:
-        """Rms of the whitened errors over the noise that the measured velocity itself shows."""
-        return float(np.sqrt(fit.cost / self.objective.count)) / max(self.data.noise, 1e-300)
+        """Rms of the whitened errors over the noise of the velocity."""
+        return float(np.sqrt(fit.cost / self.objective.count)) / max(self.noise_beside(fit), 1e-300)
+
+    def noise_beside(self, fit: Fit) -> float:
+        """Standard deviation of white noise on the velocity, as it shows where a fit is known [rad/s].
+
+        In a log slower than its controller the motion itself has third differences; what a fit leaves of it has less of them.
+        """
+        return self.data.noise_of(self.objective.error(fit))
 
     def quiet(self, fit: Fit) -> bool:
         """Whether a fit leaves so little that no effort is spent beyond it."""
@@ -117,7 +124,7 @@ class ModelSpace:
         """Whether the errors before whitening, in the loop where there is one, are little more than the noise."""
         inside = fit.hypothesis.driven_by(self.closed(fit.predictor)) if self.data.loopable else fit.hypothesis
         cost = float(self.objective.costs(inside, fit.x[None, :], WHITE)[0])
-        return bool(np.sqrt(cost / self.objective.count) < self.policy.free_run_ratio * self.data.noise)
+        return bool(np.sqrt(cost / self.objective.count) < self.policy.free_run_ratio * self.noise_beside(fit))
 
     def worth(self, fuller: Fit, simpler: Fit) -> bool:
         """The decision: whether a fuller model is worth its effects against a simpler one."""
@@ -147,7 +154,7 @@ class ModelSpace:
         impacts = any(t.multimodal and t.in_coupling for t in simpler.parameters.terms)
         if self.quiet(fuller) and not impacts:
             return True
-        noise = self.objective.count * self.data.noise**2
+        noise = self.objective.count * self.noise_beside(fuller) ** 2
         share = self.policy.material_beside_impacts if impacts else self.policy.material_share
         if simpler.cost - fuller.cost > share * (simpler.cost - noise):
             return True

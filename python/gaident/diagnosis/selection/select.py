@@ -277,7 +277,7 @@ def specification(space: Moves, task: Task, fit: Fit) -> Specification:
         return Specification(0.0, bound)
     output = task.by_output_errors.objective
     whole = float(np.sum(output.unwhitened_errors(fit) ** 2))
-    if free and whole < output.count * (space.policy.noise_ratio * output.data.noise) ** 2:
+    if free and whole < output.count * (space.policy.noise_ratio * space.noise_beside(fit)) ** 2:
         return Specification(0.0, bound)
     least = output.unwhitened_errors(ls.fit(output, fit.hypothesis, fit.x, WHITE, space.policy.usual))
     information = min(effective_samples(least), output.count)

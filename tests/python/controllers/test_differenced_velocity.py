@@ -1,0 +1,78 @@
+"""A loop whose drive takes the difference of its encoder's angle for the velocity: simulated with the mean over each sample.
+
+The referee is the drive of tests/cpp/drive_rig.cpp, with an encoder that is far finer than any.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from test_servo import CASES, KI, KP, T
+
+import gaident as ga
+from drive_rig import Array, Noise, Plant, rig, skip_without_library
+from gaident.control.differencing import differencing
+
+skip_without_library()
+
+EVERY = 4
+DRIVE = Plant(J=4e-4, D=0.004, JL=3e-4, DL=0.006, KG=1500.0, DG=0.02, kp=KP, ki=KI, dt=EVERY * T)  # resonance at 470 Hz
+LOOPS: dict[str, dict[str, Any]] = {
+    "bare": {},
+    "IP": {"velocity": {"command_weight": 0.0}},
+    "limit": {"velocity": {"torque_limit": 0.6, "anti_windup": "hold"}},
+    "low pass": {"torque_filters": ga.LowPass(time_constant=0.4e-3)},
+    "delay": {"delay": 0.5 * T},
+    "position": {"position": ga.P(30.0), "position_period": 2 * T},
+}
+
+
+def drive(loop: str) -> tuple[Plant, ga.Cascade, ga.Model]:
+    given = dict(LOOPS[loop])
+    cascade = ga.Cascade(ga.PI(KP, KI, **given.pop("velocity", {})), period=T, **given)
+    model = ga.TwoMass(JM=DRIVE.J, DM=DRIVE.D, JL=DRIVE.JL, DL=DRIVE.DL, KG=DRIVE.KG, DG=DRIVE.DG).model()
+    return replace(DRIVE, cascade=cascade), cascade, model
+
+
+def command(placed: bool) -> Array:
+    n = np.arange(600)
+    if placed:
+        return np.asarray(3.0 * (1.0 - np.cos(2 * np.pi * n / 600)))
+    return np.where(n < 50, 0.0, np.where(n < 300, 20.0, -15.0))
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.2e-3])
+@pytest.mark.parametrize("loop", LOOPS)
+def test_the_loop_shows_the_mean_over_each_sample(loop: str, lag: float) -> None:
+    plant, cascade, model = drive(loop)
+    effects = {"torque_lag": {"time_constant": lag}} if lag else {}
+    model = model.with_effect("torque_lag", time_constant=lag) if lag else model
+    log = rig(plant, command(plant.placed), effects, Noise(white=0.0, encoder=1e-13, differenced=True))
+    by_mean = ga.simulate(model, log, differencing(cascade)) - log.velocity
+    by_delay = ga.simulate(model, log, replace(cascade, delay=cascade.delay + 0.5 * T)) - log.velocity
+    size = np.abs(log.velocity).max()
+    assert np.abs(by_mean).max() < 2e-5 * size
+    assert np.abs(by_mean).max() < 0.1 * np.abs(by_delay).max()
+
+
+def test_it_needs_a_servo_and_is_no_one_equation() -> None:
+    from gaident import _core
+
+    with pytest.raises(ValueError, match="only a servo"):
+        _core.Loop(kind="open").differenced()
+    log = ga.Record(4 * T, command=command(False), velocity=np.zeros(600))
+    cascade = ga.Cascade(ga.PI(KP, KI), period=T)
+    assert cascade.line_equation(log, 2)
+    assert not differencing(cascade).line_equation(log, 2)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_it_keeps_all_of_the_controller(name: str) -> None:
+    pi, around, _ = CASES[name]
+    cascade = ga.Cascade(ga.PI(KP, KI, **pi), period=T, **around)
+    assert differencing(cascade).to_dict() == cascade.to_dict()
+    log = ga.Record(T, command=command(False), velocity=np.zeros(600))
+    assert np.array_equal(differencing(cascade).torque_of(log), cascade.torque_of(log))
