@@ -26,33 +26,37 @@
 #include "sensor/velocity_quantisation.hpp"
 #include "sensor/velocity_ripple.hpp"
 
+#include "at_load.hpp"
 #include "registry.hpp"
 
 namespace gaident {
 
-using Effects = EffectList<CoulombFriction,       //
-                           StribeckFriction,      //
-                           AsymmetricFriction,    //
-                           PreslidingFriction,    //
-                           LugreFriction,         //
-                           QuadraticDrag,         //
-                           LoadTorque,            //
-                           Unbalance,             //
-                           Cogging,               //
-                           FrictionDrift,         //
-                           Backlash,              //
-                           HardeningStiffness,    //
-                           TorqueSaturation,      //
-                           TorqueDeadBand,        //
-                           TransportDelay,        //
-                           TorqueLag,             //
-                           IntegratorClamp,       //
-                           CommandRateLimit,      //
-                           VelocityFilter,        //
-                           VelocityRipple,        //
-                           VelocityQuantisation,  //
-                           ExtraResonance,        //
-                           Outliers>;
+using Listed = EffectList<CoulombFriction,       //
+                          StribeckFriction,      //
+                          AsymmetricFriction,    //
+                          PreslidingFriction,    //
+                          LugreFriction,         //
+                          QuadraticDrag,         //
+                          LoadTorque,            //
+                          Unbalance,             //
+                          Cogging,               //
+                          FrictionDrift,         //
+                          Backlash,              //
+                          HardeningStiffness,    //
+                          TorqueSaturation,      //
+                          TorqueDeadBand,        //
+                          TransportDelay,        //
+                          TorqueLag,             //
+                          IntegratorClamp,       //
+                          CommandRateLimit,      //
+                          VelocityFilter,        //
+                          VelocityRipple,        //
+                          VelocityQuantisation,  //
+                          ExtraResonance,        //
+                          Outliers>;
+
+// Behind them those of the shaft once more, at the load.
+using Effects = WithLoadSide<Listed>;
 
 inline constexpr auto& effect_table = Effects::table;
 inline constexpr int effect_count = Effects::size;
@@ -69,12 +73,12 @@ inline Effect effect_named(std::string_view name) {
 }
 constexpr const EffectInfo& info_of(Effect e) { return effect_table[static_cast<std::size_t>(e)]; }
 
-// A set of effects; in a model each appears at most once.
+// A set of effects; in a model each appears at most once at a side.
 struct EffectSet {
-    std::uint32_t bits = 0;
-    static_assert(effect_count <= 32);
+    std::uint64_t bits = 0;
+    static_assert(effect_count <= 64);
 
-    static constexpr std::uint32_t bit(Effect e) { return std::uint32_t{1} << static_cast<unsigned>(e); }
+    static constexpr std::uint64_t bit(Effect e) { return std::uint64_t{1} << static_cast<unsigned>(e); }
     constexpr bool has(Effect e) const { return (bits & bit(e)) != 0; }
     template <class E>
     constexpr bool has() const {
@@ -101,6 +105,15 @@ constexpr EffectSet effects_with(Hooks hooks) {
     EffectSet set;
     Effects::each([&]<class E>() {
         if ((E::hooks & hooks) != Hooks::none) set.add(effect<E>);
+    });
+    return set;
+}
+// Those at the load of which the effect itself has one of these functions.
+constexpr EffectSet load_effects_with(Hooks hooks) {
+    EffectSet set;
+    Effects::each([&]<class E>() {
+        if constexpr (hook::load<E>)
+            if ((E::AtMotor::hooks & hooks) != Hooks::none) set.add(effect<E>);
     });
     return set;
 }

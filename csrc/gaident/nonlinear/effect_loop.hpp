@@ -11,6 +11,7 @@
 
 #include "../control/servo.hpp"
 #include "effect_run.hpp"
+#include "load_side.hpp"
 #include "mechanism.hpp"
 
 #include <span>
@@ -28,7 +29,8 @@ public:
           c_(constants),
           plant_(constants, run.order),
           pi_(controller_of(run)),
-          own_(run, plant_.velocity()) {
+          own_(run, plant_.velocity()),
+          load_(run, plant_.twist()) {
         const bool continuous = run.loop.kind == LoopKind::continuous;
         h_ = run.sample_time / run.substeps;
         if constexpr (!is_servo)
@@ -44,6 +46,7 @@ public:
             if constexpr (hook::law<E>) E::law(c, law_);
             if constexpr (hook::begin<E>) E::begin(c, states_.template of<E>(), start);
         });
+        if constexpr (Plant::loaded) begin_at_load();
         if constexpr (!is_servo) pi_.s = c_.stored;
         else if (run.moving) pi_.rest(start.command, start.velocity, c_.stored);
         angle_ = R(run.start_angle);
@@ -133,6 +136,23 @@ private:
         const std::size_t last = run_.position.size() - 1;
         if (n < last) return run_.position[n + 1];
         return last == 0 ? run_.position[0] : 2.0 * run_.position[last] - run_.position[last - 1];
+    }
+
+    void begin_at_load() {
+        plant_.correcting = run_.effects.meets(effects_with(Hooks::coupling));
+        const Beginning<R> start{plant_.load_velocity(), c_.before, first_command()};
+        each_at<Side::load>([&]<class Key, class E>() {
+            if (!run_.effects.has<Key>()) return;
+            const auto& c = c_.effects.template of<Key>();
+            if constexpr (hook::law<E>) E::law(c, load_.law);
+            if constexpr (hook::begin<E>) E::begin(c, states_.template of<Key>(), start);
+        });
+        turning_ = turning_ || load_.turning;
+        // As for friction at the motor; where the step is too coarse for the resonance both ends cannot be solved.
+        if (load_.dry) {
+            const R alone = plant_.load_beta() - (plant_.back() / plant_.beta()) * plant_.across();
+            plant_.x[0] = greater(minimum(plant_.load_beta(), alone), R(0.0), plant_.x[0], R(any_value));
+        }
     }
 
     // theta in the middle of the substep
@@ -249,38 +269,91 @@ private:
         const R w = plant_.velocity();
         if (own_.shaft()) [[unlikely]]
             T = own_.with_torque(w, theta_, T, t);
-        const R w_free = plant_.free_velocity(T, friction_torque_);
-        R w_next = w_free;
-        if (dry_) {
-            w_next = under_friction(w, w_free, t);
-            friction_torque_ = (w_free - w_next) * per_beta_;
-            T = T - friction_torque_;
+        R w_next;
+        if constexpr (Plant::loaded) {
+            w_next = move_both(T, w, t);
+        } else {
+            const R w_free = plant_.free_velocity(T, friction_torque_);
+            w_next = w_free;
+            if (dry_) {
+                w_next = under_friction<Side::motor>(states_, law_, {w, w_free, plant_.beta()}, t);
+                friction_torque_ = (w_free - w_next) * per_beta_;
+                T = T - friction_torque_;
+            }
+            plant_.move(T, w_next);
         }
-        plant_.move(T, w_next);
         angle_ = angle_ + (w + w_next) * R(0.5 * h_);
     }
 
-    [[gnu::always_inline]] R under_friction(R w, R w_free, double t) {
-        FrictionStep<R> step{R(h_), w, w_free, plant_.beta(), law_};
+    // The same where effects act at the load, too, under the torque T at the motor: the motor's velocity at the end.
+    [[gnu::always_inline]] R move_both(R T, R w, double t) {
+        const R w_load = plant_.load_velocity();
+        R T_load = R(0.0);
+        if (load_.turning || run_.effects.meets(load_effects_with(Hooks::torque))) {
+            const R middle = (run_.position.empty() ? angle_ + w * R(0.5 * h_) : theta_) -
+                             (plant_.twist() - load_.twist_at_start) - (w - w_load) * R(0.5 * h_);
+            each_at<Side::load>([&]<class Key, class E>() __attribute__((always_inline)) {
+                if constexpr (hook::torque<E>)
+                    if (run_.effects.has<Key>()) T_load = T_load - E::torque(c_.effects.template of<Key>(), middle);
+            });
+        }
+        plant_.free_velocities(T, T_load, friction_torque_, load_.friction);
+        const FreeEnd<R> motor{w, plant_.free[0], plant_.beta()}, load{w_load, plant_.free[1], plant_.load_beta()};
+        R w_next = motor.w_free, w_next_load = load.w_free;
+        if (dry_ && load_.dry) {
+            typename Effects::States<R> trial = states_;
+            under_friction_at_both(
+                motor, load, plant_.across(), plant_.back(), w_next, w_next_load, friction_torque_, load_.friction,
+                [&](int round, R w_free, R beta) __attribute__((always_inline)) {
+                    return apart<Side::motor>(round == 0 ? trial : states_, law_, {w, w_free, beta}, t);
+                },
+                [&](int round, R w_free, R beta) __attribute__((always_inline)) {
+                    return apart<Side::load>(round == 0 ? trial : states_, load_.law, {w_load, w_free, beta}, t);
+                });
+        } else if (load_.dry) {
+            w_next_load = apart<Side::load>(states_, load_.law, load, t);
+            load_.friction = (load.w_free - w_next_load) / load.beta;
+            w_next = w_next - plant_.across() * load_.friction;
+        } else if (dry_) {
+            w_next = apart<Side::motor>(states_, law_, motor, t);
+            friction_torque_ = (motor.w_free - w_next) * per_beta_;
+            w_next_load = w_next_load - plant_.back() * friction_torque_;
+        }
+        plant_.move(friction_torque_, load_.friction, w_next, w_next_load);
+        return w_next;
+    }
+
+    // With friction at both ends it is asked four times a substep: a call, so that it is compiled once.
+    template <Side side>
+    [[gnu::noinline]] R apart(typename Effects::States<R>& states, const FrictionLaw<R>& law, const FreeEnd<R>& end, double t) {
+        return under_friction<side>(states, law, end, t);
+    }
+    // The velocity at the substep's end at one end of the shaft, and the state of its friction there.
+    template <Side side>
+    [[gnu::always_inline]] R under_friction(typename Effects::States<R>& states, const FrictionLaw<R>& law, const FreeEnd<R>& end,
+                                            double t) {
+        const R w = end.w;
+        FrictionStep<R> step{R(h_), w, end.w_free, end.beta, law};
         const auto add = [&](R level) __attribute__((always_inline)) {
             step.law.level_positive = step.law.level_positive + level;
             step.law.level_negative = step.law.level_negative + level;
         };
-        if (own_.friction()) add(own_.level());
-        Effects::each([&]<class E>() __attribute__((always_inline)) {
+        if constexpr (side == Side::motor)
+            if (own_.friction()) add(own_.level());
+        each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
             if constexpr (hook::level<E>)
-                if (run_.effects.has<E>()) add(E::level(c_.effects.template of<E>(), R(t > 0.0 ? t : 0.0)));
+                if (run_.effects.has<Key>()) add(E::level(c_.effects.template of<Key>(), R(t > 0.0 ? t : 0.0)));
         });
-        Effects::each([&]<class E>() __attribute__((always_inline)) {
+        each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
             if constexpr (hook::friction<E>)
-                if (run_.effects.has<E>()) [[unlikely]]  // keeps what it needs out of the registers of the others
-                    E::friction(c_.effects.template of<E>(), states_.template of<E>(), step);
+                if (run_.effects.has<Key>()) [[unlikely]]  // keeps what it needs out of the registers of the others
+                    E::friction(c_.effects.template of<Key>(), states.template of<Key>(), step);
         });
         const R w_next = velocity_under_friction(step.law, w, step.w_free, step.beta);
-        Effects::each([&]<class E>() __attribute__((always_inline)) {
+        each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
             if constexpr (hook::after_friction<E>)
-                if (run_.effects.has<E>()) [[unlikely]]
-                    E::after_friction(c_.effects.template of<E>(), states_.template of<E>(), step, w_next);
+                if (run_.effects.has<Key>()) [[unlikely]]
+                    E::after_friction(c_.effects.template of<Key>(), states.template of<Key>(), step, w_next);
         });
         return w_next;
     }
@@ -296,47 +369,11 @@ private:
     OwnInLoop<R> own_;
     typename Effects::States<R> states_{};  // all zero
     FrictionLaw<R> law_;
+    [[no_unique_address]] std::conditional_t<Plant::loaded, LoadSide<R>, NoLoadSide> load_;
     R angle_, theta_ = R(0.0), theta_middle_;
     R held_ = R(0.0);
     R friction_torque_ = R(0.0), per_beta_;
     std::size_t issued_ = 0;
 };
-
-template <class Loop>
-[[gnu::noinline]] void run_in_memory(Loop& loop) {
-    loop();
-}
-
-// Where a number takes one register, the compiler keeps the loop's state in registers.
-// Where it takes several, moving the state took up to 25 % more instructions: behind a call it stays in memory.
-template <class R, class Plant>
-[[gnu::always_inline]] inline void run_effects_on(const EffectRun& run, const EffectConstants<R>& c) {
-    EffectLoop<R, Plant, ControllerState<R>> loop(run, c);
-    if constexpr (Pack<R>::registers == 1) loop();
-    else run_in_memory(loop);
-}
-
-template <class R, class Plant>
-[[gnu::noinline]] void run_servo_on(const EffectRun& run, const EffectConstants<R>& c) {
-    EffectLoop<R, Plant, Servo<R>> loop(run, c);
-    run_in_memory(loop);
-}
-
-// Runs the lanes whose constants are given, with the plant's order known to the compiler where it is a usual one.
-template <class R>
-void run_effects(const EffectRun& run, const EffectConstants<R>& c) {
-    if (run.loop.kind == LoopKind::servo) {
-        if (run.two_masses) return run_servo_on<R, TwoMassPlant<R>>(run, c);
-        return run_servo_on<R, ObserverPlant<R, -1>>(run, c);
-    }
-    if (run.two_masses) return run_effects_on<R, TwoMassPlant<R>>(run, c);
-    switch (run.order) {
-        case 1: return run_effects_on<R, ObserverPlant<R, 1>>(run, c);
-        case 2: return run_effects_on<R, ObserverPlant<R, 2>>(run, c);
-        case 3: return run_effects_on<R, ObserverPlant<R, 3>>(run, c);
-        case 5: return run_effects_on<R, ObserverPlant<R, 5>>(run, c);
-        default: return run_effects_on<R, ObserverPlant<R, -1>>(run, c);
-    }
-}
 
 }  // namespace gaident

@@ -146,7 +146,9 @@ void delay_torque(EffectModel& model, double delay) {
 int substeps_for(const EffectModel& model, const EffectRecord& record, const Loop& loop, bool own) {
     const Factors<double>& g = model.linear;
     const double Ts = record.sample_time;
-    const Circumstances at{g, loop, Ts, record.top_speed};
+    TwoMasses m{};
+    const bool loaded = model.effects.meets(effects_with(Hooks::load)) && two_masses_of(g, m);
+    const Circumstances at{g, loop, Ts, record.top_speed, g.structure.p == 1 ? g.gain : 0.0, loaded ? 1.0 / m.JL : 0.0};
     double wanted = 1.0;
     Pace pace = own ? Pace::fine : Pace::sample;
     Effects::each([&]<class E>() {
@@ -163,9 +165,9 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
     }
     if (loop.kind == LoopKind::continuous && g.structure.p == 1)
         wanted = std::max({wanted, 8.0, std::abs(g.gain * loop.controller.kp) * Ts / 0.06});
-    int m = 1;
-    while (m < wanted && m < 16) m *= 2;
-    return m;
+    int steps = 1;
+    while (steps < wanted && steps < 16) steps *= 2;
+    return steps;
 }
 
 void prepare_effects(const EffectModel& model, const EffectRecord& record, const Loop& loop, int substeps, const double* start,

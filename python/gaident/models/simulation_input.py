@@ -11,8 +11,9 @@ from gaident.control import core
 from gaident.control.controller import Controller, checked_controller
 from gaident.data.record import Record
 from gaident.errors import ModelError, RecordError
+from gaident.models.discrete import require_strictly_proper
 from gaident.models.mechanics import OneMass, TwoMass
-from gaident.models.model import Model, require_strictly_proper
+from gaident.models.model import Model
 
 Signal = NDArray[np.float64]
 AnyModel = Model | OneMass | TwoMass

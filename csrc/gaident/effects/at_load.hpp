@@ -1,0 +1,73 @@
+// A shaft effect at the load of two masses: the same coefficients, state and functions, asked with the load's velocity and angle.
+// It is an effect of its own in the list, so that a model may have one of a kind at either end, or at both; in the registry its
+// name is that of the effect with "@load" behind it.
+#pragma once
+
+#include "registry.hpp"
+
+namespace gaident {
+
+template <class E>
+struct AtLoad {
+    using AtMotor = E;
+    static_assert(E::info.place == Place::shaft, "only a shaft effect has a side");
+
+private:
+    static constexpr std::string_view suffix = "@load";
+    static constexpr std::size_t length = std::string_view(E::info.name).size();
+    static constexpr std::array<char, length + suffix.size() + 1> name = [] {
+        std::array<char, length + suffix.size() + 1> both{};
+        for (std::size_t i = 0; i < length; ++i) both[i] = E::info.name[i];
+        for (std::size_t i = 0; i < suffix.size(); ++i) both[length + i] = suffix[i];
+        return both;
+    }();
+
+public:
+    static constexpr EffectInfo info = [] {
+        EffectInfo there = E::info;
+        there.name = name.data();
+        there.needs_two_masses = true;
+        there.at_load = true;
+        return there;
+    }();
+    static constexpr Hooks hooks = Hooks::load | (E::hooks & Hooks::substeps);
+
+    template <class R>
+    using Coefficients = typename E::template Coefficients<R>;
+    template <class R>
+    using State = typename detail::StateAt<AtLoad, E, R>::Type;
+    static constexpr Pace pace = E::pace;
+    static void prepare(const double* p, const Timing& time, Coefficients<double>& c) { E::prepare(p, time, c); }
+    static double substeps(const double* p, const Circumstances& at)
+        requires(hook::substeps<E>)
+    {
+        Circumstances there = at;
+        there.inverse_inertia = at.inverse_load;
+        return E::substeps(p, there);
+    }
+};
+
+namespace detail {
+
+// The list with its shaft effects, which are among E..., once more behind it.
+template <class List, class... E>
+struct LoadSide {
+    using Type = List;
+};
+template <class... Listed, class E, class... Rest>
+struct LoadSide<EffectList<Listed...>, E, Rest...> : LoadSide<EffectList<Listed...>, Rest...> {};
+template <class... Listed, class E, class... Rest>
+    requires(E::info.place == Place::shaft)
+struct LoadSide<EffectList<Listed...>, E, Rest...> : LoadSide<EffectList<Listed..., AtLoad<E>>, Rest...> {};
+
+template <class List>
+struct BothSides;
+template <class... E>
+struct BothSides<EffectList<E...>> : LoadSide<EffectList<E...>, E...> {};
+
+}  // namespace detail
+
+template <class List>
+using WithLoadSide = typename detail::BothSides<List>::Type;
+
+}  // namespace gaident
