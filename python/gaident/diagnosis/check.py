@@ -171,7 +171,8 @@ def _of_diagnosis(mechanics: Mapping[str, Estimate], effects: Effects) -> dict[s
     for effect, parameters in effects.items():
         term = LIBRARY[effect]
         if term.levels and not term.time_varying:
-            found["dry friction"] = _level(parameters)
+            here, elsewhere = _level(parameters), found["dry friction"]  # of both ends of the shaft the sum shows
+            found["dry friction"] = replace(here, value=here.value + elsewhere.value, std=math.hypot(here.std, elsewhere.std))
         elif term.levels:
             del found["dry friction"]
         elif _is_gravity(term):

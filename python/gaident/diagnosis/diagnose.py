@@ -26,6 +26,7 @@ from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.wording import basis_of, closest, drives_itself, evidence_of, far_off, hidden_by_torque_noise
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
 from gaident.diagnosis.library.record import findings_of_the_record
+from gaident.diagnosis.library.sides import name_of, sides_of
 from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, in_controller
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
 from gaident.diagnosis.note import Note
@@ -34,6 +35,7 @@ from gaident.diagnosis.records.folded import ADVICE, folded
 from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation, unexplained
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection.attribution import only_describes, shown_by_the_records, simplified, what_is_left
+from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.offset import Offset, offset_of
 from gaident.diagnosis.selection.rivals import Replacement
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
@@ -280,12 +282,10 @@ class _Work:
         for effect in causes:
             gain, rivals = self.rivals[effect]
             alternatives = self._alternatives(effect, rivals, offset)
-            said_by = evidence_of(effect, gain, alternatives, offset)
-            findings.append(
-                Finding(
-                    effect, estimates[effect], alternatives, gains.of(effect), gain, None, said_by, place=LIBRARY[effect].place
-                )
-            )
+            sides = sides_of(effect, [r.effect for r in rivals], masses := self.final.parameters.masses)
+            said_by = evidence_of(effect, gain, alternatives, offset, sides if masses > 1 else ())
+            what = name_of(effect), estimates[effect], alternatives, gains.of(effect), gain, None, said_by, False
+            findings.append(Finding(*what, LIBRARY[effect].place, sides))
         if driver is None and (damping := negative_damping(mechanics)) is not None:
             driver = "velocity"
             self.notes.append(drives_itself(damping))
@@ -368,16 +368,15 @@ class _Work:
                 return gains
             effect = gains.harmful[-1]
             text = "{} would come closer to these records, but makes the held-out data worse: it is not accepted."
-            self.notes.append(say(text, effect.replace("_", " ").capitalize()))
-            shorter = self.found.space.without(self.final, effect)
-            self.take(compared(self.found, shorter, self._equivalent_here, self._say))
+            self.notes.append(say(text, words([effect]).capitalize()))
+            self.take(compared(self.found, self.found.space.without(self.final, effect), self._equivalent_here, self._say))
 
     def _alternatives(self, effect: str, rivals: Sequence[Replacement], offset: Offset | None) -> tuple[str, ...]:
         """Rivals, equivalent effects and, where the loop is not the drive's, the controller; no untestable ones."""
         shown = shown_by_the_records(self.found.space, self.final, effect)
         here = sorted(self._equivalent_here(effect))
         names = alternatives_of(effect, rivals, here, bool(shown), offset, not (self.data.slower and self.driving.in_doubt))
-        return tuple(name for name in names if name not in self.not_testable)
+        return tuple(n for n in dict.fromkeys(map(name_of, names)) if n != name_of(effect) and n not in self.not_testable)
 
     def _only_describes(self, effect: str, driver: str | None) -> bool:
         of_class = bool(self._equivalent_here(effect))
@@ -389,6 +388,7 @@ class _Work:
         # Speeds held in either direction, in whichever record, split what a reversal splits.
         turns = max(e.reversals, int(min(e.speeds, default=0.0) < 0.0 < max(e.speeds, default=0.0)))
         classes = conditional_classes(turns, len(e.steps), self.data.torque_logged)
+        effect = name_of(effect)
         return set().union(*(c for c in classes if effect in c)) - {effect} - set(self.not_testable)
 
     def _determined(self, effect: str, parameters: Mapping[str, Estimate]) -> bool:
@@ -396,5 +396,5 @@ class _Work:
         if any(e.identifiable and not e.at_bound for e in parameters.values()):
             return True
         text = "{} comes closer to these records, but they do not determine one of its parameters: it is not named."
-        self.notes.append(say(text, effect.replace("_", " ").capitalize()))
+        self.notes.append(say(text, words([effect]).capitalize()))
         return False

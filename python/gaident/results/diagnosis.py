@@ -343,6 +343,7 @@ class Diagnosis(SavedResult):
                             **f,
                             "parameters": {n: Estimate(**e) for n, e in f["parameters"].items()},
                             "alternatives": tuple(f["alternatives"]),
+                            "sides": tuple(f.get("sides", ())),
                             "evidence": restored(f["evidence"], linear),
                             "place": f.get("place") or _place_of(f["effect"]),
                         }

@@ -35,6 +35,9 @@ class Finding:
     place : {"controller", "actuator", "shaft", "coupling", "plant", "sensor", "record"}
         Where it is: the effect's place in `gaident.effects.table()`.
         It is "controller" for all that the logged torque shows to differ from the given controller.
+    sides : tuple of {"motor", "load"}
+        Where on the shaft the data allow it, one or both; () where an effect has no side.
+        In a model of one mass both ends are the same place.
 
     Examples
     --------
@@ -54,6 +57,7 @@ class Finding:
     evidence: str = ""
     is_noise: bool = False
     place: str = ""
+    sides: tuple[str, ...] = ()
 
     @property
     def named(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gaident.diagnosis.library.equivalences import equivalents
+from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.rivals import Replacement
@@ -28,7 +29,7 @@ def alternatives_of(
     names = [r.effect for r in rivals if not shown or LIBRARY[r.effect].levels]
     names += here
     if offset is None or effect != offset.effect:
-        names += equivalents(effect)
+        names += equivalents(name_of(effect))
     if not follows and not shown:
         names += OF_THE_CONTROLLER
     return list(dict.fromkeys(names))

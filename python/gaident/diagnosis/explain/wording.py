@@ -5,19 +5,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gaident.axis import Text, called, say
+from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
-from gaident.models.effects import table
+from gaident.models.effects import row_of
 from gaident.results.estimate import Estimate
 
 __all__ = ["basis_of", "closest", "drives_itself", "evidence_of", "far_off", "hidden_by_torque_noise"]
 
 
-def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None) -> Text:
-    """What speaks for a finding: what it does, how sure that is, what these data cannot tell from it."""
+def evidence_of(
+    effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None, sides: Sequence[str] = ()
+) -> Text:
+    """What speaks for a finding: what it does, how sure that is, what these data cannot tell from it.
+
+    sides: where on an elastic shaft it may be; the motor goes without saying.
+    """
     from gaident.show.wording import certainty
 
-    what = next(row.says for row in table() if row.name == effect).begun()
+    what = row_of(effect).says.begun()
+    if len(sides) > 1:
+        what = say("{} (at the {}: these data do not say at which end of the shaft)", what, " or the ".join(sides))
+    elif row_of(effect).at_load:
+        what = say("{}, at the load", what)
     sure, worse = certainty(gain), f"(the model without it is {gain:.0f} BIC units worse)"
     if alternatives:
         others = " or ".join(a.replace("_", " ") for a in alternatives)
@@ -57,7 +67,7 @@ def closest(effects: Sequence[str], driver: str | None, named: bool) -> Text:
         text = "With {} the model would come closer still, but an error{} stays: this fits no effect of the library."
     else:
         text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
-    return say(text, " and ".join(e.replace("_", " ") for e in effects), on)
+    return say(text, " and ".join(words([e]) for e in effects), on)
 
 
 def far_off(ratio: float) -> Text:

@@ -6,6 +6,7 @@ A model is a mechanism (one mass or two) with effects. The moves are
     drop        an effect                                                                      (backward elimination)
     simplify    a generalisation to what it contains
     exchange    an effect for one of its equivalence class, where only others tell them apart
+    other side  a shaft effect of two masses at the other end of the shaft
     resettle    the mechanism's resonance at the place of an extra one
     hold        one mass by a spring to the ground
     demote      two masses to one, or the spring away
@@ -65,7 +66,7 @@ class Moves(ModelSpace):
             for t in self.allowed
             if t.name not in blocked
             and t.family not in families
-            and (fit.parameters.masses == 2 or not t.in_coupling)
+            and (fit.parameters.masses == 2 or not t.needs_two_masses)
             and (self.whitens or not t.in_controller or fit.predictor.closed)
         ]
 
@@ -89,10 +90,10 @@ class Moves(ModelSpace):
         addable = self.candidates(now)
         test.add(now.hypothesis, now.x, [t for t in addable if not t.nested])
         fits: list[Fit] = []
-        simple = next((t for t in now.parameters.terms if t.family), None)
-        if simple is not None:
+        families = [t for t in now.parameters.terms if t.family]
+        for simple in families:
             self._generalisations(test, now, now, simple)
-        else:
+        if all(t.at_load for t in families):
             for first in [t for t in addable if t.family and not t.nested]:
                 # The simplest of a family first: its generalisations are tried at its level.
                 start = next((s for s in test.ranked(WHITE) if s.term is first), None)
@@ -121,6 +122,7 @@ class Moves(ModelSpace):
         fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
         if fits:
             fits += self.resettled(min(fits, key=self.score))
+            fits += self.at_the_load(now, fits)
         return self._best(now, fits)
 
     def _best(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
@@ -143,7 +145,8 @@ class Moves(ModelSpace):
         """
         parameters = source.parameters.without(simple.name)
         x = source.parameters.removed(source.x, simple.name)
-        wanted = [t for t in self.allowed if t.family == simple.family and simple.name in t.nested]
+        rows = [LIBRARY[t.other_side] for t in self.allowed if t.other_side] if simple.at_load else self.allowed
+        wanted = [t for t in rows if t.family == simple.family and simple.name in t.nested]
         level = abs(float(source.x[source.parameters.slot(simple.name)][0]))
         torque = parameters.scales.torque
         for friction in {max(level, LEAST * torque), max(level, MISSED * torque)}:
@@ -209,6 +212,55 @@ class Moves(ModelSpace):
         best = sorted(short, key=lambda f: f.bic)[: self.policy.starts]
         return tries + [self.refitted(f.hypothesis, f.x, self.policy.long) for f in best]
 
+    # Moves to the other side.
+
+    def may(self, term: Term) -> bool:
+        """Whether a model may have it: at the load what it may have at the motor."""
+        return term in self.allowed or (term.at_load and LIBRARY[term.other_side] in self.allowed)
+
+    def other_side(self, fit: Fit) -> list[Fit]:
+        """Each shaft effect of two masses at the other end of the shaft; not where little is left for that to explain."""
+        if fit.parameters.masses == 1 or self.quiet(fit):
+            return []
+        found = (self.at_other_side(fit, t) for t in fit.parameters.terms)
+        return [f for f in found if f is not None]
+
+    def at_other_side(self, fit: Fit, term: Term) -> Fit | None:
+        """The model refitted with an effect at the other end of the shaft, from its values; None where it cannot be there."""
+        short, x = fit.hypothesis.without(term.name), fit.parameters.removed(fit.x, term.name)
+        other = self._beside(short, term)
+        if other is None:
+            return None
+        return self.refitted(short.extended(other), short.parameters.inserted(x, fit.x[fit.parameters.slot(term.name)]))
+
+    def at_the_load(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
+        """The most promising of some grown models with what they have more at the other end; and dry friction at both ends.
+
+        now: what they are grown from. None where the best of them leaves little.
+        """
+        best = sorted((f for f in fits if f.cost < WORST), key=self.score)
+        if now.parameters.masses == 1 or not best or self.quiet(best[0]):
+            return []
+        last = [f for f in best if f.parameters.masses == 2 and f.parameters.terms[-1].other_side]
+        found = [self.at_other_side(f, f.parameters.terms[-1]) for f in last[: self.policy.starts]]
+        rests = [t for t in now.parameters.terms if t.levels]
+        simplest = next((t for t in self.allowed if t.simplest and t.levels), None)
+        if len(rests) == 1 and not rests[0].at_load and simplest and (other := self._beside(now.hypothesis, simplest)):
+            longer = now.hypothesis.extended(other)
+            X = np.array([now.parameters.inserted(now.x, np.array(z)) for z in other.starts(now.parameters.scales)])
+            start = X[int(np.argmin(self.objective.costs(longer, X, WHITE)))]
+            found.append(self.refitted(longer, start))
+        return [f for f in found if f is not None]
+
+    def _beside(self, hypothesis: Hypothesis, term: Term) -> Term | None:
+        """The same effect at the other end of the shaft, where the rest of a model leaves room for it."""
+        key, there = term.other_side, hypothesis.parameters.terms
+        if not key or hypothesis.parameters.masses == 1 or any(t.name == key or t.resonates for t in there):
+            return None
+        other = LIBRARY[key]
+        taken = other.family and any(t.family == other.family for t in there)
+        return None if taken or not self.may(other) else other
+
     # Moves that reduce.
 
     def drop(self, fit: Fit) -> list[Fit]:
@@ -225,10 +277,7 @@ class Moves(ModelSpace):
     def simplify(self, fit: Fit) -> list[Fit]:
         """Each generalisation as what it contains, at its level."""
         return [
-            self.as_nested(fit, t, LIBRARY[name])
-            for t in fit.parameters.terms
-            for name in t.nested
-            if LIBRARY[name] in self.allowed
+            self.as_nested(fit, t, LIBRARY[name]) for t in fit.parameters.terms for name in t.nested if self.may(LIBRARY[name])
         ]
 
     def as_nested(self, fit: Fit, term: Term, simple: Term) -> Fit:
@@ -243,7 +292,7 @@ class Moves(ModelSpace):
         if fit.parameters.held:
             hypothesis, x = released(fit)
             return [self.continued(hypothesis, fit, x, self.policy.long)]
-        if fit.parameters.masses == 1 or not fit.effects or any(t.in_coupling or t.resonates for t in fit.parameters.terms):
+        if fit.parameters.masses == 1 or not fit.effects or any(t.needs_two_masses or t.resonates for t in fit.parameters.terms):
             return []
         hypothesis, x = as_one_mass(fit)
         return [self.continued(hypothesis, fit, x, self.policy.long)]
