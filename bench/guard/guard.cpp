@@ -124,6 +124,7 @@ constexpr Sizes sizes[] = {
     {"unbalance", {0.05, 0.3}},
     {"cogging", {0.03, 12.0, 0.4}},
     {"friction_drift", {0.05, -0.2}},
+    {"load_dependent_friction", {0.04, 0.2}},
     {"backlash", {0.01}},
     {"hardening_stiffness", {1e4}},
     {"torque_saturation", {0.5}},

@@ -7,8 +7,8 @@ J dw/dt + D w - u of a single mass, an actuator's torque J dw/dt + D w, a sensor
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +54,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Picture:
-    """What is drawn of one effect. axes: labels of the right panel; curve: its lines as (x, y)."""
+    """What is drawn of one effect. axes: labels of the right panel; curve: its lines as (x, y); beside: effects in both runs."""
 
     values: dict[str, float]
     axes: tuple[str, str]
@@ -62,6 +62,7 @@ class Picture:
     command: Vector
     dots: bool = True
     masses: int = 1
+    beside: Mapping[str, dict[str, float]] = field(default_factory=dict)
 
 
 def levels(*speeds: float, dwell: float = 0.1) -> Vector:
@@ -137,6 +138,10 @@ PICTURES: dict[str, Picture] = {
     "friction_drift": Picture(
         {"torque": 0.08, "rate": -1.2}, ("time [s]", AGAINST_VELOCITY[1]), shaft_of_time, swing(15.0, 0.1, 6.0), dots=False
     ),
+    "load_dependent_friction": Picture(
+        {"torque": 0.02, "share": 0.3}, AGAINST_ANGLE, shaft_of_angle, swing(18.0, 0.8),
+        beside={"unbalance": {"amplitude": 0.12, "phase": 0.0}},
+    ),
     "backlash": Picture({"gap": 0.06}, ("time [s]", ASKED), motor, levels(12.0, -12.0, dwell=0.2), dots=False, masses=2),
     "hardening_stiffness": Picture(
         {"cubic_stiffness": 4e4}, ("time [s]", ASKED), motor, levels(25.0, -25.0, dwell=0.15), dots=False, masses=2
@@ -173,6 +178,8 @@ def run_of(model: ga.Model, command: Vector) -> Run:
 
 def draw(name: str, picture: Picture) -> Figure:
     drive = (ONE if picture.masses == 1 else TWO).model()
+    for other, values in picture.beside.items():
+        drive = drive.with_effect(other, **values)
     plain, changed = (run_of(m, picture.command) for m in (drive, drive.with_effect(name, **picture.values)))
     figure = Figure(figsize=(8.4, 2.9), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.35, 1.0))

@@ -1,6 +1,6 @@
 from . import errors
 from .control import PI, Cascade, LowPass, Notch, P
-from .data import Alignment, Record, Winding, align, columns, differentiate, read, read_axes, read_columns
+from .data import Alignment, Record, Winding, align, columns, differentiate, read, read_axes, read_columns, read_pieces
 from .diagnosis import diagnose, first_experiment
 from .errors import GaidentError
 from .estimation import ForceError, WindingFit, estimate_winding, force_error, inverse_dynamics
@@ -76,6 +76,7 @@ __all__ = [
     "read",
     "read_axes",
     "read_columns",
+    "read_pieces",
     "report",
     "run",
     "simulate",

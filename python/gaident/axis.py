@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from gaident.arguments import parts_of
+from gaident.arguments import arg, parts_of
 from gaident.errors import GaidentError, SettingsError
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "linear_sentences",
     "message_of",
     "order",
+    "period_of",
     "restored",
     "said",
     "say",
@@ -148,6 +149,23 @@ def checked_axis(axis: str) -> str:
     if axis not in AXES:
         raise SettingsError(f"axis is {axis!r}: it must be one of {', '.join(map(repr, AXES))}")
     return axis
+
+
+def period_of(axis: str, pitch: float | None) -> float | None:
+    """What is tied to the place returns with: a turn [rad], the pitch of a linear axis [m], None where that is not known.
+
+    Raises SettingsError for a pitch that is no positive length, and for one of a rotary axis.
+    """
+    if pitch is None:
+        return TURN if checked_axis(axis) == "rotary" else None
+    remedy = "give the length in m with which a force returns, for example 0.024"
+    if isinstance(pitch, bool) or not isinstance(pitch, int | float) or not 0.0 < pitch < math.inf:
+        raise SettingsError(f"pitch is {pitch!r}: {remedy}")
+    if checked_axis(axis) == "rotary":
+        raise SettingsError(
+            f"pitch is {pitch!r}, which belongs to a linear axis: say {arg('axis', repr('linear'))}, or leave it out"
+        )
+    return float(pitch)
 
 
 def unit(rotary: str, axis: str = "rotary") -> str:

@@ -42,6 +42,8 @@ struct Shaft {  // effects at one end of the shaft
     double cogging_phase = 0;
     double friction_drift_torque = 0;
     double friction_drift_rate = 0;
+    double load_dependent_friction_torque = 0;
+    double load_dependent_friction_share = 0;
     // end of shaft fields
 };
 
@@ -121,10 +123,11 @@ public:
         return T;
     }
 
-    // Dry friction, where the other torques bring the velocity `free`.
-    double level(double w, double free, double t) const {
+    // Dry friction, where the other torques bring the velocity `free`, under what the torques there brake with [N m].
+    double level(double w, double free, double t, double braking) const {
         double T =
             c.coulomb_friction_torque + c.stribeck_friction_torque + c.friction_drift_torque * (1 + c.friction_drift_rate * t);
+        T += c.load_dependent_friction_torque + c.load_dependent_friction_share * std::abs(braking);
         if (const double more = c.stribeck_friction_static_torque - c.stribeck_friction_torque; more != 0) {
             const double ratio = 0.5 * (w + free) / c.stribeck_friction_stribeck_velocity;
             T += more * std::exp(-ratio * ratio);
@@ -168,19 +171,20 @@ public:
 
     // One fine step under the torque command v, its middle at time t.
     void step(double v, double t) {
-        const double T =
-            shaft_torque(resonant(lagged(late(beyond(clip(v, c.torque_saturation_limit), c.torque_dead_band_width)))));
+        const double braking = motor.load(angle + 0.5 * h * w);
+        const double T = resonant(lagged(late(beyond(clip(v, c.torque_saturation_limit), c.torque_dead_band_width)))) - braking;
         const bool two = c.JL > 0;
         twist += 0.5 * h * (w - wL);
         const double Tc = two ? coupling() : 0;
         const double damp = 0.5 * h * c.DM / c.JM;
         const double free = ((1 - damp) * w + h / c.JM * (T - Tc - motor.smooth(w))) / (1 + damp);
-        const double next = beyond(free, h / c.JM * motor.level(w, free, t));
+        const double next = beyond(free, h / c.JM * motor.level(w, free, t, braking));
         if (two) {
             const double damp_L = 0.5 * h * c.DL / c.JL;
-            const double pull = Tc - load.load(angle_load + 0.5 * h * wL) - load.smooth(wL);
+            const double braking_load = load.load(angle_load + 0.5 * h * wL);
+            const double pull = Tc - braking_load - load.smooth(wL);
             const double free_L = ((1 - damp_L) * wL + h / c.JL * pull) / (1 + damp_L);
-            const double next_L = beyond(free_L, h / c.JL * load.level(wL, free_L, t));
+            const double next_L = beyond(free_L, h / c.JL * load.level(wL, free_L, t, braking_load));
             angle_load += 0.5 * h * (wL + next_L);
             wL = next_L;
         }
@@ -229,8 +233,6 @@ private:
         const double x1_mean = 0.5 * (old1 + x1) - 0.5 * h * 0.5 * (x2 - old2);
         return (wp / wz) * (wp / wz) * (T + (zz * wz - zp * wp) * (old2 + x2) + (wz * wz - wp * wp) * x1_mean);
     }
-
-    double shaft_torque(double T) const { return T - motor.load(angle + 0.5 * h * w); }
 
     double coupling() const {
         const double half_gap = 0.5 * c.backlash_gap, x = beyond(twist, half_gap);

@@ -18,6 +18,7 @@
 //   - torque              T' = T - torque(c, theta)              a torque that brakes, at the angle theta [rad]
 //   - law                 law(c, friction)                       once: its part of the friction law that is constant
 //   - level               level(c, t)                            dry friction known by the time t [s] alone [N m]
+//   - loaded              loaded(c, load)                        dry friction known by what the torque hooks brake with [N m]
 //   - friction            friction(c, s, step)                   what its friction changes in the substep's equation
 //   - after_friction      after_friction(c, s, step, w_next)     and once its velocity is known; may be absent
 //   - coupling            coupling, mean_coupling, loaded_twist  a nonlinear coupling of two masses (mechanism.hpp)
@@ -72,7 +73,8 @@ enum class Hooks : std::uint32_t {
     possible = 1U << 16,
     tabulate = 1U << 17,
     later = 1U << 18,
-    load = 1U << 19,
+    loaded = 1U << 19,
+    load = 1U << 20,
 };
 constexpr Hooks operator|(Hooks a, Hooks b) {
     return static_cast<Hooks>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));

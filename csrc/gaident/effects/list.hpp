@@ -14,6 +14,7 @@
 #include "friction/asymmetric_friction.hpp"
 #include "friction/coulomb_friction.hpp"
 #include "friction/friction_drift.hpp"
+#include "friction/load_dependent_friction.hpp"
 #include "friction/lugre_friction.hpp"
 #include "friction/presliding_friction.hpp"
 #include "friction/quadratic_drag.hpp"
@@ -31,28 +32,29 @@
 
 namespace gaident {
 
-using Listed = EffectList<CoulombFriction,       //
-                          StribeckFriction,      //
-                          AsymmetricFriction,    //
-                          PreslidingFriction,    //
-                          LugreFriction,         //
-                          QuadraticDrag,         //
-                          LoadTorque,            //
-                          Unbalance,             //
-                          Cogging,               //
-                          FrictionDrift,         //
-                          Backlash,              //
-                          HardeningStiffness,    //
-                          TorqueSaturation,      //
-                          TorqueDeadBand,        //
-                          TransportDelay,        //
-                          TorqueLag,             //
-                          IntegratorClamp,       //
-                          CommandRateLimit,      //
-                          VelocityFilter,        //
-                          VelocityRipple,        //
-                          VelocityQuantisation,  //
-                          ExtraResonance,        //
+using Listed = EffectList<CoulombFriction,        //
+                          StribeckFriction,       //
+                          AsymmetricFriction,     //
+                          PreslidingFriction,     //
+                          LugreFriction,          //
+                          QuadraticDrag,          //
+                          LoadTorque,             //
+                          Unbalance,              //
+                          Cogging,                //
+                          FrictionDrift,          //
+                          LoadDependentFriction,  //
+                          Backlash,               //
+                          HardeningStiffness,     //
+                          TorqueSaturation,       //
+                          TorqueDeadBand,         //
+                          TransportDelay,         //
+                          TorqueLag,              //
+                          IntegratorClamp,        //
+                          CommandRateLimit,       //
+                          VelocityFilter,         //
+                          VelocityRipple,         //
+                          VelocityQuantisation,   //
+                          ExtraResonance,         //
                           Outliers>;
 
 // Behind them those of the shaft once more, at the load.

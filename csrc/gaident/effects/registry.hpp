@@ -114,6 +114,8 @@ concept law = requires(C<E> c, FrictionLaw<double>& sum) { E::law(c, sum); };
 template <class E>
 concept level = requires(C<E> c, double x) { E::level(c, x); };
 template <class E>
+concept loaded = requires(C<E> c, double x) { E::loaded(c, x); };
+template <class E>
 concept friction = requires(C<E> c, S<E> s, FrictionStep<double>& step) { E::friction(c, s, step); };
 template <class E>
 concept after_friction =
@@ -162,18 +164,18 @@ constexpr Hooks all_of() {
     return if_there(command<E>, Hooks::command) | if_there(controller<E>, Hooks::controller) |
            if_there(actuator<E>, Hooks::actuator) | if_there(actuator_dynamics<E>, Hooks::actuator_dynamics) |
            if_there(torque<E>, Hooks::torque) | if_there(law<E>, Hooks::law) | if_there(level<E>, Hooks::level) |
-           if_there(friction<E>, Hooks::friction) | if_there(after_friction<E>, Hooks::after_friction) |
-           if_there(coupling<E>, Hooks::coupling) | if_there(sensor<E>, Hooks::sensor) |
-           if_there(sensor_dynamics<E>, Hooks::sensor_dynamics) | if_there(reading<E>, Hooks::reading) |
-           if_there(plant<E>, Hooks::plant) | if_there(begin<E>, Hooks::begin) | if_there(substeps<E>, Hooks::substeps) |
-           if_there(possible<E>, Hooks::possible) | if_there(tabulate<E>, Hooks::tabulate) | if_there(later<E>, Hooks::later) |
-           if_there(load<E>, Hooks::load);
+           if_there(loaded<E>, Hooks::loaded) | if_there(friction<E>, Hooks::friction) |
+           if_there(after_friction<E>, Hooks::after_friction) | if_there(coupling<E>, Hooks::coupling) |
+           if_there(sensor<E>, Hooks::sensor) | if_there(sensor_dynamics<E>, Hooks::sensor_dynamics) |
+           if_there(reading<E>, Hooks::reading) | if_there(plant<E>, Hooks::plant) | if_there(begin<E>, Hooks::begin) |
+           if_there(substeps<E>, Hooks::substeps) | if_there(possible<E>, Hooks::possible) |
+           if_there(tabulate<E>, Hooks::tabulate) | if_there(later<E>, Hooks::later) | if_there(load<E>, Hooks::load);
 }
 
 // Those of which an effect at this place has to have one.
 constexpr Hooks acting_at(Place place) {
     switch (place) {
-        case Place::shaft: return Hooks::torque | Hooks::law | Hooks::level | Hooks::friction | Hooks::load;
+        case Place::shaft: return Hooks::torque | Hooks::law | Hooks::level | Hooks::loaded | Hooks::friction | Hooks::load;
         case Place::coupling: return Hooks::coupling;
         case Place::actuator: return Hooks::actuator | Hooks::actuator_dynamics;
         case Place::controller: return Hooks::command | Hooks::controller;

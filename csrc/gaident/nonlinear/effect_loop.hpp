@@ -35,7 +35,7 @@ public:
         h_ = run.sample_time / run.substeps;
         if constexpr (!is_servo)
             if (continuous) pi_ = ControllerState<R>(run.loop.controller, Clock{h_});
-        dry_ = run.effects.meets(effects_with(Hooks::law | Hooks::level | Hooks::friction)) || own_.friction();
+        dry_ = run.effects.meets(effects_with(Hooks::law | Hooks::level | Hooks::loaded | Hooks::friction)) || own_.friction();
         turning_ = run.effects.meets(effects_that_turn()) || own_.there();
         looking_back_ = run.effects.meets(effects_with(Hooks::tabulate));
         const Beginning<R> start{plant_.velocity(), c_.before, first_command()};
@@ -46,7 +46,7 @@ public:
             if constexpr (hook::law<E>) E::law(c, law_);
             if constexpr (hook::begin<E>) E::begin(c, states_.template of<E>(), start);
         });
-        if constexpr (Plant::loaded) begin_at_load();
+        if constexpr (Plant::both_ends) begin_at_load();
         if constexpr (!is_servo) pi_.s = c_.stored;
         else if (run.moving) pi_.rest(start.command, start.velocity, c_.stored);
         angle_ = R(run.start_angle);
@@ -270,7 +270,7 @@ private:
         if (own_.shaft()) [[unlikely]]
             T = own_.with_torque(w, theta_, T, t);
         R w_next;
-        if constexpr (Plant::loaded) {
+        if constexpr (Plant::both_ends) {
             w_next = move_both(T, w, t);
         } else {
             const R w_free = plant_.free_velocity(T, friction_torque_);
@@ -297,6 +297,7 @@ private:
                     if (run_.effects.has<Key>()) T_load = T_load - E::torque(c_.effects.template of<Key>(), middle);
             });
         }
+        load_.braking = R(0.0) - T_load;
         plant_.free_velocities(T, T_load, friction_torque_, load_.friction);
         const FreeEnd<R> motor{w, plant_.free[0], plant_.beta()}, load{w_load, plant_.free[1], plant_.load_beta()};
         R w_next = motor.w_free, w_next_load = load.w_free;
@@ -323,6 +324,20 @@ private:
         return w_next;
     }
 
+    // What the effects at the shaft brake with at one end [N m].
+    template <Side side>
+    [[gnu::always_inline]] R braking() const {
+        if constexpr (side == Side::load) return load_.braking;
+        else return braking_at(run_, c_, theta_);
+    }
+    [[gnu::noinline]] static R braking_at(const EffectRun& run, const EffectConstants<R>& c, R theta) {
+        return Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::torque<E>)
+                if (run.effects.has<E>()) return x + E::torque(c.effects.template of<E>(), theta);
+            return x;
+        });
+    }
+
     // With friction at both ends it is asked four times a substep: a call, so that it is compiled once.
     template <Side side>
     [[gnu::noinline]] R apart(typename Effects::States<R>& states, const FrictionLaw<R>& law, const FreeEnd<R>& end, double t) {
@@ -343,6 +358,9 @@ private:
         each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
             if constexpr (hook::level<E>)
                 if (run_.effects.has<Key>()) add(E::level(c_.effects.template of<Key>(), R(t > 0.0 ? t : 0.0)));
+            if constexpr (hook::loaded<E>)
+                if (run_.effects.has<Key>()) [[unlikely]]
+                    add(E::loaded(c_.effects.template of<Key>(), braking<side>()));
         });
         each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
             if constexpr (hook::friction<E>)
@@ -369,7 +387,7 @@ private:
     OwnInLoop<R> own_;
     typename Effects::States<R> states_{};  // all zero
     FrictionLaw<R> law_;
-    [[no_unique_address]] std::conditional_t<Plant::loaded, LoadSide<R>, NoLoadSide> load_;
+    [[no_unique_address]] std::conditional_t<Plant::both_ends, LoadSide<R>, NoLoadSide> load_;
     R angle_, theta_ = R(0.0), theta_middle_;
     R held_ = R(0.0);
     R friction_torque_ = R(0.0), per_beta_;

@@ -147,8 +147,8 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
     const Factors<double>& g = model.linear;
     const double Ts = record.sample_time;
     TwoMasses m{};
-    const bool loaded = model.effects.meets(effects_with(Hooks::load)) && two_masses_of(g, m);
-    const Circumstances at{g, loop, Ts, record.top_speed, g.structure.p == 1 ? g.gain : 0.0, loaded ? 1.0 / m.JL : 0.0};
+    const bool both_ends = model.effects.meets(effects_with(Hooks::load)) && two_masses_of(g, m);
+    const Circumstances at{g, loop, Ts, record.top_speed, g.structure.p == 1 ? g.gain : 0.0, both_ends ? 1.0 / m.JL : 0.0};
     double wanted = 1.0;
     Pace pace = own ? Pace::fine : Pace::sample;
     Effects::each([&]<class E>() {

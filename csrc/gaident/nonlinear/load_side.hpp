@@ -62,10 +62,11 @@ struct LoadSide {
     bool dry, turning;
     FrictionLaw<R> law;
     R friction = R(0.0);  // of the substep before [N m]
+    R braking = R(0.0);   // what the effects there brake with [N m]
     R twist_at_start;     // rad: the load's angle starts where the motor's does
 
     [[gnu::always_inline]] LoadSide(const EffectRun& run, R twist)
-        : dry(run.effects.meets(load_effects_with(Hooks::law | Hooks::level | Hooks::friction))),
+        : dry(run.effects.meets(load_effects_with(Hooks::law | Hooks::level | Hooks::loaded | Hooks::friction))),
           turning(run.effects.any([](const EffectInfo& info) { return info.at_load && info.turns; })),
           twist_at_start(twist) {}
 };

@@ -9,7 +9,7 @@ namespace gaident {
 // Any linear plant, in the delta observer form of closed_loop.hpp; N its order, -1 where it is known only at run time.
 template <class R, int N>
 struct ObserverPlant {
-    static constexpr bool loaded = false;  // whether effects act at the load, too
+    static constexpr bool both_ends = false;  // whether effects act at the load, too
     static constexpr int capacity = N >= 0 ? N : max_plant_order;
     R a[capacity], b[capacity + 1], x[capacity];
     int order;
@@ -52,7 +52,7 @@ struct ObserverPlant {
 // Each leaves in x is left of the twist to the effects that follow.
 template <class R>
 struct TwoMassPlant {
-    static constexpr bool loaded = false;
+    static constexpr bool both_ends = false;
     R phi[3][3], motor[3], coupling[3];
     R KG, DG, per_scale;
     R x[3];  // w_M, w_L, psi
@@ -111,7 +111,7 @@ struct TwoMassPlant {
 // The same with torques and friction at the load, too (load_side.hpp solves it).
 template <class R>
 struct LoadedTwoMassPlant : TwoMassPlant<R> {
-    static constexpr bool loaded = true;
+    static constexpr bool both_ends = true;
     using TwoMassPlant<R>::x, TwoMassPlant<R>::motor, TwoMassPlant<R>::coupling, TwoMassPlant<R>::correction;
     // Response to a unit torque at the load. The coupling's pulls the motor back by what it drives the load with, so that with a
     // unit torque at the motor beside it only the load is driven.

@@ -48,6 +48,8 @@ def drive_of(args: argparse.Namespace) -> Drive:
         sections["space"],
         sections["limits"],
         sections["shift"],
+        sections["show"],
+        {key: value for key, value in sections["report"].items() if value},
         unfilled,
     )
 
@@ -62,8 +64,8 @@ def _selected(args: argparse.Namespace) -> str | None:
 
 def read_all(drive: Drive, logs: Sequence[str], controller: Controller | None, measured: bool = True) -> list[Record]:
     """The logs, each with what drives its simulation; raises SettingsError where that is missing."""
-    records = [drive.read(log, measured) for log in logs]
-    for log, rec in zip(logs, records, strict=True):
+    named = [(log, rec) for log in logs for rec in drive.records(log, measured)]
+    for log, rec in named:
         if controller is not None and controller.driven_by == "position_command":
             if rec.position_command is None:
                 raise SettingsError(
@@ -80,7 +82,7 @@ def read_all(drive: Drive, logs: Sequence[str], controller: Controller | None, m
                 f"{log}: there is no torque, which drives the model in open loop: name its column "
                 "(--columns torque=...), or give the controller (--kp, --ki)"
             )
-    return records
+    return [rec for _, rec in named]
 
 
 def reading_notes(drive: Drive, records: Sequence[Record]) -> list[Text]:

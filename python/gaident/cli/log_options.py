@@ -122,6 +122,12 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="put irregular time stamps, or channels of several rates, on an even axis of this sample time [s]",
     )
+    g.add_argument(
+        "--from", type=number, metavar="S", help="leave out what lies before it [s], counted from the log's first line"
+    )
+    g.add_argument("--to", type=number, metavar="S", help="leave out what lies behind it [s]")
+    pieces = "take what lies around the gaps of the time as records of their own, which are identified together"
+    g.add_argument("--pieces", action="store_true", default=None, help=pieces)
     g.add_argument("--gear-ratio", type=number, metavar="X", help="turns of the motor per turn of the load, with --load-side")
     g.add_argument("--load-side", nargs="+", metavar="CH", help="channels that were measured behind the gear")
     shift = "move channels by samples, where the log wrote them on another line: torque=-1 for one that was logged a sample late"
@@ -131,6 +137,8 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
     for name, text in CONSTANT_HELP.items():
         g.add_argument(f"--{name.replace('_', '-')}", type=number, metavar="X", help=text)
     _add_text_options(g)
+    pitch = "of a linear axis, the length with which its cogging returns [m]: pitch of the screw or of the poles"
+    g.add_argument("--pitch", type=number, metavar="M", help=pitch)
     g.add_argument("--axis", choices=AXES, help="linear: print m, m/s, N, kg (default: rotary)")
 
 

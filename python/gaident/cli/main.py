@@ -27,6 +27,7 @@ COMMANDS = {
     "diagnose": "diagnose:diagnose_command",
     "simulate": "simulate:simulate_command",
     "report": "report:report_command",
+    "export": "export:export_command",
     "effects": "effects:effects_command",
     "demo": "demo:demo_command",
     "reproduce": "reproduce:reproduce_command",

@@ -8,6 +8,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
+from gaident.cli.export_options import EXPORT_EXAMPLES, EXPORT_HELP, add_export_options
 from gaident.cli.log_options import add_log_commands, add_log_options, gain, number
 from gaident.cli.report_options import REPORT_EXAMPLES, REPORT_HELP, add_report_option, add_report_options
 from gaident.control.words import LOOPS
@@ -200,6 +201,9 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
     sub = command("report", "RESULT.json [LOG...] ", line, REPORT_HELP, REPORT_EXAMPLES)
     add_report_options(sub)
     add_log_options(sub)
+
+    sub = command("export", "RESULT.json ", "saved result -> C, SciPy, python-control, CSV", EXPORT_HELP, EXPORT_EXAMPLES)
+    add_export_options(sub)
 
     sub = command("effects", "", "what a model can carry beyond its linear part", EFFECTS_HELP)
     sub.add_argument("--json", action="store_true", help="print JSON instead of a table")

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import io
+import shlex
+import shutil
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,12 +28,21 @@ __all__ = [
     "csv_text",
     "naming",
     "print_json",
+    "program",
     "proposal_csv",
     "save_figure",
     "summary_of",
     "target_of",
     "write",
 ]
+
+
+def program() -> str:
+    """How this program is called again, for a line to paste: gaident where the shell finds it, else with its folder."""
+    called = Path(sys.argv[0])
+    if called.stem != "gaident" or shutil.which("gaident") is not None:
+        return "gaident"
+    return shlex.quote(str(called))
 
 
 def csv_text(rec: Record, result: Run | None, axis: str) -> str:
@@ -110,11 +122,11 @@ def naming(target: Path) -> Iterator[None]:
         raise OSError(f"cannot write {target}: {error.strerror or error}") from error
 
 
-def summary_of(idn: Identification, axis: str) -> str:
+def summary_of(idn: Identification, axis: str, units: Mapping[str, str | float] | None = None) -> str:
     """The summary, its remedies as options."""
     from gaident.show.summary import identification_summary
 
-    return identification_summary(idn, axis)
+    return identification_summary(idn, axis, units)
 
 
 def save_figure(figure: Figure, path: Path) -> None:

@@ -9,7 +9,7 @@ __all__ = ["in_options"]
 
 # Options with the name of the argument.
 SAME_NAME = {
-    *("dt", "delimiter", "decimal", "skip", "encoding", "decimate", "resample", "loop", "ki", "kp"),
+    *("dt", "delimiter", "decimal", "skip", "encoding", "decimate", "resample", "pieces", "loop", "ki", "kp"),
     *(
         "counts_per_turn",
         "torque_constant",
@@ -22,6 +22,7 @@ SAME_NAME = {
         "torque_is",
     ),
 }
+_OTHER_NAME = {"start": "from", "stop": "to"}
 WHOLE = {
     ("controller", "None"): "--loop open",
     ("controller", "PI(...)"): "--kp and --ki",
@@ -43,5 +44,7 @@ def _option(a: Argument) -> str:
         return f"--{a.name} {a.key}={value}"
     if a.name in ("p", "q"):
         return f"--{a.name} {a.value.strip('()').replace(', ', '..')}"
+    if a.name in _OTHER_NAME:
+        return f"--{_OTHER_NAME[a.name]} {a.value}"
     name = "velocity-cutoff" if a.name == "velocity_cutoff_hz" else a.name.replace("_", "-") if a.name in SAME_NAME else ""
     return f"--{name} {a.value}".rstrip() if name else str(a)

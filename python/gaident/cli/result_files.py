@@ -6,7 +6,7 @@ from argparse import Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gaident.cli.options import PICTURES
 from gaident.cli.output import apart, naming, save_figure, target_of, write
@@ -15,10 +15,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gaident.data.record import Record
+    from gaident.drive.drive_file import Drive
     from gaident.results.diagnosis import Diagnosis
     from gaident.results.identification import Identification
 
-__all__ = ["ResultFiles", "write_report"]
+__all__ = ["ResultFiles", "shown_block", "write_report"]
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class ResultFiles:
     result: Path | None
     picture: Path | None
     page: Path | None
+    live: bool = True
 
     @classmethod
     def of(cls, args: Namespace, sources: Sequence[str], **others: Path | None) -> ResultFiles:
@@ -36,6 +38,7 @@ class ResultFiles:
             target_of(args.out, sources),
             target_of(args.plot, sources, PICTURES),
             target_of(args.report, sources),
+            not args.pictures,
         )
         apart({"--out": files.result, "--plot": files.picture, "--report": files.page, **others})
         return files
@@ -45,7 +48,7 @@ class ResultFiles:
         result: Diagnosis | Identification,
         records: Sequence[Record],
         validation: Sequence[Record],
-        axis: str,
+        drive: Drive,
         figure: Callable[[], Figure],
     ) -> list[Path]:
         """Write those that were asked for and return them; figure: draws the picture."""
@@ -53,18 +56,33 @@ class ResultFiles:
             with naming(self.result):
                 result.save(self.result)
         if self.picture is not None:
-            save_figure(figure(), self.picture)
+            from gaident.show.units import figure_in_units, scales_of
+
+            save_figure(figure_in_units(figure(), scales_of(drive.units_shown, drive.axis)), self.picture)
         if self.page is not None:
-            write_report(result, self.page, records, validation, axis)
+            write_report(result, self.page, records, validation, drive, self.live)
         return [path for path in (self.result, self.picture, self.page) if path is not None]
 
 
 def write_report(
-    result: Diagnosis | Identification, target: Path, records: Sequence[Record], validation: Sequence[Record], axis: str
+    result: Diagnosis | Identification,
+    target: Path,
+    records: Sequence[Record],
+    validation: Sequence[Record],
+    drive: Drive,
+    live: bool,
 ) -> int:
     """The page; returns its size [bytes]."""
     from gaident.reporting.report import report_page
 
-    page = report_page(result, records, validation, axis).encode()
+    page = report_page(result, records, validation, drive.axis, drive.units_shown, drive.about, live).encode()
     write(target, page)
     return len(page)
+
+
+def shown_block(result: Diagnosis | Identification, drive: Drive) -> dict[str, Any]:
+    """What --json adds where the drive file says in which units the user works."""
+    from gaident.show.units import scales_of, shown_in
+
+    found = shown_in(result, scales_of(drive.units_shown, drive.axis), drive.axis)
+    return {"shown": found} if found else {}

@@ -1,9 +1,22 @@
 from .alignment import Alignment, align
 from .axes import read_axes
 from .listing import Listing, columns
+from .pieces import read_pieces
 from .readers import read, read_columns
 from .record import Record
 from .signals.conditioning import differentiate
 from .winding import Winding
 
-__all__ = ["Alignment", "Listing", "Record", "Winding", "align", "columns", "differentiate", "read", "read_axes", "read_columns"]
+__all__ = [
+    "Alignment",
+    "Listing",
+    "Record",
+    "Winding",
+    "align",
+    "columns",
+    "differentiate",
+    "read",
+    "read_axes",
+    "read_columns",
+    "read_pieces",
+]

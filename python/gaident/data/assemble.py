@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gaident.arguments import NO_TIME, arg
 from gaident.data.clock import axis_of, clock_of, common_clock, part_of, second_of
+from gaident.data.column_score import LEAST, spoken_for
 from gaident.data.counters import Counters
 from gaident.data.formats.table import Column, Table
 from gaident.data.record import CHANNELS, Record
@@ -22,7 +23,9 @@ from gaident.data.wanted import Wanted, si_factor
 from gaident.data.winding_torque import ELECTRICAL, torque_of_winding
 from gaident.errors import ReadError, RecordError
 
-__all__ = ["assemble"]
+__all__ = ["assemble", "channels_of"]
+
+SAID = 3  # no decision: columns that a sentence names
 
 
 def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
@@ -30,7 +33,7 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
 
     The rows come block by block, so that a log longer than memory can be decimated on its way in.
     """
-    named = _channels(table, wanted)
+    named = channels_of(table, wanted)
     for quantity in wanted.units:
         if quantity not in named and quantity != "time":
             raise ReadError(
@@ -43,7 +46,7 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
     scales = {channel: _scale(table, wanted, channel, column) for channel, column in named.items()}
     kind = _torque_kind(table, wanted, named.get("torque")) if ELECTRICAL.isdisjoint(named) else ""
     counters = Counters(table, wanted, named)
-    said: list[str] = []
+    said = _unnamed_torque(table, wanted, named)
     if wanted.resample is not None:
         dt, values = _on_even_axis(table, wanted, named, scales, counters)
     else:
@@ -78,6 +81,26 @@ def _torque_kind(table: Table, wanted: Wanted, column: Column | None) -> str:
             f"with {arg('columns', '...', 'torque')}, or leave torque_is out"
         )
     return wanted.torque_is
+
+
+def _unnamed_torque(table: Table, wanted: Wanted, named: dict[str, Column]) -> list[str]:
+    """What to say of columns that may be the torque where none is read; nothing where the user says that there is none."""
+    if "torque" in named or not ELECTRICAL.isdisjoint(named) or "torque" in (wanted.columns or {}):
+        return []
+    used = {column.key for column in named.values()}
+    free = [column for column in table.columns if column.key not in used]
+    found = [
+        min((column.key, *column.names), key=len)
+        for column in free
+        if spoken_for((column.key, *column.names), column.unit, "torque")[0] >= LEAST
+    ]
+    if not found:
+        return []
+    which = " or ".join(repr(key) for key in found[:SAID])
+    return [
+        f"No torque is read, but by its name {which} may be it: give columns={{'torque': {found[0]!r}}} "
+        f"(--columns torque={found[0]}). A logged torque shows what the controller does."
+    ]
 
 
 def _slow_clock(table: Table, wanted: Wanted, named: dict[str, Column], dt: float) -> list[str]:
@@ -168,7 +191,7 @@ def _on_even_axis(
     return dt * factor, even
 
 
-def _channels(table: Table, wanted: Wanted) -> dict[str, Column]:
+def channels_of(table: Table, wanted: Wanted) -> dict[str, Column]:
     """Channel -> column, complete enough for a Record; time is not among them."""
     if len(table.columns) == 1 and wanted.measured:
         hint = "" if table.form == "DataFrame" else f"; if other columns were not recognised, give {arg('delimiter')}"

@@ -1,91 +1,122 @@
 """The words in the names of a log's columns, and what they say of a column.
 
-English and German, the commonest ones of French, Italian, Spanish and romanised Japanese.
+English, German, French, Italian, Spanish and romanised Japanese, as drives and their tools write them.
 """
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from functools import cache
 
-__all__ = ["COMMAND_WORDS", "FOREIGN_WORDS", "MEASURED_WORDS", "QUANTITY_WORDS", "words_of"]
+__all__ = [
+    "COMMAND_WORDS",
+    "FOREIGN_WORDS",
+    "MEASURED_WORDS",
+    "QUANTITY_WORDS",
+    "UNSURE_AT_THE_END",
+    "UNSURE_WORDS",
+    "words_of",
+]
 
 COMMAND_WORDS = frozenset(
     (
         *("r", "ref", "reference", "cmd", "command", "soll", "sollwert", "set", "setpoint", "setpt", "sp", "target"),
-        *("desired", "demand", "des", "demanded", "commanded", "vcmd", "pcmd", "icmd"),
-        *("consigne", "riferimento", "consigna", "referencia", "shirei"),
+        *("desired", "demand", "des", "demanded", "commanded", "vcmd", "pcmd", "icmd", "tcmd", "rvel", "rpos", "nominal"),
+        *("vorgabe", "consigne", "référence", "riferimento", "richiesta", "richiesto", "comandata", "comandato", "nominale"),
+        *("teorica", "consigna", "referencia", "comandada", "comandado", "shirei", "shireichi", "mokuhyou", "mokuhyo"),
     )
 )
 """It is a command; r only as the whole name."""
 
 MEASURED_WORDS = frozenset(
     (
-        *("act", "actual", "ist", "istwert", "meas", "measured", "gemessen", "fb", "fbk", "feedback", "est", "estimate"),
-        *("estimated", "real", "motor", "servo", "vfb", "pfb"),
-        *("mesure", "mesurée", "mesuré", "réelle", "reelle", "attuale", "misurata", "actuel", "actuelle", "medida"),
+        *("act", "actual", "actl", "ist", "istwert", "meas", "measured", "gemessen", "gemessene", "gemessenes", "fb", "fbk"),
+        *("feedback", "est", "estimate", "estimated", "real", "motor", "servo", "vfb", "pfb", "fvel", "fpos", "active", "wirk"),
+        *("aktuell", "aktuelle", "aktueller", "aktuelles", "mesure", "mesurée", "mesuré", "réelle", "réel", "reelle", "estimée"),
+        *("retour", "actif", "attuale", "misurata", "misurato", "effettiva", "effettivo", "reale", "actuel", "actuelle"),
+        *("medida", "medido", "jitsu", "jissokudo", "genzai", "kikan"),
     )
 )
 """It is of the motor, and what happened rather than what was asked for."""
 
 QUANTITY_WORDS: dict[str, dict[str, int]] = {
     "velocity": {
-        **dict.fromkeys(("velocity", "vel", "velo", "speed", "spd", "omega", "drehzahl", "geschwindigkeit", "rpm"), 4),
-        **dict.fromkeys(("vitesse", "velocità", "velocita", "velocidad", "sokudo", "vcmd", "vfb"), 4),
+        **dict.fromkeys(("velocity", "velocities", "vel", "velo", "speed", "spd", "omega", "drehzahl", "geschwindigkeit"), 4),
+        **dict.fromkeys(("winkelgeschwindigkeit", "rpm", "vitesse", "velocità", "velocita", "velocidad", "sokudo"), 4),
+        **dict.fromkeys(("jissokudo", "kaitensuu", "kaitensu", "vcmd", "vfb", "fvel", "rvel"), 4),
         **dict.fromkeys(("w", "wm", "n", "v", "vl", "dq", "qd"), 2),
     },
     "torque": {
         **dict.fromkeys(("torque", "trq", "moment", "momenten", "drehmoment", "tau", "force", "kraft", "effort"), 4),
-        **dict.fromkeys(("couple", "coppia", "toruku"), 4),
-        **dict.fromkeys(("current", "strom", "iq", "thrust", "icmd"), 3),
-        **dict.fromkeys(("u", "m", "i", "il", "par"), 2),
+        **dict.fromkeys(("couple", "coppia", "toruku", "tcmd"), 4),
+        **dict.fromkeys(("current", "strom", "iq", "isq", "thrust", "icmd", "courant", "corrente", "corriente"), 3),
+        **dict.fromkeys(("denryuu", "denryu"), 3),
+        **dict.fromkeys(("u", "m", "i", "il", "par", "f"), 2),
     },
     "position": {
-        **dict.fromkeys(
-            ("position", "pos", "angle", "theta", "phi", "lage", "winkel", "posizione", "posición", "pcmd", "pfb"), 4
-        ),
-        **dict.fromkeys(("encoder",), 3),
-        **dict.fromkeys(("q", "qm", "enc", "weg", "x", "pl"), 2),
+        **dict.fromkeys(("position", "pos", "angle", "theta", "phi", "lage", "winkel", "posizione", "posición", "quota"), 4),
+        **dict.fromkeys(("ichi", "pcmd", "pfb", "fpos", "rpos"), 4),
+        **dict.fromkeys(("encoder", "codeur"), 3),
+        **dict.fromkeys(("q", "qm", "enc", "weg", "x", "s", "pl"), 2),
     },
 }
-"""How much each speaks for a quantity."""
+"""How much each speaks for a quantity; f, a letter of many meanings, only beside a word for a command or a measurement."""
 
 FOREIGN_WORDS = frozenset(
     (
         *("error", "err", "deviation", "droop", "following", "limit", "max", "min", "load", "ratio", "temp", "temperature"),
-        *("abweichung", "regelabweichung", "schleppfehler", "fehler", "grenze", "last", "temperatur", "beschleunigung"),
-        *("feedforward", "ffw", "precontrol", "vorsteuerung", "setting"),
-        *("status", "state", "seq", "id", "acc", "acceleration", "jerk", "counter", "digital", "selected", "power"),
+        *("abweichung", "regelabweichung", "regeldifferenz", "differenz", "schleppfehler", "schleppabstand", "fehler", "grenze"),
+        *("last", "temperatur", "beschleunigung", "diff", "difference", "lag", "erreur", "poursuite", "errore", "inseguimento"),
+        *("seguimiento", "hensa", "pe", "feedforward", "ffw", "precontrol", "vorsteuerung", "setting", "window", "rated", "nenn"),
+        *("status", "state", "seq", "id", "acc", "acceleration", "jerk", "qdd", "ddq", "counter", "digital", "selected", "power"),
+        *("utilization", "utilisation", "auslastung", "flux", "field", "feldbildend", "reactive", "blind", "voltage", "tcp"),
     )
 )
 """It is no channel of a record."""
+
+UNSURE_WORDS = frozenset(("control", "input", "output", "limited", "ziel", "revolution"))
+"""It may be commanded or measured, raw or folded: where no other word says which, nobody but the user knows."""
+
+UNSURE_AT_THE_END = frozenset(("in", "out"))
+"""The same, as the last word of a name."""
 
 
 _NUMBERED = re.compile(
     r"^\s*[a-zA-Z](?:\d+(?:\[\d+\])?|(?:-\d+)+)(?=[\s:]+\S)"
 )  # a parameter's number before its name: r63, S-0-0040
+_IDN = re.compile(r"\b[SP](?:-\d+){2,}")  # S-0-0040 by itself
+_CAPITAL = re.compile(r"([^\W\d_A-Z])([A-Z])")
+_TYPE_PREFIX = re.compile(r"\b(?:f|lr)(?=[A-Z][a-z])")  # fActVelo, lrSetVelocity: a program's mark for the type of a number
 _JOINTS = ("", "s", "en")  # Geschwindigkeit-s-sollwert, Moment-en-sollwert
 _LETTERS = 3  # no decision: shorter words would be found in any name
 
 
 def words_of(name: str) -> list[str]:
-    """The words of a column's name, small; it is cut at capitals, digits and signs, and a unit in brackets is left out.
+    """The words of a column's name, small; it is cut at capitals, digits and signs, and what stands in square brackets left out.
 
     A compound of known words is cut as well, as German writes them.
 
-    >>> [words_of(name) for name in ("Motor speed [rpm]", "Solldrehzahl", "Geschwindigkeitsistwert", "Torsion")]
+    >>> [words_of(name) for name in ("Motor speed [rpm]", "Solldrehzahl", "Geschwindigkeits-Istwert", "Torsion")]
     [['motor', 'speed'], ['soll', 'drehzahl'], ['geschwindigkeit', 'istwert'], ['torsion']]
     """
-    spaced = re.sub(r"([a-z])([A-Z])", r"\1 \2", re.sub(r"[\[(<{].*", "", name))
-    found = [word.casefold() for word in re.findall(r"[^\W\d_]+", _NUMBERED.sub("", spaced))]
-    return [part for word in found for part in _parts(word) or (word,)]
+    plain = _NUMBERED.sub("", _IDN.sub("", unicodedata.normalize("NFC", name)))
+    spaced = _CAPITAL.sub(r"\1 \2", _TYPE_PREFIX.sub("", re.sub(r"\[[^\]]*\]?|[<{].*", " ", plain)))
+    found = [word.casefold() for word in re.findall(r"[^\W\d_]+", spaced)]
+    parts = [part for word in found for part in _parts(word) or _parts(word.removesuffix("s")) or (word,)]
+    for k in reversed(range(len(parts) - 1)):
+        if parts[k] == "i" and parts[k + 1] in ("q", "d"):  # the two currents of a motor, i_q and i_d
+            parts[k : k + 2] = [parts[k] + parts[k + 1]]
+    return parts
 
 
 @cache
 def _known() -> frozenset[str]:
     """Words that a compound may be made of."""
     quantities = (word for words in QUANTITY_WORDS.values() for word in words)
-    return frozenset(w for w in (*quantities, *COMMAND_WORDS, *MEASURED_WORDS, *FOREIGN_WORDS) if len(w) >= _LETTERS)
+    return frozenset(
+        w for w in (*quantities, *COMMAND_WORDS, *MEASURED_WORDS, *FOREIGN_WORDS, *UNSURE_WORDS) if len(w) >= _LETTERS
+    )
 
 
 @cache

@@ -8,25 +8,20 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.column_words import COMMAND_WORDS, FOREIGN_WORDS, MEASURED_WORDS, QUANTITY_WORDS, words_of
-from gaident.data.formats.units import Constants, factor
+from gaident.data.column_score import LEAST, spoken_for
+from gaident.data.formats.units import factor
 from gaident.data.listing import ColumnInfo, Listing
 from gaident.data.record import CHANNELS
-from gaident.errors import ReadError
 from gaident.policy.table import POLICY
 
 __all__ = ["Guess", "guess_channels", "position_and_velocity", "unit_from_position", "unit_from_velocity"]
-
-COMMANDED_QUANTITY = {"command": "velocity", "position_command": "position"}
-"""Channel that is a command -> the quantity that it commands."""
-_LEAST = 2  # no decision: words that speak for a column
 
 
 @dataclass(frozen=True)
 class Guess:
     """Channel -> column, with why; what the file says of its unit stands in the column.
 
-    undecided: channel -> columns for which as much speaks.
+    undecided: channel -> columns for which as much speaks, or of which only the user knows what they are.
     """
 
     channels: Mapping[str, ColumnInfo]
@@ -41,10 +36,13 @@ def guess_channels(listing: Listing) -> Guess:
     longest = max((c.samples for c in usable), default=0)
     usable = [c for c in usable if c.samples == longest or c.sample_time is not None]
     scored: dict[str, list[tuple[int, ColumnInfo, str]]] = {channel: [] for channel in CHANNELS}
+    asked: dict[str, list[ColumnInfo]] = {channel: [] for channel in CHANNELS}
     for column in usable:
         for channel in CHANNELS:
-            score, reason = _score(column, channel)
-            if score >= _LEAST:
+            score, reason, unsure = spoken_for((column.name, *column.names), column.unit, channel)
+            if score >= LEAST and unsure:
+                asked[channel].append(column)
+            elif score >= LEAST:
                 scored[channel].append((score, column, reason))
     channels: dict[str, ColumnInfo] = {}
     reasons: dict[str, str] = {}
@@ -55,8 +53,8 @@ def guess_channels(listing: Listing) -> Guess:
         first = [row for row in free if row[0] == best]
         if len(first) == 1:
             _, channels[channel], reasons[channel] = first[0]
-        elif first:
-            undecided[channel] = tuple(column for _, column, _ in first)
+        elif first or asked[channel]:
+            undecided[channel] = (*(column for _, column, _ in first), *asked[channel])
     order = {channel: channels[channel] for channel in CHANNELS if channel in channels}
     return Guess(order, reasons, _time(listing, longest), undecided)
 
@@ -68,50 +66,6 @@ def _time(listing: Listing, longest: int) -> ColumnInfo | None:
         return named[0]
     even = [c for c in listing.columns if c.rises_evenly and c.samples == longest and c.lowest is not None]
     return even[0] if len(even) == 1 else None
-
-
-def _score(column: ColumnInfo, channel: str) -> tuple[int, str]:
-    """How much speaks for it: words of the name, the unit."""
-    quantity = COMMANDED_QUANTITY.get(channel, channel)
-    words = [word for name in (column.name, *column.names) for word in words_of(name)]
-    if FOREIGN_WORDS & set(words):
-        return 0, ""
-    by_name = max((QUANTITY_WORDS[quantity].get(word, 0) for word in words), default=0)
-    fits = _is_unit_of(column.unit, quantity)
-    if column.unit is not None and not fits and not _converts(column.unit, quantity):
-        return 0, ""
-    others = (held for other, held in QUANTITY_WORDS.items() if other != quantity)
-    if max((held.get(word, 0) for held in others for word in words), default=0) > max(by_name, _LEAST):
-        return 0, ""  # the set value of a position is no velocity command
-    commands = COMMAND_WORDS & set(words)
-    commanded = bool(commands) and (commands != {"r"} or len(set(words)) == 1)
-    measured = bool(MEASURED_WORDS & set(words))
-    score = by_name + (3 if fits else 0)
-    if channel in COMMANDED_QUANTITY:
-        score = score + 3 if commanded else 0
-    elif channel in ("velocity", "position"):
-        score = 0 if commanded else score + (1 if measured else 0)  # a command is no measurement, whatever its unit
-    else:
-        score += 1 if commanded else 0  # what the controller issued rather than what was measured
-    why = [f"its name says {quantity}" if by_name else "", f"its unit is one of {quantity}" if fits else ""]
-    if channel in COMMANDED_QUANTITY and commanded:
-        why.append("its name says that it is a command")
-    return score, ", ".join(filter(None, why))
-
-
-def _is_unit_of(unit: str | None, quantity: str) -> bool:
-    if unit is None or not _converts(unit, quantity):
-        return False
-    # V and 1 stand for many things.
-    return unit.strip().casefold() not in ("v", "mv", "m", "1", "-") or quantity == "position"
-
-
-def _converts(unit: str, quantity: str) -> bool:
-    try:
-        factor(quantity, unit, Constants(1.0, 1.0, 1.0, 1.0))
-    except ReadError:
-        return False
-    return True
 
 
 _VELOCITY_UNITS = ("rad/s", "rpm", "deg/s", "rps", "m/s", "mm/s", "m/min", "mm/min")

@@ -165,7 +165,7 @@ def _refuse(table: Table, column: Column, t: NDArray[np.float64], step: int, dt:
     even = (
         f"cut the log there, or put it on an even axis with {arg('resample', format(dt, '.6g'))}"
         if bridged
-        else "split the log there into two"
+        else f"split the log there into two records, as read_pieces does ({arg('pieces', python='pieces=True')})"
     )
     raise ReadError.at(
         f"{table.path}, {table.place(step + 1 - shift)}",

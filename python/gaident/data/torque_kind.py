@@ -15,7 +15,7 @@ TORQUE_KINDS = (COMMANDED, MEASURED)
 """What a logged torque may be: the controller's command, or a measured current times a constant."""
 
 _BEHIND_ACTUATOR = (MEASURED_WORDS - {"motor", "servo", "real", "est", "estimate", "estimated"}) | {"sensor"}
-_QUADRATURE = frozenset({"iq"})  # a drive's name for the torque-forming current that its transducers see
+_QUADRATURE = frozenset({"iq", "isq"})  # a drive's name for the torque-forming current that its transducers see
 _SYMBOL = re.compile(r"(?:current|torque|strom|moment|trq|tau|iq|i|m|t)(?=\w\w)")
 
 
@@ -46,5 +46,5 @@ def _split(name: str) -> list[str]:
     words = words_of(name)
     cut = [(symbol[0], word[symbol.end() :]) for word in words if (symbol := _SYMBOL.match(word)) is not None]
     behind = [part for symbol, rest in cut if rest in COMMAND_WORDS | _BEHIND_ACTUATOR for part in (symbol, rest)]
-    joined = ["iq" for one, two in pairwise(words) if (one, two) == ("i", "q")]
+    joined = ["iq" for pair in pairwise([word for word in words if word != "axis"]) if pair == ("q", "current")]
     return [*words, *behind, *joined]

@@ -24,6 +24,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.gains import Gains, interval_of_fall
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.errors import GaidentError
+from gaident.estimation.dataset import DataSet
 from gaident.estimation.regression.force_error import FilteredRecords, ForceError, band_of, effects_before_the_shaft
 from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
 from gaident.estimation.term import Term
@@ -69,24 +70,16 @@ class Check:
     regression_better: bool = False
 
 
-def checked(
-    records: Sequence[Record],
-    gains: Gains,
-    model: Model,
-    mechanics: Mapping[str, Estimate],
-    effects: Effects,
-    driven: bool,
-    axis: str = "rotary",
-) -> Check:
+def checked(data: DataSet, gains: Gains, model: Model, mechanics: Mapping[str, Estimate], effects: Effects) -> Check:
     """The check of a diagnosis.
 
-    records: as they were fitted; model: the extended one; mechanics: name -> Estimate; effects: effect -> its parameters;
-    driven: whether a torque drives the simulation, for lack of a controller; axis: rotary or linear.
+    data: the records as they were fitted; model: the extended one; mechanics: name -> Estimate; effects: effect -> parameters.
     """
+    records, driven = [data.as_old(r) for r in data.records], data.open_runs
     nothing = Check(None, None, (), gains.before, gains.after, (), Text(""))
     if not all(r.torque is not None for r in records):
         return nothing
-    found = _regression(records, model, axis)
+    found = _regression(records, model, data.axis)
     before, after, second, better = _forces(records, gains, found)
     if found is None:
         return replace(nothing, before=before, after=after, reason=_reason(effects, driven))
@@ -170,11 +163,12 @@ def _of_diagnosis(mechanics: Mapping[str, Estimate], effects: Effects) -> dict[s
     found |= {name.replace("_", " "): e for name, e in mechanics.items() if name.replace("_", " ") in NONE}
     for effect, parameters in effects.items():
         term = LIBRARY[effect]
-        if term.levels and not term.time_varying:
-            here, elsewhere = _level(parameters), found["dry friction"]  # of both ends of the shaft the sum shows
+        elsewhere = found.get("dry friction")  # of both ends of the shaft the sum shows
+        if term.levels and (term.time_varying or term.beside):  # no one number: it changes in time, or with the load
+            found.pop("dry friction", None)
+        elif term.levels and elsewhere is not None:
+            here = _level(parameters)
             found["dry friction"] = replace(here, value=here.value + elsewhere.value, std=math.hypot(here.std, elsewhere.std))
-        elif term.levels:
-            del found["dry friction"]
         elif _is_gravity(term):
             found["gravity"] = parameters["amplitude"]
     return found

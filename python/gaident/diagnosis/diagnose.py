@@ -3,59 +3,28 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gaident.axis import Text, say
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
-from gaident.diagnosis.check import Check
-from gaident.diagnosis.check import checked as by_second_method
-from gaident.diagnosis.controller.controller_place import as_read, controller_findings
-from gaident.diagnosis.controller.driving import Driving, driving_of
+from gaident.diagnosis.controller.driving import driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
-from gaident.diagnosis.experiments.candidates import candidates, loop_notes
-from gaident.diagnosis.experiments.excitation import excitation
-from gaident.diagnosis.explain.alternatives import alternatives_of
-from gaident.diagnosis.explain.held_out import standing
-from gaident.diagnosis.explain.wording import basis_of, closest, drives_itself, evidence_of, far_off, hidden_by_torque_noise
-from gaident.diagnosis.gains import Gains, measured_gains, with_effects
-from gaident.diagnosis.library.record import findings_of_the_record
-from gaident.diagnosis.library.sides import name_of, sides_of
-from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, in_controller
-from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_order, noise_std_of, records_of
-from gaident.diagnosis.records.folded import ADVICE, folded
-from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation, unexplained
-from gaident.diagnosis.records.sizes import scales_of
-from gaident.diagnosis.selection.attribution import only_describes, shown_by_the_records, simplified, what_is_left
-from gaident.diagnosis.selection.model_space import words
-from gaident.diagnosis.selection.offset import Offset, offset_of
-from gaident.diagnosis.selection.rivals import Replacement
-from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
-from gaident.diagnosis.selection.sensor_age import searched
-from gaident.estimation.dataset import DataSet
-from gaident.estimation.objective import Fit, Objective
-from gaident.estimation.term import Term
-from gaident.estimation.uncertainty import estimates_of
+from gaident.diagnosis.work import Work
 from gaident.identification.identify import identify
-from gaident.identification.notes import open_loop_notes
 from gaident.models.drive_torque import torque_driven
-from gaident.models.model import Model
-from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
-from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 from gaident.results.identification import Identification
-from gaident.version import version
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
+
+ROUNDS = 3  # no decision: work; searches under gains that the one before has shown
 
 
 def diagnose(
@@ -68,6 +37,7 @@ def diagnose(
     seed: int = 0,
     progress: ProgressCallback | None = None,
     axis: str = "rotary",
+    pitch: float | None = None,
 ) -> Diagnosis:
     """Show what the model of an axis gets wrong, name the physical cause where the data allow it, and measure the gain.
 
@@ -95,7 +65,9 @@ def diagnose(
     progress : callable, optional
         Called now and then with (fraction done, message), see `gaident.progress`.
     axis : {"rotary", "linear"}
-        "linear" (m, m/s, N): positions are lengths, and no effect that returns with every turn is tried.
+        "linear" (m, m/s, N): positions are lengths, and what returns with every turn is tried where a `pitch` is given.
+    pitch : float, optional
+        Of a linear axis, the length with which its cogging returns: pitch of the screw or of the poles [m].
 
     Returns
     -------
@@ -128,7 +100,7 @@ def diagnose(
     driven = torque_driven(given, asked.controller)
     kept = () if validation is None else records_of(validation, "validation")
     records, held = driven.records, torque_driven(kept, asked.controller).records if kept else ()
-    checked(records, held, driven.loop, identification, bootstrap, seed, progress, axis)
+    checked(records, held, driven.loop, identification, bootstrap, seed, progress, axis, pitch)
     origin = {r.digest: whole for r, whole in zip((*records, *held), (*given, *kept), strict=True)}
     records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
@@ -142,8 +114,22 @@ def diagnose(
         note(0.02, "identifying the linear model")
         moved, pi = driving.moved, bare_pi(driving.controller)
         idn = identification if identification is not None else identify(list(moved.records), pi, seed=seed)
-        work = _Work(moved.records, moved.held, driving, idn, noise_std, note, axis)
+        work = Work(moved.records, moved.held, driving, idn, noise_std, note, axis, pitch)
         work.search()
+        given_work = work
+        for _ in range(ROUNDS):
+            other = work.other_gains()
+            if other is None:
+                break
+            note(0.03, "once more, under other gains")
+            driving = driving.regained(other)
+            idn = identify(list(moved.records), driving.logged.controller, seed=seed)
+            work = Work(moved.records, moved.held, driving, idn, noise_std, note, axis, pitch)
+            work.search()
+        if work is not given_work and (stands := work.under_given()) is not None:
+            # What was found under other gains explains the records under the given ones as well.
+            work, driving = given_work, given_work.driving
+            work.settle(stands)
         result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
         result = moved.noted(result)
         answered = work.at_controller.decided or any(f.place == "controller" for f in result.findings)
@@ -154,247 +140,3 @@ def diagnose(
             space = work.found.space
             result = with_p_value(result, space, work.base, work.final, bootstrap, seed, lambda message: note(None, message))
     return replace(result, seconds=time.perf_counter() - began)
-
-
-class _Judged(NamedTuple):
-    """What is reported of a search: figures, what the error that is left depends on, effects that count, all numbers."""
-
-    gains: Gains
-    driver: str | None
-    causes: list[str]
-    estimates: dict[str, dict[str, Estimate]]
-    offset: Offset | None
-    mechanics: dict[str, Estimate]
-    model: Model
-    check: Check
-
-
-@dataclass
-class _Work:
-    """One diagnosis on its way."""
-
-    records: tuple[Record, ...]
-    held: tuple[Record, ...]
-    driving: Driving
-    idn: Identification
-    noise: float | None
-    note: Note
-    axis: str
-
-    def __post_init__(self) -> None:
-        self.controller = self.driving.controller
-        self.pi = bare_pi(self.controller)
-        self.notes: list[Text] = list(self.driving.logged.notes)
-        if self.controller is None or self.pi is not None:
-            self.notes += open_loop_notes(self.records, self.pi)
-        hit = [left_out(r, self.idn.model, self.pi) for r in self.records]
-        clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
-        self.clean = tuple(clean)
-        self.step = quantisation(self.records)
-        whole = self.driving.read
-        read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, hit, strict=True)], self.controller)
-        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis)
-        self.scales = scales_of(data)
-        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.driving.logged.replays)
-        self.notes += notes
-        self.controller_steps += (*self.driving.logged.findings, *self.driving.findings)
-        # Limits that the log shows act in every loop that is closed for a fit.
-        limits = self.at_controller.effects
-        known: dict[Term, NDArray[np.float64]] = {
-            t: np.array(list(limits[t.name].values())) for t in in_controller() if t.name in limits
-        }
-        shown = self.at_controller.controller or self.controller
-        self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
-        data = replace(
-            data, controller=shown, loop_follows=self.follows, from_rest=self.driving.from_rest, known_noise=self.noise
-        )
-        self.data = data if self.at_controller.controller is not None else data.with_effects(known)
-        self.excited = excitation(self.clean, self.data.loop, axis=self.axis)
-        kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
-        self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
-
-    def search(self) -> None:
-        """The selected model, its rivals, what is left."""
-        allowed, self.not_testable = candidates(self.records, self.clean, self.data, self.excited, self.at_controller)
-        self.notes += [ADVICE] * any(folded(r) for r in self.records)
-        self.notes += loop_notes(self.data)
-        rest = self.scales, self.idn.model, allowed, self._equivalent_here, self._say
-        found, older = searched(self.objective, self.scales, self.idn.model, lambda objective: selected(objective, *rest))
-        self.notes += older
-        self.note(0.85, "looking for what is left")
-        self.take(found)
-        simpler = simplified(found.space, found.final, self.left)
-        if simpler is not found.final:
-            self.take(compared(found, simpler, self._equivalent_here, self._say))
-
-    def _say(self, message: str) -> None:
-        self.note(None, message)
-
-    def take(self, found: Selection) -> None:
-        """The result of a search, and what it leaves."""
-        self.found, self.base, self.rivals = found, found.base, found.rivals
-        self.data, self.objective = found.space.data, found.space.objective
-        self._settle(found.final)
-
-    def _settle(self, final: Fit) -> None:
-        self.final = final
-        self.adequate, self.left = what_is_left(self.found.space, final)
-        self.under, self.estimate = self.found.estimated()
-
-    def judged(self) -> _Judged:
-        """What is shown, and what it gains; where no effect is, that of a search by whitened errors instead."""
-        while True:
-            said = list(self.notes)
-            self.notes += basis_of(self.found)
-            gains = self._accepted_gains()
-            driver = self.left.driver if self.adequate else self.left.strongest
-            adds_up = self.data.slower and not self.data.loopable  # what the torque lacks between the lines of the log
-            beyond = gains.after.rmse / floor if (floor := gains.floor) > 0.0 else 0.0
-            if driver is None and not adds_up and beyond > POLICY.free_run_ratio:
-                # A noise filter removes a slow misfit completely; the free run shows it.
-                driver = self.left.strongest or "time"
-                self.notes.append(far_off(beyond))
-            if driver is None and self.data.torque_measured and not gains.closed:
-                self.notes.append(hidden_by_torque_noise(floor))
-            causes = [e for e in self.final.effects if not self._only_describes(e, driver)]
-            estimates = estimates_of(self.under, self.estimate)
-            causes = [e for e in causes if self._determined(e, estimates[e])]
-            mechanics = mechanics_of(self.under, self.estimate)
-            model = with_effects(self.estimate.parameters.model(self.estimate.x), self.at_controller.effects)
-            check = by_second_method(self.clean, gains, model, mechanics, estimates, self.data.open_runs, self.axis)
-            causes, why = standing(causes, gains, check, self._equivalent_here)
-            if why:
-                driver = driver or self.left.strongest or "time"
-                self.notes += why
-            instead = None if causes else by_whitened_errors(self.found, self._equivalent_here, self._say)
-            if instead is None:
-                return _Judged(gains, driver, causes, estimates, offset_of(self.found.space, self.final), mechanics, model, check)
-            self.notes = said
-            self.take(instead)
-
-    def report(self, seed: int) -> Diagnosis:
-        """Everything the user sees."""
-        self.note(0.9, "measuring the gain")
-        gains, driver, causes, estimates, offset, mechanics, model, check = self.judged()
-        spoiled = unexplained(self.data.velocity, self.objective.error(self.final), self.objective.weight)
-        findings = findings_of_the_record(spoiled, sum(len(r) for r in self.records), self.step)
-        findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
-        for effect in causes:
-            gain, rivals = self.rivals[effect]
-            alternatives = self._alternatives(effect, rivals, offset)
-            sides = sides_of(effect, [r.effect for r in rivals], masses := self.final.parameters.masses)
-            said_by = evidence_of(effect, gain, alternatives, offset, sides if masses > 1 else ())
-            what = name_of(effect), estimates[effect], alternatives, gains.of(effect), gain, None, said_by, False
-            findings.append(Finding(*what, LIBRARY[effect].place, sides))
-        if driver is None and (damping := negative_damping(mechanics)) is not None:
-            driver = "velocity"
-            self.notes.append(drives_itself(damping))
-        real = [f for f in findings if not f.is_noise]
-        answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
-        if driver is None:
-            verdict = "explained" if real else "adequate"
-        else:
-            verdict = "partly explained" if real else "unexplained"
-            dropped = [e for e in self.final.effects if e not in causes]
-            if dropped:
-                shown = driver if self.left.gains[driver] > self.left.needed else None
-                self.notes.append(closest(dropped, shown, bool(real)))
-        self.notes += check.notes
-        if self.final.parameters.held and any(LIBRARY[e].constant for e in self.final.effects):
-            self.notes.append(
-                Text("The axis is held by a spring: its tension where the record starts is part of the constant load.")
-            )
-        ambiguous = [f for f in real if f.alternatives]
-        proposal = None
-        if ambiguous:
-            self.note(0.95, "proposing the next experiment")
-            from gaident.diagnosis.experiments.next_experiment import propose
-
-            elsewhere = self.at_controller.effects
-            proposal, notes = propose(ambiguous, self.rivals, self.final, self.data, self.objective.count, elsewhere)
-            self.notes += notes
-        return Diagnosis(
-            verdict=verdict,
-            findings=tuple(findings),
-            not_testable=self.not_testable,
-            model=model if self.final.effects or self.at_controller.effects or self.data.slower else self.idn.model,
-            before=check.before,
-            after=check.after,
-            driver=driver,
-            next_experiment=proposal,
-            gain_interval=gains.interval,
-            held_out=gains.held_out,
-            base_shift=base_shift(self.base, self.estimate),
-            left=self.left.gains,
-            left_needed=self.left.needed,
-            line=self.left.line if driver == "time" else None,
-            one_sided={e: sizes for e, sizes in self.excited.one_sided.items() if e not in answered},
-            mechanics=mechanics,
-            regression=check.regression,
-            regression_force_error=check.force_error,
-            comparisons=check.comparisons,
-            force_reason=check.reason,
-            notes=tuple(self.notes),
-            identification=self.idn,
-            controller=self.controller,
-            seed=seed,
-            seconds=0.0,
-            simulations=self.objective.counter.simulations,
-            samples=sum(self.data.lengths),
-            digests=tuple(r.digest for r in self.records),
-            validation_digests=tuple(r.digest for r in self.held),
-            torque_logged=self.data.torque_logged,
-            loop_follows=self.follows,
-            version=version(),
-            axis=self.axis,
-            records=self.records,
-            validation_records=self.held,
-        )
-
-    def _accepted_gains(self) -> Gains:
-        """The gains, once every effect that makes held-out data worse is out of the model."""
-        while True:
-            gains = measured_gains(
-                self.clean,
-                self.held,
-                self.controller,
-                self.idn.model,
-                self.estimate,
-                self.under,
-                self.noise,
-                self.at_controller.effects,
-            )
-            if not gains.harmful:
-                return gains
-            effect = gains.harmful[-1]
-            text = "{} would come closer to these records, but makes the held-out data worse: it is not accepted."
-            self.notes.append(say(text, words([effect]).capitalize()))
-            self.take(compared(self.found, self.found.space.without(self.final, effect), self._equivalent_here, self._say))
-
-    def _alternatives(self, effect: str, rivals: Sequence[Replacement], offset: Offset | None) -> tuple[str, ...]:
-        """Rivals, equivalent effects and, where the loop is not the drive's, the controller; no untestable ones."""
-        shown = shown_by_the_records(self.found.space, self.final, effect)
-        here = sorted(self._equivalent_here(effect))
-        names = alternatives_of(effect, rivals, here, bool(shown), offset, not (self.data.slower and self.driving.in_doubt))
-        return tuple(n for n in dict.fromkeys(map(name_of, names)) if n != name_of(effect) and n not in self.not_testable)
-
-    def _only_describes(self, effect: str, driver: str | None) -> bool:
-        of_class = bool(self._equivalent_here(effect))
-        return only_describes(self.found.space, self.final, effect, self.rivals[effect][0], driver, self.left, of_class)
-
-    def _equivalent_here(self, effect: str) -> set[str]:
-        """What these records cannot tell from an effect, whatever their noise, for lack of reversals or of sizes of steps."""
-        e = self.excited
-        # Speeds held in either direction, in whichever record, split what a reversal splits.
-        turns = max(e.reversals, int(min(e.speeds, default=0.0) < 0.0 < max(e.speeds, default=0.0)))
-        classes = conditional_classes(turns, len(e.steps), self.data.torque_logged)
-        effect = name_of(effect)
-        return set().union(*(c for c in classes if effect in c)) - {effect} - set(self.not_testable)
-
-    def _determined(self, effect: str, parameters: Mapping[str, Estimate]) -> bool:
-        """Whether the records say how large an effect is; else its name would rest on nothing, and a note says so."""
-        if any(e.identifiable and not e.at_bound for e in parameters.values()):
-            return True
-        text = "{} comes closer to these records, but they do not determine one of its parameters: it is not named."
-        self.notes.append(say(text, words([effect]).capitalize()))
-        return False

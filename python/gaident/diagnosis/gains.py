@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
-from gaident.diagnosis.controller.replay import stored_torque
 from gaident.diagnosis.records.hygiene import quantisation
 from gaident.estimation.criterion import effective_samples
 from gaident.estimation.dataset import DataSet
@@ -26,7 +25,7 @@ from gaident.estimation.prediction import torque_noise_in
 from gaident.models import simulate
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
-from gaident.models.starts import noise_std, starts_moving
+from gaident.models.starts import noise_std, starts_moving, stored_torque
 from gaident.policy.table import POLICY
 from gaident.results.fitness import Fitness
 
@@ -88,7 +87,8 @@ def measured_gains(
     at_controller: dict[str, dict[str, float]],
 ) -> Gains:
     """Errors of the linear model, of each stage and of the extended model, closed over the controller where they can be."""
-    controller = objective.data.older(closed_over(controller, (*records, *held)))
+    loop = closed_over(controller, (*records, *held))
+    controller = objective.data.older(loop)
     part: tuple[int, ...] | None
     if held:
         scored, words, part = [(r, 0) for r in held], "validation records", None
@@ -99,7 +99,7 @@ def measured_gains(
         words = f"the last 30 % of {'the record' if by_time else 'its path'}, parameters fitted to the first 70 %"
     else:
         scored, words, part = [(r, 0) for r in records], IN_SAMPLE, None
-    scored = [(_turned(r, controller, final), first) for r, first in scored]
+    scored = [(_turned(r, loop, final), first) for r, first in scored]
     stages = _stages(final, objective, part)
     named = list(at_controller.items())
     bare = stages[0].parameters.model(stages[0].x)
@@ -109,8 +109,8 @@ def measured_gains(
     chain += [with_effects(f.parameters.model(f.x), at_controller) for f in stages[1:]]
     # Where the simulated loop is known not to be the drive's, the torque drives the models that are compared and printed.
     driver = controller if objective.data.loop_follows or not objective.data.torque_logged else None
-    if driver is None and objective.data.age:
-        scored = [(objective.data.as_old(r), first) for r, first in scored]
+    shaft = [(objective.data.as_old(r), first) for r, first in scored]
+    scored = shaft if driver is None else scored
     errors = [free_run_errors(m, scored, driver) for m in chain]
     levels = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in errors]
     base = free_run_errors(stages[0].parameters.model(stages[0].x), scored, driver)
@@ -148,7 +148,7 @@ def measured_gains(
         interval=interval_of_fall(errors[0], errors[-1]),
         held_out=words,
         steps=steps,
-        scored=tuple(scored),
+        scored=tuple(shaft),
         mechanism=bare,
         extended=chain[-1],
         closed=driver is not None,

@@ -151,6 +151,8 @@ class _Draft:
                 'or "linear": m, m/s, N, kg' if self.axis == "rotary" else 'or "rotary"',
             )
         ]
+        if self.axis == "linear":
+            lines.append(_line('# pitch = "24 mm"', "with which a cogging returns: pitch of the screw, or of the poles"))
         time = self.guess.time
         if time is None and self.dt is None:
             lines.append(self._todo("# dt = 1e-3", "dt", "s; no column looks like time"))
@@ -201,20 +203,30 @@ class _Draft:
         ]
         # no decision: how many columns a remark names
         others = f"; the log also holds {', '.join(map(_quoted, rest[:8]))}" if rest else ""
-        either = " or ".join(_quoted(c.name) for c in self.guess.undecided.get("velocity", ()))
-        if "velocity" not in self.guess.channels and either:
-            lines.append(self._todo('# velocity = "..."', "velocity", f"the measured velocity, not its command: {either}?"))
-        elif "velocity" not in self.guess.channels and "position" not in self.guess.channels:
-            lines.append(self._todo('# velocity = "..."', "velocity", f"the measured velocity (or position = ...){others}"))
-        if "command" not in self.guess.channels:
-            needed = "torque" not in self.guess.channels
-            text = f"the velocity command, for closed loop{others}"
-            lines.append(self._todo('# command = "..."', "command", text) if needed else _line('# command = "..."', text))
-        if "torque" not in self.guess.channels:
-            needed = "command" not in self.guess.channels
-            text = f"the controller's {word('torque', self.axis)} (or current), for open loop{others}"
-            lines.append(self._todo('# torque = "..."', "torque", text) if needed else _line('# torque = "..."', text))
+        if not self.guess.channels.keys() & {"velocity", "position"}:
+            either = self._either("velocity", "position")
+            text = f", not its command: {either}" if either else f" (or position){others}"
+            lines.append(self._todo('# velocity = "..."', "velocity", f"the measured velocity{text}"))
+        for channel, other, text in (
+            ("command", "torque", "the velocity command, for closed loop"),
+            ("torque", "command", f"the controller's {word('torque', self.axis)} (or current), for open loop"),
+        ):
+            if channel not in self.guess.channels:
+                either = self._either(channel)
+                told = f"{text}: {either}" if either else f"{text}{others}"
+                needed = bool(either) or other not in self.guess.channels
+                line = f'# {channel} = "..."'
+                lines.append(self._todo(line, channel, told) if needed else _line(line, told))
+        for channel in ("position", "position_command"):
+            if channel not in self.guess.channels and (either := self._either(channel)):
+                lines.append(_line(f'# {channel} = "..."', either))
         return lines
+
+    def _either(self, *channels: str) -> str:
+        """The columns of which one may be the channel, where only the user knows; "" where there are none."""
+        names = dict.fromkeys(c.name for channel in channels for c in self.guess.undecided.get(channel, ()))
+        free = [name for name in names if name not in {c.name for c in self.guess.channels.values()}]
+        return f"{' or '.join(map(_quoted, free))}?" if free else ""
 
     def _units(self) -> list[str]:
         lines = []

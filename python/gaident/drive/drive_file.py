@@ -13,6 +13,7 @@ from typing import Any
 
 from gaident.checks import known_keys, one_of
 from gaident.control.controller import Controller
+from gaident.data.pieces import read_pieces
 from gaident.data.readers import read
 from gaident.data.record import CHANNELS, Record
 from gaident.drive import kinds
@@ -37,6 +38,7 @@ RANGES = ("inertia", "resonance_hz", "damping", "gain", "real", "imaginary", "p"
 KEYS: dict[str, dict[str, kinds.Check]] = {
     "": {
         "axis": kinds.axis,
+        "pitch": kinds.length,
         "dt": kinds.number,
         "velocity_cutoff_hz": kinds.number,
         **dict.fromkeys(CONSTANTS, kinds.number),
@@ -45,6 +47,9 @@ KEYS: dict[str, dict[str, kinds.Check]] = {
         "torque_is": kinds.torque_is,
         "decimate": kinds.whole,
         "resample": kinds.positive,
+        "from": kinds.number,
+        "to": kinds.number,
+        "pieces": kinds.yes_or_no,
         "delimiter": kinds.text,
         "decimal": kinds.text,
         "skip": kinds.whole,
@@ -61,6 +66,8 @@ KEYS: dict[str, dict[str, kinds.Check]] = {
         "bits": kinds.whole,
     },
     "limits": dict.fromkeys(("speed", "torque", "travel", "duration"), kinds.positive),
+    "show": dict.fromkeys(("velocity", "torque", "position"), kinds.text),
+    "report": dict.fromkeys(("date", "machine", "customer", "text"), kinds.text),
 }
 
 
@@ -75,6 +82,8 @@ class Drive:
     space_values: Mapping[str, Any]
     limit_values: Mapping[str, Any] = field(default_factory=dict)
     shift: Mapping[str, int] = field(default_factory=dict)
+    show: Mapping[str, str] = field(default_factory=dict)
+    about: Mapping[str, str] = field(default_factory=dict)
     unfilled: Mapping[tuple[str, str], str] = field(default_factory=dict)  # (section, key) -> file and line, see `unfilled_of`
 
     @property
@@ -82,22 +91,48 @@ class Drive:
         """ "rotary" or "linear": which units are printed."""
         return str(self.general.get("axis", "rotary"))
 
+    @property
+    def units_shown(self) -> dict[str, Any]:
+        """The units of [show] with the constants that they need; {} where none are asked for."""
+        return {**self.show, **{key: self.general[key] for key in CONSTANTS if key in self.general}} if self.show else {}
+
+    @property
+    def pitch(self) -> float | None:
+        """Of a linear axis, the length with which its cogging returns [m]; None: not known."""
+        return self.general.get("pitch")
+
     def read(self, path: str, measured: bool = True) -> Record:
-        """The log as a Record; measured: as `gaident.read` takes it. Raises ReadError or RecordError.
+        """The log as one Record. Raises ReadError or RecordError, and SettingsError where its pieces are several."""
+        found = self.records(path, measured)
+        if len(found) > 1:
+            raise SettingsError(
+                f"{path}: --pieces makes {len(found)} records of it, where one is needed; name a part: --from, --to"
+            )
+        return found[0]
+
+    def records(self, path: str, measured: bool = True) -> list[Record]:
+        """The log as a Record, or the pieces around its gaps; measured: as `gaident.read` takes it.
+
+        Raises ReadError or RecordError.
 
         A CSV that gaident wrote itself, of a proposed command, names its columns and units: the drive's are those of its logs.
         """
         if not measured and _is_proposal(path) and not {"command", "command [rad/s]", "command [m/s]"} & {*self.columns.values()}:
-            return read(path, measured=False)
+            return [read(path, measured=False)]
         columns = {k: None if v == "" else v for k, v in self.columns.items()}
         left_out = {k for k, v in columns.items() if v is None}
-        not_read = {"axis", "dt"} | ({"torque_is"} if "torque" in left_out else set())
+        not_read = {"axis", "pitch", "dt", "from", "to", "pieces"} | ({"torque_is"} if "torque" in left_out else set())
         more = {k: v for k, v in self.general.items() if k not in not_read}
         asked = [k for k in (*CHANNELS, *([] if "dt" in self.general else ["time"])) if k not in left_out]
         self._refuse_unfilled("units", asked, "or give it with --units CHANNEL=UNIT")
         units = {k: v for k, v in self.units.items() if k not in left_out}
         shift = {k: v for k, v in self.shift.items() if k not in left_out}
-        return read(path, columns or None, units or None, self.general.get("dt"), measured=measured, shift=shift, **more)
+        asked_for = (columns or None, units or None, self.general.get("dt"))
+        more |= {"measured": measured, "shift": shift}
+        start, stop, pieces = (self.general.get(key) for key in ("from", "to", "pieces"))
+        if pieces or start is not None or stop is not None:
+            return read_pieces(path, *asked_for, start=start, stop=stop, pieces=bool(pieces), **more)
+        return [read(path, *asked_for, **more)]
 
     def controller(self) -> Controller | None:
         """The controller; None: open loop. Raises ControllerError where half of it is missing."""

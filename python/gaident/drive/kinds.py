@@ -6,12 +6,14 @@ from collections.abc import Callable, Sequence
 
 from gaident.axis import AXES
 from gaident.checks import one_of, real_number
+from gaident.data.formats.units import factor
 from gaident.data.record import CHANNELS
 from gaident.data.torque_kind import TORQUE_KINDS
 from gaident.errors import ReadError
 
 __all__ = [
-    *("Check", "axis", "channels", "column", "number", "pair", "pair_or_one", "positive", "text", "torque_is", "unit", "whole"),
+    *("Check", "axis", "channels", "column", "length", "number", "pair", "pair_or_one", "positive", "text"),
+    *("torque_is", "unit", "whole", "yes_or_no"),
 ]
 
 Check = Callable[[object, str], object]
@@ -26,6 +28,12 @@ def number(value: object, name: str) -> float:
 def whole(value: object, name: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise ReadError(f"{name} is {value!r}: give a whole number")
+    return value
+
+
+def yes_or_no(value: object, name: str) -> bool:
+    if not isinstance(value, bool):
+        raise ReadError(f"{name} is {value!r}: give true or false, without quotes")
     return value
 
 
@@ -72,6 +80,17 @@ def positive(value: object, name: str) -> float:
     if not found > 0.0:
         raise ReadError(f"{name} is {value!r}: give a number > 0")
     return found
+
+
+def length(value: object, name: str) -> float:
+    """A length in m; with its unit, "24 mm", too."""
+    if isinstance(value, str):
+        number_, _, unit_ = value.strip().partition(" ")
+        try:
+            return positive(float(number_) * factor("position", unit_.strip()), name)
+        except (ValueError, ReadError):
+            raise ReadError(f'{name} is {value!r}: give a length in m, or with its unit, "24 mm"') from None
+    return positive(value, name)
 
 
 def axis(value: object, name: str) -> str:

@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import TURN, period_of
 from gaident.control.cascade import cascade_of
 from gaident.control.controller import Controller, Limiting
 from gaident.control.filtering import rate_limited
@@ -26,7 +27,7 @@ from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.term import Term
 from gaident.models.drive_torque import late, torque_of
 from gaident.models.simulate_many import LoadedRecord
-from gaident.models.starts import noise_std, starts_moving
+from gaident.models.starts import noise_std, starts_moving, stored_torque
 
 __all__ = ["DataSet", "with_angle"]
 
@@ -46,8 +47,8 @@ class DataSet:
     as the controller read them, which may hold samples that the fit leaves out. finest: no substep of a simulation is much
     shorter [s]; resolution: step of the lattice that all velocities lie on [rad/s], 0: none; known_noise: standard deviation
     of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
-    makes; from_rest: whether its integrator held no torque before a record; torque_measured: whether it is a measured one, with
-    noise on it, behind the actuator; axis: "rotary" or "linear".
+    makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear".
+    period: with which returns what is tied to the place [rad, m], of which orders count; None: not known.
     age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample old. What
     drives a model is late by as much, here and in the loop that is simulated.
     """
@@ -64,9 +65,9 @@ class DataSet:
     resolution: float = 0.0
     known_noise: float | None = None
     loop_follows: bool = True
-    from_rest: bool = True
     torque_measured: bool = False
     axis: str = "rotary"
+    period: float | None = TURN
     age: float = 0.0
 
     @classmethod
@@ -78,6 +79,7 @@ class DataSet:
         read: Sequence[Record] | None = None,
         resolution: float = 0.0,
         axis: str = "rotary",
+        pitch: float | None = None,
     ) -> DataSet:
         """The records as driven by their torque; spoiled: some velocities are not what the controller read."""
         driven = tuple(_driven(r, torque_of(r, bare_pi(controller))) for r in records)
@@ -87,7 +89,12 @@ class DataSet:
         seen = tuple(records if read is None else read)
         measured = any(r.torque_is == MEASURED for r in records)
         found = cls(tuple(records), controller, driven, turned, free, moving, spoiled, seen, resolution=resolution)
-        return replace(found, torque_measured=measured, axis=axis)
+        return replace(found, torque_measured=measured, axis=axis, period=period_of(axis, pitch))
+
+    def under(self, controller: PI) -> DataSet:
+        """The same records, whose torque is not logged, under a PI with other gains."""
+        driven = tuple(_driven(r, torque_of(r, controller)) for r in self.records)
+        return replace(self, controller=controller, driven=driven, free=_freed(self.records, driven))
 
     def aged(self, lines: float) -> DataSet:
         """The same with a measured velocity that is so many lines of the log old."""
@@ -105,14 +112,20 @@ class DataSet:
 
         That is the mean of the velocities at the ends of a line; `gaident.estimation.mean_velocity` has what is nearer.
         """
-        torque = torque_in(rec)
-        return rec.with_channels(torque=late(torque, self.age, torque[0] if starts_moving(rec, None) else 0.0))
+        if not self.age or rec.torque is None:
+            return rec
+        start = rec.torque[0] if starts_moving(rec, None) else 0.0
+        return rec.with_channels(torque=late(rec.torque, self.age, start))
 
     def ready(self, rec: Record) -> Record:
         """A record whose simulation `seen` takes for the velocity that the sensor shows."""
         if not self.age:
             return rec
-        return with_middles(rec) if self.differenced else self.as_old(rec)
+        if not self.differenced:
+            return self.as_old(rec)
+        if rec.position is not None and self.records[0].position is None:  # integrated from the velocity, the angle is as old
+            rec = rec.with_channels(position=rec.position + self.age * self.dt * rec.velocity)
+        return with_middles(rec)
 
     def seen(self, rows: Matrix) -> Matrix:
         """Rows of velocities that the sensor shows, of those that a record made `ready` gives."""
@@ -164,6 +177,11 @@ class DataSet:
             return False
         loop = self.loop
         return all(loop.command_of(r) is not None for r in self.records)
+
+    @cached_property
+    def from_rest(self) -> bool:
+        """Whether the integrator held no torque before any of the records."""
+        return self.pi is None or not any(stored_torque(r, self.pi) for r in self.records)
 
     @cached_property
     def loop(self) -> Controller | None:

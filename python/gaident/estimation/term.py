@@ -6,7 +6,7 @@ What it has to know of one is data of its `Term`; the terms themselves stand in 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -55,7 +55,8 @@ class Term:
     natural: coordinates (n, k) -> parameters (n, m) in the order of the effects table; coordinates: its inverse for one vector.
     limits, starts: bounds (k pairs) and start rows for given scales. steps: size of each coordinate that makes a difference; 0
     for one that is chosen by search, not by slope (an order). nested: names of simpler effects that this one contains.
-    family: of effects that exclude each other in one model, "" for none; excludes: names of others that it does not stand beside.
+    family: of effects that exclude each other in one model, "" for none; excludes: names of others that it does not stand beside;
+    beside: names of others of which it needs one in the model, on whose torque its own depends; empty where it needs none.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Term:
     shared: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  # nested effect -> its coordinates here; else the first
     family: str = ""
     excludes: frozenset[str] = frozenset()
+    beside: frozenset[str] = frozenset()
     harmonic: str = ""  # "torque" or "velocity": phase and size follow from two columns per order of the angle
     orders: tuple[int, int] = (1, 1)  # lowest and highest order of a harmonic
     neutral: Callable[[float, Scales], tuple[float, ...]] | None = None  # the nested effect of this level as this one
@@ -85,6 +87,10 @@ class Term:
     other_side: str = ""  # name of the same effect at the other end of the shaft
     at_load: bool = False  # of two masses: it acts there
     curve: Callable[[Vector, Mapping[str, float]], Vector] | None = None  # static torque at velocities [rad/s], as friction
+
+    def stands_with(self, effects: Iterable[str]) -> bool:
+        """Whether a model with these effects holds what its torque depends on."""
+        return not self.beside or not self.beside.isdisjoint(effects)
 
     @cached_property
     def size(self) -> int:

@@ -108,6 +108,8 @@ static double gaident_dry(const gaident_shaft *k, gaident_shaft_memory *s, doubl
     f.drag = k->quadratic_drag.coefficient;
     if (k->effects & GAIDENT_FRICTION_DRIFT)
         gaident_add_level(&f, k->friction_drift.torque * fmax(1.0 + k->friction_drift.rate * t, 0.0));
+    if (k->effects & GAIDENT_LOAD_DEPENDENT_FRICTION)
+        gaident_add_level(&f, k->load_dependent_friction.torque + k->load_dependent_friction.share * fabs(s->braking));
     if (k->effects & GAIDENT_STRIBECK_FRICTION) gaident_stribeck(k, s, &f);
     if (k->effects & GAIDENT_PRESLIDING_FRICTION) gaident_presliding(k, s, h, &f);
     if (k->effects & GAIDENT_LUGRE_FRICTION) gaident_lugre(k, s, h, &f);
@@ -195,7 +197,8 @@ static void gaident_masses(const gaident_drive *k, gaident_memory *s, double T, 
     double free[3], end[3], load[3], T_load, now, mean, w_next, w_next_load;
     int i;
     for (i = 0; i < 3; ++i) load[i] = k->motor[i] + k->coupling[i];
-    T_load = -gaident_braking(&k->at_load, s->angle + 0.5 * k->h * s->x[1] - x0);
+    s->at_load.braking = gaident_braking(&k->at_load, s->angle + 0.5 * k->h * s->x[1] - x0);
+    T_load = -s->at_load.braking;
     for (i = 0; i < 3; ++i) {
         free[i] = s->x[i] + k->phi[3 * i] * s->x[0] + k->phi[3 * i + 1] * s->x[1] + k->phi[3 * i + 2] * s->x[2];
         free[i] += k->motor[i] * T + load[i] * T_load;
@@ -287,7 +290,8 @@ static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, do
             s->torque_lag.T = T + gap * k->torque_lag.decay;
             T += gap * k->torque_lag.mean;
         }
-        T -= gaident_braking(&k->at_motor, s->theta);
+        s->at_motor.braking = gaident_braking(&k->at_motor, s->theta);
+        T -= s->at_motor.braking;
         s->theta = s->angle + 1.5 * k->h * w;
         if (k->two_masses) gaident_masses(k, s, T, s->time + 0.5 * k->h);
         else gaident_observer(k, s, T, s->time + 0.5 * k->h);

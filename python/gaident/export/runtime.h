@@ -29,8 +29,10 @@ enum { /* the effects that act */
     GAIDENT_VELOCITY_RIPPLE = 1 << 18,
     GAIDENT_VELOCITY_QUANTISATION = 1 << 19,
     GAIDENT_LUGRE_FRICTION = 1 << 20,
+    GAIDENT_LOAD_DEPENDENT_FRICTION = 1 << 21,
     GAIDENT_DRY = GAIDENT_COULOMB_FRICTION | GAIDENT_STRIBECK_FRICTION | GAIDENT_ASYMMETRIC_FRICTION |
-                  GAIDENT_PRESLIDING_FRICTION | GAIDENT_LUGRE_FRICTION | GAIDENT_QUADRATIC_DRAG | GAIDENT_FRICTION_DRIFT
+                  GAIDENT_PRESLIDING_FRICTION | GAIDENT_LUGRE_FRICTION | GAIDENT_QUADRATIC_DRAG |
+                  GAIDENT_FRICTION_DRIFT | GAIDENT_LOAD_DEPENDENT_FRICTION
 };
 
 typedef struct { /* what acts at one end of the shaft */
@@ -45,6 +47,7 @@ typedef struct { /* what acts at one end of the shaft */
     struct { double amplitude, phase; } unbalance;
     struct { double amplitude, order, phase; } cogging;
     struct { double torque, rate; } friction_drift;
+    struct { double torque, share; } load_dependent_friction;
 } gaident_shaft;
 
 typedef struct {
@@ -82,6 +85,7 @@ typedef struct {
 
 typedef struct {
     double friction; /* of the substep before [N m] */
+    double braking;  /* what the torques there brake with in this one [N m] */
     struct { double w_before; } stribeck_friction;
     gaident_bristle presliding_friction;
     struct { gaident_bristle bristle; double w_before; } lugre_friction;

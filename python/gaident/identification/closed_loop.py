@@ -2,32 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import TORQUE
 from gaident.axis import Text, say
-from gaident.control.cascade import cascade_of
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.errors import RecordError
-from gaident.identification.controller_numbers import Numbers, with_estimates
-from gaident.identification.logged_torque import not_followed
+from gaident.identification.logged_torque import corrected, not_followed
 from gaident.identification.space import derive_space
-from gaident.models.drive_torque import torque_driven
+from gaident.models.drive_torque import straight_driven, torque_driven
 from gaident.models.search_space import SearchSpace
 from gaident.models.starts import starts_moving
+from gaident.results.estimate import Estimate
 
 __all__ = ["Looped", "input_of", "line_equation", "looped_over", "space_of", "with_torque"]
 
 Vector = NDArray[np.float64]
 
-WITH_OTHER_GAINS = Text("With other gains it does: these are used instead of the given ones.")
 NOT_THE_LOOP = say(
     "So the loop is not closed over it: the logged {torque} drives the model. Give all of the controller, filters and limits "
     "too; a diagnosis looks for its form."
@@ -36,38 +33,36 @@ USUAL_POLES = 6  # no decision: p + q of the largest structure of a derived spac
 
 
 class Looped(NamedTuple):
-    """Records, the controller that the loop is closed over, None where their torque drives the model, and notes on that."""
+    """Records, the controller that the loop is closed over, None where their torque drives the model, and notes on that.
+
+    estimates: of numbers of the controller that are not the given ones.
+    """
 
     records: list[Record]
     controller: Controller | None
     notes: tuple[Text, ...] = ()
+    estimates: Mapping[str, Estimate] = {}
 
 
 def looped_over(records: Sequence[Record], controller: Controller | None, space: object, from_rest: bool = True) -> Looped:
     """What an identification of the records does under a controller; space: the search space, or None. Raises RecordError.
 
     from_rest: False: every record has a start state of its own, which the equation from line to line has not.
-    Where a logged torque shows that a controller faster than the log is not the drive's, its gains are those that the torque
-    shows or, where it does not follow from these either, the torque drives the model.
+    Where a logged torque shows that a controller faster than the log is not the drive's, one number of it is what the torque
+    shows or, where it does not follow with any one, the torque drives the model, straight between the lines.
     """
     doubts = not_followed(records, controller)
     if from_rest and line_equation(records, controller, space if isinstance(space, SearchSpace) else None):
         if not doubts or any(r.torque is None for r in records):
             return Looped(list(records), controller, doubts)
         assert controller is not None  # else there were no doubt
-        if (other := _with_other_gains(records, controller)) is not None:
-            return Looped(list(records), other.controller, (*doubts, WITH_OTHER_GAINS, *other.notes))
-        doubts = (*doubts, NOT_THE_LOOP)
+        if (other := corrected(records, controller)) is not None:
+            return Looped(list(records), other.controller, (*doubts, other.note), other.estimates)
+        straight = [straight_driven(r, controller).with_channels(command=None) for r in records]
+        return Looped(straight, None, (*torque_driven(records, controller).notes, *doubts, NOT_THE_LOOP))
     driven = torque_driven(records, controller)
     given = [r.with_channels(command=None) for r in driven.records] if driven.slower else list(driven.records)
     return Looped(given, driven.loop, (*driven.notes, *driven.doubts, *doubts))
-
-
-def _with_other_gains(records: Sequence[Record], controller: Controller) -> Numbers | None:
-    """The controller with the kp and ki that the logged torques show, where they follow from it then; else None."""
-    cascade, unknown = cascade_of(controller), dict[str, Any](kp=None, ki=None)
-    numbers = with_estimates(records, replace(cascade, velocity=replace(cascade.velocity, **unknown)))
-    return None if numbers.doubt or not_followed(records, numbers.controller) else numbers
 
 
 def line_equation(records: Sequence[Record], controller: Controller | None, space: SearchSpace | None) -> bool:

@@ -44,7 +44,8 @@ LONGEST = 1 << 13  # no decision: work; lines of all records that the numbers ar
 ROUNDS = 3  # no decision: effort; fits, each with the correlation that the one before left
 STARTS = 8  # no decision: effort; best points of the grid, from which a search starts
 MOST_STARTS = 500  # no decision: effort; points of the grid
-GAINS = ("kp", "ki", "command_weight", "acceleration_feedforward", "friction_feedforward")
+BOUNDED = ("kp", "ki", "command_weight")  # no controller has one below 0
+GAINS = (*BOUNDED, "acceleration_feedforward", "friction_feedforward")
 """Linear in the torque; the others are searched by their logarithm, but a numerator's damping and a share."""
 LOGARITHMIC = ("gain", "time_constant", "frequency", "denominator_damping")
 FIRST, WHOLE = 12, 60  # no decision: effort; evaluations of a search from the grid, and of the best of them
@@ -93,6 +94,8 @@ def with_estimates(records: Sequence[Record], controller: Controller | None) -> 
     hidden = [name for name, seen in zip(unknown, numbers.seen, strict=True) if not seen or estimates[name].at_bound]
     if not numbers.rms < POLICY.replay_noise * numbers.size:
         doubt = number_words.not_followed(unknown, numbers.rms, numbers.size) + _remedy(controller, records)
+    elif negative := [(name, free) for name, free in zip(unknown, numbers.free, strict=True) if free < 0.0]:
+        doubt = number_words.negative(*negative[0], estimates[negative[0][0]].unit)
     elif hidden:
         doubt = number_words.not_shown(hidden[0], estimates[hidden[0]])
     notes = (number_words.found(estimates, numbers.rms, numbers.size), *((number_words.moved(shift),) if shift else ()))
@@ -167,7 +170,9 @@ def _solved(controller: Controller, unknown: tuple[str, ...], records: Sequence[
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """x, values, stds, at_bound, seen: one of each unknown; x as the search moves it.
+    """x, values, stds, at_bound, seen, free: one of each unknown; x as the search moves it.
+
+    free: of a gain that stands at 0, what it would be without that bound where it is beyond its deviations; else 0.
 
     rms, size: of what is left, and of the torque where no limit acts [N m].
     """
@@ -177,6 +182,7 @@ class _Solved:
     stds: list[float]
     at_bound: list[bool]
     seen: list[bool]
+    free: list[float]
     rms: float
     size: float
 
@@ -363,12 +369,17 @@ class _Fit:
             for std, std_x, v, rms in zip(natural, stds, values, own, strict=True)
         ]
         near = 1e-6  # no decision: of a range, within which a search stands at its end
-        bound = [
-            f not in GAINS and bool(np.isfinite(b - a) and (v - a < near * (b - a) or b - v < near * (b - a)))
-            for v, a, b, f in zip(x, low, high, self.fields, strict=True)
+        wide = near * (high - low)
+        at_end = np.isfinite(wide) & ((x - low < wide) | (high - x < wide))
+        bound = [bool(end) and f not in (*GAINS, "numerator_damping") for end, f in zip(at_end, self.fields, strict=True)]
+        beyond = x - back @ at
+        rest = max(float(np.sqrt(np.sum((at + J @ (beyond - x)) ** 2) / max(count, 1))), ROUNDING * size)
+        own_std = rest * np.sqrt(np.diag(spread))
+        free = [
+            float(b) if f in BOUNDED and v <= near * abs(b) and b < -POLICY.check_deviations * s else 0.0
+            for b, f, v, s in zip(beyond, self.fields, values, own_std, strict=True)
         ]
-        bound = [b and f != "numerator_damping" for b, f in zip(bound, self.fields, strict=True)]
-        return _Solved(x, values, natural, bound, seen, float(np.sqrt(np.mean(free_left**2))), size)
+        return _Solved(x, values, natural, bound, seen, free, float(np.sqrt(np.mean(free_left**2))), size)
 
 
 def _inverse(J: Matrix) -> tuple[Matrix, Matrix]:

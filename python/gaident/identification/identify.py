@@ -16,6 +16,7 @@ from gaident import _core
 from gaident.control import core
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
+from gaident.control.simplest import simplest
 from gaident.data.record import Record
 from gaident.errors import SettingsError, SpaceError
 from gaident.identification import adequacy, covariance, selection
@@ -125,7 +126,7 @@ def identify(
     settings = Settings() if settings is None else settings
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings is {settings!r}: give a gaident.Settings")
-    looped = looped_over(checked, numbers.controller, space, settings.initial_state != "free")
+    looped = looped_over(checked, simplest(numbers.controller, (r.dt for r in checked)), space, settings.initial_state != "free")
     given, loop = looped.records, looped.controller
     check_numbers(trials, seed, workers)
     check_arithmetic(settings, loop)
@@ -154,7 +155,9 @@ def identify(
             f"In {settings.arithmetic} {overflows} of {evaluations} candidates left its range or diverged; they count as worst."
         )
     seconds = time.perf_counter() - began
-    return replace(result, warnings=tuple(warnings), controller_numbers=numbers.estimates, seconds=seconds)
+    return replace(
+        result, warnings=tuple(warnings), controller_numbers={**numbers.estimates, **looped.estimates}, seconds=seconds
+    )
 
 
 @dataclass(frozen=True)

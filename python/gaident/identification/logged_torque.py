@@ -6,27 +6,34 @@ What the velocity did between the lines is lost: d is compared with what other c
     a straight line instead of a cubic spline, and that spline with white noise between the lines, as large as that at the lines,
 
 which the integrator adds up: all three without their correlation from line to line, rho (Cochrane and Orcutt 1949).
+
+Where it does not follow, one number of the controller at a time is estimated from the same signals, as one that is not known
+(`corrected`). Identification and diagnosis use what comes out. No plant is involved.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text
-from gaident.control.cascade import cascade_of
+from gaident.axis import Text, joined, say, unit_text
+from gaident.control.cascade import FEEDFORWARDS, Cascade, P, cascade_of
 from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.data.signals.lattice import rounding_step
+from gaident.errors import GaidentError
+from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.logged_stretches import Log, centred, correlation, log_of, whitened
-from gaident.models.drive_torque import follows_not
+from gaident.models.drive_torque import follows_not, torque_driven
 from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
+from gaident.results.estimate import Estimate
 
-__all__ = ["not_followed"]
+__all__ = ["Corrected", "corrected", "noise_between", "not_followed"]
 
 Vector = NDArray[np.float64]
 
@@ -82,9 +89,61 @@ def _off(rec: Record, controller: Controller) -> float:
     return 0.0 if follows else off
 
 
+def noise_between(rec: Record, count: int, every: int) -> Vector:
+    """White noise (count,) as large as the velocity's at the lines [rad/s], on the controller's samples between them."""
+    noise: Vector = noise_std(rec.velocity) * np.random.default_rng(0).standard_normal(count)
+    noise[::every] = 0.0
+    return noise
+
+
 def _courses(log: Log, rec: Record) -> list[tuple[Log, bool]]:
     """The log with other courses between its lines, and whether the velocity goes straight there."""
-    every = len(log.velocity) // len(log.source)
-    noise = noise_std(rec.velocity) * np.random.default_rng(0).standard_normal(len(log.velocity))
-    noise[::every] = 0.0
+    noise = noise_between(rec, len(log.velocity), len(log.velocity) // len(log.source))
     return [(log, True), (replace(log, velocity=log.velocity + noise), False)]
+
+
+class Corrected(NamedTuple):
+    """The controller with another number, the estimate of it, and a sentence on that."""
+
+    controller: Controller
+    estimates: Mapping[str, Estimate]
+    note: Text
+
+
+def corrected(records: Sequence[Record], controller: Controller) -> Corrected | None:
+    """The one number with which the torque of all records follows; None where there is none, or several are as good."""
+    cascade, found = cascade_of(controller), []
+    for given, one in _with_one_open(cascade):
+        try:
+            numbers = with_estimates(records, one)
+        except GaidentError:  # the records lack what shows it
+            continue
+        if numbers.controller is None or numbers.doubt or _doubts(records, numbers.controller):
+            continue
+        values = [_value(name, e) for name, e in numbers.estimates.items()]
+        text = "With {} (given: {}) it does: all simulations use this."
+        found.append(Corrected(numbers.controller, numbers.estimates, say(text, joined(" and ", values), given)))
+    return found[0] if len(found) == 1 else None
+
+
+def _value(name: str, e: Estimate) -> Text:
+    """ "position gain 40 1/s" of "position.gain", "kp 0.02 N m s/rad" of "velocity.kp"."""
+    words = name.removeprefix("velocity.").replace(".", " ").replace("_", " ")
+    return say("{} {:.4g}", words, e.value) if e.unit == "1" else say("{} {:.4g} {}", words, e.value, unit_text(e.unit))
+
+
+def _doubts(records: Sequence[Record], controller: Controller | None) -> tuple[Text, ...]:
+    return (*torque_driven(records, controller).doubts, *not_followed(records, controller))
+
+
+def _with_one_open(cascade: Cascade) -> Iterator[tuple[Text, Cascade]]:
+    """(what was given, the cascade with it as None)."""
+    unknown: dict[str, Any] = {"kp": None, "ki": None}
+    pi = cascade.velocity
+    yield say("{:.4g} and {:.4g}", pi.kp, pi.ki), replace(cascade, velocity=replace(pi, **unknown))
+    if cascade.position is not None:
+        yield say("{:.4g}", cascade.position.gain), replace(cascade, position=P(None))
+    for name in FEEDFORWARDS:
+        if cascade.position is not None or name != "velocity_feedforward":
+            open_one: dict[str, Any] = {name: None}
+            yield say("{:.4g}", getattr(cascade, name)), replace(cascade, **open_one)

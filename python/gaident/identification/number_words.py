@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from gaident.axis import Text, joined, say, unit_text
 from gaident.results.estimate import Estimate
 
-__all__ = ["found", "moved", "not_followed", "not_shown"]
+__all__ = ["found", "moved", "negative", "not_followed", "not_shown"]
 
 
 def found(estimates: Mapping[str, Estimate], rms: float, size: float) -> Text:
@@ -38,4 +38,12 @@ def not_shown(name: str, estimate: Estimate) -> str:
     return (
         f"{name} of the controller is None, not known, and the records do not show it ({estimate.value:.3g} "
         f"+- {estimate.std:.2g} {estimate.unit}): give its number, leave out what has no effect, or log a motion in which it acts"
+    )
+
+
+def negative(name: str, value: float, unit: str) -> str:
+    return (
+        f"{name} of the controller is None, not known, and the torque follows best with {value:.3g} {unit}, "
+        f"but no such controller has a number below 0: give {name.rsplit('.', 1)[-1]}=0 where it has no such "
+        "part, else its filters and feedforward too, or check the sign of the torque"
     )

@@ -20,7 +20,17 @@ from gaident.errors import RecordError
 from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
 
-__all__ = ["Driven", "driven_by", "follows_not", "late", "made_by", "torque_blocks", "torque_driven", "torque_of"]
+__all__ = [
+    "Driven",
+    "driven_by",
+    "follows_not",
+    "late",
+    "made_by",
+    "straight_driven",
+    "torque_blocks",
+    "torque_driven",
+    "torque_of",
+]
 
 Vector = NDArray[np.float64]
 
@@ -93,6 +103,18 @@ def driven_by(rec: Record, controller: Controller) -> Record:
     if every == 1:
         return rec.with_channels(torque=late(torque, controller.delay / rec.dt, before), command=None, position_command=None)
     mean = _at_its_clock(rec, torque, controller).reshape(len(rec), every).mean(axis=1)
+    return rec.with_channels(torque=late(mean, controller.delay / rec.dt, before))
+
+
+def straight_driven(rec: Record, controller: Controller) -> Record:
+    """The record with a logged torque that goes straight between the lines: of the controller clock and delay alone are known.
+
+    It is the mean over each line, as in `driven_by`: what a controller that is not the drive's makes between the lines is worse.
+    """
+    assert rec.torque is not None
+    every = controller.log_every(rec.dt)
+    before = rec.torque[0] if starts_moving(rec, None) else 0.0
+    mean = at_the_clock(rec.torque, every).reshape(len(rec), every).mean(axis=1)
     return rec.with_channels(torque=late(mean, controller.delay / rec.dt, before))
 
 

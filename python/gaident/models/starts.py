@@ -7,10 +7,12 @@ from numpy.typing import NDArray
 
 from gaident.axis import Text, say
 from gaident.control.controller import Controller
+from gaident.control.pi import PI
+from gaident.control.pi_torque import pi_torque
 from gaident.data.record import Record
 from gaident.policy.table import POLICY
 
-__all__ = ["doubtful_start", "noise_std", "starts_moving", "stretches"]
+__all__ = ["doubtful_start", "noise_std", "starts_moving", "stored_torque", "stretches"]
 
 
 def noise_std(velocity: NDArray[np.float64], step: float = 0.0) -> float:
@@ -57,6 +59,19 @@ def starts_moving(rec: Record, controller: Controller | None) -> bool:
     record would say nothing about zeros and gain (see `doubtful_start`).
     """
     return _first_is_motion(rec, controller) and not _constant_input(rec, controller)
+
+
+def stored_torque(rec: Record, pi: PI) -> float:
+    """What the integrator held before a record [N m], for a load: the logged torque's constant distance from the replayed one.
+
+    0 where that does not stand out of what else is off, or nothing shows it.
+    """
+    if rec.torque is None or rec.command is None:
+        return 0.0
+    off = rec.torque - pi_torque(rec.command, rec.velocity, rec.dt, pi)
+    held = float(np.mean(off))
+    aside = max(POLICY.above_noise * float(np.std(off)), POLICY.negligible * float(np.abs(rec.torque).max()))
+    return held if abs(held) > aside else 0.0
 
 
 def doubtful_start(rec: Record, controller: Controller | None) -> Text | None:

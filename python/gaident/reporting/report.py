@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.show.report.page import page
 from gaident.show.report.views import View
+from gaident.show.units import scales_of
 from gaident.version import version
 
 __all__ = ["report", "report_page"]
@@ -35,6 +37,9 @@ def report(
     records: Records = None,
     validation: Records = None,
     axis: str | None = None,
+    units: Mapping[str, str | float] | None = None,
+    about: Mapping[str, str] | None = None,
+    live: bool = True,
 ) -> None:
     """Write a result as one HTML page that needs nothing else: no network, no other file, no Python.
 
@@ -55,6 +60,13 @@ def report(
         The records that were held out, likewise.
     axis : {"rotary", "linear"}, optional
         "linear": units of m and N; None: those of a diagnosis' axis, else rotary.
+    units : mapping, optional
+        Units in which you work, beside SI in tables and in place of it in figures, and the constants that they need:
+        ``{"velocity": "rpm", "torque": "%", "position": "deg", "rated_torque": 2.4}``.
+    about : mapping of str to str, optional
+        What stands below the title: ``{"date": "2026-11-22", "machine": "X1", "customer": "...", "text": "..."}``, any keys.
+    live : bool
+        False: pictures in place of figures that zoom; a page of some 0.3 MB, to be mailed or printed.
 
     Raises
     ------
@@ -78,16 +90,28 @@ def report(
     >>> "<html" in pathlib.Path("report.html").read_text(encoding="utf-8")
     True
     """
-    write_whole(path, report_page(result, records, validation, axis).encode())
+    write_whole(path, report_page(result, records, validation, axis, units, about, live).encode())
 
 
 def report_page(
-    result: Diagnosis | Identification, records: Records = None, validation: Records = None, axis: str | None = None
+    result: Diagnosis | Identification,
+    records: Records = None,
+    validation: Records = None,
+    axis: str | None = None,
+    units: Mapping[str, str | float] | None = None,
+    about: Mapping[str, str] | None = None,
+    live: bool = True,
 ) -> str:
     """The text of what `report` writes."""
     from plotly.offline import get_plotlyjs
 
-    return page(result, view_of(result, records, validation, axis), get_plotlyjs())
+    view = view_of(result, records, validation, axis)
+    for key, value in (about or {}).items():
+        if not isinstance(value, str):
+            raise GaidentError(f"about: {key} is {value!r}: give text")
+    return page(
+        result, replace(view, scales=scales_of(units, view.axis), about=dict(about or {})), get_plotlyjs() if live else ""
+    )
 
 
 def view_of(result: Diagnosis | Identification, records: Records, validation: Records, axis: str | None) -> View:

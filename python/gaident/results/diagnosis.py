@@ -12,12 +12,11 @@ from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import check_schema
 from gaident.models.drive_torque import driven_by
-from gaident.models.effects import table
 from gaident.models.model import Model
 from gaident.providers import provided
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
-from gaident.results.finding import Finding
+from gaident.results.finding import Finding, finding_of
 from gaident.results.fitness import Comparison, Fitness
 from gaident.results.identification import Identification
 from gaident.results.inverse_dynamics import InverseDynamics
@@ -197,9 +196,22 @@ class Diagnosis(SavedResult):
         rec = rec.shifted(**moves) if (moves := self.log_shifts.get(rec.digest)) else rec
         return rec if self.controller is None or self.controller.one_equation else driven_by(rec, self.controller)
 
-    def summary(self, axis: str | None = None) -> str:
-        """Return the result as text, in the units of its axis; axis="linear" for m and N, "rotary" for rad and N m."""
-        text: str = provided("diagnosis_summary")(self, axis or self.axis)
+    def summary(self, axis: str | None = None, units: Mapping[str, str | float] | None = None) -> str:
+        """Return the result as text.
+
+        Parameters
+        ----------
+        axis : {"rotary", "linear"}, optional
+            "linear": words and units of m and N, "rotary": of rad and N m; None: those of the axis.
+        units : mapping, optional
+            Your units, which tables show beside SI, as `report` takes them.
+
+        Returns
+        -------
+        str
+            Verdict, causes, gain, what to measure next, and what could not be tested.
+        """
+        text: str = provided("diagnosis_summary")(self, axis or self.axis, units)
         return text
 
     def plot(self, records: Record | Sequence[Record] | None = None, axis: str | None = None) -> Figure:
@@ -337,19 +349,7 @@ class Diagnosis(SavedResult):
             linear = data.get("linear_axis", {})  # files of gaident 0.1.0 lack it: their sentences are those of a rotary axis
             return cls(
                 verdict=data["verdict"],
-                findings=tuple(
-                    Finding(
-                        **{
-                            **f,
-                            "parameters": {n: Estimate(**e) for n, e in f["parameters"].items()},
-                            "alternatives": tuple(f["alternatives"]),
-                            "sides": tuple(f.get("sides", ())),
-                            "evidence": restored(f["evidence"], linear),
-                            "place": f.get("place") or _place_of(f["effect"]),
-                        }
-                    )
-                    for f in data["findings"]
-                ),
+                findings=tuple(finding_of(f, linear) for f in data["findings"]),
                 not_testable={effect: restored(why, linear) for effect, why in data["not_testable"].items()},
                 model=Model.from_dict(data["model"]),
                 before=Fitness(**data["before"]),
@@ -390,8 +390,3 @@ class Diagnosis(SavedResult):
                 axis=data.get("axis", "rotary"),
                 controller_numbers={name: Estimate(**e) for name, e in data.get("controller_numbers", {}).items()},
             )
-
-
-def _place_of(effect: str) -> str:
-    """The place of a finding in a file of gaident 0.1.0, which lacks it: what is no effect is a form of the controller."""
-    return next((row.place for row in table() if row.name == effect), "controller")

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
+from gaident.axis import restored
+from gaident.models.effects import table
 from gaident.results.estimate import Estimate
 
-__all__ = ["Finding"]
+__all__ = ["Finding", "finding_of"]
 
 
 @dataclass(frozen=True)
@@ -63,3 +66,16 @@ class Finding:
     def named(self) -> bool:
         """Whether the cause is named, without an alternative."""
         return not self.alternatives
+
+
+def finding_of(data: Mapping[str, Any], linear: Mapping[str, str]) -> Finding:
+    """The finding of plain data; linear: the sentences of a linear axis, see `linear_sentences`."""
+    parameters = {name: Estimate(**e) for name, e in data["parameters"].items()}
+    listed = {"alternatives": tuple(data["alternatives"]), "sides": tuple(data.get("sides", ()))}
+    said = {"parameters": parameters, "evidence": restored(data["evidence"], linear)}
+    return Finding(**{**data, **listed, **said, "place": data.get("place") or _place_of(data["effect"])})
+
+
+def _place_of(effect: str) -> str:
+    """The place of a finding in a file of gaident 0.1.0, which lacks it: what is no effect is a form of the controller."""
+    return next((row.place for row in table() if row.name == effect), "controller")

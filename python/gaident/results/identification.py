@@ -168,9 +168,22 @@ class Identification(SavedResult):
         """Return measured minus simulated velocity [rad/s], shape (n,)."""
         return rec.velocity - self.simulate(rec)
 
-    def summary(self, axis: str = "rotary") -> str:
-        """Return the result as text; axis="linear" for units of m and N."""
-        text: str = provided("identification_summary")(self, axis)
+    def summary(self, axis: str = "rotary", units: Mapping[str, str | float] | None = None) -> str:
+        """Return the result as text.
+
+        Parameters
+        ----------
+        axis : {"rotary", "linear"}
+            "linear": units of m and N.
+        units : mapping, optional
+            Your units, which are shown beside SI, as `report` takes them.
+
+        Returns
+        -------
+        str
+            What was found, and what it is worth.
+        """
+        text: str = provided("identification_summary")(self, axis, units)
         return text
 
     def plot(self, records: Record | Sequence[Record] | None = None, axis: str = "rotary") -> Figure:

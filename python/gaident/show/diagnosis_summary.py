@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Mapping
 
-from gaident.axis import Text, identifier_words, said, say, unit, velocity_unit, word
+from gaident.axis import Text, called, identifier_words, joined, said, say, unit, velocity_unit, word
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
-from gaident.show.wording import certainty, controller_lines, number, table, with_std
+from gaident.show.units import Scales, beside, scales_of
+from gaident.show.wording import certainty, controller_lines, either, missing_words, number, table, with_std, words
 
 __all__ = [
     "TESTED_UP_TO",
     "chance_words",
     "diagnosis_summary",
     "driver_counts",
-    "either",
     "fall_words",
     "left_words",
     "mechanical_name",
@@ -27,7 +28,6 @@ __all__ = [
     "next_words",
     "parameter_row",
     "verdict_words",
-    "words",
 ]
 
 WIDTH = 100  # no decision: letters of a line
@@ -43,15 +43,17 @@ DRIVERS = {
 }
 
 
-def diagnosis_summary(dia: Diagnosis, axis: str = "rotary") -> str:
+def diagnosis_summary(dia: Diagnosis, axis: str = "rotary", units: Mapping[str, str | float] | None = None) -> str:
     """What is wrong, why, the gain, what could not be tested, what to measure next; no line break at the end.
 
     dia: a Diagnosis, or anything with its attributes. axis: "rotary", or "linear" for words and units of m and N.
+    units: of the user, shown beside SI in the tables, as `scales_of` takes them.
     """
+    scales = scales_of(units, axis)
     sections = [
         _verdict(dia, axis),
-        _causes(dia, axis),
-        _gain(dia, axis),
+        _causes(dia, axis, scales),
+        _gain(dia, axis, scales),
         _force(dia, axis),
         _second_method(dia, axis),
         _next(dia, axis),
@@ -66,24 +68,13 @@ def diagnosis_summary(dia: Diagnosis, axis: str = "rotary") -> str:
     return "\n\n".join("\n".join(lines) for lines in sections if lines)
 
 
-def words(effect: str) -> str:
-    """The name of an effect as it is written."""
-    return effect.replace("_", " ")
-
-
 def _wrapped(text: str, indent: str = "", hanging: str = "") -> list[str]:
     lines = textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent + hanging, break_on_hyphens=False)
     return lines or [""]
 
 
-def either(finding: Finding) -> str:
-    """ "a, b or c" of a finding and what these data cannot tell from it."""
-    names = [words(name) for name in (finding.effect, *finding.alternatives)]
-    return f"{', '.join(names[:-1])} or {names[-1]}"
-
-
 def _verdict(dia: Diagnosis, axis: str) -> list[str]:
-    head = " ".join(filter(None, (verdict_words(dia), left_words(dia, axis))))
+    head = " ".join(filter(None, (verdict_words(dia, axis), left_words(dia, axis))))
     lines = [f"Verdict: {dia.verdict}", *_wrapped(head)]
     for note in dia.notes:
         lines += _wrapped(said(note, axis))
@@ -109,16 +100,18 @@ def driver_counts(dia: Diagnosis) -> bool:
     return dia.driver is not None and dia.left.get(dia.driver, 0.0) > dia.left_needed
 
 
-def verdict_words(dia: Diagnosis) -> str:
+def verdict_words(dia: Diagnosis, axis: str) -> str:
     """The verdict in words, with the names."""
     if dia.verdict == "adequate":
         return "The linear model is adequate: nothing significant is left that could be blamed on the drive."
     if dia.verdict == "unexplained":
         return "The model is wrong, and no effect of the library fits what is left."
     causes = [f for f in dia.findings if not f.is_noise]
-    named = [words(f.effect) for f in causes if not f.alternatives]
-    open_ = [either(f) for f in causes if f.alternatives]
+    named = list(dict.fromkeys(words(f.effect, axis) for f in causes if not f.alternatives))
+    kinds = dict.fromkeys(filter(None, (missing_words(f, axis) for f in causes if f.alternatives)))
+    open_ = dict.fromkeys(either(f, axis) for f in causes if f.alternatives and not missing_words(f, axis))
     parts = [f"{'Cause' if len(named) == 1 else 'Causes'}: {', '.join(named)}."] if named else []
+    parts += [f"{text[0].upper()}{text[1:]}." for text in kinds]
     parts += [
         f"What is {'also ' if named else ''}missing is one of: {names}. These data do not tell them apart." for names in open_
     ]
@@ -130,14 +123,14 @@ def verdict_words(dia: Diagnosis) -> str:
     return " ".join([f"The model was wrong, {found} nothing significant is left.", *parts])
 
 
-def _causes(dia: Diagnosis, axis: str) -> list[str]:
+def _causes(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
     lines: list[str] = []
     for f in dia.findings:
         if f.is_noise:
             continue
         place = ", in the controller" if f.place == "controller" else ", at the load" if f.sides == ("load",) else ""
-        lines.append(words(f.effect) + place + "".join(f", or {words(a)}" for a in f.alternatives))
-        lines += table([parameter_row(n, e, axis) for n, e in f.parameters.items()], "    ")
+        lines.append(words(f.effect, axis) + place + "".join(f", or {words(a, axis)}" for a in f.alternatives))
+        lines += table([parameter_row(n, e, axis, scales) for n, e in f.parameters.items()], "    ")
         lines += _wrapped(said(f.evidence, axis), "    ")
         if f.p_value is not None:
             lines += _wrapped(chance_words(f, dia.bootstrap), "    ")
@@ -152,26 +145,31 @@ def chance_words(finding: Finding, bootstrap: int) -> str:
     return f"Chance of such a finding where there is no effect at all (bootstrap): {most}{finding.p_value:.2g}."
 
 
-def parameter_row(name: str, e: Estimate, axis: str) -> tuple[str, str, str, str]:
-    """Name, value with its standard deviation, unit, remark."""
+def parameter_row(name: str, e: Estimate, axis: str, scales: Scales) -> tuple[str, str, str, str, str]:
+    """Name, value with its standard deviation, unit, the same in the user's unit, remark."""
     value, std, u = e.value, e.std, e.unit
     if axis == "linear" and u == "1/turn":  # a turn is 2 pi m
         value, std, u = value / math.tau, std / math.tau, "1/m"
+        return identifier_words(name, axis), with_std(value, std), u, "", f"every {number(1e3 / value)} mm" if value > 0.0 else ""
     elif name not in NOT_OF_THE_AXIS:
         u = unit(u, axis)
     remark = "at a bound" if e.at_bound else "" if e.identifiable else "not determined"
-    return identifier_words(name, axis), with_std(value, std), "" if u == "1" else u, remark
+    return identifier_words(name, axis), with_std(value, std), "" if u == "1" else u, beside(scales, name, value, std, u), remark
 
 
-def _gain(dia: Diagnosis, axis: str) -> list[str]:
+def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
     v = velocity_unit(axis)
     extended = bool(dia.model.effects)
-    rows = [
+    rows: list[tuple[str, ...]] = [
         ("", f"rmse [{v}]", "fit [%]"),
         ("linear model", number(dia.before.rmse), f"{dia.before.fit_percent:.2f}"),
         ("extended model", number(dia.after.rmse), f"{dia.after.fit_percent:.2f}"),
         ("noise of the measured velocity", number(dia.after.noise_floor), ""),
     ]
+    if v in scales:
+        shown, size = scales[v]
+        sizes = (dia.before.rmse, dia.after.rmse, dia.after.noise_floor)
+        rows = [(*row, more) for row, more in zip(rows, (f"rmse [{shown}]", *(number(size * x) for x in sizes)), strict=True)]
     in_sample = dia.held_out == "in-sample"
     where = "IN-SAMPLE: too little data to hold any out" if in_sample else f"on {dia.held_out}"
     lines = [f"Free-run simulation, {where}", *table(rows if extended else [rows[0], rows[1], rows[3]])]
@@ -179,7 +177,7 @@ def _gain(dia: Diagnosis, axis: str) -> list[str]:
         lines += _wrapped(said(not_the_loop_words(dia), axis), "  ")
     if extended and dia.before.rmse > 0.0:
         lines += _wrapped(said(fall_words(dia), axis), "  ")
-        steps = [f"{words(f.effect)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
+        steps = [f"{words(f.effect, axis)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
         if len(steps) > 1:
             lines += _wrapped(f"One after the other, each of what was left before it: {', '.join(steps)}.", "  ")
     return lines
@@ -282,21 +280,21 @@ def _record(dia: Diagnosis, axis: str) -> list[str]:
     lines = []
     for f in dia.findings:
         if f.is_noise:
-            lines += _wrapped(f"{words(f.effect)}: {said(f.evidence, axis)}", "  ", "  ")
+            lines += _wrapped(f"{words(f.effect, axis)}: {said(f.evidence, axis)}", "  ", "  ")
     return ["About the record", *lines] if lines else []
 
 
 def _untested(dia: Diagnosis, axis: str) -> list[str]:
     lines = []
     for effect, reason in dia.not_testable.items():
-        lines += _wrapped(f"{words(effect)}: {said(reason, axis)}", "  ", "  ")
+        lines += _wrapped(f"{words(effect, axis)}: {said(reason, axis)}", "  ", "  ")
     return ["Not testable with this record", *lines] if lines else []
 
 
 def _tested_up_to(dia: Diagnosis, axis: str) -> list[str]:
     lines = []
     for effect, sizes in dia.one_sided.items():
-        lines += _wrapped(f"{words(effect)}: {said(sizes, axis)}", "  ", "  ")
+        lines += _wrapped(f"{words(effect, axis)}: {said(sizes, axis)}", "  ", "  ")
     return [TESTED_UP_TO, *lines] if lines else []
 
 
@@ -312,9 +310,9 @@ def _next(dia: Diagnosis, axis: str) -> list[str]:
 def next_words(dia: Diagnosis, p: Proposal) -> Text:
     """Why the experiment p comes next, what it tells apart and how surely."""
     margin = f", {certainty(p.margin)} ({p.margin:.0f} BIC units, 10 are enough)" if math.isfinite(p.margin) else ""
-    text = say("{} It tells {}{}.", p.reason, " from ".join(map(words, p.separates)), margin)
+    text = say("{} It tells {}{}.", p.reason, joined(" from ", map(called, p.separates)), margin)
     rest = dict.fromkeys(a for f in dia.findings for a in f.alternatives if a not in p.separates)
-    return say("{} It was not chosen for {}.", text, " or ".join(map(words, rest))) if rest else text
+    return say("{} It was not chosen for {}.", text, joined(" or ", map(called, rest))) if rest else text
 
 
 def _how(dia: Diagnosis) -> list[str]:

@@ -12,6 +12,7 @@ from gaident.models.mechanics import Mechanics, TwoMass
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.identification import Identification
+from gaident.show.units import Scales, beside, scales_of
 from gaident.show.wording import controller_lines, number, structure_words, table, with_std
 
 __all__ = [
@@ -27,13 +28,15 @@ WIDTH = 100  # no decision: letters of a line
 SHOWN_STRUCTURES = 5  # no decision: how many are listed
 
 
-def identification_summary(idn: Identification, axis: str = "rotary") -> str:
+def identification_summary(idn: Identification, axis: str = "rotary", units: Mapping[str, str | float] | None = None) -> str:
     """What was found and what it is worth; plain text, verdict first, no line break at the end.
 
     idn: an Identification, or anything with its attributes. axis: "rotary", or "linear" for units of m and N.
+    units: of the user, shown beside SI, as `scales_of` takes them.
     """
+    scales = scales_of(units, axis)
     sections = [
-        _verdict(idn, axis),
+        _verdict(idn, axis, scales),
         _warnings(idn, axis),
         _mechanics(idn, axis),
         controller_lines(idn.controller_numbers, axis),
@@ -57,16 +60,16 @@ def mechanics_comparison(found: Mechanics, truth: Mechanics, axis: str = "rotary
     return "\n".join(table(rows))
 
 
-def _verdict(idn: Identification, axis: str) -> list[str]:
+def _verdict(idn: Identification, axis: str, scales: Scales) -> list[str]:
     stands = "the linear model stands"
     if idn.falsified:
         stands = "the linear model is FALSIFIED"
     elif idn.adequacy.undecided:
         stands = "whether a linear model holds is UNDECIDED"
-    records = len(idn.digests)
+    records, v = len(idn.digests), velocity_unit(axis)
     figures = (
         f"fit {number(idn.fit_percent)} %",
-        f"rmse {number(idn.rmse)} {velocity_unit(axis)}",
+        ", ".join(filter(None, (f"rmse {number(idn.rmse)} {v}", beside(scales, "", idn.rmse, None, v)))),
         f"noise {number(idn.adequacy.noise_std)} {velocity_unit(axis)}",
         f"{idn.samples} samples of {records} record{'s' if records != 1 else ''}",
     )

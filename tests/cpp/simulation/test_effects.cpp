@@ -45,6 +45,7 @@ const Sizes sizes[] = {
     {effect<Unbalance>, {0.05, 0.3}, {1e-14, 0.3}},
     {effect<Cogging>, {0.03, 12.0, 0.4}, {1e-14, 12.0, 0.4}},
     {effect<FrictionDrift>, {0.05, -0.2}, {1e-14, -0.2}},
+    {effect<LoadDependentFriction>, {0.04, 0.2}, {1e-14, 1e-14}},
     {effect<Backlash>, {0.01}, {1e-15}},
     {effect<HardeningStiffness>, {1e3}, {1e-10}},
     {effect<TorqueSaturation>, {0.5}, {1e14}},

@@ -38,6 +38,7 @@ const Sizes sizes[] = {
     {"unbalance", {0.05, 0.3}, {1e-14, 0.3}},
     {"cogging", {0.03, 12.0, 0.4}, {1e-14, 12.0, 0.4}},
     {"friction_drift", {0.05, -0.2}, {1e-14, -0.2}},
+    {"load_dependent_friction", {0.04, 0.2}, {1e-14, 1e-14}},
 };
 
 Effect at_load(const char* name) { return effect_named(std::string(name) + "@load"); }

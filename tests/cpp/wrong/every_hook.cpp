@@ -9,9 +9,10 @@ struct All {
     static constexpr EffectParameter parameters[] = {{"torque", "N m", 0.0, 0.0}};
     static constexpr EffectInfo info{.name = "all", .place = Place::shaft, .meaning = "every hook", .parameters = parameters};
     static constexpr Hooks hooks = Hooks::command | Hooks::controller | Hooks::actuator | Hooks::actuator_dynamics |
-                                   Hooks::torque | Hooks::law | Hooks::level | Hooks::friction | Hooks::after_friction |
-                                   Hooks::coupling | Hooks::sensor | Hooks::sensor_dynamics | Hooks::reading | Hooks::plant |
-                                   Hooks::begin | Hooks::substeps | Hooks::possible | Hooks::tabulate;
+                                   Hooks::torque | Hooks::law | Hooks::level | Hooks::loaded | Hooks::friction |
+                                   Hooks::after_friction | Hooks::coupling | Hooks::sensor | Hooks::sensor_dynamics |
+                                   Hooks::reading | Hooks::plant | Hooks::begin | Hooks::substeps | Hooks::possible |
+                                   Hooks::tabulate;
     static constexpr Pace pace = Pace::sample;
 
     template <class R>
@@ -49,6 +50,8 @@ struct All {
     static void law(const Coefficients<R>&, FrictionLaw<R>&);
     template <class R>
     static R level(const Coefficients<R>&, R);
+    template <class R>
+    static R loaded(const Coefficients<R>&, R);
     template <class R>
     static void friction(const Coefficients<R>&, State<R>&, FrictionStep<R>&);
     template <class R>
@@ -100,6 +103,10 @@ struct Level : All {
     static double level();
 };
 static_assert(lacks<Level>(Hooks::level));
+struct Loaded : All {
+    static double loaded();
+};
+static_assert(lacks<Loaded>(Hooks::loaded));
 struct Friction : All {
     static void friction();
 };

@@ -82,7 +82,7 @@ WRONG_DRIVE_FILES = [
     (
         "# nothing\n",
         "this drive file is empty",
-        "it holds [columns], [units], [shift], [controller], [space], [limits] and axis, dt, velocity_cutoff_hz",
+        "[controller], [space], [limits], [show], [report] and axis, pitch, dt, velocity_cutoff_hz",
     ),
 ]
 

@@ -10,6 +10,7 @@ import pytest
 import gaident as ga
 import servo_referee as referee
 from gaident.control.controller import Limiting
+from gaident.diagnosis.controller.form_findings import loop_of
 
 T = 125e-6
 KP, KI = 0.05, 2.0
@@ -114,3 +115,23 @@ def test_the_replay_has_limits(name: str, limits: dict[str, float]) -> None:
     made, free = cascade.torque_of(rec, also), cascade.torque_of(rec)
     assert np.abs(made - u)[:known].max() < 1e-9
     assert np.abs(free - u)[:known].max() > 1e-3
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize("known", [True, False])
+def test_a_limit_that_a_slow_log_shows_is_said_and_the_gains_are_as_sure_as_they_are(noise: float, known: bool) -> None:
+    """Every fourth sample logged; what the velocity did between the lines, and noise on it, are part of the deviations."""
+    dt, rng = 1e-3, np.random.default_rng(0)
+    command = np.repeat([0, 20.0, -30, 10, -10, 40, -20, 5, 30, -5, 0, 15, -25, 8, 0], 100)
+    true = ga.Cascade(ga.PI(0.05, 1.5, torque_limit=0.6, anti_windup="hold"), period=dt / 4)
+    still = np.zeros(len(command))
+    done = ga.run(ga.OneMass(J=4e-4, D=2e-3), ga.Record(dt, command=command, velocity=still), true)
+    rec = ga.Record(dt, command=command, velocity=done.velocity + noise * rng.standard_normal(len(command)), torque=done.torque)
+    found = loop_of([rec], ga.Cascade(ga.PI(0.05, 1.5) if known else ga.PI(kp=None, ki=None), period=dt / 4))
+    (limit,) = found.findings
+    assert limit.effect == "torque_saturation" and limit.parameters["limit"].value == pytest.approx(0.6)
+    assert isinstance(found.controller, ga.Cascade) and found.controller.velocity.anti_windup == "hold"
+    if not known:
+        for name, value in (("velocity.kp", 0.05), ("velocity.ki", 1.5)):
+            e = found.estimates[name]
+            assert abs(e.value - value) < 4.0 * e.std < 0.06 * value

@@ -175,3 +175,39 @@ def test_data_of_a_cascade_gives_it_back(position: ga.P | None) -> None:
     given = ga.Cascade(UNKNOWN, T, position=position, torque_filters=(ga.LowPass(None), ga.Notch(None, 0.1, None)))
     again = ga.Cascade.from_dict(json.loads(json.dumps(given.to_dict())))
     assert again == given and again.unknown == given.unknown
+
+
+@pytest.mark.parametrize("period", [None, 1e-3, 0.5e-3])
+def test_a_torque_that_needs_a_negative_integral_gain_is_refused(period: float | None) -> None:
+    """Fitted with ki >= 0 it would be 0, and nothing would say why."""
+    rng, dt = np.random.default_rng(0), 1e-3
+    command = np.repeat([0, 20.0, -30, 10, -10, 40, -20, 5, 30, -5, 0, 15, -25, 8, 0], 100)
+    noise = 0.02 * rng.standard_normal(len(command))
+    drive, still = ga.OneMass(J=4e-4, D=2e-3), np.zeros(len(command))
+    done = ga.run(drive, ga.Record(dt, command=command - noise, velocity=still), ga.PI(0.05, 1.5))
+    error = command - done.velocity - noise
+    rec = ga.Record(dt, command=command, velocity=done.velocity + noise, torque=0.05 * error - 0.3 * dt * np.cumsum(error))
+    pi = ga.PI(kp=None, ki=None)
+    given = pi if period is None else ga.Cascade(pi, period=period)
+    with pytest.raises(ga.GaidentError, match=r"ki of the controller is None.* best with -0\.3\d* N m/rad.*give ki=0"):
+        ga.identify(rec, given)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_pi_alone_in_a_cascade_at_the_rate_of_the_log_is_that_pi(known: bool) -> None:
+    """Its form is looked for in the same way."""
+    rng, dt = np.random.default_rng(0), 1e-3
+    command = np.repeat([0, 20.0, -30, 10, -10, 40, -20, 5, 30, -5, 0, 15, -25, 8, 0], 100)
+    noise = 0.02 * rng.standard_normal(len(command))
+    drive, still = ga.OneMass(J=4e-4, D=2e-3), np.zeros(len(command))
+    true = ga.Cascade(ga.PI(0.05, 1.5), torque_filters=(ga.LowPass(1.5e-3),))
+    done = ga.run(drive, ga.Record(dt, command=command - noise, velocity=still), true)
+    rec = ga.Record(dt, command=command, velocity=done.velocity + noise, torque=done.torque)
+    pi = ga.PI(0.05, 1.5) if known else ga.PI(kp=None, ki=None)
+    alone, within = (ga.diagnose(rec, c, seed=1) for c in (pi, ga.Cascade(pi, period=dt)))
+    assert [f.effect for f in within.causes] == ["torque_filter"] and within.verdict == "explained"
+    assert within.findings == alone.findings and within.controller == alone.controller
+    assert (
+        ga.identify(rec, ga.Cascade(ga.PI(0.05, 1.5), period=dt), seed=1).model
+        == ga.identify(rec, ga.PI(0.05, 1.5), seed=1).model
+    )

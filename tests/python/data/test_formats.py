@@ -88,7 +88,7 @@ def test_irregular_stamps_are_refused_and_resampled_on_request() -> None:
 def test_a_pause_of_the_logger_is_not_bridged(tmp_path: Path) -> None:
     t = np.concatenate([np.arange(100), 600 + np.arange(100)]) * 1e-3
     np.savez(tmp_path / "pause.npz", time=t, command=np.ones(200), velocity=np.sin(50 * t))
-    with pytest.raises(ReadError, match=r"irregular.*split the log there into two; if") as caught:
+    with pytest.raises(ReadError, match=r"irregular.*split the log there into two records, as read_pieces does .*; if") as caught:
         read(tmp_path / "pause.npz")
     assert "resample" not in str(caught.value)
     with pytest.raises(ReadError, match=r"gap of 0\.501 s, from 0\.099 to 0\.6 s, where.* 0\.001 s.*split the log there"):

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.data.guess import guess_channels
+from gaident.cli import main
+from gaident.data.guess import Guess, guess_channels
+from gaident.data.listing import ColumnInfo
 
 # Columns of a trace, the time aside -> what is taken for (command, velocity, torque, position, position_command).
 HEADERS: dict[str, tuple[str | None, ...]] = {
@@ -78,6 +80,73 @@ def test_a_header_says_the_channels(header: str, tmp_path: Path) -> None:
     found = guess_channels(ga.columns(tmp_path / "log.csv")).channels
     expected = {CHANNELS[key]: name for key, name in zip(HEADERS[header], names, strict=True) if key is not None}
     assert {channel: column.name for channel, column in found.items()} == expected
+
+
+SAMPLES = Path(__file__).parents[1] / "support" / "samples" / "headers.txt"
+TOOLS = [
+    "SINAMICS", "TwinCAT", "IndraWorks", "MR Configurator2", "SigmaWin+", "EPOS Studio", "ODrive", "LinuxCNC", "CODESYS",
+    "dSPACE", "ROS", "Heidenhain", "German", "French", "Italian", "Spanish", "romanised Japanese", "the time",
+]  # fmt: skip
+
+
+def headers_of(tool: str) -> list[tuple[str, ...]]:
+    """(header, channel, kind of a torque, unit) of one tool, as the sample file lists them."""
+    section = SAMPLES.read_text(encoding="utf-8").partition(f"\n## {tool}")[2].partition("\n## ")[0]
+    return [tuple(cell.strip() for cell in line.rsplit("|", 3)) for line in section.splitlines()[1:] if line]
+
+
+def test_the_sample_holds_hundreds_of_headers() -> None:
+    listed = [header for tool in TOOLS for header in headers_of(tool)]
+    lines = [line for line in SAMPLES.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    assert len(listed) == len(lines) > 400 and len({row[0] for row in listed}) > 400
+
+
+def looked_at(header: str, is_time: bool, folder: Path) -> tuple[ColumnInfo, Guess]:
+    """The column of a log that holds it alone, beside a time, and what is taken for what."""
+    head = f"{header};a" if is_time else f"Time [s];{header}"
+    rows = "".join(f"{k};{np.sin(k):.4f}\n" for k in range(30))
+    (folder / "log.csv").write_text(f"{head}\n{rows}", encoding="utf-8")
+    listing = ga.columns(folder / "log.csv")
+    return listing.columns[0 if is_time else 1], guess_channels(listing)
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_headers_of_drives_and_tools(tool: str, tmp_path: Path) -> None:
+    """Each by itself: its channel, what kind of torque it is, its unit; where only the user knows, it is asked for."""
+    rows = headers_of(tool)
+    assert len(rows) >= 10
+    for header, channel, kind, unit in rows:
+        column, guess = looked_at(header, channel == "time", tmp_path)
+        assert (column.unit or "-") == unit, header
+        if channel == "time":
+            assert column.is_time, header
+            continue
+        taken = {name: c.name for name, c in guess.channels.items()}
+        assert taken == ({} if channel in "-?" else {channel: column.name}), header
+        if channel == "?":
+            assert any(column in open_ for open_ in guess.undecided.values()), header
+        if channel == "torque":
+            assert (column.torque_is or "-") == kind, header
+
+
+def test_what_only_the_user_knows_is_marked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    rows = "".join(f"{k};{np.sin(k):.4f};{np.cos(k):.4f}\n" for k in range(30))
+    Path("log.csv").write_text(f"time_ms;axis0.controller.input_vel;tau_J_d\n{rows}")
+    assert main(["init", "log.csv"]) == 0
+    marked = [line for line in Path("drive.toml").read_text().splitlines() if "FILL IN" in line and line.startswith("# ")]
+    assert any(line.startswith("# velocity") and '"axis0.controller.input_vel"?' in line for line in marked)
+    assert any(line.startswith("# torque") and '"tau_J_d"?' in line for line in marked)
+
+
+def test_init_keeps_a_german_position_and_its_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    rows = "".join(f"{k};{np.sin(k):.4f};{np.sin(k - 0.1):.4f};{np.cos(k):.4f}\n" for k in range(30))
+    Path("log.csv").write_text(f"t/ms;x_soll [mm];x_ist [mm];F_ist [N]\n{rows}")
+    assert main(["init", "log.csv"]) == 0
+    text = Path("drive.toml").read_text()
+    for line in ('position_command = "x_soll [mm]"', 'position = "x_ist [mm]"', 'torque = "F_ist [N]"', 'axis = "linear"'):
+        assert line in text
 
 
 @pytest.mark.parametrize(

@@ -373,3 +373,15 @@ def test_real_mat_files_are_what_scipy_says(data_dir: Path) -> None:
 def test_real_coupled_electric_drives(data_dir: Path) -> None:
     rec = read(real(data_dir, "ced", "DATAUNIF.MAT"), columns={"torque": "u11", "velocity": "z11"}, dt=0.02)
     assert len(rec) == 500
+
+
+def test_a_column_that_may_be_the_torque_and_is_not_read_is_named(tmp_path: Path) -> None:
+    log = tmp_path / "run.csv"
+    rows = "".join(f"{1e-3 * i:.3f},{i % 5},{0.1 * i},{0.02 * i},{i}\n" for i in range(40))
+    log.write_text("t,w_ref,w,M [N m],M_load\n" + rows)
+    columns: dict[str, str | int | None] = {"time": "t", "command": "w_ref", "velocity": "w"}
+    (note,) = read(log, columns=columns).notes
+    assert note.startswith("No torque is read, but by its name 'M' may be it: give columns={'torque': 'M'}"), note
+    # What is read, and what the user says is none, is not asked for.
+    assert not read(log, columns={**columns, "torque": "M"}).notes
+    assert not read(log, columns={**columns, "torque": None}).notes

@@ -12,6 +12,7 @@ import gaident as ga
 from drive_rig import Plant, rig, skip_without_library
 from gaident.diagnosis.check import Check, checked
 from gaident.diagnosis.gains import Gains
+from gaident.estimation.dataset import DataSet
 from gaident.results.diagnosis import Fitness
 
 skip_without_library()
@@ -44,7 +45,8 @@ def check_of(
     fitness = Fitness(1.0, 0.0, 0.1)
     gains = Gains(fitness, fitness, (0.0, 0.0), "the rest", {}, ((rec, 4200),), bare, model)
     mechanics = {"inertia": ga.Estimate(inertia, share * inertia, "kg m^2")}
-    return checked([rec], gains, model, mechanics, estimates(effects), driven)
+    data = DataSet.of([rec], None if driven else PLANT.controller)
+    return checked(data, gains, model, mechanics, estimates(effects))
 
 
 def rows(check: Check) -> dict[str, Any]:

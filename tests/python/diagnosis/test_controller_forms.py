@@ -10,12 +10,17 @@ from threadpoolctl import threadpool_limits
 
 import gaident as ga
 import servo_referee as referee
+from gaident.diagnosis.controller.driving import driving_of
 from gaident.diagnosis.controller.form_findings import driver_of, loop_of
+from gaident.diagnosis.controller.form_regression import fitted_shape, law_of
 from gaident.diagnosis.controller.forms import Shown, form_shown
+from gaident.diagnosis.controller.other_form import other_form
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.controller.slow_forms import limited
 from gaident.diagnosis.explain.alternatives import alternatives_of
+from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.identification.logged_torque import not_followed
+from gaident.models.drive_torque import torque_driven
 from referee_logs import GIVEN, KI, KP, NOTCH, T, command, dip, log, low, slower
 
 
@@ -196,11 +201,61 @@ def test_a_controller_that_is_not_the_drives_is_a_rival_of_mechanics() -> None:
     assert alternatives_of("coulomb_friction", [], [], True, None, False) == []  # the records show its jump
 
 
-def test_a_slow_log_whose_torque_does_not_follow_is_doubted() -> None:
+def test_a_wrong_filter_that_was_given_is_not_taken_for_mechanics() -> None:
     rec = slower(4, torque_filters=[low(1e-3)])
-    for tau, doubted in ((1e-3, False), (2e-4, True)):  # with a filter given, no other form is looked for
+    for tau, named in ((1e-3, []), (2e-4, ["torque_filter"])):
         dia = ga.diagnose(rec, ga.Cascade(GIVEN, T, torque_filters=(ga.LowPass(tau),)))
-        assert any("does not follow from command and velocity" in note for note in dia.notes) == doubted
+        assert [f.effect for f in dia.causes] == named
+        assert isinstance(dia.controller, ga.Cascade)
+        (used,) = dia.controller.torque_filters
+        assert isinstance(used, ga.LowPass) and used.time_constant == pytest.approx(1e-3, rel=0.01)
+        assert any("this one is used" in note for note in dia.notes) == bool(named)
     found = ga.diagnose(rec, ga.Cascade(GIVEN, T))
     assert [f.effect for f in found.causes] == ["torque_filter"]
-    assert not any("does not follow" in note for note in found.notes)
+
+
+def test_what_was_given_and_is_not_there_is_left_out() -> None:
+    rec = slower(4, weight=0.5)
+    filtered = ga.Cascade(ga.PI(KP, KI, command_weight=0.5), T, torque_filters=(ga.LowPass(1e-3),))
+    with threadpool_limits(1, user_api="blas"):
+        form = other_form([rec], [], filtered)
+    assert form is not None and form.findings == ()  # the weight is as given
+    assert form.controller.velocity.command_weight == pytest.approx(0.5, abs=1e-3) and form.controller.torque_filters == ()
+    assert "without its torque filter" in str(form.notes[0])
+    assert not not_followed([rec], form.controller)
+
+
+def test_a_loop_in_doubt_explains_nothing() -> None:
+    """Four things at once are no form that a slow log shows: what a wrong loop leaves looks like mechanics."""
+    rec = slower(weight=0.5, torque_filters=[low(1e-3), dip()], command_filters=[low(3e-3)], torque_limit=0.4, windup="hold")
+    given = ga.Cascade(GIVEN, T, torque_filters=(ga.LowPass(1e-3),))
+    with threadpool_limits(1, user_api="blas"):
+        assert other_form([rec], [], given) is None
+    assert not_followed([rec], given)
+    assert verdict_of(found=True, left=False, loop_in_doubt=True) == "partly explained"
+    assert verdict_of(found=True, left=False, loop_in_doubt=False) == "explained"
+    assert verdict_of(found=False, left=False, loop_in_doubt=True) == "adequate"
+    assert verdict_of(found=False, left=True, loop_in_doubt=False) == "unexplained"
+
+
+def test_what_a_slow_log_does_not_show_between_its_lines_counts_behind_a_filter() -> None:
+    """A bare PI answers on the line; a filter also to the samples between the lines, and leaves that much more."""
+    regression = law_of([slower(4, torque_filters=[dip()])], GIVEN, 4)
+    assert regression is not None
+    law, floor = regression
+    notched = fitted_shape(law, (("torque_filters", ga.Notch),), floor)
+    bare = fitted_shape(law, (), floor)
+    assert law.unseen(notched) > 3.0 * law.unseen(bare) > 0.0
+    every = law_of([log(torque_filters=[dip()])], GIVEN)
+    assert every is not None and every[0].unseen(fitted_shape(every[0], (), 0.0)) == 0.0
+
+
+def test_a_form_that_was_found_is_not_looked_for_again() -> None:
+    """The scheme that comes closest at the limit is in doubt, the limit is not."""
+    rec = slower(4, torque_limit=0.6, windup="tracking", tracking=4e-3, weight=0.5)
+    with threadpool_limits(1, user_api="blas"):
+        asked = loop_of([rec], ga.Cascade(GIVEN, T))
+        driven = torque_driven([rec], asked.controller)
+        found = driving_of(driven.records, (), asked, driven, {driven.records[0].digest: rec})
+    assert {f.effect for f in asked.findings} == {"torque_saturation", "command_weight"}
+    assert found.findings == asked.findings and found.controller == asked.controller

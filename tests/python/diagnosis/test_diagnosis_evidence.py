@@ -270,6 +270,7 @@ def test_a_single_step_says_what_it_cannot_judge() -> None:
         "asymmetric_friction",
         "quadratic_drag",
         "friction_drift",
+        "load_dependent_friction",
         "backlash",
         "hardening_stiffness",
     }

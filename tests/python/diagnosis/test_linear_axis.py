@@ -74,7 +74,42 @@ def test_a_rotary_axis_is_asked_for_its_turns_as_before() -> None:
     assert set(excitation(rec, axis="linear").not_testable) >= PERIODIC
     why = "positions are lengths on a linear axis: which length is one turn, they do not say"
     short = excitation(rec.with_channels(position=0.01 * rec.velocity), axis="linear").not_testable
-    assert {short[name] for name in PERIODIC} == {why}
+    assert short["unbalance"] == why and {short[name] for name in PERIODIC} == {
+        why,
+        "positions are lengths on a linear axis: with which length it returns, they do not say; give its pitch",
+    }
+
+
+def screw(pitch: float) -> ga.Record:
+    """20 kg with 15 N of dry friction, and 8 N of cogging with every pitch [m]."""
+    t = 1e-3 * np.arange(4000)
+    command = 0.08 * np.sin(2.0 * np.pi * 0.2 * t) + 0.05 * np.sign(np.sin(2.0 * np.pi * 0.45 * t))
+    axis = ga.OneMass(J=20.0, D=100.0).model().with_effect("coulomb_friction", torque=15.0)
+    axis = axis.with_effect("cogging", amplitude=8.0, order=2.0 * np.pi / pitch, phase=0.4)
+    noise = 2e-4 * np.random.default_rng(1).standard_normal(len(t))
+    run = ga.run(axis, ga.Record(1e-3, command=command - noise, velocity=noise), LOOP)
+    return ga.Record(1e-3, command=command, velocity=run.velocity + noise, torque=run.torque, position=run.position)
+
+
+@pytest.mark.parametrize("given", [0.024, 0.048])
+def test_cogging_of_a_linear_axis_is_found_by_its_pitch(given: float) -> None:
+    """By the pitch itself, and by one of which it is the second order."""
+    dia = ga.diagnose(screw(0.024), LOOP, axis="linear", pitch=given)
+    found = {f.effect: f for f in dia.causes}
+    assert dia.verdict == "explained" and all(f.named for f in dia.causes) and set(found) == {"coulomb_friction", "cogging"}
+    cogging = found["cogging"].parameters
+    assert cogging["amplitude"].value == pytest.approx(8.0, rel=0.01)
+    assert cogging["order"].value == pytest.approx(2.0 * np.pi / 0.024)
+    assert "every 24 mm" in dia.summary() and "torque" not in dia.summary().lower()
+
+
+def test_a_pitch_that_is_none() -> None:
+    rec = record()[:400]
+    for wrong in (0.0, -0.01, np.nan, True):
+        with pytest.raises(SettingsError, match=r"pitch is .*: give the length in m"):
+            ga.diagnose(rec, axis="linear", pitch=wrong)
+    with pytest.raises(SettingsError, match=r"pitch is 0\.024, which belongs to a linear axis: .*axis='linear'"):
+        ga.diagnose(rec, pitch=0.024)
 
 
 def test_experiments_keep_to_the_travel_of_a_linear_axis() -> None:
@@ -103,6 +138,11 @@ def test_the_command_line_takes_the_axis_of_the_drive_file(
     assert main(["diagnose", "axis.csv", "--drive", "drive.toml", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["axis"] == "linear" and set(data["not_testable"]) >= PERIODIC
+    assert main(["diagnose", "axis.csv", "--drive", "drive.toml", "--pitch", "0.5", "--json"]) == 0
+    assert set(json.loads(capsys.readouterr().out)["not_testable"]) & PERIODIC == {"unbalance"}
+    Path("drive.toml").write_text('axis = "linear"\npitch = "24 parsec"\n')
+    assert main(["diagnose", "axis.csv", "--drive", "drive.toml"]) == 2
+    assert "pitch is '24 parsec': give a length in m" in capsys.readouterr().err
     limits = "[limits]\nspeed = 1.0\ntorque = 300.0\ntravel = 2.0\nduration = 20.0\n"
     Path("drive.toml").write_text('axis = "linear"\ndt = 1e-3\n' + limits)
     assert main(["experiment", "--drive", "drive.toml", "--json"]) == 0

@@ -17,7 +17,7 @@ from scipy.stats import chi2
 
 import gaident as ga
 from gaident.control.controller import Limiting
-from gaident.diagnosis.selection import model_space, moves, score_test
+from gaident.diagnosis.selection import model_space, moves, score_test, side_moves
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.bootstrap import largest_gains
 from gaident.diagnosis.selection.rivals import rivals_of
@@ -138,6 +138,7 @@ def _no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(prediction, "simulate_values", simulated)
     monkeypatch.setattr(LoadedRecord, "velocities", simulated)
+    monkeypatch.setattr(side_moves, "LIBRARY", LIBRARY)
     for module in (moves, model_space):
         monkeypatch.setattr(module, "LIBRARY", LIBRARY)
         monkeypatch.setattr(module, "equivalents", lambda effect: {"lag": ("seen",), "seen": ("lag",)}.get(effect, ()))

@@ -12,7 +12,7 @@ from gaident.estimation.regression.sensor_lag import velocity_lag
 
 JOINT = Plant(J=15.0, D=18.0, kp=300.0, ki=1500.0, dt=0.01)
 GRAVITY = {"unbalance": {"amplitude": 113.0, "phase": -1.57}}
-LOADED = {**GRAVITY, "coulomb_friction": {"torque": 10.5}, "load_dependent_friction": {"share": 0.07}}
+LOADED = {**GRAVITY, "load_dependent_friction": {"torque": 10.5, "share": 0.07}}
 ROOT = {"root_drag": {"coefficient": 20.0}}
 
 
@@ -76,14 +76,21 @@ def test_a_filtered_velocity_is_late_behind_the_position_and_a_plain_one_is_not(
     assert velocity_lag(other) is None, "a velocity that is not that of the position"
 
 
-def test_friction_beside_gravity_stands_where_it_grows_with_the_load_too() -> None:
+def test_friction_beside_gravity_is_seen_to_grow_with_the_load() -> None:
     dia = ga.diagnose(joint(LOADED))
-    assert {f.effect for f in dia.causes} == {"unbalance", "coulomb_friction"}
+    assert {f.effect for f in dia.causes} == {"unbalance", "load_dependent_friction"}
     assert not any(f.alternatives for f in dia.causes)
-    assert dia.verdict == "partly explained" and dia.driver is not None, "the library does not hold what grows with the load"
-    sizes = {f.effect: next(iter(f.parameters.values())).value for f in dia.causes}
-    assert sizes["unbalance"] == pytest.approx(113.0, rel=0.03)
-    assert 10.5 < sizes["coulomb_friction"] < 10.5 + 0.07 * 113.0
+    assert dia.verdict == "explained" and dia.driver is None
+    found = {f.effect: {name: e.value for name, e in f.parameters.items()} for f in dia.causes}
+    assert found["unbalance"]["amplitude"] == pytest.approx(113.0, rel=0.01)
+    assert found["load_dependent_friction"] == pytest.approx({"torque": 10.5, "share": 0.07}, rel=0.02)
+    assert not any("disagree" in note for note in dia.notes), "a regression without it has no one number to compare"
+
+
+def test_friction_of_one_size_beside_gravity_is_not_seen_to_grow_with_the_load() -> None:
+    dia = ga.diagnose(joint({**GRAVITY, "coulomb_friction": {"torque": 10.5}}))
+    assert {f.effect for f in dia.causes} == {"unbalance", "coulomb_friction"}
+    assert not any(f.alternatives for f in dia.causes) and dia.verdict == "explained"
 
 
 def test_a_steep_drag_alone_gets_no_name() -> None:

@@ -43,8 +43,14 @@ def test_the_true_model_needs_the_logged_torque(effect: str, plant: Plant) -> No
     true = mechanism(plant).with_effect(effect, **EFFECTS[effect])
     at_truth = ga.force_error(true, rec)
     without = ga.force_error(mechanism(plant), rec, cutoff_hz=at_truth.cutoff_hz)
-    assert at_truth.percent < 1.5, at_truth
-    assert without.rms > 3.0 * at_truth.rms, (without, at_truth)
+    assert at_truth.percent < 1.0, at_truth
+    assert without.rms > 30.0 * at_truth.rms, (without, at_truth)
+
+
+def test_steps_of_two_masses_leave_little_at_the_truth() -> None:
+    """Up to half of the antiresonance, where the motor's inertia alone is not what the loop leads."""
+    rec = rig(TWO, np.repeat([20.0, -30.0, 10.0, -5.0, 40.0, 0.0, -20.0, 15.0], 500), {}, noise="none")
+    assert ga.force_error(mechanism(TWO), rec).percent < 0.2
 
 
 def test_a_missing_friction_is_missing_in_its_size() -> None:

@@ -11,7 +11,14 @@ from drive_rig import Noise, Plant, rig, skip_without_library
 from gaident.data.signals.lattice import encoder_lines
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.records.hygiene import unexplained
+from gaident.diagnosis.records.sizes import scales_of
+from gaident.diagnosis.selection.bases import Task
+from gaident.diagnosis.selection.mechanisms import on_a_shaft, resonance
+from gaident.estimation import least_squares as ls
+from gaident.estimation.dataset import DataSet
 from gaident.estimation.mean_velocity import means, with_middles
+from gaident.estimation.noise_model import WHITE
+from gaident.estimation.objective import Objective
 from gaident.models.drive_torque import late
 
 T, LINES = 0.5e-3, 2**20
@@ -27,10 +34,10 @@ def command(seed: int) -> np.ndarray:
     )
 
 
-def record(seed: int, effects: dict[str, dict[str, float]], differenced: bool = True) -> ga.Record:
+def record(seed: int, effects: dict[str, dict[str, float]], differenced: bool = True, drive: Plant = DRIVE) -> ga.Record:
     skip_without_library()
     noise = Noise(white=0.0, encoder=2.0 * np.pi / LINES, differenced=differenced)
-    return rig(DRIVE, command(seed), effects, noise, seed)
+    return rig(drive, command(seed), effects, noise, seed)
 
 
 def test_lines_of_an_encoder_are_whole() -> None:
@@ -77,13 +84,47 @@ def test_a_differenced_angle_without_a_logged_torque_is_no_finding() -> None:
     assert any("torque_saturation" in (f.effect, *f.alternatives) for f in dia.causes), dia.summary()
 
 
-@pytest.mark.parametrize("effect", ["", "stribeck_friction", "torque_lag"])
-def test_the_search_finds_the_age_where_the_lines_of_a_turn_are_no_whole_number(effect: str) -> None:
+@pytest.mark.parametrize(
+    ("effect", "logged"), [("", True), ("stribeck_friction", True), ("torque_lag", True), ("cogging", True), ("cogging", False)]
+)
+def test_the_search_finds_the_age_where_the_lines_of_a_turn_are_no_whole_number(effect: str, logged: bool) -> None:
+    """With cogging also the angle, which is integrated from the velocity, is half a sample old."""
     skip_without_library()
-    rec, validation, controller, truth = random_case(314, effect or None, noise="differenced")
+    rec, validation, controller, truth = random_case(314, effect or None, noise="differenced", torque_logged=logged)
     dia = ga.diagnose(rec, controller, validation=validation)
     assert any("half a sample old" in note for note in dia.notes), dia.summary()
     assert [effect in {f.effect, *f.alternatives} for f in dia.causes] == [True] * len(truth.effects), dia.summary()
+
+
+# Resonance at 290 Hz, damped by 0.02; the zeros at 190 Hz.
+SHAFT = Plant(J=2e-4, D=7e-4, JL=2.7e-4, DL=7e-4, KG=381.0, DG=0.0084, kp=0.06, ki=3.0, dt=T, name="shaft")
+LAG = {"torque_lag": {"time_constant": 0.4e-3}}
+
+
+def test_the_age_is_told_behind_a_lag_beside_a_resonance() -> None:
+    """A mechanism that was fitted without the lag has its resonance elsewhere: neither age fits from there."""
+    dia = ga.diagnose(record(1, LAG, drive=SHAFT), SHAFT.controller, validation=record(2, LAG, drive=SHAFT))
+    assert any(f"({LINES} lines a turn)" in note for note in dia.notes), dia.summary()
+    (found,) = dia.causes
+    assert {found.effect, *found.alternatives} == {"torque_lag", "velocity_filter"}, dia.summary()
+    assert found.parameters["time_constant"].value == pytest.approx(0.4e-3, rel=0.01)
+    assert dia.mechanics["motor_inertia"].value == pytest.approx(SHAFT.J, rel=0.01)
+
+
+def test_a_resonance_is_found_beside_the_lag_that_hides_it() -> None:
+    rec = record(1, LAG, drive=SHAFT)
+    data = DataSet.of([rec], None).aged(0.5)
+    objective, scales = Objective(data, np.ones(len(rec))), scales_of(data)
+    one = Task(objective, scales, ga.OneMass(J=4.7e-4, D=1.4e-3).model(), (), lambda message: None).one_mass()
+    lag = LIBRARY["torque_lag"]
+    longer = one.hypothesis.extended(lag)
+    late = ls.fit(objective, longer, one.parameters.inserted(one.x, lag.coordinates({"time_constant": 0.3e-3})), WHITE, 12)
+    fits = [ls.fit(objective, hypothesis, x, WHITE, 12) for hypothesis, x in on_a_shaft(objective, late)]
+    best = min(fits, key=lambda f: f.cost)
+    own = np.sqrt(SHAFT.KG * (1.0 / SHAFT.J + 1.0 / SHAFT.JL))
+    assert best.parameters.kind == "two masses" and best.effects == ("torque_lag",)
+    assert resonance(best) == pytest.approx(own, rel=0.01)
+    assert best.cost < 0.01 * late.cost
 
 
 def test_a_rounded_velocity_that_is_no_difference_is_not_taken_for_one() -> None:

@@ -218,7 +218,9 @@ def test_gains_that_the_logged_torque_contradicts_are_corrected(every: int) -> N
     assert len(not_followed([rec], given)) == 1
     idn = ga.identify(rec, given, seed=1, workers=1)
     assert idn.controller is not None and idn.controller.gains.kp == pytest.approx(GIVEN.kp, rel=5e-3)
-    assert any("instead of the given ones" in note for note in idn.warnings)
+    assert any(f"(given: {given.velocity.kp:.4g} and {given.velocity.ki:.4g}) it does" in note for note in idn.warnings)
+    kp = idn.controller_numbers["velocity.kp"]
+    assert kp.value == idn.controller.gains.kp and 0.0 < kp.std < 0.02 * kp.value
     assert (idn.p, idn.q) == (1, 2) and not idn.falsified
     assert np.abs(idn.model.poles).max() == pytest.approx(465.4, rel=5e-3)
 

@@ -24,6 +24,7 @@ from gaident.models import FactorCounts, factor_parameters, initial_state, simul
 
 # Typical sizes of each effect on a small servo drive.
 TWO_MASSES = ("backlash", "hardening_stiffness")
+BESIDE = {"load_dependent_friction": ("unbalance", "load_torque")}  # in the same run: alone it is Coulomb friction
 CONTROLLER_ONLY = ("integrator_clamp", "command_rate_limit")
 ONE = ga.OneMass(5e-4, 0.005)
 TWO = ga.TwoMass(1.02e-4, 0.003, 5.815e-4, 0.008, 2.59, 0.002)
@@ -85,7 +86,7 @@ def reference() -> dict[Key, tuple[Array, Array, Array]]:
                     if two:
                         drive = {"motor": (TWO.JM, TWO.DM), "load": (TWO.JL, TWO.DL), "shaft": (TWO.KG, TWO.DG)}
                     source = pulses() if loop == "open" else staircase()
-                    effects = {} if name is None else {name: SIZES[name]}
+                    effects = {} if name is None else {other: SIZES[other] for other in (name, *BESIDE.get(name, ()))}
                     cases.append(FineCase(dt, loop, source, **drive, **gains, effects=effects))
                     keys.append((dt, two, loop, name))
     out = integrated(cases, fine=100)
@@ -111,7 +112,10 @@ def test_effect_agrees_with_the_fine_integrator(reference: dict[Key, tuple[Array
             # In open loop the angle is the record's, elsewhere the simulation's own.
             rec = record(dt, loop, angle if loop == "open" else None, truth)
             ctl = controller_of(loop, two)
-            ours = ga.simulate(model.with_effect(name, **SIZES[name]), rec, ctl)
+            with_all = model.with_effect(name, **SIZES[name])
+            for other in BESIDE.get(name, ()):
+                with_all = with_all.with_effect(other, **SIZES[other])
+            ours = ga.simulate(with_all, rec, ctl)
             # With minus without on both sides: what the reference's own steps do to the linear drive is no matter of the effect.
             deviation = (ours - ga.simulate(model, rec, ctl)) - (truth - plain)
             size = rms(truth - plain)

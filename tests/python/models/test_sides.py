@@ -55,6 +55,8 @@ AT_BOTH = [f"{name}+{name}@load" for name in DRY] + [
     "coulomb_friction+stribeck_friction@load",
     "stribeck_friction+lugre_friction@load",
     "cogging+coulomb_friction+unbalance@load+coulomb_friction@load",
+    "load_dependent_friction@load+unbalance@load+load_torque@load",
+    "load_dependent_friction+unbalance+load_dependent_friction@load+cogging@load+load_torque@load",
     "backlash+coulomb_friction@load",
     "backlash+coulomb_friction+coulomb_friction@load",
 ]

@@ -58,6 +58,10 @@ for _name in ("coulomb_friction", "stribeck_friction", "presliding_friction", "f
               "torque_dead_band", "transport_delay", "torque_lag", "command_rate_limit", "velocity_filter"):  # fmt: skip
     _all = _all.with_effect(_name, **SIZES[_name])
 CASES["many"] = (_all, CONTROLLER, {})
+_loaded = ONE
+for _name in ("load_dependent_friction", "load_torque", "unbalance", "cogging"):
+    _loaded = _loaded.with_effect(_name, **SIZES[_name])
+CASES["loaded"] = (_loaded, CONTROLLER, {})
 
 COMMAND = np.repeat([20.0, 60.0, -40.0, -5.0, 5.0, 0.0], N // 6)
 TORQUE = 0.3 * np.sin(np.linspace(0.0, 25.0, N)) + 0.15 * (np.arange(N) > 120)

@@ -44,6 +44,7 @@ ROOMS = [
         "diagnosis/controller",
         "diagnosis/experiments",
         "diagnosis/explain",
+        "diagnosis/work",
         "diagnosis/diagnose",
     ),
     *("reporting", "paper", "drive", "cli", "cli/commands", "__init__", "__main__"),

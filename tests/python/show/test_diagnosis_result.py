@@ -160,7 +160,7 @@ def test_a_linear_axis_is_spoken_of_in_metres_and_newtons() -> None:
     text = summary(fake(), "linear")
     assert "0.1 m/s at 0.02 N." in text and "motor mass" in text and " kg\n" in text and "N s/m" in text
     assert "rad/s" not in text and "N m" not in text and "turn " not in text.replace("per turn", "")
-    assert "torque saturation: a limit above 1.25 N would not have shown: no more force was asked for" in text
+    assert "force saturation: a limit above 1.25 N would not have shown: no more force was asked for" in text
     assert "a limit above 2e+04 m/s^2 would not have shown" in text
     assert f"{12.0 / math.tau:.5g}" in text  # 12 per turn are 12/(2 pi) per metre
 

@@ -127,12 +127,12 @@ FIELDS: dict[str, dict[str, str]] = {
     "extra_resonance": {"frequency": "wp", "damping": "zp", "zero_frequency": "wz", "zero_damping": "zz"},
     "torque_hum": {"amplitude": "hum", "frequency": "hum_frequency", "phase": "hum_phase"},
     "uneven_friction": {"torque": "uneven", "depth": "uneven_depth", "order": "uneven_order", "phase": "uneven_phase"},
-    "load_dependent_friction": {"share": "loaded"},
     "root_drag": {"coefficient": "root"},
     "hysteretic_spring": {"share": "hysteretic", "yield_twist": "yield"},
 }
 FRICTION: dict[str, dict[str, str]] = {
     "coulomb_friction": {"torque": "both"},
+    "load_dependent_friction": {"torque": "both", "share": "loaded"},
     "stribeck_friction": {"torque": "both", "static_torque": "static", "stribeck_velocity": "stribeck_velocity"},
     "asymmetric_friction": {
         "torque_positive": "friction_positive",
@@ -200,12 +200,14 @@ def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:
             raise ValueError(f"{effect} takes {sorted(known)}, not {sorted(parameters)}")
         if effect in COUPLING and not plant.two_masses:
             raise ValueError(f"{effect} acts in the shaft between two masses")
-        if effect == "coulomb_friction" or effect == "stribeck_friction":
+        if "both" in known.values():
             values["friction_positive"] += parameters["torque"]
             values["friction_negative"] += parameters["torque"]
         if effect == "stribeck_friction":
             values["stribeck"] = parameters["static_torque"] - parameters["torque"]
             values["stribeck_velocity"] = parameters["stribeck_velocity"]
+        elif effect == "load_dependent_friction":
+            values["loaded"] = parameters["share"]
         elif effect == "asymmetric_friction":
             for name, place in known.items():
                 values[place] += parameters[name]

@@ -26,6 +26,7 @@ SIZES: dict[str, dict[str, float]] = {
     "unbalance": {"amplitude": 0.05, "phase": 0.3},
     "cogging": {"amplitude": 0.03, "order": 12.0, "phase": 0.4},
     "friction_drift": {"torque": 0.05, "rate": -0.2},
+    "load_dependent_friction": {"torque": 0.04, "share": 0.2},
     "backlash": {"gap": 0.01},
     "hardening_stiffness": {"cubic_stiffness": 1e4},
     "torque_saturation": {"limit": 0.5},

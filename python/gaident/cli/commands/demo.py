@@ -6,10 +6,11 @@ import argparse
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from gaident.cli import demonstration
-from gaident.cli.output import csv_text, print_json, save_figure, summary_of, write
+from gaident.cli.output import csv_text, print_json, program, save_figure, summary_of, write
 from gaident.show.progress_bar import Progress
 
 __all__ = ["demo_command"]
@@ -33,7 +34,7 @@ def demo_command(args: argparse.Namespace) -> None:
     write(log, csv_text(rec, None, "rotary").encode())
     save_figure(idn.plot(rec), picture)
     say(f"\nwritten: {picture}, {log}; the same from the log:")
-    say(f"  gaident identify {log} --kp {controller.kp} --ki {controller.ki} --loop {controller.loop}")
+    say(f"  {program()} identify {quote(str(log))} --kp {controller.kp} --ki {controller.ki} --loop {controller.loop}")
     report: dict[str, Any] = {
         "schema": "gaident/demo",
         "schema_version": 1,
@@ -62,7 +63,7 @@ def demo_command(args: argparse.Namespace) -> None:
     save_figure(dia.plot(), picture)
     controller = demonstration.DIGITAL
     say(f"\n{demonstration.FRICTION_TRUTH}\nwritten: {picture}, {log}; the same from the log:")
-    say(f"  gaident diagnose {log} --kp {controller.kp} --ki {controller.ki}")
+    say(f"  {program()} diagnose {quote(str(log))} --kp {controller.kp} --ki {controller.ki}")
     report["friction"] = {"truth": demonstration.HIDDEN, "diagnosis": dia.to_dict()}
     if args.json:
         print_json(report)

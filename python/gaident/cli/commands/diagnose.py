@@ -13,7 +13,7 @@ from gaident.axis import velocity_unit
 from gaident.cli.drive import drive_of, read_all, reading_notes
 from gaident.cli.output import print_json, proposal_csv, target_of, write
 from gaident.cli.remedies import in_options
-from gaident.cli.result_files import ResultFiles
+from gaident.cli.result_files import ResultFiles, shown_block
 from gaident.diagnosis.diagnose import diagnose
 from gaident.drive.drive_file import Drive, axes_in
 from gaident.errors import GaidentError, SettingsError
@@ -22,9 +22,8 @@ from gaident.models.drive_torque import torque_driven
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
 from gaident.results.store import load
-from gaident.show.diagnosis_summary import either, words
 from gaident.show.progress_bar import Progress
-from gaident.show.wording import number, table
+from gaident.show.wording import either, number, table, words
 
 __all__ = ["diagnose_command"]
 
@@ -35,9 +34,9 @@ def diagnose_command(args: Namespace) -> int | None:
         return _several(args, args.select or names)
     drive, dia, written = _diagnosed(args)
     if args.json:
-        print_json(dia.to_dict())
+        print_json({**dia.to_dict(), **shown_block(dia, drive)})
         return None
-    print(dia.summary(drive.axis))
+    print(dia.summary(drive.axis, drive.units_shown))
     if args.next_command is not None and dia.next_experiment is None:
         print(f"\nnot written: {args.next_command}, as there is no next experiment to propose")
     if written:
@@ -71,7 +70,7 @@ def _several(args: Namespace, names: Sequence[str]) -> int | None:
     print("\n".join(table([("axis", "verdict", "cause", "rmse, linear", "extended", ""), *starmap(_row, found.items())], "")))
     for name, result in found.items():
         if not isinstance(result, GaidentError):
-            print(f"\n--- {name}\n\n{result[1].summary(result[0].axis)}")
+            print(f"\n--- {name}\n\n{result[1].summary(result[0].axis, result[0].units_shown)}")
     if written:
         print(f"\nwritten: {', '.join(map(str, written))}")
     return 1 if failed else None
@@ -81,7 +80,7 @@ def _row(name: str, result: tuple[Drive, Diagnosis] | GaidentError) -> tuple[str
     if isinstance(result, GaidentError):
         return name, "not diagnosed", in_options(result), "", "", ""
     drive, dia = result
-    causes = ", ".join(either(f) if f.alternatives else words(f.effect) for f in dia.causes) or "none"
+    causes = ", ".join(either(f, drive.axis) if f.alternatives else words(f.effect, drive.axis) for f in dia.causes) or "none"
     return name, dia.verdict, causes, number(dia.before.rmse), number(dia.after.rmse), velocity_unit(drive.axis)
 
 
@@ -114,9 +113,10 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
             seed=args.seed,
             progress=progress,
             axis=drive.axis,
+            pitch=drive.pitch,
         )
     dia = replace(dia, notes=(*reading_notes(drive, [*records, *(validation or ())]), *dia.notes))
-    written = files.write(dia, records, validation or (), drive.axis, lambda: dia.plot(axis=drive.axis))
+    written = files.write(dia, records, validation or (), drive, lambda: dia.plot(axis=drive.axis))
     if following is not None and dia.next_experiment is not None:
         write(following, proposal_csv(dia.next_experiment, drive.axis).encode())
         written.append(following)

@@ -10,7 +10,7 @@ from dataclasses import replace
 from gaident.axis import say
 from gaident.cli.drive import drive_of, read_all, reading_notes
 from gaident.cli.output import print_json, summary_of
-from gaident.cli.result_files import ResultFiles
+from gaident.cli.result_files import ResultFiles, shown_block
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
@@ -48,11 +48,11 @@ def identify_command(args: argparse.Namespace) -> None:
         for name, said in _replayed(records, controller)
     ]
     idn = replace(idn, warnings=(*reading_notes(drive, records), *off, *idn.warnings))
-    written = files.write(idn, records, (), drive.axis, lambda: idn.plot(records, drive.axis))
+    written = files.write(idn, records, (), drive, lambda: idn.plot(records, drive.axis))
     if args.json:
-        print_json(idn.to_dict())
+        print_json({**idn.to_dict(), **shown_block(idn, drive)})
         return
-    print(summary_of(idn, drive.axis))
+    print(summary_of(idn, drive.axis, drive.units_shown))
     if written:
         print(f"\nwritten: {', '.join(map(str, written))}")
 

@@ -8,7 +8,7 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from gaident.cli.output import print_json, target_of, write
+from gaident.cli.output import print_json, program, target_of, write
 from gaident.data.listing import columns, printable
 from gaident.data.readers import read_columns
 from gaident.drive.draft import draft
@@ -59,7 +59,7 @@ def init_command(args: argparse.Namespace) -> None:
         for line in found.fill_in:
             print(f"  {line}")
     then = "then, once that is done" if found.fill_in else "then"
-    print(f"{then}: gaident identify {shlex.quote(str(args.log))} --drive {shlex.quote(str(target))}")
+    print(f"{then}: {program()} identify {shlex.quote(str(args.log))} --drive {shlex.quote(str(target))}")
 
 
 def _text_options(args: argparse.Namespace) -> dict[str, Any]:

@@ -24,8 +24,8 @@ def report_command(args: argparse.Namespace) -> None:
     result = load(args.result)
     if not isinstance(result, (Diagnosis, Identification)):
         raise GaidentError(f"{args.result}: a record, no result; give what `gaident identify` or `diagnose` wrote with --out")
-    records, validation = ([drive.read(log) for log in logs] for logs in (args.logs, held))
-    size = write_report(result, target, records, validation, drive.axis)
+    records, validation = ([rec for log in logs for rec in drive.records(log)] for logs in (args.logs, held))
+    size = write_report(result, target, records, validation, drive, not args.pictures)
     if args.json:
         print_json({"schema": "gaident/report", "schema_version": 1, "path": str(target), "bytes": size})
         return

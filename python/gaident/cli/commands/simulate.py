@@ -34,6 +34,8 @@ def simulate_command(args: argparse.Namespace) -> None:
     if drive.controller_values and drive.controller() != controller:
         controller, states = drive.controller(), {}  # the saved states are of the loop they were found in
     records = read_all(drive, args.logs, controller, measured=False)
+    if len(records) != len(args.logs):
+        raise SettingsError("--pieces: gaident simulate takes a log as one record; name a part of it with --from and --to")
     several = len(records) > 1
     if several and args.out is None and not args.json:
         raise SettingsError(f"{len(records)} logs are given: name a folder for their CSV files with --out, or use --json")

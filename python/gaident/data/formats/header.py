@@ -20,7 +20,7 @@ COMMENT = re.compile(r"\s*(#|//|%)")
 _BRACKETS = re.compile(r"(.*\S)\s*[\[(<{]([^\])>}]+)[\])>}]")
 _NOTED = re.compile(r"(.*\S)\s*\[([^\]]+)\]\s*\S.*")  # n_ist [1/min] (smoothed)
 _AFTER = re.compile(r"(.*\S)\s+(?:/|in)\s+(\S.*)")
-_PLAIN = re.compile(r"(.*[^\s_])[\s_]+(rpm|nm|rad/s|deg/s|1/min|r/min|u/min|min-1|m/s|mm/s|m/min|mm/min)", re.IGNORECASE)
+_PLAIN = re.compile(r"(.*[^\s_-])[\s_-]+(rpm|nm|rad/s|deg/s|1/min|r/min|u/min|min-1|m/s|mm/s|m/min|mm/min)", re.IGNORECASE)
 """A unit behind a blank or underline, of those that are no word beside: speed_rpm, torque_Nm."""
 _ENCLOSED = re.compile(r"[\[(<{](.*)[\])>}]")
 

@@ -13,9 +13,9 @@ NO_NAME = "Time"
 
 TIME_NAMES = (
     *("time", "t", "__time", "timestamp", "stamp", "header.stamp", "field.header.stamp", "header/stamp"),
-    *("zeit", "zeitstempel", "temps", "tempo", "tiempo", "index"),
+    *("zeit", "zeitstempel", "temps", "tempo", "tiempo", "jikan", "index"),
 )
-"""In English, ROS's, German, French, Italian and Spanish words; small letters."""
+"""In English, ROS's, German, French, Italian, Spanish and Japanese words; small letters."""
 
 _WITH_UNIT = re.compile(
     rf"({'|'.join(map(re.escape, TIME_NAMES))})(?:\s*[/,;_\s]\s*|\s+in\s+|\s*(?=[\[(]))[\[(]?(\w+)[\])]?", re.IGNORECASE

@@ -63,13 +63,13 @@ _TORQUE: dict[tuple[str, ...], _Unit] = {
     ("kN",): _Unit(1e3),
     ("%", "percent", "% rated", "% of rated", "% of rated torque"): _Unit(0.01, _RATED),
     ("‰", "per mille", "0.1 %", "promille"): _Unit(1e-3, _RATED),
-    ("A", "amp", "ampere", "arms"): _Unit(1.0, _AMPERE),
+    ("A", "amp", "ampere", "arms", "aeff"): _Unit(1.0, _AMPERE),
     ("mA",): _Unit(1e-3, _AMPERE),
     ("V", "volt"): _Unit(1.0, _VOLT),
     ("mV",): _Unit(1e-3, _VOLT),
 }
 _VOLTAGE: dict[tuple[str, ...], _Unit] = {("V", "volt"): _Unit(1.0), ("mV",): _Unit(1e-3)}
-_CURRENT: dict[tuple[str, ...], _Unit] = {("A", "amp", "ampere", "arms"): _Unit(1.0), ("mA",): _Unit(1e-3)}
+_CURRENT: dict[tuple[str, ...], _Unit] = {("A", "amp", "ampere", "arms", "aeff"): _Unit(1.0), ("mA",): _Unit(1e-3)}
 _TIME: dict[tuple[str, ...], _Unit] = {
     ("s", "sec", "second", "seconds"): _Unit(1.0),
     ("ms", "msec", "millisecond", "milliseconds"): _Unit(1e-3),

@@ -72,5 +72,5 @@ def _refuse_gaps(path: str, name: str, t: NDArray[np.float64], start: float, sto
         raise ReadError(
             f"{path}: {name} has a gap of {steps[at]:.4g} s, from {t[at]:.9g} to {t[at + 1]:.9g} s, where its usual step is "
             f"{usual:.4g} s, and nobody knows what happened in it; split the log there into two records, which can be "
-            "identified together"
+            f"identified together: read_pieces does it ({arg('pieces', python='pieces=True')})"
         )

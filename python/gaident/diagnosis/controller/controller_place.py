@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, say, unit_text
+from gaident.axis import Text, called, say, unit_text
 from gaident.control.controller import Controller
 from gaident.control.pi import PI
 from gaident.control.pi_torque import HOLDS, held_torque, pi_torque
@@ -183,7 +183,7 @@ def controller_findings(
             name,
             value,
             unit_text(unit),
-            effect.replace("_", " "),
+            called(effect),
             np.sqrt(cost / n),
         )
         finding = _finding(effect, name, Estimate(value, std, unit), before, cost, floor, n, text)

@@ -7,14 +7,16 @@ from dataclasses import dataclass, field, replace
 
 from gaident.axis import Text
 from gaident.control.controller import Controller
-from gaident.control.pi import bare_pi
+from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
 from gaident.diagnosis.controller.form_findings import Loop, driver_of
+from gaident.diagnosis.controller.limit_not_given import by_a_limit
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
-from gaident.diagnosis.controller.wrong_number import by_a_limit, corrected
-from gaident.identification.logged_torque import not_followed
-from gaident.models.drive_torque import Driven
+from gaident.diagnosis.controller.other_form import other_form
+from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains
+from gaident.identification.logged_torque import corrected, not_followed
+from gaident.models.drive_torque import Driven, straight_driven
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
@@ -28,6 +30,7 @@ class Driving:
     logged: the bare PI with the gains that the torques show. findings: of the controller's form. notes: what to keep in mind.
     doubts: notes on torques that do not follow from a controller that is no bare PI. numbers: those that were not given.
     limited: whether a limit of the controller, which was not given either, makes the torques follow.
+    regained_from: the PI that was given, where records without a torque show other gains.
     """
 
     moved: Aligned
@@ -38,16 +41,30 @@ class Driving:
     doubts: tuple[Text, ...] = ()
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
     limited: bool = False
+    regained_from: PI | None = None
+
+    def regained(self, other: OtherGains) -> Driving:
+        """The same under other gains, which command and velocity show where no torque is logged; a finding says so."""
+        given = self.regained_from or self.logged.controller
+        assert given is not None
+        kept = tuple(f for f in self.findings if f.effect != OTHER_GAINS)
+        return replace(
+            self,
+            controller=other.controller,
+            logged=replace(self.logged, controller=other.controller),
+            findings=(*kept, other.finding(given)),
+            regained_from=given,
+        )
+
+    @property
+    def regained_by(self) -> int:
+        """How many gains are not the given ones."""
+        return sum(len(f.parameters) for f in self.findings if f.effect == OTHER_GAINS)
 
     @property
     def in_doubt(self) -> bool:
         """Whether the logged torque follows neither from the given controller nor from a form of it, nor from a limit more."""
         return bool(self.doubts) and not self.limited and not any(f.place == "controller" for f in self.findings)
-
-    @property
-    def from_rest(self) -> bool:
-        """Whether no integrator held a torque before a record."""
-        return all(r.cause != "initial_integral" for r in self.logged.replays.values())
 
     @property
     def read(self) -> tuple[Record, ...]:
@@ -68,7 +85,7 @@ def driving_of(
     whole = [origin.get(r.digest, r) for r in records]
     doubts = (*driven.doubts, *not_followed(whole, controller))
     moved = aligned(records, held, pi)
-    form = None if moved.shifts else driver_of(records, held, pi, tuple(asked.estimates))
+    form = None if moved.shifts else driver_of(records, held, pi, tuple(n.removeprefix("velocity.") for n in asked.estimates))
     findings, numbers, limited = asked.findings, asked.estimates, False
     if form is None:
         notes = (*(asked.notes or asked.numbers.trusted().notes), *notes)
@@ -77,13 +94,30 @@ def driving_of(
             limited = other is None and by_a_limit(whole, controller)
             if other is not None:
                 controller, numbers, notes, doubts = other.controller, other.estimates, (*notes, *doubts, other.note), ()
-    else:
-        controller, pi, notes = form.controller, None, (*notes, *form.notes)
+            elif not limited and not asked.findings:  # a form that a bare PI lacked was found already
+                form = other_form(whole, [origin.get(r.digest, r) for r in held], controller)
+    if form is not None:
+        controller, pi, notes, doubts = form.controller, None, (*notes, *form.notes), ()
         findings, numbers = form.findings, form.estimates
         pairs = zip((*form.records, *form.held), (*records, *held), strict=True)
         origin = {changed.digest: origin.get(given.digest, given) for changed, given in pairs}
         moved = aligned(form.records, form.held, None)
+    elif doubts and driven.slower and not limited:
+        # What this controller would make between the lines is not what the drive's made there.
+        records, held, origin = _straight((*records,), (*held,), origin, driven.controller)
+        moved = aligned(records, held, None)
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
     used = controller if bare_pi(controller) is None else logged.controller
     return Driving(moved, used, logged, findings, notes, doubts, numbers, limited)
+
+
+def _straight(
+    records: Sequence[Record], held: Sequence[Record], origin: Mapping[str, Record], controller: Controller | None
+) -> tuple[tuple[Record, ...], tuple[Record, ...], dict[str, Record]]:
+    """Records, held ones and origin with the logged torque straight between the lines."""
+    assert controller is not None
+    given = [[origin.get(r.digest, r) for r in part] for part in (records, held)]
+    changed = [tuple(straight_driven(r, controller) for r in part) for part in given]
+    pairs = zip((*changed[0], *changed[1]), (*given[0], *given[1]), strict=True)
+    return changed[0], changed[1], {now.digest: whole for now, whole in pairs}

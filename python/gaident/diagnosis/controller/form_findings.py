@@ -11,6 +11,7 @@ from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller
 from gaident.control.pi import PI
+from gaident.control.simplest import simplest
 from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.replay import replay
@@ -21,7 +22,7 @@ from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
-__all__ = ["Driver", "Loop", "driver_of", "loop_of"]
+__all__ = ["Driver", "Loop", "driver_of", "findings_of", "loop_of", "notes_of", "parts_of"]
 
 UNITS = {
     "kp": "N m s/rad",
@@ -67,7 +68,7 @@ def driver_of(
     if shown is None:
         return None
     driven, held = (tuple(driven_by(r, shown.controller) for r in part) for part in (records, held))
-    return Driver(driven, held, shown.controller, _findings(shown), _notes(shown, records), _estimates(shown.estimated))
+    return Driver(driven, held, shown.controller, findings_of(shown), notes_of(shown, records), _estimates(shown.estimated))
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,7 @@ def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     """The controller with estimates for what is None and, where a log has fewer lines than a bare PI in a Cascade has samples,
     in the form that the logged torque shows."""
     numbers = with_estimates(records, given)
+    numbers = replace(numbers, controller=simplest(numbers.controller, (r.dt for r in records)))
     as_given = Loop(numbers.controller, numbers, (), (), numbers.estimates)
     pi, every = _alone(numbers.controller, records)
     if pi is None or every == 1 or any(r.torque is None or r.command is None for r in records):
@@ -94,7 +96,7 @@ def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     if shown is None:
         return replace(as_given, numbers=numbers.trusted())
     estimates = {f"velocity.{name}": e for name, e in _estimates(shown.estimated).items()}
-    return Loop(shown.controller, replace(numbers, doubt=""), _findings(shown), _notes(shown, records), estimates)
+    return Loop(shown.controller, replace(numbers, doubt=""), findings_of(shown), notes_of(shown, records), estimates)
 
 
 def _alone(controller: Controller | None, records: Sequence[Record]) -> tuple[PI | None, int]:
@@ -107,7 +109,7 @@ def _alone(controller: Controller | None, records: Sequence[Record]) -> tuple[PI
     return (pi if bare else None), controller.log_every(records[0].dt)
 
 
-def _findings(shown: Shown) -> tuple[Finding, ...]:
+def findings_of(shown: Shown) -> tuple[Finding, ...]:
     return tuple(
         Finding(name, _estimates(numbers), (), 0.0, shown.gains[name], None, _evidence(shown, name), place="controller")
         for name, numbers in shown.numbers.items()
@@ -126,7 +128,7 @@ def _estimates(numbers: Mapping[str, tuple[float, float]]) -> dict[str, Estimate
     return {name: Estimate(value, std, unit, identifiable=std < abs(value) or value == 0.0) for name, value, std, unit in units}
 
 
-def _words(shown: Shown) -> Text:
+def parts_of(shown: Shown) -> Text:
     """What differs from the bare PI."""
     return joined(", ", (_part(shown, name) for name in shown.numbers))
 
@@ -144,13 +146,13 @@ def _unit(parameter: str) -> Text:
     return joined("", (" ", unit_text(UNITS[parameter]))) if parameter in UNITS else Text("")
 
 
-def _notes(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
+def notes_of(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
     notes = [
         say(
             "The controller is not the given PI, which does not make the logged {torque} (rms {:.2g} {N m}). One with {} does, "
             "to {:.1g} {N m} rms{}.",
             shown.before,
-            _words(shown),
+            parts_of(shown),
             shown.rms,
             say(": its {torque} drives the model, and no loop is simulated") if shown.controller.period is None else "",
         )

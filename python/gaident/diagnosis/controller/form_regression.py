@@ -25,6 +25,7 @@ from gaident.control.ticks import at_the_clock, between_lines
 from gaident.data.record import Record
 from gaident.diagnosis.controller.replay import rounding_of
 from gaident.identification.logged_stretches import centred, correlation_of, log_of, numbered, whitened
+from gaident.identification.logged_torque import noise_between
 from gaident.policy.table import POLICY
 
 __all__ = [
@@ -78,6 +79,8 @@ class Law:
     lengths: lines of each record; period: of the controller [s].
     Of a log with r = 1 all used lines count alike, and a start of the integrator is one of the numbers. Of a slower one, what is
     fitted is x(k) - rho x(k-1) of each signal without its mean in each stretch between two limits, see `logged_stretches`.
+    courses: other velocities that have the same lines [rad/s] (n r,) each; () where the log has all samples.
+    straight: the velocity straight between its lines [rad/s] (n r,).
     """
 
     command: Vector
@@ -89,6 +92,13 @@ class Law:
     every: int = 1
     stretch: NDArray[np.intp] | None = None
     rho: float = 0.0
+    courses: tuple[Vector, ...] = ()
+    straight: Vector | None = None
+
+    @property
+    def others(self) -> tuple[Law, ...]:
+        """The same of a slower log with what is not known: the velocity straight between the lines, and no correlation."""
+        return () if self.straight is None else (replace(self, velocity=self.straight), replace(self, rho=0.0))
 
     def columns(self, places: Sequence[Place], numbers: Vector) -> Matrix:
         """(n used, 5 + records) [-w, r, integral of e by the trapezoidal rule, slope of r, sign of r, starts], filtered."""
@@ -124,6 +134,15 @@ class Law:
             return rows.T[self.used]
         stretch, rho = self.stretch, self.rho
         return np.array([centred(*whitened(row, stretch, rho), False) for row in rows]).T
+
+    def unseen(self, shape: Shape) -> float:
+        """Root mean square of what the velocity may have made of the torque between the lines [N m]; 0 where all are logged.
+
+        The proportional part answers on the line itself. Behind a filter it is made of the samples between the lines too.
+        """
+        made = self.columns(shape.places, shape.numbers)
+        others = [replace(self, velocity=w).columns(shape.places, shape.numbers) for w in self.courses]
+        return float(np.sqrt(sum(float(np.mean(((made - other) @ shape.coefficients) ** 2)) for other in others)))
 
     def of_course(self, other: Law, coefficients: Vector) -> tuple[Vector, NDArray[np.intp]]:
         """(what another course of the velocity between the lines makes of the torque [N m], stretch of each line)."""
@@ -174,12 +193,14 @@ def law_of(records: Sequence[Record], given: PI, every: int = 1) -> tuple[Law, f
         smooth = np.concatenate([log.velocity for log in logs])
         straight = np.concatenate([at_the_clock(log.velocity[::every], every) for log in logs])
         used = stretch >= 0
-        law = Law(command, smooth, torque, used, lengths, period, every, stretch)
+        law = Law(command, smooth, torque, used, lengths, period, every, stretch, straight=straight)
         coefficients = np.array([given.kp, given.kp, given.ki, *np.zeros(2 + len(records))])
         off, own = law.of_course(replace(law, velocity=straight), coefficients)
         law = replace(law, rho=correlation_of(off, own))
         d, _ = whitened(_at(used, off), stretch, law.rho)
         floor = POLICY.course * float(np.sqrt(np.mean(d**2)))
+        noise = np.concatenate([noise_between(rec, len(log.velocity), every) for rec, log in zip(records, logs, strict=True)])
+        law = replace(law, courses=(straight, smooth + noise))
     return _with_enough(law, floor)
 
 

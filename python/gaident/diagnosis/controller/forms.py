@@ -114,9 +114,10 @@ def _compared(law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> li
         if followed is not None and len(places) > followed:
             break  # what leaves no more than rounding or white noise is not improved by another filter
         shape = fitted_shape(law, places, floor)
-        if shape.rms <= POLICY.near_rounding * floor or white_noise(shape.left, law.logged):
+        least = float(np.hypot(floor, law.unseen(shape)))
+        if shape.rms <= POLICY.near_rounding * least or white_noise(shape.left, law.logged):
             followed = len(places)
-        candidates += _candidates(law, shape, given, floor, unknown)
+        candidates += _candidates(law, shape, given, least, unknown)
     return sorted(candidates, key=lambda c: c.criterion)
 
 
@@ -205,21 +206,25 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
 
 def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[Candidate], floor: float) -> Shown | None:
     """The same of a log with fewer lines: None where it leaves more than another course between them could make."""
-    allowed = max(POLICY.near_rounding * floor, POLICY.negligible * float(np.abs(law.torque).max()))
+    negligible = POLICY.negligible * float(np.abs(law.torque).max())
     # Where the given controller leaves no more, no other one is looked for; only a setting without a number of its own.
     plain = [c for c in candidates if not c.names]
     as_free = [c for c in candidates if plain and c.count == plain[0].count and c.shape is plain[0].shape and not c.form.free]
     for best in (*as_free[:1], *plain[:1], candidates[0]):
         numbers, filters, cov = _fitted(law, best, given)
         left = law.logged - law.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
-        if _rms([left]) <= allowed:
+        least = float(np.hypot(floor, law.unseen(best.shape)))
+        follows = _rms([left]) <= max(POLICY.near_rounding * least, negligible)
+        if follows and not too_fast(_controller(best, numbers, filters, given, law.period), records[0].dt):
+            others = [best, *(c for c in candidates if c is not best)]
+            if (shown := _with_limit(records, law, given, others, (numbers, filters, cov))) is not None:
+                return shown
             break
-    else:
-        return None
-    candidates = [best, *(c for c in candidates if c is not best)]
-    if too_fast(_controller(best, numbers, filters, given, law.period), records[0].dt):
-        return None
-    return _with_limit(records, law, given, candidates, (numbers, filters, cov))
+    # Noise on the logged velocity leaves more than a course; with a limit the given controller may explain the whole.
+    for best in plain[:1]:
+        others = [best, *(c for c in candidates if c is not best)]
+        return _with_limit(records, law, given, others, _fitted(law, best, given), float(np.sqrt(POLICY.replay_left)))
+    return None
 
 
 def _shown_quietly(records: Sequence[Record], law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> Shown | None:
@@ -240,15 +245,25 @@ def _shown_quietly(records: Sequence[Record], law: Law, given: PI, floor: float,
 
 
 def _with_limit(
-    records: Sequence[Record], law: Law, given: PI, candidates: Sequence[Candidate], fitted: tuple[Vector, Vector, Matrix]
+    records: Sequence[Record],
+    law: Law,
+    given: PI,
+    candidates: Sequence[Candidate],
+    fitted: tuple[Vector, Vector, Matrix],
+    part: float = POLICY.better_reason,
 ) -> Shown | None:
-    """A form that was shown where no limit acts, and the limit; None where there is neither, or the whole torque is no nearer."""
+    """A form that was shown where no limit acts, and the limit; None where there is neither, or the whole torque is no nearer.
+
+    part: of the given controller's rms error over the whole torque, what is left at most. Of a slower log it is also no more than
+    noise of a measured torque.
+    """
     best, (numbers, filters, cov) = candidates[0], fitted
     at_limit = limited(records, replace(_controller(best, numbers, filters, given, law.period), period=law.period))
     if not best.names and at_limit.limit is None:
         return None
     before, after = run_error(records, Cascade(given, law.period)), run_error(records, at_limit.controller)
-    if not after < POLICY.better_reason * before:
+    size = float(np.std(np.concatenate([r.torque for r in records if r.torque is not None])))
+    if not after < part * before or (law.every > 1 and after > POLICY.replay_noise * size):
         return None
     named, gains = _named(best, numbers, filters, cov, law.period), _gains(candidates)
     if at_limit.limit is not None:
@@ -324,6 +339,13 @@ def _fitted(law: Law, best: Candidate, given: PI) -> tuple[Vector, Vector, Matri
     sizes[sizes == 0.0] = 1.0
     variance = max(float(np.mean((size * off(x)) ** 2)), (ROUNDING * float(np.abs(law.logged).max())) ** 2)
     spread = variance * np.linalg.pinv((J / sizes).T @ (J / sizes), rcond=1e-12) / np.outer(sizes, sizes)
+    here = np.linalg.lstsq(J / sizes, law.logged - table @ coefficients, rcond=1e-12)[0] / sizes
+    for other in law.others:  # where the numbers would be by what is not known between the lines
+        columns = other.columns(shape.places, x[m:])
+        slopes = _slopes(other, Shape(shape.places, x[m:], coefficients, shape.left))
+        table = np.column_stack([columns @ B @ wide, slopes]) / sizes
+        there = np.linalg.lstsq(table, other.logged - columns @ coefficients, rcond=1e-12)[0] / sizes
+        spread += np.outer(there - here, there - here)
     k = wide.shape[1]
     outward = np.zeros((len(fixed) + len(shape.numbers), J.shape[1]))
     outward[: len(fixed), :k] = wide

@@ -82,12 +82,6 @@ def replay(rec: Record, controller: Controller | None) -> Replay:
     return _compared(rec, controller.asked(rec), controller, logged, replayed)
 
 
-def stored_torque(rec: Record, pi: PI) -> float:
-    """What the integrator held before the record [N m], where the logged torque shows it; else 0."""
-    found = None if rec.torque is None or not pi.replayable(rec) else replay(rec, pi)
-    return found.value if found is not None and found.cause == "initial_integral" else 0.0
-
-
 def _unchecked(torque: Vector, replayed: Vector | None, sentence: Text) -> Replay:
     resolution = 0.0 if torque is replayed else lattice_step(torque)
     return Replay(torque, replayed, np.nan, np.nan, resolution, None, "", np.nan, None, sentence)

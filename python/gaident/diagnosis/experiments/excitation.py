@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import TURN, Text, say, turns
+from gaident.axis import TURN, Text, period_of, say, turns
 from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
@@ -93,9 +93,15 @@ class Excitation:
 
 
 def excitation(
-    records: Record | Sequence[Record], controller: Controller | None = None, model: Model | None = None, axis: str = "rotary"
+    records: Record | Sequence[Record],
+    controller: Controller | None = None,
+    model: Model | None = None,
+    axis: str = "rotary",
+    pitch: float | None = None,
 ) -> Excitation:
     """Looks at one record or several; with `model`, its structure too decides what can be judged. axis: rotary or linear.
+
+    pitch: of a linear axis, as `period_of` takes it [m].
 
     Raises RecordError where there is no record, or a record has no torque and nothing to make it from.
     """
@@ -104,7 +110,7 @@ def excitation(
         raise RecordError("records is empty: give at least one Record")
     top = max(float(np.abs(rec.velocity).max()) for rec in listed)
     motions = [_motion(rec, controller, top) for rec in listed]
-    seen = Motions(tuple(motions), controller, model, axis)
+    seen = Motions(tuple(motions), controller, model, axis, period_of(axis, pitch))
     speeds = _distinct([v for m in motions for v in m.held], POLICY.apart * top)
     torque = max(float(np.abs(m.torque).max()) for m in motions)
     limit = math.inf if controller is None else controller.limits[0]

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, say
+from gaident.axis import Text, called, joined, say
 from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.data.torque_kind import COMMANDED, MEASURED
@@ -54,10 +54,10 @@ ROOM = 0.9  # no decision: of the torque, what a smaller command is made for
 RAMP = 0.6  # no decision: of the torque, what the ramps of a path ask for
 
 
-def _listed(effects: Sequence[str]) -> str:
+def _listed(effects: Sequence[str]) -> Text:
     """'a, b and c', as people write the names."""
-    names = [e.replace("_", " ") for e in effects]
-    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+    names = [called(e) for e in effects]
+    return joined(" and ", filter(None, (joined(", ", names[:-1]), *names[-1:])))
 
 
 @dataclass(frozen=True)

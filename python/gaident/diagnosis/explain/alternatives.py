@@ -8,11 +8,12 @@ from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.offset import Offset
+from gaident.diagnosis.selection.other_gains import OTHER_GAINS
 from gaident.diagnosis.selection.rivals import Replacement
 
 __all__ = ["alternatives_of"]
 
-OF_THE_CONTROLLER = ("other_gains", "torque_filter")
+OF_THE_CONTROLLER = (OTHER_GAINS, "torque_filter")
 """What a controller that is not the drive's may lack, in words of the findings."""
 
 

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gaident.axis import Text, called, say
-from gaident.diagnosis.selection.model_space import words
+from gaident.axis import Text, called, joined, say
+from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
+from gaident.estimation.dataset import DataSet
 from gaident.models.effects import row_of
 from gaident.results.estimate import Estimate
 
-__all__ = ["basis_of", "closest", "drives_itself", "evidence_of", "far_off", "hidden_by_torque_noise"]
+__all__ = [
+    "basis_of",
+    "closest",
+    "drives_itself",
+    "evidence_of",
+    "far_off",
+    "hidden_by_torque_noise",
+    "or_other_gains",
+    "torque_unlogged",
+]
 
 
 def evidence_of(
@@ -30,7 +40,7 @@ def evidence_of(
         what = say("{}, at the load", what)
     sure, worse = certainty(gain), f"(the model without it is {gain:.0f} BIC units worse)"
     if alternatives:
-        others = " or ".join(a.replace("_", " ") for a in alternatives)
+        others = joined(" or ", map(called, alternatives))
         return say("{}, or {}: one of these is there, {} {}; these data do not say which.", what, others, sure, worse)
     if offset is not None and effect == offset.effect:
         return say("{}: {} {}. {}", what, sure, worse, offset.sentence)
@@ -67,7 +77,7 @@ def closest(effects: Sequence[str], driver: str | None, named: bool) -> Text:
         text = "With {} the model would come closer still, but an error{} stays: this fits no effect of the library."
     else:
         text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
-    return say(text, " and ".join(words([e]) for e in effects), on)
+    return say(text, joined(" and ", map(called_of, effects)), on)
 
 
 def far_off(ratio: float) -> Text:
@@ -95,3 +105,20 @@ def drives_itself(damping: Estimate) -> Text:
         "does not depend on it, or a lag, is in its place. {Inertia} and friction are not to be trusted."
     )
     return say(text, damping.value)
+
+
+def torque_unlogged(data: DataSet) -> list[Text]:
+    """What stays open where the gains alone say which torque drove the motor."""
+    if data.pi is None or any(r.torque is not None for r in data.records):
+        return []
+    text = (
+        "No {torque} is logged: the given gains make it of command and velocity. Where both are wrong by one factor, every "
+        "{inertia} and {torque} found here is wrong by that factor, and nothing shows it: log the {torque}."
+    )
+    return [say(text)]
+
+
+def or_other_gains(effect: str) -> Text:
+    """What is said of a finding in whose place other gains would explain as much."""
+    text = "Other gains than the given ones would explain these records as well as the {}: log the {torque}, it shows the gains."
+    return say(text, called_of(effect))

@@ -79,7 +79,7 @@ def harmonic(effect: str, place: str, first: int, with_order: bool, kind: str, *
 
     def limits(s: Scales) -> Rows:
         a = (10.0 if with_order else FREE) * amplitude(s) if kind == "torque" else amplitude(s)
-        rows: Rows = [(-a, a), (-a, a), (float(first), 1000.0)]
+        rows: Rows = [(-a, a), (-a, a), (float(first), FREE)]
         return rows[: 3 if with_order else 2]
 
     def steps(s: Scales) -> tuple[float, ...]:

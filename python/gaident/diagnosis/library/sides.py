@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from gaident.axis import Text, called, say
 from gaident.diagnosis.library.cause import Cause
 from gaident.models.effect_rows import AT_LOAD, SIDES, effect_and_side
 from gaident.models.effects import row_of
 
-__all__ = ["at_load", "at_motor", "name_of", "sides_of"]
+__all__ = ["at_load", "at_motor", "called_of", "name_of", "sides_of"]
 
 
 def at_load(cause: Cause, excludes: frozenset[str]) -> Cause:
@@ -25,6 +26,7 @@ def at_load(cause: Cause, excludes: frozenset[str]) -> Cause:
         shared={there(n): places for n, places in cause.shared.items()},
         family=f"{cause.family} at the load" if cause.family else "",
         excludes=cause.excludes | excludes,
+        beside=frozenset(there(n) for n in cause.beside),
         other_side=cause.name,
         at_load=True,
         alike={},
@@ -34,6 +36,12 @@ def at_load(cause: Cause, excludes: frozenset[str]) -> Cause:
 def name_of(key: str) -> str:
     """An effect's name, whatever its side."""
     return effect_and_side(key)[0]
+
+
+def called_of(key: str) -> Text:
+    """An effect in words for a field of `say`, at the load with its side."""
+    name, side = effect_and_side(key)
+    return say("{} at the load", called(name)) if side == SIDES[1] else called(name)
 
 
 def at_motor(cause: Cause) -> Cause:

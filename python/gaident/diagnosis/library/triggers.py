@@ -48,12 +48,16 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """The records of a diagnosis; controller, model: None where not known; axis: rotary or linear."""
+    """The records of a diagnosis; controller, model: None where not known; axis: rotary or linear.
+
+    period: with which returns what is tied to the place [rad, m]; None: not known.
+    """
 
     records: tuple[Motion, ...]
     controller: Controller | None = None
     model: Model | None = None
     axis: str = "rotary"
+    period: float | None = TURN
 
     @cached_property
     def top(self) -> float:
@@ -89,6 +93,13 @@ def rotary(s: Motions) -> Text | None:
     if s.axis == "rotary":
         return None
     return Text("positions are lengths on a linear axis: which length is one turn, they do not say")
+
+
+def periodic(s: Motions) -> Text | None:
+    """Of what returns with every turn, or on a linear axis with every pitch: it is known how long that is."""
+    if s.period is not None:
+        return None
+    return Text("positions are lengths on a linear axis: with which length it returns, they do not say; give its pitch")
 
 
 def moves(s: Motions) -> Text | None:
@@ -146,9 +157,15 @@ def part_of_a_turn(s: Motions) -> Text | None:
 
 def period_of_an_order(s: Motions) -> Text | None:
     """The travel holds a period of the highest order that a drive is expected to have."""
-    if s.travel < TURN / HIGHEST_ORDER:
-        return say("{} hold no period of order {} or less", _travelled(s), order(HIGHEST_ORDER))
+    highest = HIGHEST_ORDER * _per_turn(s)
+    if s.travel < TURN / highest:
+        return say("{} hold no period of order {} or less", _travelled(s), order(highest))
     return None
+
+
+def _per_turn(s: Motions) -> float:
+    """Order 1 of what returns with every period [1/turn]."""
+    return TURN / (s.period or TURN)
 
 
 def _travelled(s: Motions) -> Text:
@@ -251,12 +268,14 @@ def slope_beyond(s: Motions) -> Text | None:
 
 def orders_beyond(s: Motions) -> Text | None:
     """Orders of the angle too low for the travel, or too high for the sampling."""
-    least = math.ceil(POLICY.seen_turn * TURN / s.travel) if s.travel > 0.0 else HIGHEST_ORDER
+    one = _per_turn(s)
+    least = math.ceil(POLICY.seen_turn * TURN / s.travel / one) if s.travel > 0.0 else HIGHEST_ORDER
     per_sample = max(_slowest_held(m) * m.dt for m in s.records)
-    fastest = math.floor(POLICY.seen_band * math.pi / per_sample) if per_sample > 0.0 else None
-    parts = [say("orders below {} need more than the {} travelled", order(least), turns(s.travel))] if least > 2 else []
+    fastest = math.floor(POLICY.seen_band * math.pi / per_sample / one) if per_sample > 0.0 else None
+    below = say("orders below {} need more than the {} travelled", order(least * one), turns(s.travel))
+    parts = [below] if least > 2 else []
     if fastest is not None and fastest < HIGHEST_ORDER:
-        parts.append(say("orders above {} are faster than the sampling even at the slowest speed held", order(fastest)))
+        parts.append(say("orders above {} are faster than the sampling even at the slowest speed held", order(fastest * one)))
     return joined("; ", parts) if parts and least <= HIGHEST_ORDER else None
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from gaident.arguments import NO_CONTROLLER
-from gaident.axis import checked_axis
+from gaident.axis import period_of
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
@@ -36,9 +36,10 @@ def checked(
     seed: int,
     progress: ProgressCallback | None,
     axis: str,
+    pitch: float | None,
 ) -> None:
     """Raises RecordError or SettingsError for what cannot be diagnosed."""
-    checked_axis(axis)
+    period_of(axis, pitch)
     if idn is not None and not isinstance(idn, Identification):
         raise SettingsError(f"identification is {type(idn).__name__}: give what identify() returned, or None")
     for r in (*records, *held):

@@ -8,12 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from gaident.diagnosis.library.terms import of_inverse_dynamics
+from gaident.diagnosis.library.equivalences import equivalents
+from gaident.diagnosis.library.sides import name_of
+from gaident.diagnosis.library.terms import LIBRARY, of_inverse_dynamics
 from gaident.diagnosis.selection.attribution import friction_shown
 from gaident.diagnosis.selection.mechanisms import is_mechanism, one_mass, reduced, resonant, rigid, swings
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.score_test import ScoreTest
-from gaident.errors import RecordError, SettingsError
+from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE, ShaftNoise
@@ -24,6 +26,7 @@ from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.projection import WORST
 from gaident.estimation.regression.inverse_dynamics import ORDER, inverse_dynamics
 from gaident.estimation.regression.motion import BAND, cutoff_of
+from gaident.estimation.regression.torque_terms import TERMS
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
@@ -259,6 +262,45 @@ def _axis(data: DataSet) -> InverseDynamics | None:
                 return found
             doubtful = found if inertia.value > 0.0 and doubtful is None else doubtful
     return doubtful
+
+
+def heaviest(data: DataSet, fit: Fit) -> float | None:
+    """The inertia [kg m^2] from which a model counts as heavier than an axis that is regressed with its own terms.
+
+    A regression that holds gravity, a load or a spring which the model does not hold is that of another axis, and its inertia is
+    another one. None where no such regression shows an inertia beyond its deviations.
+    """
+    axis = _axis(data)
+    if axis is None:
+        return None
+    causes = of_inverse_dynamics({name: e.value for name, e in axis.parameters.items()})
+    turns_back = any(cause.levels for cause in causes)
+    terms = tuple(term for term in axis.terms if _holds(fit, term, turns_back))
+    if terms != axis.terms:
+        try:
+            axis = inverse_dynamics(list(data.records), terms=terms, cutoff_hz=axis.cutoff_hz, axis=data.axis)
+        except GaidentError:
+            return None
+    inertia = axis.parameters["inertia"]
+    return inertia.value + POLICY.heavier * inertia.std if inertia.value > POLICY.heavier * inertia.std else None
+
+
+def _holds(fit: Fit, term: str, turns_back: bool) -> bool:
+    """Whether a model holds what a term of the regression stands for; friction of either form counts as the same.
+
+    turns_back: whether the regression holds dry friction, which it cannot tell from a constant torque in one direction.
+    """
+    names = [p.name for p in TERMS[term].parameters]
+    if "spring" in names:
+        return fit.parameters.held
+    causes = of_inverse_dynamics(dict.fromkeys(names, 1.0))
+    effects = {name_of(effect) for effect in fit.effects}
+    there = {name for effect in effects for name in (effect, *equivalents(effect))}
+    families = {LIBRARY[effect].family for effect in effects} - {""}
+    return not causes or any(
+        cause.name in there or cause.family in families or (cause.constant and bool(families) and not turns_back)
+        for cause in causes
+    )
 
 
 def _corner(axis: InverseDynamics) -> float:

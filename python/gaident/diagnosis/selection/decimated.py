@@ -37,7 +37,7 @@ def decimated(data: DataSet, blocks: int) -> DataSet:
     records = [decimated_record(data.as_old(r) if data.age else r, blocks) for r in data.driven]
     finest = max(FINEST, 2.0 * data.dt)  # no decision: the step of a simulation
     found = replace(DataSet.of(records, None), finest=finest, known_noise=data.noise)
-    return replace(found, torque_measured=data.torque_measured, axis=data.axis)
+    return replace(found, torque_measured=data.torque_measured, axis=data.axis, period=data.period)
 
 
 def decimated_objective(objective: Objective, blocks: int) -> Objective:

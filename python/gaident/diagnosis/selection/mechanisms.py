@@ -6,6 +6,8 @@ diagnosis starts from the mechanism, so that they can be told by name.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,6 +28,7 @@ __all__ = [
     "evenly_damped",
     "held",
     "is_mechanism",
+    "on_a_shaft",
     "one_mass",
     "reduced",
     "released",
@@ -35,6 +38,8 @@ __all__ = [
 ]
 
 Vector = NDArray[np.float64]
+SHAFTS, SHAFT_RATIOS, SHAFT_DAMPING = 48, (0.6, 0.75, 0.87), 0.05  # no decision: a grid; zeros below the poles, as on a shaft
+SLOWEST_SHAFT, SHAFT_SPAN, HIGHEST_SHAFT = 8.0, 0.02, 0.9  # no decision: its ends, in half periods, of the highest, of Nyquist's
 AT_BOUND = 0.999  # no decision: of a bound, what a fit that ends there has
 Matrix = NDArray[np.float64]
 
@@ -125,16 +130,40 @@ def reduced(identified: Model) -> list[Model]:
 
 def resonant(objective: Objective, one: Fit) -> list[Model]:
     """Two-mass starts: the resonances that help the one mass most, linearised."""
-    term = next(t for t in LIBRARY.values() if t.resonates)
-    longer = one.hypothesis.extended(term)
-    rows = np.array(term.starts(one.parameters.scales))
+    term = _resonance()
+    longer, X = _helpful(objective, one, np.array(term.starts(one.parameters.scales)))
+    return [_two_masses(longer.parameters, x) for x in X]
+
+
+def on_a_shaft(objective: Objective, one: Fit) -> list[tuple[Hypothesis, Vector]]:
+    """A fit of one mass with its effects, as two masses: the resonances that help it most, on a fine grid.
+
+    What delays the torque moves the resonance that fits best, and the cost has a valley at each: with it in the model the
+    resonance is looked for where it is.
+    """
+    s = one.parameters.scales
+    highest = HIGHEST_SHAFT * np.pi / s.dt
+    poles = np.geomspace(max(SLOWEST_SHAFT * np.pi / s.duration, SHAFT_SPAN * highest), highest, SHAFTS)
+    z = SHAFT_DAMPING
+    rows = np.array([(np.log(w), z, np.log(w * r), z) for w in poles for r in SHAFT_RATIOS])
+    longer, X = _helpful(objective, one, rows)
+    return [as_two_masses(replace(one, hypothesis=longer, x=x)) for x in X]
+
+
+def _helpful(objective: Objective, one: Fit, rows: Matrix) -> tuple[Hypothesis, Matrix]:
+    """(the fit with an extra resonance, x of those rows of its coordinates that leave least once the rest is refitted)."""
+    longer = one.hypothesis.extended(_resonance())
     X = np.vstack([one.parameters.inserted(one.x, z) for z in rows])
     J, _ = objective.sensitivities(one.hypothesis, one.x)
     E = objective.errors(longer, X)
     finite = np.all(np.abs(E) < LOST, axis=1)
     rest = project_out(J, np.where(finite[:, None], E, 0.0))
     costs = np.where(finite, np.einsum("ij,ij->i", rest, rest), np.inf)
-    return [_two_masses(longer.parameters, X[i]) for i in np.argsort(costs)[: POLICY.starts]]
+    return longer, X[np.argsort(costs)[: POLICY.starts]]
+
+
+def _resonance() -> Term:
+    return next(t for t in LIBRARY.values() if t.resonates)
 
 
 def _resonance_of(parameters: Parameterisation) -> Term:

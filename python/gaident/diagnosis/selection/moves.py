@@ -22,6 +22,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.terms import LIBRARY
@@ -32,10 +33,12 @@ from gaident.diagnosis.selection.mechanisms import (
     held,
     is_mechanism,
     moved_to,
+    on_a_shaft,
     released,
 )
-from gaident.diagnosis.selection.model_space import ModelSpace, words
+from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.score_test import ScoreTest
+from gaident.diagnosis.selection.side_moves import SideMoves
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import gained
 from gaident.estimation.noise_model import WHITE
@@ -50,8 +53,15 @@ MISSED = 0.05  # no decision: of the largest torque, a level of friction to star
 LEAST = 1e-4  # no decision: the same, of a level that was fitted as 0
 
 
+def _nested(hypothesis: Hypothesis, x: NDArray[np.float64], term: Term, simple: Term) -> tuple[Hypothesis, NDArray[np.float64]]:
+    """A hypothesis with a simpler effect in the place of one that contains it, at its level."""
+    level = x[hypothesis.parameters.slot(term.name)][list(term.shared.get(simple.name, (0,)))]
+    shorter = hypothesis.without(term.name)
+    return shorter.extended(simple), shorter.parameters.inserted(hypothesis.parameters.removed(x, term.name), level)
+
+
 @dataclass(frozen=True, eq=False)
-class Moves(ModelSpace):
+class Moves(SideMoves):
     """The models over one objective, and the moves between them."""
 
     # Moves that add.
@@ -66,6 +76,7 @@ class Moves(ModelSpace):
             for t in self.allowed
             if t.name not in blocked
             and t.family not in families
+            and t.stands_with(fit.effects)
             and (fit.parameters.masses == 2 or not t.needs_two_masses)
             and (self.whitens or not t.in_controller or fit.predictor.closed)
         ]
@@ -146,7 +157,7 @@ class Moves(ModelSpace):
         parameters = source.parameters.without(simple.name)
         x = source.parameters.removed(source.x, simple.name)
         rows = [LIBRARY[t.other_side] for t in self.allowed if t.other_side] if simple.at_load else self.allowed
-        wanted = [t for t in rows if t.family == simple.family and simple.name in t.nested]
+        wanted = [t for t in rows if t.family == simple.family and simple.name in t.nested and t.stands_with(now.effects)]
         level = abs(float(source.x[source.parameters.slot(simple.name)][0]))
         torque = parameters.scales.torque
         for friction in {max(level, LEAST * torque), max(level, MISSED * torque)}:
@@ -212,55 +223,6 @@ class Moves(ModelSpace):
         best = sorted(short, key=lambda f: f.bic)[: self.policy.starts]
         return tries + [self.refitted(f.hypothesis, f.x, self.policy.long) for f in best]
 
-    # Moves to the other side.
-
-    def may(self, term: Term) -> bool:
-        """Whether a model may have it: at the load what it may have at the motor."""
-        return term in self.allowed or (term.at_load and LIBRARY[term.other_side] in self.allowed)
-
-    def other_side(self, fit: Fit) -> list[Fit]:
-        """Each shaft effect of two masses at the other end of the shaft; not where little is left for that to explain."""
-        if fit.parameters.masses == 1 or self.quiet(fit):
-            return []
-        found = (self.at_other_side(fit, t) for t in fit.parameters.terms)
-        return [f for f in found if f is not None]
-
-    def at_other_side(self, fit: Fit, term: Term) -> Fit | None:
-        """The model refitted with an effect at the other end of the shaft, from its values; None where it cannot be there."""
-        short, x = fit.hypothesis.without(term.name), fit.parameters.removed(fit.x, term.name)
-        other = self._beside(short, term)
-        if other is None:
-            return None
-        return self.refitted(short.extended(other), short.parameters.inserted(x, fit.x[fit.parameters.slot(term.name)]))
-
-    def at_the_load(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
-        """The most promising of some grown models with what they have more at the other end; and dry friction at both ends.
-
-        now: what they are grown from. None where the best of them leaves little.
-        """
-        best = sorted((f for f in fits if f.cost < WORST), key=self.score)
-        if now.parameters.masses == 1 or not best or self.quiet(best[0]):
-            return []
-        last = [f for f in best if f.parameters.masses == 2 and f.parameters.terms[-1].other_side]
-        found = [self.at_other_side(f, f.parameters.terms[-1]) for f in last[: self.policy.starts]]
-        rests = [t for t in now.parameters.terms if t.levels]
-        simplest = next((t for t in self.allowed if t.simplest and t.levels), None)
-        if len(rests) == 1 and not rests[0].at_load and simplest and (other := self._beside(now.hypothesis, simplest)):
-            longer = now.hypothesis.extended(other)
-            X = np.array([now.parameters.inserted(now.x, np.array(z)) for z in other.starts(now.parameters.scales)])
-            start = X[int(np.argmin(self.objective.costs(longer, X, WHITE)))]
-            found.append(self.refitted(longer, start))
-        return [f for f in found if f is not None]
-
-    def _beside(self, hypothesis: Hypothesis, term: Term) -> Term | None:
-        """The same effect at the other end of the shaft, where the rest of a model leaves room for it."""
-        key, there = term.other_side, hypothesis.parameters.terms
-        if not key or hypothesis.parameters.masses == 1 or any(t.name == key or t.resonates for t in there):
-            return None
-        other = LIBRARY[key]
-        taken = other.family and any(t.family == other.family for t in there)
-        return None if taken or not self.may(other) else other
-
     # Moves that reduce.
 
     def drop(self, fit: Fit) -> list[Fit]:
@@ -268,8 +230,14 @@ class Moves(ModelSpace):
         return [self.without(fit, e) for e in fit.effects]
 
     def without(self, fit: Fit, effect: str) -> Fit:
-        """The model refitted without one of its effects; beside stops and impacts after a search of its own."""
-        less = self.continued(fit.hypothesis.without(effect), fit, fit.parameters.removed(fit.x, effect))
+        """The model refitted without one of its effects; beside stops and impacts after a search of its own.
+
+        What depended on its torque becomes the simplest that it contains.
+        """
+        hypothesis, x = fit.hypothesis.without(effect), fit.parameters.removed(fit.x, effect)
+        for term in [t for t in hypothesis.parameters.terms if not t.stands_with(hypothesis.effects)]:
+            hypothesis, x = _nested(hypothesis, x, term, LIBRARY[term.nested[0]])
+        less = self.continued(hypothesis, fit, x)
         if any(t.multimodal and t.in_coupling for t in less.parameters.terms) and self.data.loopable and not self.quiet(less):
             less = min((less, self.evolved(less)), key=lambda f: f.bic)
         return less
@@ -282,9 +250,7 @@ class Moves(ModelSpace):
 
     def as_nested(self, fit: Fit, term: Term, simple: Term) -> Fit:
         """The model refitted with a simpler effect in the place of one that contains it, at its level."""
-        level = fit.x[fit.parameters.slot(term.name)][list(term.shared.get(simple.name, (0,)))]
-        hypothesis = fit.hypothesis.without(term.name).extended(simple)
-        x = hypothesis.parameters.without(simple.name).inserted(fit.parameters.removed(fit.x, term.name), level)
+        hypothesis, x = _nested(fit.hypothesis, fit.x, term, simple)
         return self.continued(hypothesis, fit, x)
 
     def demote(self, fit: Fit) -> list[Fit]:
@@ -342,7 +308,32 @@ class Moves(ModelSpace):
             fit = min((fit, self.restarted(fit, term)), key=lambda f: f.bic)
             if term.multimodal and not self.quiet(fit):
                 fit = min((fit, self.evolved(fit)), key=lambda f: f.bic)
-        return fit
+        return self.settled(fit)
+
+    def settled(self, fit: Fit) -> Fit:
+        """The fit or, where these score better, two masses with another resonance.
+
+        A fit at the wrong resonance may leave little: a noise filter takes the ringing that it misses for noise.
+        """
+        return min((fit, *self.elsewhere(fit)), key=self.score)
+
+    def elsewhere(self, fit: Fit) -> list[Fit]:
+        """Two masses with the same effects, their resonance looked for beside these: that of the fit was found before them.
+
+        What stands for a resonance at the wrong place, another resonance or an effect of the shaft, is left out.
+        """
+        bare, x = fit.hypothesis, fit.x
+        for t in fit.parameters.terms:
+            if t.in_coupling or t.resonates:
+                x, bare = bare.parameters.removed(x, t.name), bare.without(t.name)
+        if fit.parameters.masses == 1 or not bare.parameters.terms or any(t.at_load for t in bare.parameters.terms):
+            return []
+        bare, x = as_one_mass(replace(fit, hypothesis=bare, x=x))
+        one = ls.fit(self.objective, bare, x, WHITE, self.policy.usual)
+        starts = on_a_shaft(self.objective, one) if one.cost < WORST else []
+        short = [ls.fit(self.objective, h, x, WHITE, self.policy.short) for h, x in starts]
+        best = min(short, key=lambda f: f.cost, default=None)
+        return [] if best is None else [self.refitted(best.hypothesis, best.x, self.policy.long)]
 
     def restarted(self, fit: Fit, term: Term) -> Fit:
         """The best fit from an effect's starts, with the rest as it stands: the first began far from the rest's final values."""

@@ -157,7 +157,8 @@ class ScoreTest:
         """(orders, columns): what the raw error loses per unit of the two components, pairs of rows per order."""
         angle = self.data.angle
         first, last = term.orders
-        orders = np.arange(float(first), last + 1.0)
+        per_period = TURN / (self.data.period or TURN)  # 1 but on a linear axis, whose orders count in its pitch
+        orders = np.arange(float(first if per_period == 1.0 else 1), last + 1.0) * per_period
         # Seen is what passes a few times, slowly enough for the sampling at the speeds that matter: there and back counts twice,
         # but most of a turn has to be there. A single order once per turn is gravity, which a sixth of a turn shows.
         turned, path = float(np.ptp(angle)), float(np.abs(np.diff(angle)).sum())
@@ -168,7 +169,7 @@ class ScoreTest:
         orders = orders[seen & (orders * per_sample < POLICY.seen_band * np.pi)]
         if len(orders) == 0:
             return orders, np.zeros((0, len(error)))
-        waves = _harmonics(angle, orders)
+        waves = _harmonics(per_period * angle, np.rint(orders / per_period))
         if term.harmonic == "torque":
             pairs = np.stack([-waves.imag, -waves.real], axis=1).reshape(-1, len(angle))
             return orders, hypothesis.predictor.torque_response(hypothesis.parameters, x, pairs)

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.diagnosis.selection.bases import ByOutputErrors, Task, linear_bases, noise_floor, output_error_bases
+from gaident.diagnosis.selection.bases import ByOutputErrors, Task, heaviest, linear_bases, noise_floor, output_error_bases
 from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
@@ -64,7 +64,8 @@ class Selection:
 
         Output errors weighed as torques show a cause best. But a torque that the model lacks biases the inertia there: the slope
         of its error is the smaller, the heavier the axis. So the velocity is nearly all of the error that is minimised
-        (`velocity_part`), and the torque the rest.
+        (`velocity_part`), and the torque the rest. Of a measured torque an inertia is free up to that of the regression with the
+        terms of this model, and not of those that the records suggest before anything is selected.
         """
         objective, final = self.space.objective, self.final
         family = objective.family
@@ -72,6 +73,8 @@ class Selection:
             return objective, final
         ratio = float(np.sqrt(POLICY.velocity_part / (1.0 - POLICY.velocity_part)))
         family = replace(family, prefilter=replace(family.prefilter, corner=ratio * family.prefilter.corner))
+        if family.inertia is not None:
+            family = replace(family, inertia=heaviest(objective.data, final) or family.inertia)
         fit = ls.fit(objective.under(family), final.hypothesis, final.x, WHITE, POLICY.usual)
         samples = effective_samples(objective.under(family).unwhitened_errors(fit))
         objective = objective.under(replace(family, samples=samples))
@@ -132,9 +135,11 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
         # Noise on the input makes a whitened inertia too large, whatever the noise model; at the slow end there is little of it.
         return _by_output_errors(task.by_output_errors, bases, note)
     by_output: _Found | None = None
+    again: Fit | None = None
     if min(space.ratio(b) for b in bases) > POLICY.noise_ratio:
         by_output = _by_output_errors(task.by_output_errors, bases, note)
-        test = specification(space, task, _as_innovations(space, by_output.final))
+        again = _as_innovations(space, by_output.final)
+        test = specification(space, task, again)
         if test.contradicts and by_output.final.effects:
             return replace(by_output, specification=test)
     base, final = _explored(task, space, bases)
@@ -142,9 +147,9 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
     if by_output is None and (test.contradicts or not (space.is_noise(final) and space.small_unwhitened(final))):
         by_output = _by_output_errors(task.by_output_errors, bases, note)
     if by_output is not None:
-        again = _improved(space, _as_innovations(space, by_output.final), final)
-        if again is not final:
-            base, final = _bare(space, again), again
+        better = _improved(space, again or _as_innovations(space, by_output.final), final)
+        if better is not final:
+            base, final = _bare(space, better), better
         test = specification(space, task, final)
         by_output = _offered(by_output, final)
     whitened = _Found(space, base, final, test)
@@ -251,8 +256,11 @@ def _improved(space: Moves, other: Fit, best: Fit) -> Fit:
 
 
 def _as_innovations(space: Moves, fit: Fit) -> Fit:
-    """A model selected by output errors under a noise model of its own, under the predictors that may say more."""
-    return space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit)))
+    """A model selected by output errors under a noise model of its own, under the predictors that may say more.
+
+    A prefilter shows no fast resonance: whitened errors do, and it is looked for again.
+    """
+    return space.settled(space.finished(ls.reestimated(space.objective, ls.scored(space.objective, fit))))
 
 
 def specification(space: Moves, task: Task, fit: Fit) -> Specification:

@@ -44,6 +44,8 @@ LOOP = 0.4  # no decision: accuracy of the inversion
 """Gain of the stiff loop, of the one that takes an integrator to its command in a single step."""
 INTEGRAL = 0.02  # no decision: the same
 """Of the proportional gain, in each step: what friction and gravity leave of the error is gone within the filter's time."""
+PASSES = 3  # no decision: the same
+"""Runs of that loop: where a shaft's antiresonance weakens it, what one run misses is added to the command of the next one."""
 STEPS = 200  # no decision: the same
 """Steps of the stiff loop in 1/cutoff: its bandwidth is 0.4 * 200/(2 pi) = 13 times the cutoff."""
 EDGE = 2.0  # no decision: what is left out is in neither figure
@@ -268,15 +270,18 @@ def _led(model: Model, rec: Record, motion: Motion, cutoff_hz: float) -> Vector:
     grid, at = np.arange(n) * rec.dt, np.arange(n * fine) * dt
     w = CubicSpline(grid, motion.velocity)
     kp = LOOP / (model.gain * dt)
+    wanted = w(np.minimum(at, grid[-1]))
     # The loop follows late by dt/LOOP, so the command leads by as much.
-    command = w(np.minimum(at, grid[-1])) + dt / LOOP * w(np.minimum(at, grid[-1]), 1)
+    command = wanted + dt / LOOP * w(np.minimum(at, grid[-1]), 1)
     position = CubicSpline(grid, motion.position)(np.minimum(at, grid[-1]))
-    lead = Record(dt, command=command, velocity=command, position=position)
     state = np.zeros(mechanism.order + 2 * any(e.row.place == "plant" for e in mechanism.effects) + 1)
     state[0] = motion.velocity[0]
+    loop = PI(kp=kp, ki=INTEGRAL * kp / dt)
     with np.errstate(all="ignore"):
-        torque = run(mechanism, lead, PI(kp=kp, ki=INTEGRAL * kp / dt), state).torque
-    held = torque.reshape(n, fine)
+        for _ in range(PASSES):
+            led = run(mechanism, Record(dt, command=command, velocity=command, position=position), loop, state)
+            command = command + np.where(np.isfinite(led.velocity), wanted - led.velocity, 0.0)
+    held = led.torque.reshape(n, fine)
     return np.asarray(held[:, 0] if rec.torque_is == MEASURED else held.mean(axis=1))
 
 

@@ -10,13 +10,13 @@ from gaident.axis import said, unit, velocity_unit, word
 from gaident.models.factors import gain_unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
+from gaident.results.finding import Finding
 from gaident.show.controller_words import controller_words
 from gaident.show.diagnosis_summary import (
     DRIVERS,
     TESTED_UP_TO,
     chance_words,
     driver_counts,
-    either,
     fall_words,
     left_words,
     mechanical_name,
@@ -24,7 +24,6 @@ from gaident.show.diagnosis_summary import (
     next_words,
     not_the_loop_words,
     parameter_row,
-    words,
 )
 from gaident.show.html import Html, Row, joined, number, table, tag, typeset
 from gaident.show.report import charts
@@ -46,6 +45,7 @@ from gaident.show.report.parts import (
 )
 from gaident.show.report.views import View
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
+from gaident.show.wording import either, missing_words, size_words, words
 
 __all__ = ["chapters", "headline", "mark", "tiles"]
 
@@ -59,26 +59,35 @@ GOOD, HALF, BAD = ("good", "✓"), ("half", "◐"), ("bad", "✗")
 MARKS = {"adequate": GOOD, "explained": GOOD, "partly explained": HALF, "unexplained": BAD}
 
 
-def head(dia: Diagnosis) -> Head:
+def head(dia: Diagnosis, axis: str) -> Head:
     """What stands at the top of the page."""
-    return Head("Diagnosis", *mark(dia), headline(dia), dia.notes)
+    return Head("Diagnosis", *mark(dia), headline(dia, axis), dia.notes)
 
 
-def headline(dia: Diagnosis) -> str:
-    """The verdict in one sentence."""
+def headline(dia: Diagnosis, axis: str) -> str:
+    """The verdict in one sentence, with the size of each cause."""
     if dia.verdict == "adequate":
         return "The linear model is adequate: nothing significant is left that could be blamed on the drive."
     causes = [f for f in dia.findings if not f.is_noise]
     if not causes:
         return "The model is wrong, and no effect of the library fits what is left."
-    named = [words(f.effect) for f in causes if not f.alternatives]
+    named = list(dict.fromkeys(_sized(f, axis) for f in causes if not f.alternatives))
     listed = " and ".join(filter(None, (", ".join(named[:-1]), *named[-1:])))
     lacks = [listed] if named else []
-    lacks += [f"one of {either(f)}, which these data do not tell apart" for f in causes if f.alternatives]
+    lacks += list(dict.fromkeys(_open(f, axis) for f in causes if f.alternatives))
     text = f"The model lacks {'; and '.join(lacks)}"
     if dia.verdict == "partly explained":
         return f"{text}; this explains a part of what it gets wrong, and something significant is left."
     return f"{text}; with {'it' if len(causes) == 1 else 'them'} nothing significant is left."
+
+
+def _sized(f: Finding, axis: str) -> str:
+    size = size_words(f, axis)
+    return f"{words(f.effect, axis)} ({size})" if size else words(f.effect, axis)
+
+
+def _open(f: Finding, axis: str) -> str:
+    return missing_words(f, axis) or f"one of {either(f, axis)}, which these data do not tell apart"
 
 
 def mark(dia: Diagnosis) -> tuple[str, str, str]:
@@ -89,11 +98,18 @@ def mark(dia: Diagnosis) -> tuple[str, str, str]:
 def tiles(dia: Diagnosis, view: View) -> Html:
     """The figures seen first."""
     v = velocity_unit(view.axis)
+    _, size = view.scales.get(v, (v, 1.0))
     where = "in-sample" if dia.held_out == "in-sample" else "held-out data"
-    shown = [tile(f"error, linear model ({where})", number(dia.before.rmse), v)]
+    shown = [tile(f"error, linear model ({where})", number(size * dia.before.rmse), _unit_of(dia.before.rmse, v, view))]
     if dia.model.effects:
-        shown.append(tile(f"error, extended model ({where})", number(dia.after.rmse), v))
-    shown.append(tile("noise of the measured velocity", number(dia.after.noise_floor), v))
+        shown.append(tile(f"error, extended model ({where})", number(size * dia.after.rmse), _unit_of(dia.after.rmse, v, view)))
+    shown.append(
+        tile(
+            "noise of the measured velocity",
+            number(size * dia.after.noise_floor),
+            _unit_of(dia.after.noise_floor, v, view),
+        )
+    )
     if dia.model.effects and dia.before.rmse > 0.0:
         low, high = dia.gain_interval
         interval = typeset(f"95 % interval of the fall: {percent(low)} to {percent(high)} %") if math.isfinite(low) else ""
@@ -101,6 +117,11 @@ def tiles(dia: Diagnosis, view: View) -> Html:
         label = "the error grows by" if fall < -0.005 else "the error falls by"  # no decision: what is printed as 0 %
         shown.append(tile(label, typeset(f"{percent(abs(fall))} %"), interval))
     return joined(shown)
+
+
+def _unit_of(value: float, si: str, view: View) -> str:
+    """The unit in which a value is shown, with the value in SI behind where that is another."""
+    return f"{view.scales[si][0]} ({number(value)} {si})" if si in view.scales else si
 
 
 def percent(share: float) -> str:
@@ -137,10 +158,8 @@ def _causes(dia: Diagnosis, view: View) -> Section:
         )
         parts.append(tag("p", text))
     for f in causes:
-        name = joined((tag("b", words(f.effect)), *(joined((" or ", tag("b", words(a)))) for a in f.alternatives)))
-        rows: list[Row] = [
-            (n, typeset(value), typeset(u), remark) for n, value, u, remark in map(_row(axis), f.parameters.items())
-        ]
+        name = joined((tag("b", words(f.effect, axis)), *(joined((" or ", tag("b", words(a, axis)))) for a in f.alternatives)))
+        rows: list[Row] = [(n, *map(typeset, cells), remark) for n, *cells, remark in map(_row(view), f.parameters.items())]
         held = "in-sample" if dia.held_out == "in-sample" else "held-out"
         place = f"Place: {f.place}. " if f.place else ""
         figures = f"{place}{f.delta_bic:.0f} BIC units; the {held} error falls by {percent(f.gain)} % of what was left before it."
@@ -148,7 +167,7 @@ def _causes(dia: Diagnosis, view: View) -> Section:
             box(
                 tag("h3", name, " ", tag("small", "cannot be told apart" if f.alternatives else "named")),
                 tag("p", typeset(said(f.evidence, axis))),
-                table(("parameter", "value", "unit", ""), [rows]) if rows else "",
+                table(("parameter", "value", "unit", "", ""), [rows]) if rows else "",
                 tag("p", tag("small", typeset(figures))),
                 tag("p", tag("small", typeset(chance_words(f, dia.bootstrap)))) if f.p_value is not None else "",
                 kind="cause" if not f.alternatives else "cause warn",
@@ -159,12 +178,14 @@ def _causes(dia: Diagnosis, view: View) -> Section:
     noise = [f for f in dia.findings if f.is_noise]
     if noise:
         parts.append(tag("h3", "About the record"))
-        parts.append(tag("ul", *(tag("li", tag("b", words(f.effect)), ": ", typeset(said(f.evidence, axis))) for f in noise)))
+        parts.append(
+            tag("ul", *(tag("li", tag("b", words(f.effect, axis)), ": ", typeset(said(f.evidence, axis))) for f in noise))
+        )
     return Section("cause", "Cause and evidence", *parts)
 
 
-def _row(axis: str) -> Callable[[tuple[str, Estimate]], tuple[str, str, str, str]]:
-    return lambda item: parameter_row(item[0], item[1], axis)
+def _row(view: View) -> Callable[[tuple[str, Estimate]], tuple[str, str, str, str, str]]:
+    return lambda item: parameter_row(item[0], item[1], view.axis, view.scales)
 
 
 def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
@@ -280,7 +301,7 @@ def _untested(dia: Diagnosis, view: View) -> Section:
 
 def _reasons(why: Mapping[str, str], head: str, axis: str) -> Html:
     """A table of effects with a sentence on each."""
-    rows: list[Row] = [(words(effect), typeset(said(reason, axis))) for effect, reason in why.items()]
+    rows: list[Row] = [(words(effect, axis), typeset(said(reason, axis))) for effect, reason in why.items()]
     return tag("div", table(("effect", head), [rows]), class_="text")
 
 

@@ -33,7 +33,7 @@ def diagnosis_html(dia: Diagnosis) -> Html:
         errors.append(("extended model", number(dia.after.rmse), f"{dia.after.fit_percent:.2f}"))
     errors.append(("noise", number(dia.after.noise_floor), ""))
     where = f"{UNITS}; {dia.held_out}"
-    return _framed(diagnosis.head(dia), causes, table(("", "rmse", "fit [%]"), [errors], left=(0,)), where)
+    return _framed(diagnosis.head(dia, dia.axis), causes, table(("", "rmse", "fit [%]"), [errors], left=(0,)), where)
 
 
 def identification_html(idn: Identification) -> Html:

@@ -21,10 +21,14 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inli
 
 
 def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
-    """The whole page of a Diagnosis or an Identification; plotly_js: the library's text."""
-    drawn = Charts()
+    """The whole page of a Diagnosis or an Identification; plotly_js: the library's text, "" for pictures and no script."""
+    drawn = Charts(view.scales, bool(plotly_js))
     if isinstance(result, Diagnosis):
-        head_of, tiles, chapters = diagnosis.head(result), diagnosis.tiles(result, view), diagnosis.chapters(result, view, drawn)
+        head_of, tiles, chapters = (
+            diagnosis.head(result, view.axis),
+            diagnosis.tiles(result, view),
+            diagnosis.chapters(result, view, drawn),
+        )
     else:
         head_of, tiles = identification.head(result), identification.tiles(result, view)
         chapters = identification.chapters(result, view, drawn)
@@ -48,18 +52,33 @@ def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
         tag("meta", name="color-scheme", content="light dark"),
         tag("title", f"gaident: {title}"),
         tag("style", _asset("page.css")),
-        tag("script", Html('document.documentElement.classList.add("js");')),
+        tag("script", Html('document.documentElement.classList.add("js");')) if plotly_js else "",
     )
-    body = (
-        tag("header", tag("div", tag("p", "gaident report", class_="brand"), tag("h1", title)), _switch()),
-        tag("main", verdict, contents, *(tag("section", tag("h2", c.title), c.body, id=c.key) for c in chapters)),
-        tag("footer", tag("p", "Everything in this page is in this file: it needs no network. Figures: plotly.js, MIT licence.")),
+    scripts = (
         tag("script", Html(plotly_js.replace("</script", "<\\/script"))) if drawn.all else "",
         tag("script", script_json(data), type="application/json", id="figures"),
         tag("script", _asset("page.js")),
     )
+    licence = " Figures: plotly.js, MIT licence." if plotly_js else ""
+    body = (
+        tag(
+            "header",
+            tag("div", tag("p", "gaident report", class_="brand"), tag("h1", title), _about(view)),
+            _switch() if plotly_js else "",
+        ),
+        tag("main", verdict, contents, *(tag("section", tag("h2", c.title), c.body, id=c.key) for c in chapters)),
+        tag("footer", tag("p", "Everything in this page is in this file: it needs no network.", licence)),
+        *(scripts if plotly_js else ()),
+    )
     whole = tag("html", Html("\n"), tag("head", joined(head, "\n")), Html("\n"), tag("body", joined(body, "\n")), lang="en")
     return f"<!DOCTYPE html>\n{whole}\n"
+
+
+def _about(view: View) -> Html:
+    """Date, axis, customer, what the user says besides."""
+    rows = [joined((tag("b", key), ": ", text)) for key, text in view.about.items() if key != "text"]
+    free = tag("p", view.about["text"]) if view.about.get("text") else Html()
+    return joined((tag("p", joined(rows, " · ")) if rows else Html(), free))
 
 
 def _switch() -> Html:

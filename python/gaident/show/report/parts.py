@@ -17,6 +17,7 @@ from gaident.show.html import Html, Row, joined, number, png_uri, table, tag, ty
 from gaident.show.report import charts
 from gaident.show.report.views import Run, View
 from gaident.show.response_plots import response_chart
+from gaident.show.units import Scales, in_units
 from gaident.show.wording import with_std
 
 __all__ = [
@@ -61,17 +62,21 @@ class Section:
 class Charts:
     """The charts of a page, gathered as they are put in."""
 
-    def __init__(self) -> None:
+    def __init__(self, scales: Scales | None = None, live: bool = True) -> None:
+        """scales: to the user's units, in which the axes are drawn. live: False: pictures alone."""
         self.all: list[Chart] = []
+        self.scales: Scales = scales or {}
+        self.live = live
 
     def put(self, chart: Chart | None) -> Html:
         """The place of a chart: the live figure, and the picture for print and where no script runs."""
         if chart is None:
             return Html()
+        chart = in_units(chart, self.scales)
         self.all.append(chart)
         live = tag("div", class_="live", data_chart=chart.key, role="img", aria_label=chart.caption)
         still = tag("img", class_="still", alt=chart.caption, src=png_uri(picture(chart)))
-        return tag("figure", live, still, tag("figcaption", chart.caption), id=f"figure-{chart.key}")
+        return tag("figure", live if self.live else "", still, tag("figcaption", chart.caption), id=f"figure-{chart.key}")
 
 
 def box(*inside: str, kind: str = "") -> Html:

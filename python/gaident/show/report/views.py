@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.results.frequency import Responses
+from gaident.show.units import Scales
 
 __all__ = ["Curve", "Run", "Vector", "View"]
 
@@ -55,7 +56,7 @@ class View:
 
     runs: one per record, those that were fitted first. curve: (velocity, torque, label) of named effects. response: of the
     longest record, see `gaident.results.frequency.Responses`; without it no_response says why. made_with: what computed
-    and drew the page -> version. axis: "rotary" or "linear".
+    and drew the page -> version. axis: "rotary" or "linear". scales: to the user's units. about: what stands below the title.
     """
 
     runs: tuple[Run, ...] = ()
@@ -64,6 +65,8 @@ class View:
     no_response: str = ""
     axis: str = "rotary"
     made_with: Mapping[str, str] = field(default_factory=dict)
+    scales: Scales = field(default_factory=dict)
+    about: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def fitted(self) -> tuple[Run, ...]:

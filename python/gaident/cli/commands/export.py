@@ -1,0 +1,104 @@
+"""gaident export: a saved result for C, python-control, SciPy or a table."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import math
+import re
+from pathlib import Path
+
+from gaident.axis import unit
+from gaident.cli.export_options import FORMS
+from gaident.cli.output import print_json, target_of, write
+from gaident.control.pi import bare_pi
+from gaident.errors import SettingsError
+from gaident.models.model import Model
+from gaident.results.diagnosis import Diagnosis
+from gaident.results.estimate import Estimate
+from gaident.results.identification import Identification
+from gaident.results.store import load
+
+__all__ = ["export_command"]
+
+
+def export_command(args: argparse.Namespace) -> None:
+    """`gaident export RESULT.json --to FORM`."""
+    result = load(args.result)
+    if not isinstance(result, (Diagnosis, Identification)):
+        raise SettingsError(f"{args.result} holds a record, no model: give what gaident identify or diagnose wrote with --out")
+    path = args.out or str(Path(args.result).with_suffix(FORMS[args.to]).name)
+    target = target_of(path, [args.result])
+    assert target is not None
+    if args.to == "c":
+        text = _c_source(result, target, args)
+    elif args.to == "csv":
+        text = _table(result, args.axis or (result.axis if isinstance(result, Diagnosis) else "rotary"))
+    else:
+        text = _python(result, args)
+    write(target, text.encode())
+    if args.json:
+        print_json({"schema": "gaident/export", "schema_version": 1, "path": str(target), "form": args.to})
+        return
+    print(f"written: {target}")
+
+
+def _c_source(result: Diagnosis | Identification, target: Path, args: argparse.Namespace) -> str:
+    """The C99 file; --closed: with the result's controller, command to velocity."""
+    if args.dt is None:
+        raise SettingsError("--to c needs the sample time of its steps: give --dt [s]")
+    model, _ = _linear(result, args)
+    loop = bare_pi(result.controller)
+    if args.closed and loop is None:
+        raise SettingsError(
+            "--closed: in C the controller is a bare PI at the steps of the model; leave it out: torque to velocity"
+        )
+    return model.to_c(None, dt=args.dt, controller=loop if args.closed else None, name=re.sub(r"\W", "_", target.stem))
+
+
+def _linear(result: Diagnosis | Identification, args: argparse.Namespace) -> tuple[Model, str]:
+    """The model that a transfer function can be, and what it leaves out."""
+    model: Model = result.model
+    if not args.linear:
+        return model, ""
+    left = ", ".join(effect.name for effect in model.effects)
+    return model.linear, f"; left out by --linear: {left}" if left else ""
+
+
+def _python(result: Diagnosis | Identification, args: argparse.Namespace) -> str:
+    """A Python file that makes the system and needs no gaident."""
+    model, left = _linear(result, args)
+    system = model.to_scipy()
+    rows = {"zeros": list(map(complex, system.zeros)), "poles": list(map(complex, system.poles)), "gain": float(system.gain)}
+    head = [
+        f'"""Torque to velocity in SI units, of {Path(args.result).name}, written by gaident export{left}."""',
+        "",
+        "from scipy import signal" if args.to == "scipy" else "import control",
+        "",
+        *(f"{name} = {value!r}" for name, value in rows.items()),
+    ]
+    made = "signal.ZerosPolesGain(zeros, poles, gain)" if args.to == "scipy" else "control.zpk(zeros, poles, gain)"
+    return "\n".join([*head, f"plant = {made}", ""])
+
+
+def _table(result: Diagnosis | Identification, axis: str) -> str:
+    """Every number with its deviation and unit, one a row."""
+    rows: list[tuple[str, str, Estimate]] = []
+    if isinstance(result, Diagnosis):
+        rows += [("mechanics", name, e) for name, e in result.mechanics.items()]
+        rows += [(f.effect, name, e) for f in result.findings for name, e in f.parameters.items()]
+    else:
+        m = result.mechanics
+        if m is not None:
+            rows += [
+                ("mechanics", n, Estimate(getattr(m, n), m.std.get(n, math.nan), u)) for n, u in m.UNITS.items() if hasattr(m, n)
+            ]
+        rows += [("model", name, e) for name, e in result.parameters.items()]
+    rows += [("controller", name, e) for name, e in result.controller_numbers.items()]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("of", "parameter", "value", "std", "unit"))
+    for of, name, e in rows:
+        writer.writerow((of, name, repr(float(e.value)), repr(float(e.std)), unit(e.unit, axis)))
+    return text.getvalue()

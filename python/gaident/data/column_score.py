@@ -1,0 +1,53 @@
+"""How much the names and the unit of a log's column say that it is a channel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from gaident.data.column_names import name_says
+from gaident.data.formats.units import Constants, factor, is_any_unit
+from gaident.errors import ReadError
+
+__all__ = ["COMMANDED_QUANTITY", "LEAST", "spoken_for"]
+
+COMMANDED_QUANTITY = {"command": "velocity", "position_command": "position"}
+"""Channel that is a command -> the quantity that it commands."""
+LEAST = 2  # no decision: words that speak for a column
+
+
+def spoken_for(names: Sequence[str], unit: str | None, channel: str) -> tuple[int, str, bool]:
+    """How much speaks for a column of these names and this unit (words, the unit), why, and whether the user has to be asked."""
+    quantity = COMMANDED_QUANTITY.get(channel, channel)
+    said = name_says(names, unit)
+    by_name, fits = said.quantities.get(quantity, 0), _is_unit_of(unit, quantity)
+    elsewhere = unit is not None and not fits and not _converts(unit, quantity) and is_any_unit(unit)
+    if said.foreign or elsewhere or not (by_name or fits):
+        return 0, "", False
+    if max((much for other, much in said.quantities.items() if other != quantity), default=0) > max(by_name, LEAST):
+        return 0, "", False  # the set value of a position is no velocity command
+    score = by_name + (3 if fits else 0)
+    if channel in COMMANDED_QUANTITY:
+        score = score + 3 if said.commanded else 0
+    elif channel in ("velocity", "position"):
+        score = 0 if said.commanded else score + (1 if said.measured else 0)  # a command is no measurement, whatever its unit
+    else:
+        score += 1 if said.commanded else 0  # what the controller issued rather than what was measured
+    why = [f"its name says {quantity}" if by_name else "", f"its unit is one of {quantity}" if fits else ""]
+    if channel in COMMANDED_QUANTITY and said.commanded:
+        why.append("its name says that it is a command")
+    return score, ", ".join(filter(None, why)), said.unsure
+
+
+def _is_unit_of(unit: str | None, quantity: str) -> bool:
+    if unit is None or not _converts(unit, quantity):
+        return False
+    # V and 1 stand for many things.
+    return unit.strip().casefold() not in ("v", "mv", "m", "1", "-") or quantity == "position"
+
+
+def _converts(unit: str, quantity: str) -> bool:
+    try:
+        factor(quantity, unit, Constants(1.0, 1.0, 1.0, 1.0))
+    except ReadError:
+        return False
+    return True

@@ -1,0 +1,93 @@
+"""The form that the logged torques show of a velocity controller that was given with more than its gains, and is not the drive's.
+
+The search is that of a bare PI with the same gains: what else was given is left out of it. Findings are what differs from the
+given controller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from gaident.axis import Text, joined, say
+from gaident.control.cascade import Cascade, Filter, cascade_of
+from gaident.control.controller import Controller
+from gaident.control.filters import LowPass
+from gaident.control.pi import PI
+from gaident.data.record import Record
+from gaident.diagnosis.controller.form import FILTER_NAMES
+from gaident.diagnosis.controller.form_findings import Driver, findings_of, notes_of, parts_of
+from gaident.diagnosis.controller.forms import form_shown
+from gaident.diagnosis.library.settings import OF_SETTING
+from gaident.identification.logged_torque import not_followed
+from gaident.models.drive_torque import driven_by
+from gaident.policy.table import POLICY
+
+__all__ = ["other_form"]
+
+
+def other_form(records: Sequence[Record], held: Sequence[Record], given: Controller) -> Driver | None:
+    """The form in which a log slower than the given velocity controller shows it; None where no form makes the torques.
+
+    records, held: as they were given.
+    """
+    cascade = cascade_of(given)
+    pi = PI(kp=cascade.velocity.kp, ki=cascade.velocity.ki)
+    every = {given.log_every(r.dt) for r in (*records, *held)}
+    bare = Cascade(pi, cascade.period, delay=cascade.delay)
+    lacking = cascade.position is not None or any(r.torque is None or r.command is None for r in records)
+    if lacking or cascade == bare or len(every) > 1 or every == {1}:
+        return None
+    shown = form_shown(records, pi, (), max(every))
+    if shown is None and not_followed(records, bare):
+        return None
+    found = bare if shown is None else replace(shown.controller, delay=cascade.delay)
+    if not_followed(records, found):
+        return None
+    findings = () if shown is None else tuple(f for f in findings_of(shown) if _differs(f.effect, found, cascade))
+    words = (
+        "The logged {torque} does not follow from the given controller, but from one with the same gains{}{}: this one is used."
+    )
+    absent = _left_out(found, cascade)
+    without = say(" without its {}", joined(", ", [Text(name) for name in absent])) if absent else ""
+    beside = "" if shown is None else say("{} with {}", " and" if absent else "", parts_of(shown))
+    notes = (say(words, without, beside), *(() if shown is None else notes_of(shown, records)[1:]))
+    driven, later = (tuple(driven_by(r, found) for r in part) for part in (records, held))
+    return Driver(driven, later, found, findings, notes, {})
+
+
+def _differs(name: str, found: Cascade, given: Cascade) -> bool:
+    """Whether a part of the found controller is not that of the given one."""
+    here, there = found.velocity, given.velocity
+    if name == "integration_rule":
+        return here.rule != there.rule
+    if name == "command_weight":
+        return not _same(here.command_weight, there.command_weight)
+    if name == OF_SETTING["torque_limit"]:
+        return not _same(here.limits[0], there.limits[0])
+    place = next((place for place, finding in FILTER_NAMES.items() if finding == name), "")
+    if place:
+        return not _same_filters(getattr(found, place), getattr(given, place))
+    return True
+
+
+def _left_out(found: Cascade, given: Cascade) -> list[str]:
+    """Filters of the given controller where the found one has none, in words of the findings."""
+    return [name.replace("_", " ") for place, name in FILTER_NAMES.items() if getattr(given, place) and not getattr(found, place)]
+
+
+def _same_filters(found: Sequence[Filter], given: Sequence[Filter]) -> bool:
+    if [type(f) for f in found] != [type(f) for f in given]:
+        return False
+    return all(_same(_place_of(a), _place_of(b)) for a, b in zip(found, given, strict=True))
+
+
+def _place_of(f: Filter) -> float:
+    """What says where a filter acts: time constant [s] or frequency [Hz]."""
+    value = f.time_constant if isinstance(f, LowPass) else f.frequency
+    assert value is not None
+    return float(value)
+
+
+def _same(found: float, given: float) -> bool:
+    return found == given or abs(found - given) <= POLICY.same_gains * max(abs(found), abs(given))

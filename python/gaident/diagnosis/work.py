@@ -1,0 +1,308 @@
+"""One diagnosis on its way: records, search, and what is reported of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.axis import Text, say
+from gaident.control.pi import bare_pi
+from gaident.data.record import Record
+from gaident.diagnosis.check import checked as by_second_method
+from gaident.diagnosis.controller.controller_place import as_read, controller_findings
+from gaident.diagnosis.controller.driving import Driving
+from gaident.diagnosis.experiments.candidates import candidates, loop_notes
+from gaident.diagnosis.experiments.excitation import excitation
+from gaident.diagnosis.explain.alternatives import alternatives_of
+from gaident.diagnosis.explain.held_out import standing
+from gaident.diagnosis.explain.verdict import verdict_of
+from gaident.diagnosis.explain.wording import (
+    basis_of,
+    closest,
+    drives_itself,
+    evidence_of,
+    far_off,
+    hidden_by_torque_noise,
+    or_other_gains,
+    torque_unlogged,
+)
+from gaident.diagnosis.gains import Gains, measured_gains, with_effects
+from gaident.diagnosis.judged import Judged
+from gaident.diagnosis.library.record import findings_of_the_record
+from gaident.diagnosis.library.sides import called_of, name_of, sides_of
+from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, in_controller
+from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
+from gaident.diagnosis.note import Note
+from gaident.diagnosis.records.folded import ADVICE, folded
+from gaident.diagnosis.records.hygiene import cleaned, left_out, quantisation, unexplained
+from gaident.diagnosis.records.sizes import scales_of
+from gaident.diagnosis.selection.attribution import only_describes, shown_by_the_records, simplified, what_is_left
+from gaident.diagnosis.selection.offset import Offset, offset_of
+from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains, gain_doubt, under_given
+from gaident.diagnosis.selection.rivals import Replacement
+from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
+from gaident.diagnosis.selection.sensor_age import searched
+from gaident.estimation.dataset import DataSet
+from gaident.estimation.objective import Fit, Objective
+from gaident.estimation.term import Term
+from gaident.estimation.uncertainty import estimates_of
+from gaident.identification.notes import open_loop_notes
+from gaident.policy.table import POLICY
+from gaident.results.diagnosis import Diagnosis
+from gaident.results.estimate import Estimate
+from gaident.results.finding import Finding
+from gaident.results.identification import Identification
+from gaident.version import version
+
+__all__ = ["Work"]
+
+
+@dataclass
+class Work:
+    """One diagnosis on its way."""
+
+    records: tuple[Record, ...]
+    held: tuple[Record, ...]
+    driving: Driving
+    idn: Identification
+    noise: float | None
+    note: Note
+    axis: str
+    pitch: float | None
+
+    def __post_init__(self) -> None:
+        self.controller = self.driving.controller
+        self.pi = bare_pi(self.controller)
+        self.notes: list[Text] = list(self.driving.logged.notes)
+        if self.controller is None or self.pi is not None:
+            self.notes += open_loop_notes(self.records, self.pi)
+        hit = [left_out(r, self.idn.model, self.pi) for r in self.records]
+        clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
+        self.clean = tuple(clean)
+        self.step = quantisation(self.records)
+        whole = self.driving.read
+        read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, hit, strict=True)], self.controller)
+        data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis, self.pitch)
+        self.scales = scales_of(data)
+        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.driving.logged.replays)
+        self.notes += notes
+        self.controller_steps += (*self.driving.logged.findings, *self.driving.findings)
+        # Limits that the log shows act in every loop that is closed for a fit.
+        limits = self.at_controller.effects
+        known: dict[Term, NDArray[np.float64]] = {
+            t: np.array(list(limits[t.name].values())) for t in in_controller() if t.name in limits
+        }
+        shown = self.at_controller.controller or self.controller
+        self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
+        data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise)
+        self.data = data if self.at_controller.controller is not None else data.with_effects(known)
+        self.excited = excitation(self.clean, self.data.loop, axis=self.axis, pitch=self.pitch)
+        kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
+        self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
+        self.notes += torque_unlogged(self.data)
+
+    def search(self) -> None:
+        """The selected model, its rivals, what is left."""
+        allowed, self.not_testable = candidates(self.records, self.clean, self.data, self.excited, self.at_controller)
+        self.notes += [ADVICE] * any(folded(r) for r in self.records)
+        self.notes += loop_notes(self.data)
+        rest = self.scales, self.idn.model, allowed, self._equivalent_here, self._say
+        found, older = searched(self.objective, self.scales, self.idn.model, lambda objective: selected(objective, *rest))
+        self.notes += older
+        self.note(0.85, "looking for what is left")
+        self.take(found)
+        simpler = simplified(found.space, found.final, self.left)
+        if simpler is not found.final:
+            found = compared(found, simpler, self._equivalent_here, self._say)
+        self.settle(found)
+
+    def settle(self, found: Selection) -> None:
+        """The result of the search, and whether other gains would explain the records better."""
+        self.take(found)
+        self.gain_doubt = gain_doubt(self.found.space, self.final, self.driving.regained_from is not None)
+
+    def other_gains(self) -> OtherGains | None:
+        """Gains with which these records are explained better, where no torque shows which they are."""
+        return self.gain_doubt.better
+
+    def under_given(self) -> Selection | None:
+        """What was found under other gains, under the given ones, where it explains the records as well there; else None."""
+        given = self.driving.regained_from
+        assert given is not None
+        moved = under_given(self.found, given, self.driving.regained_by)
+        return None if moved is None else compared(moved, moved.final, self._equivalent_here, self._say)
+
+    def _say(self, message: str) -> None:
+        self.note(None, message)
+
+    def take(self, found: Selection) -> None:
+        """The result of a search, and what it leaves."""
+        self.found, self.base, self.rivals = found, found.base, found.rivals
+        self.data, self.objective = found.space.data, found.space.objective
+        self._settle(found.final)
+
+    def _settle(self, final: Fit) -> None:
+        self.final = final
+        self.adequate, self.left = what_is_left(self.found.space, final)
+        self.under, self.estimate = self.found.estimated()
+
+    def judged(self) -> Judged:
+        """What is shown, and what it gains; where no effect is, that of a search by whitened errors instead."""
+        while True:
+            said = list(self.notes)
+            self.notes += basis_of(self.found)
+            gains = self._accepted_gains()
+            driver = self.left.driver if self.adequate else self.left.strongest
+            adds_up = self.data.slower and not self.data.loopable  # what the torque lacks between the lines of the log
+            beyond = gains.after.rmse / floor if (floor := gains.floor) > 0.0 else 0.0
+            if driver is None and not adds_up and beyond > POLICY.free_run_ratio:
+                # A noise filter removes a slow misfit completely; the free run shows it.
+                driver = self.left.strongest or "time"
+                self.notes.append(far_off(beyond))
+            if driver is None and self.data.torque_measured and not gains.closed:
+                self.notes.append(hidden_by_torque_noise(floor))
+            causes = [e for e in self.final.effects if not self._only_describes(e, driver)]
+            estimates = estimates_of(self.under, self.estimate)
+            causes = [e for e in causes if self._determined(e, estimates[e])]
+            mechanics = mechanics_of(self.under, self.estimate)
+            model = with_effects(self.estimate.parameters.model(self.estimate.x), self.at_controller.effects)
+            check = by_second_method(self.data, gains, model, mechanics, estimates)
+            causes, why = standing(causes, gains, check, self._equivalent_here)
+            if why:
+                driver = driver or self.left.strongest or "time"
+                self.notes += why
+            instead = None if causes else by_whitened_errors(self.found, self._equivalent_here, self._say)
+            if instead is None:
+                return Judged(gains, driver, causes, estimates, offset_of(self.found.space, self.final), mechanics, model, check)
+            self.notes = said
+            self.take(instead)
+
+    def report(self, seed: int) -> Diagnosis:
+        """Everything the user sees."""
+        self.note(0.9, "measuring the gain")
+        gains, driver, causes, estimates, offset, mechanics, model, check = self.judged()
+        spoiled = unexplained(self.data.velocity, self.objective.error(self.final), self.objective.weight)
+        findings = findings_of_the_record(spoiled, sum(len(r) for r in self.records), self.step)
+        findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
+        for effect in causes:
+            gain, rivals = self.rivals[effect]
+            alternatives = self._alternatives(effect, rivals, offset)
+            if effect in self.gain_doubt.rivals:
+                self.notes.append(or_other_gains(effect))
+            sides = sides_of(effect, [r.effect for r in rivals], masses := self.final.parameters.masses)
+            said_by = evidence_of(effect, gain, alternatives, offset, sides if masses > 1 else ())
+            what = name_of(effect), estimates[effect], alternatives, gains.of(effect), gain, None, said_by, False
+            findings.append(Finding(*what, LIBRARY[effect].place, sides))
+        if driver is None and (damping := negative_damping(mechanics)) is not None:
+            driver = "velocity"
+            self.notes.append(drives_itself(damping))
+        real = [f for f in findings if not f.is_noise]
+        answered = {*self.not_testable, *(name for f in findings for name in (f.effect, *f.alternatives))}
+        verdict = verdict_of(bool(real), driver is not None, self.data.slower and self.driving.in_doubt)
+        if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
+            shown = driver if self.left.gains[driver] > self.left.needed else None
+            self.notes.append(closest(dropped, shown, bool(real)))
+        self.notes += check.notes
+        if self.final.parameters.held and any(LIBRARY[e].constant for e in self.final.effects):
+            self.notes.append(
+                Text("The axis is held by a spring: its tension where the record starts is part of the constant load.")
+            )
+        ambiguous = [f for f in real if f.alternatives]
+        proposal = None
+        if ambiguous:
+            self.note(0.95, "proposing the next experiment")
+            from gaident.diagnosis.experiments.next_experiment import propose
+
+            elsewhere = self.at_controller.effects
+            proposal, notes = propose(ambiguous, self.rivals, self.final, self.data, self.objective.count, elsewhere)
+            self.notes += notes
+        return Diagnosis(
+            verdict=verdict,
+            findings=tuple(findings),
+            not_testable=self.not_testable,
+            model=model if self.final.effects or self.at_controller.effects or self.data.slower else self.idn.model,
+            before=check.before,
+            after=check.after,
+            driver=driver,
+            next_experiment=proposal,
+            gain_interval=gains.interval,
+            held_out=gains.held_out,
+            base_shift=base_shift(self.base, self.estimate),
+            left=self.left.gains,
+            left_needed=self.left.needed,
+            line=self.left.line if driver == "time" else None,
+            one_sided={e: sizes for e, sizes in self.excited.one_sided.items() if e not in answered},
+            mechanics=mechanics,
+            regression=check.regression,
+            regression_force_error=check.force_error,
+            comparisons=check.comparisons,
+            force_reason=check.reason,
+            notes=tuple(self.notes),
+            identification=self.idn,
+            controller=self.controller,
+            seed=seed,
+            seconds=0.0,
+            simulations=self.objective.counter.simulations,
+            samples=sum(self.data.lengths),
+            digests=tuple(r.digest for r in self.records),
+            validation_digests=tuple(r.digest for r in self.held),
+            torque_logged=self.data.torque_logged,
+            loop_follows=self.follows,
+            version=version(),
+            axis=self.axis,
+            records=self.records,
+            validation_records=self.held,
+        )
+
+    def _accepted_gains(self) -> Gains:
+        """The gains, once every effect that makes held-out data worse is out of the model."""
+        while True:
+            gains = measured_gains(
+                self.clean,
+                self.held,
+                self.controller,
+                self.idn.model,
+                self.estimate,
+                self.under,
+                self.noise,
+                self.at_controller.effects,
+            )
+            if not gains.harmful:
+                return gains
+            effect = gains.harmful[-1]
+            text = "{} would come closer to these records, but makes the held-out data worse: it is not accepted."
+            self.notes.append(say(text, called_of(effect).begun()))
+            shorter = self.found.space.without(self.final, effect)
+            self.take(compared(self.found, shorter, self._equivalent_here, self._say))
+
+    def _alternatives(self, effect: str, rivals: Sequence[Replacement], offset: Offset | None) -> tuple[str, ...]:
+        """Rivals, equivalent effects and, where the loop is not the drive's, the controller; no untestable ones."""
+        shown = shown_by_the_records(self.found.space, self.final, effect)
+        here = sorted(self._equivalent_here(effect))
+        names = alternatives_of(effect, rivals, here, bool(shown), offset, not (self.data.slower and self.driving.in_doubt))
+        names += [OTHER_GAINS] * (effect in self.gain_doubt.rivals)
+        return tuple(n for n in dict.fromkeys(map(name_of, names)) if n != name_of(effect) and n not in self.not_testable)
+
+    def _only_describes(self, effect: str, driver: str | None) -> bool:
+        of_class = bool(self._equivalent_here(effect))
+        return only_describes(self.found.space, self.final, effect, self.rivals[effect][0], driver, self.left, of_class)
+
+    def _equivalent_here(self, effect: str) -> set[str]:
+        """What these records cannot tell from an effect, whatever their noise, for lack of reversals or of sizes of steps."""
+        e = self.excited
+        # Speeds held in either direction, in whichever record, split what a reversal splits.
+        turns = max(e.reversals, int(min(e.speeds, default=0.0) < 0.0 < max(e.speeds, default=0.0)))
+        classes = conditional_classes(turns, len(e.steps), self.data.torque_logged)
+        effect = name_of(effect)
+        return set().union(*(c for c in classes if effect in c)) - {effect} - set(self.not_testable)
+
+    def _determined(self, effect: str, parameters: Mapping[str, Estimate]) -> bool:
+        """Whether the records say how large an effect is; else its name would rest on nothing, and a note says so."""
+        if any(e.identifiable and not e.at_bound for e in parameters.values()):
+            return True
+        text = "{} comes closer to these records, but they do not determine one of its parameters: it is not named."
+        self.notes.append(say(text, called_of(effect).begun()))
+        return False

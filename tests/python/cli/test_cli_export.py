@@ -1,0 +1,85 @@
+"""gaident export: the files hold the result's model and numbers."""
+
+from __future__ import annotations
+
+import csv
+import json
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from gaident.cli import main
+from gaident.cli.output import program
+
+
+@pytest.fixture(scope="module")
+def result() -> ga.Diagnosis:
+    torque = np.repeat([0.8, -0.9, 0.5, -0.6, 1.0, -0.4], 100)
+    noise = 0.005 * np.random.default_rng(1).standard_normal(600)
+    drive = ga.OneMass(J=0.01, D=0.05).model().with_effect("coulomb_friction", torque=0.3)
+    velocity = ga.simulate(drive, ga.Record(1e-3, torque=torque, velocity=0.0 * torque)) + noise
+    return ga.diagnose(ga.Record(1e-3, torque=torque, velocity=velocity))
+
+
+@pytest.fixture
+def here(result: ga.Diagnosis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    result.save("run.json")
+    result.identification.save("idn.json")
+    return tmp_path
+
+
+def test_c_is_what_the_model_writes(here: Path, result: ga.Diagnosis, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "run.json", "--to", "c", "--dt", "1e-3"]) == 0
+    assert capsys.readouterr().out == "written: run.c\n"
+    assert Path("run.c").read_text() == result.model.to_c(None, dt=1e-3, name="run")
+    assert main(["export", "run.json", "--to", "c", "--dt", "1e-3", "--closed"]) == 2
+    assert "--closed" in capsys.readouterr().err
+    assert main(["export", "run.json", "--to", "c"]) == 2
+    assert "give --dt" in capsys.readouterr().err
+
+
+def test_a_python_file_makes_the_plant(here: Path, result: ga.Diagnosis, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "run.json", "--to", "scipy"]) != 0
+    assert "coulomb_friction" in capsys.readouterr().err
+    assert main(["export", "run.json", "--to", "scipy", "--linear", "--out", "plant.py"]) == 0
+    plant = runpy.run_path("plant.py")["plant"]
+    assert plant.gain == result.model.gain and np.allclose(np.sort(plant.poles), np.sort(result.model.poles))
+    assert "left out by --linear: coulomb_friction" in Path("plant.py").read_text()
+    assert main(["export", "idn.json", "--to", "control", "--out", "plant2.py", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.partition("{")[2].join(("{", "")))["form"] == "control"
+    assert "control.zpk(zeros, poles, gain)" in Path("plant2.py").read_text()
+
+
+def test_a_table_of_all_numbers(here: Path, result: ga.Diagnosis) -> None:
+    assert main(["export", "run.json", "--to", "csv"]) == 0
+    with open("run.csv", newline="") as stream:
+        rows = {(row["of"], row["parameter"]): row for row in csv.DictReader(stream)}
+    friction = rows["coulomb_friction", "torque"]
+    assert float(friction["value"]) == result.causes[0].parameters["torque"].value and friction["unit"] == "N m"
+    assert float(rows["mechanics", "inertia"]["std"]) == result.mechanics["inertia"].std
+    assert main(["export", "run.json", "--to", "csv", "--axis", "linear", "--out", "linear.csv"]) == 0
+    assert ",N\n" in Path("linear.csv").read_text()
+    assert main(["export", "idn.json", "--to", "csv"]) == 0 and "model,gain" in Path("idn.csv").read_text()
+
+
+def test_a_record_is_no_result(here: Path, result: ga.Diagnosis, capsys: pytest.CaptureFixture[str]) -> None:
+    result.records[0].save("record.json")
+    assert main(["export", "record.json", "--to", "csv"]) == 2
+    assert "holds a record, no model" in capsys.readouterr().err
+
+
+def test_a_printed_command_can_be_pasted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the folder of the program, where the shell would not find it."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr("sys.argv", [".my env/bin/gaident", "demo"])
+    assert program() == "'.my env/bin/gaident'"
+    monkeypatch.setattr("sys.argv", ["/usr/lib/python3/site-packages/gaident/__main__.py"])
+    assert program() == "gaident"
+    (tmp_path / "gaident").write_text("#!/bin/sh\n")
+    (tmp_path / "gaident").chmod(0o755)
+    monkeypatch.setattr("sys.argv", [str(tmp_path / "gaident")])
+    assert program() == "gaident"

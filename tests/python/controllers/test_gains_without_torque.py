@@ -1,0 +1,78 @@
+"""Without a logged torque: gains that are not the drive's, beside what the mechanics may be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from drive_cases import random_case
+
+DT = 1e-3
+TRUE = ga.PI(kp=0.05, ki=1.5)
+J, FRICTION = 3e-4, 0.05
+
+
+def record(friction: float = 0.0, logged: bool = False) -> ga.Record:
+    """One mass under TRUE, noise of 0.03 rad/s in the loop."""
+    rng = np.random.default_rng(2)
+    levels = np.repeat([0, 20.0, -35, 10, -10, 50, -50, 25, -5, 5, -20, 40, -30, 15, -15, 0], 90)
+    noise = 0.03 * rng.standard_normal(len(levels))
+    drive = ga.OneMass(J=J, D=2e-3).model()
+    drive = drive.with_effect("coulomb_friction", torque=friction) if friction else drive
+    done = ga.run(drive, ga.Record(DT, command=levels - noise, velocity=np.zeros(len(levels))), TRUE)
+    return ga.Record(DT, command=levels, velocity=done.velocity + noise, torque=done.torque if logged else None)
+
+
+def test_right_gains_cost_a_clean_record_nothing_and_what_cannot_show_is_said() -> None:
+    for factor in (1.0, 1.15):
+        dia = ga.diagnose(record(), ga.PI(factor * TRUE.kp, factor * TRUE.ki))
+        assert dia.verdict == "adequate" and not dia.findings
+        # A common factor of both gains is one of every inertia: nothing shows it.
+        assert dia.mechanics["inertia"].value == pytest.approx(factor * J, rel=5e-3)
+        assert any("wrong by that factor, and nothing shows it: log the torque" in note for note in dia.notes)
+    assert not any("nothing shows it" in note for note in ga.diagnose(record(logged=True), TRUE).notes)
+
+
+@pytest.mark.parametrize("friction", [0.0, FRICTION])
+@pytest.mark.parametrize("wrong", [0.85, 1.15])
+def test_a_wrong_ratio_of_the_gains_is_found_and_is_no_mechanics(wrong: float, friction: float) -> None:
+    dia = ga.diagnose(record(friction), ga.PI(TRUE.kp, wrong * TRUE.ki))
+    assert dia.verdict == "explained"
+    names = ["other_gains", *["coulomb_friction"] * bool(friction)]
+    assert [(f.effect, f.alternatives) for f in dia.causes] == [(name, ()) for name in names]
+    gains = dia.causes[0]
+    ki = gains.parameters["ki"]
+    assert gains.place == "controller" and list(gains.parameters) == ["ki"]
+    assert abs(ki.value - TRUE.ki) < 4.0 * ki.std < 0.02 * TRUE.ki
+    assert isinstance(dia.controller, ga.PI) and dia.controller.ki == ki.value
+    assert dia.mechanics["inertia"].value == pytest.approx(J, rel=5e-3)
+    assert "log the torque, which shows both gains" in " ".join(dia.summary().split())
+    if friction:
+        assert dia.causes[1].parameters["torque"].value == pytest.approx(FRICTION, rel=0.01)
+
+
+def test_what_gains_would_explain_as_well_has_them_beside_its_name() -> None:
+    """Gains that are both a tenth too low, and a limit that is given, are the same as a lower limit."""
+    free, rng = record(), np.random.default_rng(3)
+    true = replace(TRUE, torque_limit=1.0)
+    noise = 0.03 * rng.standard_normal(len(free))
+    assert free.command is not None
+    drive = ga.OneMass(J=J, D=2e-3).model()
+    done = ga.run(drive, ga.Record(DT, command=free.command - noise, velocity=np.zeros(len(free))), true)
+    rec = ga.Record(DT, command=free.command, velocity=done.velocity + noise)
+    dia = ga.diagnose(rec, replace(true, kp=0.9 * true.kp, ki=0.9 * true.ki))
+    (limit,) = dia.causes
+    assert (limit.effect, limit.alternatives) == ("torque_saturation", ("other_gains",))
+    assert any("Other gains than the given ones would explain these records as well" in note for note in dia.notes)
+
+
+def test_a_cause_that_gains_cannot_imitate_stays_a_sole_name() -> None:
+    """A search under other gains comes to the cause as well; under the given ones it explains as much."""
+    rec, validation, controller, truth = random_case(21, "stribeck_friction", torque_logged=False)
+    dia = ga.diagnose(rec, controller, validation=validation)
+    assert [(f.effect, f.alternatives) for f in dia.causes] == [("stribeck_friction", ())]
+    assert dia.controller == controller and dia.verdict == "explained"
+    assert dia.mechanics["inertia"].value == pytest.approx(truth.plant.J + truth.plant.JL, rel=0.02)
