@@ -53,7 +53,7 @@ def measure(cell: Any) -> dict[str, Any]:
     """The statistics of one record without effects, as a line of the file."""
     record, validation, controller, _ = random_case(cell.seed, (), cell.kind, cell.noise, cell.torque)
     found: list[Selection] = []
-    diagnosis = importlib.import_module("gaident.diagnosis.diagnose")
+    diagnosis = importlib.import_module("gaident.diagnosis.work")
     selected = diagnosis.selected
 
     def kept(*arguments: Any) -> Selection:

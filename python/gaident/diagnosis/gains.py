@@ -111,9 +111,9 @@ def measured_gains(
     driver = controller if objective.data.loop_follows or not objective.data.torque_logged else None
     shaft = [(objective.data.as_old(r), first) for r, first in scored]
     scored = shaft if driver is None else scored
-    errors = [free_run_errors(m, scored, driver) for m in chain]
+    errors = [free_run_errors(m, scored, driver, loop) for m in chain]
     levels = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in errors]
-    base = free_run_errors(stages[0].parameters.model(stages[0].x), scored, driver)
+    base = free_run_errors(stages[0].parameters.model(stages[0].x), scored, driver, loop)
     level0 = float(np.sqrt(np.mean(np.concatenate(base) ** 2)))
     # The linear mechanism, refitted, may be better than the identified model already.
     previous = min(levels[0], level0) if np.isfinite(level0) else levels[0]
@@ -138,7 +138,7 @@ def measured_gains(
     harmful = []
     for effect in final.effects if words != IN_SAMPLE else ():
         less = stages[0] if len(final.effects) == 1 else _without(stages[-1], effect, _part(objective, part))
-        spared = free_run_errors(with_effects(less.parameters.model(less.x), at_controller), scored, driver)
+        spared = free_run_errors(with_effects(less.parameters.model(less.x), at_controller), scored, driver, loop)
         level = float(np.sqrt(np.mean(np.concatenate(spared) ** 2)))
         if level < (1.0 - POLICY.harm) * extended_level and interval_of_fall(spared, errors[-1])[1] < 0.0:
             harmful.append(effect)
@@ -224,25 +224,30 @@ def _stages(final: Fit, objective: Objective, part: tuple[int, ...] | None) -> l
     return fits[::-1]
 
 
-def free_run_errors(model: Model, scored: Sequence[tuple[Record, int]], controller: Controller | None) -> list[Vector]:
-    """Measured minus simulated velocity of each record from a sample on [rad/s]; 1e150 where a simulation diverges."""
+def free_run_errors(
+    model: Model, scored: Sequence[tuple[Record, int]], controller: Controller | None, read: Controller | None = None
+) -> list[Vector]:
+    """Measured minus simulated velocity of each record from a sample on [rad/s]; 1e150 where a simulation diverges.
+
+    read: the controller that read the logged velocity, where the one of the runs has its age; None: the same.
+    """
     errors = []
     for r, first in scored:
-        state = start_state(model, r, controller)
+        state = start_state(model, r, controller, read)
         with np.errstate(over="ignore", invalid="ignore"):
             e = (r.velocity - simulate(model, r, controller, state))[first:]
         errors.append(np.where(np.isfinite(e), e, 1e150))
     return errors
 
 
-def start_state(model: Model, rec: Record, controller: Controller | None) -> Vector | None:
+def start_state(model: Model, rec: Record, controller: Controller | None, read: Controller | None = None) -> Vector | None:
     """Initial state of the model at the record's start; None where it starts from rest, or moves and the loop has limits.
 
     At rest the integrator may hold a load's torque, which the logged torque shows. In motion a model with effects is not linear
     in its state: two steps of Gauss and Newton over the record's head, from the first velocity.
     """
-    pi = bare_pi(controller)
-    if pi is not None and (held := stored_torque(rec, pi)):
+    pi = bare_pi(read or controller)
+    if controller is not None and pi is not None and (held := stored_torque(rec, pi)):
         return np.append(np.zeros(model.linear.order), held)
     if not starts_moving(rec, pi) or (controller is not None and (controller.limited or model.effects)):
         return None

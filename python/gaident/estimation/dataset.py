@@ -117,13 +117,13 @@ class DataSet:
         start = rec.torque[0] if starts_moving(rec, None) else 0.0
         return rec.with_channels(torque=late(rec.torque, self.age, start))
 
-    def ready(self, rec: Record) -> Record:
-        """A record whose simulation `seen` takes for the velocity that the sensor shows."""
+    def ready(self, rec: Record, at: int) -> Record:
+        """A record whose simulation `seen` takes for the velocity that the sensor shows; at: its place among the records."""
         if not self.age:
             return rec
         if not self.differenced:
             return self.as_old(rec)
-        if rec.position is not None and self.records[0].position is None:  # integrated from the velocity, the angle is as old
+        if rec.position is not None and self.records[at].position is None:  # integrated from the velocity, the angle is as old
             rec = rec.with_channels(position=rec.position + self.age * self.dt * rec.velocity)
         return with_middles(rec)
 
@@ -208,14 +208,14 @@ class DataSet:
 
         Where their torque drives a model they are made ready for a velocity of this age: see `ready`.
         """
-        ready: Callable[[Record], Record] = self.ready if controller is None else lambda rec: rec
+        ready: Callable[[Record, int], Record] = self.ready if controller is None else lambda rec, at: rec
         for name in ("records", "driven", "turned", "free"):
             if records is getattr(self, name):
                 key = name, controller
                 if key not in self._loaded:
-                    self._loaded[key] = tuple(LoadedRecord.of(ready(r), controller) for r in records)
+                    self._loaded[key] = tuple(LoadedRecord.of(ready(r, i), controller) for i, r in enumerate(records))
                 return self._loaded[key]
-        return tuple(LoadedRecord.of(ready(r), controller) for r in records)
+        return tuple(LoadedRecord.of(ready(r, i), controller) for i, r in enumerate(records))
 
     @cached_property
     def _loaded(self) -> dict[tuple[str, Controller | None], tuple[LoadedRecord, ...]]:

@@ -204,7 +204,7 @@ def _of_true_angle(
             angle = true_angle(angle, driven.velocity, own)
         states = None if controller is not None else parameters.start_values(x[None, :], i)
         turned = with_angle(record, angle)
-        ready = data.ready(turned) if controller is None else turned
+        ready = data.ready(turned, i) if controller is None else turned
         taken = data.steps_of(steps) if controller is None else steps
         run = simulate_values(parameters.structure, names, values, ready, controller, initial_states=states, substeps=taken)
         parts.append(data.seen(run) if controller is None else run)

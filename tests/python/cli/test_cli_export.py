@@ -36,9 +36,11 @@ def test_c_is_what_the_model_writes(here: Path, result: ga.Diagnosis, capsys: py
     assert main(["export", "run.json", "--to", "c", "--dt", "1e-3"]) == 0
     assert capsys.readouterr().out == "written: run.c\n"
     assert Path("run.c").read_text() == result.model.to_c(None, dt=1e-3, name="run")
-    assert main(["export", "run.json", "--to", "c", "--dt", "1e-3", "--closed"]) == 2
+    assert main(["export", "run.json", "--to", "c", "--dt", "1e-3"]) == 2  # no file is lost that was not named
+    assert "such a file already" in capsys.readouterr().err
+    assert main(["export", "run.json", "--to", "c", "--dt", "1e-3", "--closed", "--out", "run.c"]) == 2
     assert "--closed" in capsys.readouterr().err
-    assert main(["export", "run.json", "--to", "c"]) == 2
+    assert main(["export", "run.json", "--to", "c", "--out", "run.c"]) == 2
     assert "give --dt" in capsys.readouterr().err
 
 

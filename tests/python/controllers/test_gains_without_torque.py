@@ -49,7 +49,7 @@ def test_a_wrong_ratio_of_the_gains_is_found_and_is_no_mechanics(wrong: float, f
     assert abs(ki.value - TRUE.ki) < 4.0 * ki.std < 0.02 * TRUE.ki
     assert isinstance(dia.controller, ga.PI) and dia.controller.ki == ki.value
     assert dia.mechanics["inertia"].value == pytest.approx(J, rel=5e-3)
-    assert "log the torque, which shows both gains" in " ".join(dia.summary().split())
+    assert "Log the torque, which shows both gains" in " ".join(dia.summary().split())
     if friction:
         assert dia.causes[1].parameters["torque"].value == pytest.approx(FRICTION, rel=0.01)
 
@@ -76,3 +76,14 @@ def test_a_cause_that_gains_cannot_imitate_stays_a_sole_name() -> None:
     assert [(f.effect, f.alternatives) for f in dia.causes] == [("stribeck_friction", ())]
     assert dia.controller == controller and dia.verdict == "explained"
     assert dia.mechanics["inertia"].value == pytest.approx(truth.plant.J + truth.plant.JL, rel=0.02)
+
+
+def test_a_position_loop_without_a_logged_torque_is_diagnosed() -> None:
+    cascade = ga.Cascade(ga.PI(0.04, 1.0), period=1e-3, position=ga.P(30.0), position_period=1e-3)
+    command = 3.0 * np.sin(4.0 * np.pi * 1e-3 * np.arange(2500)) + 0.5 * np.sin(21.0 * np.pi * 1e-3 * np.arange(2500))
+    drive = ga.OneMass(J=4e-4, D=4e-3).model().with_effect("coulomb_friction", torque=0.1)
+    run = ga.run(drive, ga.Record(1e-3, position_command=command, position=command, velocity=0.0 * command), cascade)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(command))
+    rec = ga.Record(1e-3, position_command=command, position=run.position, velocity=run.velocity + noise)
+    dia = ga.diagnose(rec, cascade)
+    assert any("coulomb_friction" in (f.effect, *f.alternatives) for f in dia.causes), dia.summary()

@@ -30,7 +30,11 @@ def test_a_form_is_seen_and_leaves_little(name: str) -> None:
     shown = form_shown([slower(4, **made())[SKIPPED:]], GIVEN, every=4)
     assert shown is not None and set(shown.numbers) == {effect}
     assert shown.rms < 0.05 * shown.before
-    assert all(0.0 < std < 0.01 * value for value, std in shown.numbers[effect].values())
+    share = 0.012 if name == "low pass" else 0.01
+    assert all(0.0 < std < share * value for value, std in shown.numbers[effect].values())
+    if name == "low pass":
+        value, std = shown.numbers[effect]["time_constant"]
+        assert abs(value - 1e-3) < 3.0 * std  # what the course between the lines may do is in it
 
 
 def test_unknown_gains_are_found() -> None:

@@ -117,7 +117,7 @@ def test_output_errors_are_weighed_anew_on_all_samples(monkeypatch: pytest.Monke
         found.append(select.selected(*arguments))
         return found[-1]
 
-    monkeypatch.setattr(importlib.import_module("gaident.diagnosis.diagnose"), "selected", kept)
+    monkeypatch.setattr(importlib.import_module("gaident.diagnosis.work"), "selected", kept)
     rec = ga.Record(DT, velocity=rec.velocity, torque=torque, torque_is="measured")
     dia = ga.diagnose(rec)
     assert [f.effect for f in dia.causes] == ["asymmetric_friction"]

@@ -11,7 +11,7 @@ import pytest
 
 import gaident as ga
 
-module = importlib.import_module("gaident.diagnosis.diagnose")  # the package's attribute of this name is the function
+module = importlib.import_module("gaident.diagnosis.work")
 
 
 def record(seed: int) -> ga.Record:

@@ -8,7 +8,7 @@ import pytest
 import gaident as ga
 from drive_cases import random_case
 from drive_rig import Noise, Plant, rig, skip_without_library
-from gaident.data.signals.lattice import encoder_lines
+from gaident.data.signals.lattice import encoder_lines, encoder_step
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.records.hygiene import unexplained
 from gaident.diagnosis.records.sizes import scales_of
@@ -48,6 +48,23 @@ def test_lines_of_an_encoder_are_whole() -> None:
     assert encoder_lines(angle, T, 2.0 * np.pi) == 0
     rpm = np.pi / 30.0 * np.round(angle / angle.max() * 900.0)
     assert encoder_lines(rpm, 1e-3, 2.0 * np.pi) == 0  # not 60000 lines
+
+
+def test_the_step_of_an_encoder_is_seen_behind_the_rounding_of_a_log() -> None:
+    q = 2.0 * np.pi / LINES / 125e-6
+    true = 70.0 * np.sin(np.linspace(0.0, 20.0, 4000)) + np.random.default_rng(1).normal(size=4000)
+    rpm = np.round(true / q) * q * 30.0 / np.pi + 1e-9 * np.random.default_rng(2).normal(size=4000)
+    for decimals in (4, 3, 2):
+        assert encoder_step(np.round(rpm, decimals) * np.pi / 30.0) == pytest.approx(q, rel=1e-5)
+    assert encoder_step(true) == encoder_step(np.round(true, 2)) == encoder_step(np.round(rpm) * np.pi / 30.0) == 0.0
+
+
+def test_a_differenced_angle_in_a_log_of_few_decimals_is_no_finding() -> None:
+    rec = record(1, {})
+    rpm = np.round(rec.velocity * 30.0 / np.pi, 4)
+    dia = ga.diagnose(rec.with_channels(velocity=rpm * np.pi / 30.0), DRIVE.controller)
+    assert any("half a sample old" in note for note in dia.notes), dia.summary()
+    assert dia.causes == (), dia.summary()
 
 
 def test_the_mean_over_a_sample_is_exact_behind_a_current_loop() -> None:

@@ -31,6 +31,8 @@ def export_command(args: argparse.Namespace) -> None:
     path = args.out or str(Path(args.result).with_suffix(FORMS[args.to]).name)
     target = target_of(path, [args.result])
     assert target is not None
+    if args.out is None and target.exists():
+        raise SettingsError(f"{target}: there is such a file already; name it, or another one, with --out")
     if args.to == "c":
         text = _c_source(result, target, args)
     elif args.to == "csv":

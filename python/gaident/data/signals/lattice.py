@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gaident.policy.table import POLICY
 
-__all__ = ["encoder_lines", "lattice_step", "rounding_step"]
+__all__ = ["encoder_lines", "encoder_step", "lattice_step", "rounding_step"]
 
 Vector = NDArray[np.float64]
 
@@ -54,6 +54,33 @@ def encoder_lines(velocity: Vector, period: float, turn: float) -> int:
     lines = turn / (step * period)
     whole = round(lines)
     return whole if whole >= FEWEST_LINES and abs(lines - whole) < POLICY.whole_lines else 0
+
+
+def encoder_step(velocity: Vector) -> float:
+    """The step of the lattice that velocities lie on [rad/s], also where a log has rounded them to a part of it; 0.0: none.
+
+    Rounded, two neighbours are nearer or farther apart than the step, and only small gaps tell how many steps they are. So the
+    step is taken from gaps of up to twice the smallest, then of up to twice as many steps, and so on. A value on the edge of two
+    decimals may be rounded to either: gaps that are small against the median are within one place.
+    A step of 1, 2 or 5 in some decimal place of a unit of speed is the log's rounding itself.
+    """
+    distinct = np.unique(velocity)
+    if len(distinct) < FEWEST:
+        return 0.0
+    gaps = np.sort(np.diff(distinct))
+    gaps = gaps[gaps > POLICY.on_lattice * float(np.median(gaps))]
+    if len(gaps) < FEWEST - 1:
+        return 0.0
+    step, reach = float(gaps[0]), 2.0
+    while True:
+        near = gaps[: int(np.searchsorted(gaps, (reach + 0.5) * step))]
+        step = float(near.sum() / np.round(near / step).sum())
+        if len(near) == len(gaps):
+            break
+        reach *= 2.0
+    places = (velocity - distinct[0]) / step
+    on = float(np.abs(places - np.round(places)).max()) < POLICY.on_lattice
+    return step if on and not any(_decimal(step / unit) for unit in SPEEDS) else 0.0
 
 
 def _decimal(x: float) -> bool:

@@ -149,7 +149,7 @@ def controller_findings(
     known: digest of a record -> its replay with the controller of `data`; records that are not in it are replayed.
     """
     controller = data.controller
-    if controller is None or not data.torque_logged or not all(controller.replayable(r) for r in data.read):
+    if controller is None or not all(r.torque is not None and controller.replayable(r) for r in data.read):
         return [], AtController(), []
     replays = [known.get(r.digest) or replay(r, controller) for r in data.read]
     off = [r for r in replays if not r.follows]

@@ -397,5 +397,4 @@ def _named(
 
 
 def _of_logarithm(logarithm: float, std: float, unit: float) -> tuple[float, float]:
-    value = float(np.exp(logarithm)) * unit
-    return value, value * float(std)
+    return (value := float(np.exp(logarithm)) * unit), value * float(std)

@@ -273,7 +273,7 @@ def orders_beyond(s: Motions) -> Text | None:
     per_sample = max(_slowest_held(m) * m.dt for m in s.records)
     fastest = math.floor(POLICY.seen_band * math.pi / per_sample / one) if per_sample > 0.0 else None
     below = say("orders below {} need more than the {} travelled", order(least * one), turns(s.travel))
-    parts = [below] if least > 2 else []
+    parts = [below] if least > (1 if s.period else 2) else []  # of a turn, order 1 is an unbalance
     if fastest is not None and fastest < HIGHEST_ORDER:
         parts.append(say("orders above {} are faster than the sampling even at the slowest speed held", order(fastest * one)))
     return joined("; ", parts) if parts and least <= HIGHEST_ORDER else None

@@ -69,13 +69,14 @@ class OtherGains:
     def finding(self, given: PI) -> Finding:
         """What is reported of these gains in the place of the given ones."""
         text = (
-            "No {torque} is logged; with {} instead of the given {} command and velocity agree with the axis, and the best model "
-            "under the given gains is {:.0f} BIC units worse. {}log the {torque}, which shows both gains."
+            "No {torque} is logged; with {} instead of the given {} command and velocity agree with the axis{}. "
+            "{}Log the {torque}, which shows both gains."
         )
         shown = joined(" and ", (say("{} = {:.4g} {}", name, e.value, unit_text(e.unit)) for name, e in self.estimates.items()))
         was = joined(" and ", (say("{:.4g}", getattr(given, name)) for name in self.estimates))
-        more = Text("" if len(self.estimates) > 1 else "Only the ratio ki/kp shows, kp is taken as given: ")
-        return Finding(OTHER_GAINS, self.estimates, (), 0.0, self.gain, None, say(text, shown, was, self.gain, more),
+        more = Text("" if len(self.estimates) > 1 else "Only the ratio ki/kp shows, kp is taken as given. ")
+        worse = say(", and the best model under the given gains is {:.0f} BIC units worse", self.gain) if self.gain > 0.0 else ""
+        return Finding(OTHER_GAINS, self.estimates, (), 0.0, self.gain, None, say(text, shown, was, worse, more),
                        place="controller")  # fmt: skip
 
 

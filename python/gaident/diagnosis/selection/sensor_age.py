@@ -11,7 +11,7 @@ encoder has it. Left out, it is fitted as a delay or, beside a current loop, as 
   beyond the margin of two rivals.
 - On another lattice (a gear, a scale, a unit between) the velocity may be a difference. Where the search finds something linear
   in series with the mechanism, a delay, a lag or a resonance, it is made again with the age of half a sample, which is no effect
-  and costs nothing; the better score decides.
+  and costs nothing; it is there where fewer effects score better with it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gaident.axis import TURN, Text, say
-from gaident.data.signals.lattice import encoder_lines
+from gaident.data.signals.lattice import encoder_lines, encoder_step
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.mechanisms import is_mechanism, on_a_shaft, one_mass, reduced, resonance, swings
@@ -59,16 +59,18 @@ def searched(
         )
         return search(older), [say(text, lines, each, age)]
     found = search(objective)
-    if not data.resolution > 0.0 or not any(_in_series(t) for t in found.final.parameters.terms):
+    step = encoder_step(data.velocity) if any(_in_series(t) for t in found.final.parameters.terms) else 0.0
+    if not step > 0.0:
         return found, []
     again = search(older)
-    if again.space.whitens != found.space.whitens or not again.space.score(again.final) < found.space.score(found.final):
+    fewer = again.space.whitens == found.space.whitens and len(again.final.effects) < len(found.final.effects)
+    if not fewer or not again.space.score(again.final) < found.space.score(found.final):
         return found, []
     text = (
         "The velocities lie on a lattice of {:.4g} {rad/s} and are half a sample old ({:.3g} ms), as those are that are the "
         "difference of an encoder's {angle} over one sample. The simulation has it; it is no finding."
     )
-    return again, [say(text, data.resolution, age)]
+    return again, [say(text, step, age)]
 
 
 def _in_series(term: Term) -> bool:
