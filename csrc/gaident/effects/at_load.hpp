@@ -49,25 +49,34 @@ public:
 
 namespace detail {
 
-// The list with its shaft effects, which are among E..., once more behind it.
-template <class List, class... E>
-struct LoadSide {
-    using Type = List;
+template <class Listed, class... E>
+struct ShaftAtLoad {
+    using Type = Listed;
 };
 template <class... Listed, class E, class... Rest>
-struct LoadSide<EffectList<Listed...>, E, Rest...> : LoadSide<EffectList<Listed...>, Rest...> {};
+struct ShaftAtLoad<EffectList<Listed...>, E, Rest...> : ShaftAtLoad<EffectList<Listed...>, Rest...> {};
 template <class... Listed, class E, class... Rest>
     requires(E::info.place == Place::shaft)
-struct LoadSide<EffectList<Listed...>, E, Rest...> : LoadSide<EffectList<Listed..., AtLoad<E>>, Rest...> {};
+struct ShaftAtLoad<EffectList<Listed...>, E, Rest...> : ShaftAtLoad<EffectList<Listed..., AtLoad<E>>, Rest...> {};
 
 template <class List>
-struct BothSides;
+struct LoadSideOf;
 template <class... E>
-struct BothSides<EffectList<E...>> : LoadSide<EffectList<E...>, E...> {};
+struct LoadSideOf<EffectList<E...>> : ShaftAtLoad<EffectList<>, E...> {};
+
+template <class First, class Second>
+struct Joined;
+template <class... E, class... F>
+struct Joined<EffectList<E...>, EffectList<F...>> {
+    using Type = EffectList<E..., F...>;
+};
 
 }  // namespace detail
 
+// The shaft effects of a list at the load, in its order.
 template <class List>
-using WithLoadSide = typename detail::BothSides<List>::Type;
+using LoadSideOf = typename detail::LoadSideOf<List>::Type;
+template <class First, class Second>
+using Joined = typename detail::Joined<First, Second>::Type;
 
 }  // namespace gaident

@@ -32,40 +32,42 @@
 
 namespace gaident {
 
-using Listed = EffectList<CoulombFriction,        //
-                          StribeckFriction,       //
-                          AsymmetricFriction,     //
-                          PreslidingFriction,     //
-                          LugreFriction,          //
-                          QuadraticDrag,          //
-                          LoadTorque,             //
-                          Unbalance,              //
-                          Cogging,                //
-                          FrictionDrift,          //
-                          LoadDependentFriction,  //
-                          Backlash,               //
-                          HardeningStiffness,     //
-                          TorqueSaturation,       //
-                          TorqueDeadBand,         //
-                          TransportDelay,         //
-                          TorqueLag,              //
-                          IntegratorClamp,        //
-                          CommandRateLimit,       //
-                          VelocityFilter,         //
-                          VelocityRipple,         //
-                          VelocityQuantisation,   //
-                          ExtraResonance,         //
-                          Outliers>;
+using Effects = EffectList<CoulombFriction,        //
+                           StribeckFriction,       //
+                           AsymmetricFriction,     //
+                           PreslidingFriction,     //
+                           LugreFriction,          //
+                           QuadraticDrag,          //
+                           LoadTorque,             //
+                           Unbalance,              //
+                           Cogging,                //
+                           FrictionDrift,          //
+                           LoadDependentFriction,  //
+                           Backlash,               //
+                           HardeningStiffness,     //
+                           TorqueSaturation,       //
+                           TorqueDeadBand,         //
+                           TransportDelay,         //
+                           TorqueLag,              //
+                           IntegratorClamp,        //
+                           CommandRateLimit,       //
+                           VelocityFilter,         //
+                           VelocityRipple,         //
+                           VelocityQuantisation,   //
+                           ExtraResonance,         //
+                           Outliers>;
 
-// Behind them those of the shaft once more, at the load.
-using Effects = WithLoadSide<Listed>;
+// Those of the shaft once more, at the load: a list of its own, so that a loop without them holds nothing of theirs.
+using LoadEffects = LoadSideOf<Effects>;
+// What models are made of, numbered in this order.
+using AllEffects = Joined<Effects, LoadEffects>;
 
-inline constexpr auto& effect_table = Effects::table;
-inline constexpr int effect_count = Effects::size;
+inline constexpr auto& effect_table = AllEffects::table;
+inline constexpr int effect_count = AllEffects::size;
 
 // An effect's number: its place in the list.
 template <class E>
-inline constexpr Effect effect = Effects::number<E>;
+inline constexpr Effect effect = AllEffects::number<E>;
 
 // By name; throws std::invalid_argument for a name that is none.
 inline Effect effect_named(std::string_view name) {
@@ -105,7 +107,7 @@ struct EffectSet {
 // The effects that have one of these functions.
 constexpr EffectSet effects_with(Hooks hooks) {
     EffectSet set;
-    Effects::each([&]<class E>() {
+    AllEffects::each([&]<class E>() {
         if ((E::hooks & hooks) != Hooks::none) set.add(effect<E>);
     });
     return set;
@@ -113,16 +115,15 @@ constexpr EffectSet effects_with(Hooks hooks) {
 // Those at the load of which the effect itself has one of these functions.
 constexpr EffectSet load_effects_with(Hooks hooks) {
     EffectSet set;
-    Effects::each([&]<class E>() {
-        if constexpr (hook::load<E>)
-            if ((E::AtMotor::hooks & hooks) != Hooks::none) set.add(effect<E>);
+    LoadEffects::each([&]<class E>() {
+        if ((E::AtMotor::hooks & hooks) != Hooks::none) set.add(effect<E>);
     });
     return set;
 }
 // Those that depend on the shaft's angle.
 constexpr EffectSet effects_that_turn() {
     EffectSet set;
-    Effects::each([&]<class E>() {
+    AllEffects::each([&]<class E>() {
         if (E::info.turns) set.add(effect<E>);
     });
     return set;
@@ -132,15 +133,15 @@ constexpr EffectSet effects_that_turn() {
 struct EffectModel {
     Factors<double> linear;
     EffectSet effects;
-    double parameter[Effects::parameters] = {};  // one effect's after the other's
+    double parameter[AllEffects::parameters] = {};  // one effect's after the other's
 
-    const double* of(Effect e) const { return parameter + Effects::first_parameter[static_cast<std::size_t>(e)]; }
+    const double* of(Effect e) const { return parameter + AllEffects::first_parameter[static_cast<std::size_t>(e)]; }
     void add(Effect e, const double* values) {
         effects.add(e);
         for (int i = 0; i < info_of(e).count(); ++i)
-            parameter[Effects::first_parameter[static_cast<std::size_t>(e)] + i] = values[i];
+            parameter[AllEffects::first_parameter[static_cast<std::size_t>(e)] + i] = values[i];
     }
-    double* of(Effect e) { return parameter + Effects::first_parameter[static_cast<std::size_t>(e)]; }
+    double* of(Effect e) { return parameter + AllEffects::first_parameter[static_cast<std::size_t>(e)]; }
 };
 
 }  // namespace gaident

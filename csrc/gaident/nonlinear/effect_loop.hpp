@@ -143,9 +143,9 @@ private:
         const Beginning<R> start{plant_.load_velocity(), c_.before, first_command()};
         each_at<Side::load>([&]<class Key, class E>() {
             if (!run_.effects.has<Key>()) return;
-            const auto& c = c_.effects.template of<Key>();
+            const auto& c = c_.template of<Key>();
             if constexpr (hook::law<E>) E::law(c, load_.law);
-            if constexpr (hook::begin<E>) E::begin(c, states_.template of<Key>(), start);
+            if constexpr (hook::begin<E>) E::begin(c, load_.states.template of<Key>(), start);
         });
         turning_ = turning_ || load_.turning;
         // As for friction at the motor; where the step is too coarse for the resonance both ends cannot be solved.
@@ -285,6 +285,60 @@ private:
         angle_ = angle_ + (w + w_next) * R(0.5 * h_);
     }
 
+    // The dry friction that follows from what the effects at the shaft brake with, both in N m.
+    [[gnu::always_inline]] static R loaded_level(const EffectRun& run, const EffectConstants<R>& c, R theta) {
+        const R load = Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::torque<E>)
+                if (run.effects.has<E>()) return x + E::torque(c.effects.template of<E>(), theta);
+            return x;
+        });
+        return Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
+            if constexpr (hook::loaded<E>)
+                if (run.effects.has<E>()) return x + E::loaded(c.effects.template of<E>(), load);
+            return x;
+        });
+    }
+
+    // The same called with values: few models have it, and a candidate alone keeps its registers for a coupling (492 instructions
+    // a sample with backlash; 510 without the call).
+    [[gnu::noinline]] static R loaded_level_apart(const EffectRun& run, const EffectConstants<R>& c, R theta) {
+        return loaded_level(run, c, theta);
+    }
+
+    // The velocity at the substep's end at one end of the shaft, and the state of its friction there.
+    template <Side side, class States>
+    [[gnu::always_inline]] R under_friction(States& states, const FrictionLaw<R>& law, const FreeEnd<R>& end, double t) {
+        const R w = end.w;
+        FrictionStep<R> step{R(h_), w, end.w_free, end.beta, law};
+        const auto add = [&](R level) __attribute__((always_inline)) {
+            step.law.level_positive = step.law.level_positive + level;
+            step.law.level_negative = step.law.level_negative + level;
+        };
+        if constexpr (side == Side::motor)
+            if (own_.friction()) add(own_.level());
+        each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
+            if constexpr (hook::level<E>)
+                if (run_.effects.has<Key>()) add(E::level(c_.template of<Key>(), R(t > 0.0 ? t : 0.0)));
+            if constexpr (hook::loaded<E> && side == Side::load)
+                if (run_.effects.has<Key>()) add(E::loaded(c_.template of<Key>(), load_.braking));
+        });
+        if constexpr (side == Side::motor)
+            if (run_.effects.meets(effects_with(Hooks::loaded))) [[unlikely]]
+                add(width == 1 ? loaded_level_apart(run_, c_, theta_) : loaded_level(run_, c_, theta_));
+        each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
+            if constexpr (hook::friction<E>)
+                if (run_.effects.has<Key>()) [[unlikely]]  // keeps what it needs out of the registers of the others
+                    E::friction(c_.template of<Key>(), states.template of<Key>(), step);
+        });
+        const R w_next = velocity_under_friction(step.law, w, step.w_free, step.beta);
+        each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
+            if constexpr (hook::after_friction<E>)
+                if (run_.effects.has<Key>()) [[unlikely]]
+                    E::after_friction(c_.template of<Key>(), states.template of<Key>(), step, w_next);
+        });
+        return w_next;
+    }
+
     // The same where effects act at the load, too, under the torque T at the motor: the motor's velocity at the end.
     [[gnu::always_inline]] R move_both(R T, R w, double t) {
         const R w_load = plant_.load_velocity();
@@ -294,7 +348,7 @@ private:
                              (plant_.twist() - load_.twist_at_start) - (w - w_load) * R(0.5 * h_);
             each_at<Side::load>([&]<class Key, class E>() __attribute__((always_inline)) {
                 if constexpr (hook::torque<E>)
-                    if (run_.effects.has<Key>()) T_load = T_load - E::torque(c_.effects.template of<Key>(), middle);
+                    if (run_.effects.has<Key>()) T_load = T_load - E::torque(c_.template of<Key>(), middle);
             });
         }
         load_.braking = R(0.0) - T_load;
@@ -303,16 +357,17 @@ private:
         R w_next = motor.w_free, w_next_load = load.w_free;
         if (dry_ && load_.dry) {
             typename Effects::States<R> trial = states_;
+            typename LoadEffects::States<R> trial_at_load = load_.states;
             under_friction_at_both(
                 motor, load, plant_.across(), plant_.back(), w_next, w_next_load, friction_torque_, load_.friction,
                 [&](int round, R w_free, R beta) __attribute__((always_inline)) {
                     return apart<Side::motor>(round == 0 ? trial : states_, law_, {w, w_free, beta}, t);
                 },
                 [&](int round, R w_free, R beta) __attribute__((always_inline)) {
-                    return apart<Side::load>(round == 0 ? trial : states_, load_.law, {w_load, w_free, beta}, t);
+                    return apart<Side::load>(round == 0 ? trial_at_load : load_.states, load_.law, {w_load, w_free, beta}, t);
                 });
         } else if (load_.dry) {
-            w_next_load = apart<Side::load>(states_, load_.law, load, t);
+            w_next_load = apart<Side::load>(load_.states, load_.law, load, t);
             load_.friction = (load.w_free - w_next_load) / load.beta;
             w_next = w_next - plant_.across() * load_.friction;
         } else if (dry_) {
@@ -324,56 +379,10 @@ private:
         return w_next;
     }
 
-    // What the effects at the shaft brake with at one end [N m].
-    template <Side side>
-    [[gnu::always_inline]] R braking() const {
-        if constexpr (side == Side::load) return load_.braking;
-        else return braking_at(run_, c_, theta_);
-    }
-    [[gnu::noinline]] static R braking_at(const EffectRun& run, const EffectConstants<R>& c, R theta) {
-        return Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
-            if constexpr (hook::torque<E>)
-                if (run.effects.has<E>()) return x + E::torque(c.effects.template of<E>(), theta);
-            return x;
-        });
-    }
-
     // With friction at both ends it is asked four times a substep: a call, so that it is compiled once.
-    template <Side side>
-    [[gnu::noinline]] R apart(typename Effects::States<R>& states, const FrictionLaw<R>& law, const FreeEnd<R>& end, double t) {
+    template <Side side, class States>
+    [[gnu::noinline]] R apart(States& states, const FrictionLaw<R>& law, const FreeEnd<R>& end, double t) {
         return under_friction<side>(states, law, end, t);
-    }
-    // The velocity at the substep's end at one end of the shaft, and the state of its friction there.
-    template <Side side>
-    [[gnu::always_inline]] R under_friction(typename Effects::States<R>& states, const FrictionLaw<R>& law, const FreeEnd<R>& end,
-                                            double t) {
-        const R w = end.w;
-        FrictionStep<R> step{R(h_), w, end.w_free, end.beta, law};
-        const auto add = [&](R level) __attribute__((always_inline)) {
-            step.law.level_positive = step.law.level_positive + level;
-            step.law.level_negative = step.law.level_negative + level;
-        };
-        if constexpr (side == Side::motor)
-            if (own_.friction()) add(own_.level());
-        each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
-            if constexpr (hook::level<E>)
-                if (run_.effects.has<Key>()) add(E::level(c_.effects.template of<Key>(), R(t > 0.0 ? t : 0.0)));
-            if constexpr (hook::loaded<E>)
-                if (run_.effects.has<Key>()) [[unlikely]]
-                    add(E::loaded(c_.effects.template of<Key>(), braking<side>()));
-        });
-        each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
-            if constexpr (hook::friction<E>)
-                if (run_.effects.has<Key>()) [[unlikely]]  // keeps what it needs out of the registers of the others
-                    E::friction(c_.effects.template of<Key>(), states.template of<Key>(), step);
-        });
-        const R w_next = velocity_under_friction(step.law, w, step.w_free, step.beta);
-        each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
-            if constexpr (hook::after_friction<E>)
-                if (run_.effects.has<Key>()) [[unlikely]]
-                    E::after_friction(c_.effects.template of<Key>(), states.template of<Key>(), step, w_next);
-        });
-        return w_next;
     }
 
     const EffectRun& run_;

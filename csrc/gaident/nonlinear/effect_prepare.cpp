@@ -151,7 +151,7 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
     const Circumstances at{g, loop, Ts, record.top_speed, g.structure.p == 1 ? g.gain : 0.0, both_ends ? 1.0 / m.JL : 0.0};
     double wanted = 1.0;
     Pace pace = own ? Pace::fine : Pace::sample;
-    Effects::each([&]<class E>() {
+    AllEffects::each([&]<class E>() {
         if (!model.effects.has<E>()) return;
         pace = std::max(pace, E::pace);
         if constexpr (hook::substeps<E>) wanted = std::max(wanted, E::substeps(model.of(effect<E>), at));
@@ -185,10 +185,10 @@ void prepare_effects(const EffectModel& model, const EffectRecord& record, const
     c.stored = u;
     c.before = !moving ? 0.0 : open && !record.input.empty() ? record.input[0] : u;
     bool possible = true;
-    Effects::each([&]<class E>() {
+    AllEffects::each([&]<class E>() {
         if (!model.effects.has<E>()) return;
         const double* const p = model.of(effect<E>);
-        if constexpr (HasCoefficients<E>) E::prepare(p, time, c.effects.template of<E>());
+        if constexpr (HasCoefficients<E>) E::prepare(p, time, c.of<E>());
         if constexpr (HasTable<E>) E::tabulate(p, time, out.tables.template of<E>());
         if constexpr (hook::possible<E>) possible = possible && E::possible(p);
     });

@@ -10,10 +10,12 @@ enum class Side { motor, load };
 // call.operator()<Key, E>() for each effect of this side: E has its functions, under Key its coefficients and state are kept.
 template <Side side, class Call>
 [[gnu::always_inline]] inline void each_at(Call&& call) {
-    Effects::each([&]<class Key>() __attribute__((always_inline)) {
-        if constexpr (side == Side::motor) call.template operator()<Key, Key>();
-        else if constexpr (hook::load<Key>) call.template operator()<Key, typename Key::AtMotor>();
-    });
+    if constexpr (side == Side::motor) {
+        Effects::each([&]<class E>() __attribute__((always_inline)) { call.template operator()<E, E>(); });
+    } else {
+        LoadEffects::each([&]<class Key>()
+                              __attribute__((always_inline)) { call.template operator()<Key, typename Key::AtMotor>(); });
+    }
 }
 
 // One end's equation of a substep without friction, w+ = w_free - beta f.
@@ -60,6 +62,7 @@ template <class R, class Motor, class Load>
 template <class R>
 struct LoadSide {
     bool dry, turning;
+    typename LoadEffects::States<R> states{};  // all zero
     FrictionLaw<R> law;
     R friction = R(0.0);  // of the substep before [N m]
     R braking = R(0.0);   // what the effects there brake with [N m]

@@ -82,7 +82,7 @@ double most_apart(const std::vector<double>& a, const std::vector<double>& b) {
 
 TEST_CASE("every shaft effect is in the registry once more, at the load") {
     std::size_t shaft = 0;
-    for (const EffectInfo& info : Listed::table) {
+    for (const EffectInfo& info : Effects::table) {
         if (info.place != Place::shaft) continue;
         ++shaft;
         const EffectInfo& there = info_of(at_load(info.name));
@@ -90,7 +90,7 @@ TEST_CASE("every shaft effect is in the registry once more, at the load") {
         CHECK(there.count() == info.count() && there.turns == info.turns);
         CHECK(std::any_of(std::begin(sizes), std::end(sizes), [&](const Sizes& s) { return s.name == std::string(info.name); }));
     }
-    CHECK(static_cast<std::size_t>(effect_count) == std::size(Listed::table) + shaft);
+    CHECK(static_cast<std::size_t>(effect_count) == std::size(Effects::table) + shaft);
     CHECK(shaft == std::size(sizes));
 }
 
