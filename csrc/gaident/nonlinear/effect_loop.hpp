@@ -285,26 +285,6 @@ private:
         angle_ = angle_ + (w + w_next) * R(0.5 * h_);
     }
 
-    // The dry friction that follows from what the effects at the shaft brake with, both in N m.
-    [[gnu::always_inline]] static R loaded_level(const EffectRun& run, const EffectConstants<R>& c, R theta) {
-        const R load = Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
-            if constexpr (hook::torque<E>)
-                if (run.effects.has<E>()) return x + E::torque(c.effects.template of<E>(), theta);
-            return x;
-        });
-        return Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
-            if constexpr (hook::loaded<E>)
-                if (run.effects.has<E>()) return x + E::loaded(c.effects.template of<E>(), load);
-            return x;
-        });
-    }
-
-    // The same called with values: few models have it, and a candidate alone keeps its registers for a coupling (492 instructions
-    // a sample with backlash; 510 without the call).
-    [[gnu::noinline]] static R loaded_level_apart(const EffectRun& run, const EffectConstants<R>& c, R theta) {
-        return loaded_level(run, c, theta);
-    }
-
     // The velocity at the substep's end at one end of the shaft, and the state of its friction there.
     template <Side side, class States>
     [[gnu::always_inline]] R under_friction(States& states, const FrictionLaw<R>& law, const FreeEnd<R>& end, double t) {
