@@ -186,3 +186,28 @@ def test_what_does_not_go_together() -> None:
         TWO.model().with_effect("coulomb_friction", side="load", torque=0.05).with_effect(
             "extra_resonance", **SIZES["extra_resonance"]
         )
+
+
+def test_what_is_constant_has_no_end() -> None:
+    """F(0) = 1: where the shaft has come to rest, a load acts alike at either end, and one at the other cancels it."""
+    ctl = controller_of("sampled", True)
+    still = ga.Record(1e-3, command=np.full(3000, 20.0), velocity=np.zeros(3000))
+    ends = [ga.simulate(TWO.model().with_effect("load_torque", side=side, torque=0.1), still, ctl) for side in ("motor", "load")]
+    without = ga.simulate(TWO.model(), still, ctl)
+    assert rms(ends[0] - without) > 0.1
+    assert np.max(np.abs(ends[0] - ends[1])[-500:]) < 1e-3 * np.max(np.abs(ends[0] - without))
+    both = TWO.model().with_effect("load_torque", torque=0.1).with_effect("load_torque", side="load", torque=-0.1)
+    assert np.max(np.abs(ga.simulate(both, still, ctl) - without)[-500:]) < 1e-3 * np.max(np.abs(ends[0] - without))
+
+
+def test_a_viscous_part_has_no_end_on_a_stiff_shaft() -> None:
+    rec = record(1e-3, "open")
+
+    def changed(stiffness: float) -> float:
+        """What the end of a viscous part changes, beside what it changes itself."""
+        plain = {"JM": 2e-4, "JL": 5e-4, "KG": stiffness, "DG": 1e-3}
+        w = [ga.simulate(ga.TwoMass(DM=a, DL=b, **plain).model(), rec) for a, b in ((1e-3, 1e-3), (3e-3, 1e-3), (1e-3, 3e-3))]
+        return rms(w[1] - w[2]) / rms(w[1] - w[0])
+
+    assert changed(1e4) < 0.01
+    assert changed(1.0) > 0.5

@@ -54,7 +54,7 @@ def effects_named(text: str, effects: set[str]) -> list[tuple[int, str]]:
 
 def types_of_the_core() -> dict[str, str]:
     """C++ type of each effect -> its name."""
-    types = re.search(r"using Listed = EffectList<([^>]*)>", (IN_CORE / "list.hpp").read_text())
+    types = re.search(r"using Effects = EffectList<([^>]*)>", (IN_CORE / "list.hpp").read_text())
     assert types is not None
     listed = re.findall(r"\b[A-Z]\w+", types[1])
     return {t: re.sub(r"(?<!^)([A-Z])", r"_\1", t).lower() for t in listed}
