@@ -38,7 +38,7 @@ from gaident.diagnosis.selection.mechanisms import (
 )
 from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.score_test import ScoreTest
-from gaident.diagnosis.selection.side_moves import SideMoves
+from gaident.diagnosis.selection.side_moves import SideMoves, better_sides
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import gained
 from gaident.estimation.noise_model import WHITE
@@ -99,7 +99,7 @@ class Moves(SideMoves):
         self.note(f"looking beyond {words(now.effects) or 'the linear model'}")
         test = ScoreTest(self.objective)
         addable = self.candidates(now)
-        test.add(now.hypothesis, now.x, [t for t in addable if not t.nested])
+        test.add(now.hypothesis, now.x, [t for t in addable if not t.nested] + self.harmonics_at_load(now, addable))
         fits: list[Fit] = []
         families = [t for t in now.parameters.terms if t.family]
         for simple in families:
@@ -122,7 +122,7 @@ class Moves(SideMoves):
         done = {f.parameters.terms[-1] for f in fits}
         short: dict[Term, Fit] = {}
         for ranking in rankings:
-            for s in [s for s in ranking if s.term not in done][: self.policy.screened]:
+            for s in better_sides([s for s in ranking if s.term not in done])[: self.policy.screened]:
                 for x in s.starts[:2]:
                     fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, self.policy.glance))
                     if s.term not in short or fit.bic < short[s.term].bic:

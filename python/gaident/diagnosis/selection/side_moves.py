@@ -9,12 +9,19 @@ import numpy as np
 
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.model_space import ModelSpace
+from gaident.diagnosis.selection.score_test import Screened
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis
 from gaident.estimation.projection import WORST
 from gaident.estimation.term import Term
 
-__all__ = ["SideMoves"]
+__all__ = ["SideMoves", "better_sides"]
+
+
+def better_sides(ranking: Sequence[Screened]) -> list[Screened]:
+    """Of an effect at both ends of the shaft the one that promises more; ranking: the most promising first."""
+    names = [s.term.name for s in ranking]
+    return [s for i, s in enumerate(ranking) if s.term.other_side not in names[:i]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +65,16 @@ class SideMoves(ModelSpace):
             start = X[int(np.argmin(self.objective.costs(longer, X, WHITE)))]
             found.append(self.refitted(longer, start))
         return [f for f in found if f is not None]
+
+    def harmonics_at_load(self, now: Fit, addable: Sequence[Term]) -> list[Term]:
+        """The harmonic torques of these at the load: in the log they may have nothing of one at the motor.
+
+        None where little is left to explain.
+        """
+        if now.parameters.masses == 1 or not self.swings(now) or self.quiet(now):
+            return []
+        found = [self._beside(now.hypothesis, t) for t in addable if t.harmonic == "torque"]
+        return [t for t in found if t is not None]
 
     def _beside(self, hypothesis: Hypothesis, term: Term) -> Term | None:
         """The same effect at the other end of the shaft, where the rest of a model leaves room for it."""
