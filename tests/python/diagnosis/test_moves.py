@@ -542,6 +542,18 @@ def test_dry_friction_is_tried_at_both_ends() -> None:
     assert bench.space.worth(grown[0], bench.fit(NEAR)) and bench.space.worth(grown[0], bench.fit(FAR))
 
 
+@pytest.mark.parametrize("size", [0.05, 0.6])
+def test_what_shows_at_the_far_end_alone_is_screened_there(size: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(SHAPES, "far", lambda z: z[0] * wave(25.3))
+    monkeypatch.setattr(model_space.ModelSpace, "swings", lambda space, fit: True)  # the toy's numbers are no mechanism
+    bench = Bench({"far": (size,)}, masses=2, allowed=(NEAR, A), plain=True)
+    assert bench.space.screened_at_load(bench.fit()) == [FAR]
+    assert bench.space.screened_at_load(bench.fit(NEAR)) == [FAR]
+    assert bench.space.screened_at_load(bench.fit(FAR)) == []
+    assert bench.space.screened_at_load(bench.fit(masses=1)) == []
+    assert bench.space.add(bench.fit())[0].effects == ("far",)
+
+
 def test_where_the_near_end_leaves_noise_the_far_end_is_a_rival_only() -> None:
     bench = Bench({"near": (0.6,)}, masses=2, allowed=(NEAR, A), plain=True)
     found = bench.space.add(bench.fit())

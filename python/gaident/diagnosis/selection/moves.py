@@ -99,7 +99,7 @@ class Moves(SideMoves):
         self.note(f"looking beyond {words(now.effects) or 'the linear model'}")
         test = ScoreTest(self.objective)
         addable = self.candidates(now)
-        test.add(now.hypothesis, now.x, [t for t in addable if not t.nested] + self.harmonics_at_load(now, addable))
+        test.add(now.hypothesis, now.x, [t for t in addable if not t.nested] + self.screened_at_load(now))
         fits: list[Fit] = []
         families = [t for t in now.parameters.terms if t.family]
         for simple in families:

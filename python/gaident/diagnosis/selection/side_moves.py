@@ -66,14 +66,15 @@ class SideMoves(ModelSpace):
             found.append(self.refitted(longer, start))
         return [f for f in found if f is not None]
 
-    def harmonics_at_load(self, now: Fit, addable: Sequence[Term]) -> list[Term]:
-        """The harmonic torques of these at the load: in the log they may have nothing of one at the motor.
+    def screened_at_load(self, now: Fit) -> list[Term]:
+        """What is screened at the load, beside what is screened at the motor: harmonic torques and the simplest dry friction.
 
-        None where little is left to explain.
+        Of these a log may have nothing that one at the motor explains.
         """
-        if now.parameters.masses == 1 or not self.swings(now) or self.quiet(now):
+        if now.parameters.masses == 1 or not self.swings(now):
             return []
-        found = [self._beside(now.hypothesis, t) for t in addable if t.harmonic == "torque"]
+        wanted = [t for t in self.allowed if t.harmonic == "torque" or (t.simplest and t.levels)]
+        found = [self._beside(now.hypothesis, t) for t in wanted]
         return [t for t in found if t is not None]
 
     def _beside(self, hypothesis: Hypothesis, term: Term) -> Term | None:
