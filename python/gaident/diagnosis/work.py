@@ -116,12 +116,15 @@ class Work:
         self.take(found)
         simpler = simplified(found.space, found.final, self.left)
         if simpler is not found.final:
-            found = compared(found, simpler, self._equivalent_here, self._say)
-        self.settle(found)
+            self.take(compared(found, simpler, self._equivalent_here, self._say))
+        self._doubt_gains()
 
     def settle(self, found: Selection) -> None:
         """The result of the search, and whether other gains would explain the records better."""
         self.take(found)
+        self._doubt_gains()
+
+    def _doubt_gains(self) -> None:
         self.gain_doubt = gain_doubt(self.found.space, self.final, self.driving.regained_from is not None)
 
     def other_gains(self) -> OtherGains | None:

@@ -169,3 +169,17 @@ def test_in_one_mass_both_ends_are_the_same_place() -> None:
     dia = ga.diagnose(ga.Record(1e-3, command=command, velocity=velocity, torque=run.torque), controller=ctl)
     assert [(f.effect, f.sides) for f in dia.causes] == [("coulomb_friction", ("motor", "load"))]
     assert "end of the shaft" not in dia.summary()
+
+
+@pytest.mark.parametrize("frequency", [1250.0, 1450.0])
+def test_a_narrow_resonance_between_the_frequencies_of_the_starts_is_found(frequency: float) -> None:
+    """On a step of 250 samples a start as far away as the coarse grid allows promises nothing; ringing passes for noise."""
+    two = ga.TwoMass(JM=2.4e-4, DM=1.2e-3, JL=3.1e-4, DL=1.2e-3, KG=53.0, DG=0.01).model()
+    pair = {"frequency": frequency, "damping": 0.015, "zero_frequency": 0.9 * frequency, "zero_damping": 0.013}
+    noise, command = 0.1 * np.random.default_rng(2).standard_normal(250), np.full(250, 40.0)
+    controller = ga.PI(kp=0.13, ki=7.6)
+    drive = two.with_effect("extra_resonance", **pair)
+    velocity = ga.run(drive, ga.Record(4.44e-4, command=command - noise, velocity=noise), controller).velocity + noise
+    found = ga.diagnose(ga.Record(4.44e-4, command=command, velocity=velocity), controller).causes
+    assert [f.effect for f in found] == ["extra_resonance"]
+    assert found[0].parameters["frequency"].value == pytest.approx(frequency, rel=0.02)

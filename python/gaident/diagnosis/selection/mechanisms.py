@@ -135,11 +135,11 @@ def resonant(objective: Objective, one: Fit) -> list[Model]:
     return [_two_masses(longer.parameters, x) for x in X]
 
 
-def on_a_shaft(objective: Objective, one: Fit) -> list[tuple[Hypothesis, Vector]]:
+def on_a_shaft(objective: Objective, one: Fit, known: float = 0.0) -> list[tuple[Hypothesis, Vector]]:
     """A fit of one mass with its effects, as two masses: the resonances that help it most, on a fine grid.
 
     What delays the torque moves the resonance that fits best, and the cost has a valley at each: with it in the model the
-    resonance is looked for where it is.
+    resonance is looked for where it is. Not within a step of the grid from a known one [rad/s], whose valley has been searched.
     """
     s = one.parameters.scales
     highest = HIGHEST_SHAFT * np.pi / s.dt
@@ -147,7 +147,9 @@ def on_a_shaft(objective: Objective, one: Fit) -> list[tuple[Hypothesis, Vector]
     z = SHAFT_DAMPING
     rows = np.array([(np.log(w), z, np.log(w * r), z) for w in poles for r in SHAFT_RATIOS])
     longer, X = _helpful(objective, one, rows)
-    return [as_two_masses(replace(one, hypothesis=longer, x=x)) for x in X]
+    starts = [as_two_masses(replace(one, hypothesis=longer, x=x)) for x in X]
+    step = float(np.log(poles[1] / poles[0]))
+    return [(h, x) for h, x in starts if not known > 0.0 or abs(np.log(_resonance_at(h.parameters, x) / known)) > step]
 
 
 def _helpful(objective: Objective, one: Fit, rows: Matrix) -> tuple[Hypothesis, Matrix]:
@@ -252,5 +254,8 @@ def swings(fit: Fit) -> bool:
 
 def resonance(fit: Fit) -> float:
     """Of a fit of two masses [rad/s]; 0 for one."""
-    values = fit.parameters.base_values(fit.x[None, :])[0]
-    return float(np.sqrt(abs(values[3]))) if fit.parameters.masses == 2 else 0.0
+    return _resonance_at(fit.parameters, fit.x) if fit.parameters.masses == 2 else 0.0
+
+
+def _resonance_at(parameters: Parameterisation, x: Vector) -> float:
+    return float(np.sqrt(abs(parameters.base_values(x[None, :])[0][3])))

@@ -35,13 +35,14 @@ from gaident.diagnosis.selection.mechanisms import (
     moved_to,
     on_a_shaft,
     released,
+    resonance,
 )
 from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.score_test import ScoreTest
 from gaident.diagnosis.selection.side_moves import SideMoves, better_sides
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import gained
-from gaident.estimation.noise_model import WHITE
+from gaident.estimation.noise_model import WHITE, NoiseFilter
 from gaident.estimation.objective import Fit, Hypothesis
 from gaident.estimation.prediction import OpenLoop
 from gaident.estimation.projection import WORST, orthonormal_rows
@@ -120,15 +121,15 @@ class Moves(SideMoves):
             if not any(rankings):
                 return self._best(now, fits)
         done = {f.parameters.terms[-1] for f in fits}
-        short: dict[Term, Fit] = {}
+        short: dict[Term, tuple[Fit, NoiseFilter]] = {}
         for ranking in rankings:
             for s in better_sides([s for s in ranking if s.term not in done])[: self.policy.screened]:
-                for x in s.starts[:2]:
+                for x in s.starts[: len(s.starts) if s.term.resonates else 2]:  # a valley at every frequency
                     fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, self.policy.glance))
-                    if s.term not in short or fit.bic < short[s.term].bic:
-                        short[s.term] = fit
-        best = sorted((f for f in short.values() if f.cost < WORST), key=lambda f: f.bic)[: self.policy.finished]
-        best = sorted((self.completed(f) for f in best), key=self.score)
+                    if s.term not in short or fit.bic < short[s.term][0].bic:
+                        short[s.term] = fit, s.noise
+        promising = sorted((f for f in short.values() if f[0].cost < WORST), key=lambda f: f[0].bic)[: self.policy.finished]
+        best = sorted((self.completed(f, noise) for f, noise in promising), key=self.score)
         reach = self.policy.beam_reach * self.penalty
         fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
         if fits:
@@ -330,7 +331,7 @@ class Moves(SideMoves):
             return []
         bare, x = as_one_mass(replace(fit, hypothesis=bare, x=x))
         one = ls.fit(self.objective, bare, x, WHITE, self.policy.usual)
-        starts = on_a_shaft(self.objective, one) if one.cost < WORST else []
+        starts = on_a_shaft(self.objective, one, resonance(fit)) if one.cost < WORST else []
         short = [ls.fit(self.objective, h, x, WHITE, self.policy.short) for h, x in starts]
         best = min(short, key=lambda f: f.cost, default=None)
         return [] if best is None else [self.refitted(best.hypothesis, best.x, self.policy.long)]

@@ -8,7 +8,11 @@ sensitivities,
     d = P (v_c - v),   V_c = min over t of |P v + t d|^2,
 
 the cost after a linearised refit of everything else and of the size of the change. Harmonics of the angle need no grid: their two
-components are linear, order by order.
+components are linear, order by order. So are those of a resonance in series with the mechanism, frequency by frequency,
+
+    (s^2 + 2 zz wz s + wz^2)/(s^2 + 2 zp wp s + wp^2) = 1 + (c1 wp s + c0 wp^2)/(s^2 + 2 zp wp s + wp^2)
+
+on the model's velocity, as long as it changes little: the frequencies where they help most become starts beside the given ones.
 """
 
 from __future__ import annotations
@@ -19,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.filtering import filtered
 from gaident.diagnosis.selection.load_end import LoadEnd
 from gaident.diagnosis.selection.mechanisms import evenly_damped
 from gaident.estimation import least_squares as ls
@@ -36,6 +41,8 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 TURN = 2.0 * np.pi  # no decision: rad
+RESONANCES, DAMPING = 48, 0.05  # no decision: a grid; steps of 8 %, each seen within its half-width of 5 %
+PROMISING = 2  # no decision: frequencies for each noise filter that are simulated
 ROOM = 8  # no decision: samples for each direction that is taken out before a noise filter is fitted
 FURTHEST = 2.0  # no decision: times the way to a start, where the next one stands
 
@@ -144,6 +151,8 @@ class ScoreTest:
             rows = np.array(term.starts(parameters.scales))
             if rows.size == 0:
                 continue
+            if term.resonates:
+                rows = np.vstack([rows, self._narrow(rows, base)])
             if instead is not None:  # the coordinates that both have, beyond the level
                 fit, effect = instead
                 known = fit.x[fit.parameters.slot(effect)]
@@ -178,6 +187,38 @@ class ScoreTest:
             return orders, hypothesis.predictor.torque_response(hypothesis.parameters, x, pairs)
         w = (self.objective.measured - error) * orders[:, None]
         return orders, np.stack([w * waves.real, -w * waves.imag], axis=1).reshape(-1, len(angle))
+
+    def _narrow(self, rows: Matrix, base: _Base) -> Matrix:
+        """Resonances between those of some start rows that lower the error most, before whitening and beside noise of its own."""
+        poles = np.exp(np.linspace(rows[:, 0].min(), rows[:, 0].max(), RESONANCES))
+        columns, own = self._resonating(poles, base), self.objective.noise_of(base.error, base.hypothesis.predictor.closed)
+        found = []
+        for noise in {f.key: f for f in (WHITE, own)}.values():
+            filtered_base = self._filtered(base, noise)
+            V = self.objective.whitened(columns, noise)
+            V -= (V @ filtered_base.basis.T) @ filtered_base.basis
+            for i in np.argsort(_pair_worth(V, filtered_base.rest))[::-1][:PROMISING]:
+                c1, c0 = np.linalg.lstsq(V[2 * i : 2 * i + 2].T, filtered_base.rest, rcond=None)[0]
+                wz = poles[i] * np.sqrt(np.clip(1.0 + c0, 0.25, 4.0))  # no decision: a start, no further than an octave
+                found.append((np.log(poles[i]), DAMPING, np.log(wz), poles[i] * (DAMPING + 0.5 * c1) / wz))
+        return np.array(found)
+
+    def _resonating(self, poles: Vector, base: _Base) -> Matrix:
+        """What the raw error loses per unit of c1 and c0 of a resonance at each of some frequencies [rad/s], pairs of rows.
+
+        Bilinear transformation, exact at wp: s = k (1 - z^-1)/(1 + z^-1), k = wp/tan(wp dt/2).
+        """
+        lengths, starts = self.data.lengths, np.cumsum((0, *self.data.lengths[:-1]))
+        w = self.objective.measured - base.error
+        w = (w - np.repeat(w[starts], lengths))[None, :]
+        columns = []
+        for wp in poles:
+            k = wp / np.tan(0.5 * wp * self.data.dt)
+            e1, e0 = 2.0 * DAMPING * wp * k, wp * wp
+            a = np.array([k * k + e1 + e0, 2.0 * (e0 - k * k), k * k - e1 + e0])
+            for b in ([wp * k, 0.0, -wp * k], [e0, 2.0 * e0, e0]):
+                columns.append(filtered(np.array(b) / a[0], a / a[0], w, lengths)[0])
+        return np.array(columns)
 
     def filter_beyond(self, base: _Base) -> NoiseFilter:
         """Noise filter of what nothing in the library explains, to first order: no effect is whitened away as noise."""
