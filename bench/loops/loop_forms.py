@@ -1,14 +1,16 @@
 """Which form of controller a diagnosis finds, where only a bare PI is given and the drive's loop is another.
 
     python bench/loops/loop_forms.py --out forms.jsonl [--cases 1] [--seed 1] [--loops NAME ...] [--every 1 2 4 8]
-        [--effects NAME ...]
+        [--effects NAME ...] [--drives servo] [--no-torque]
     python bench/loops/loop_forms.py --out forms.jsonl --report
 
 Drives as in industry (tests/python/support/loop_cases.py): 60 to 500 Hz, inertia ratio 0.3 to 10, a current loop of 0.1 to
 0.5 ms, an encoder of 17 to 24 bits, a torque limit reached in a third.
+With --drives servo those of the group `loops` of bench/blind.py: small servo axes of one and two masses without a current loop,
+white noise and an encoder in turn.
 The log has a line for every 1, 2, 4 and 8 samples of the controller.
 The controller that is given is PI(kp, ki), in a Cascade of the right period where the log is slower.
---bare gives the PI alone there too; --unknown gives None for both gains.
+--bare gives the PI alone there too; --unknown gives None for both gains; --no-torque leaves the torque out of the log.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import argparse
 import os
 import time
 import zlib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +36,8 @@ from json_lines import read, work
 
 import gaident as ga
 from drive_cases import random_case
-from drive_rig import Noise
-from loop_cases import CURRENT_LOOP, EVERY, INDUSTRY_BITS, LOOPS, industrial_plant, loop_kind
+from drive_rig import COUPLING, Noise
+from loop_cases import CURRENT_LOOP, EVERY, INDUSTRY_BITS, LOOPS, industrial_plant, loop_kind, loop_noise, loop_plant
 
 FORMS = {
     "integration_rule", "other_gains", "command_weight", "torque_filter", "velocity_feedback_filter", "command_filter",
@@ -56,21 +59,58 @@ EXPECTED: dict[str, set[str]] = {
                  "torque_saturation", "anti_windup"},
 }  # fmt: skip
 LAGS = {"torque_lag", "velocity_filter", "transport_delay"}
-"""What a current loop and a differenced angle are called; they are there in every case."""
+"""What a current loop, a differenced angle and a computing delay are called; an industrial drive always has one."""
+DRIVES = ("industry", "servo")
 
 
-def run(loop: str, every: int, effect: str, number: int, given: str) -> dict[str, Any]:
-    """One diagnosis, judged."""
-    line: dict[str, Any] = {"key": f"{loop}/{every}/{effect}/{number}/{given}", "loop": loop, "every": every, "effect": effect}
-    rng = np.random.default_rng([number, zlib.crc32(f"{loop} {every} {effect}".encode())])
-    try:
+@dataclass(frozen=True)
+class Case:
+    """One case, complete: the same case is the same record. given: "period" (a PI in a Cascade where the log is slower), "bare",
+    "unknown" or "whole"."""
+
+    loop: str
+    every: int
+    effect: str
+    number: int
+    given: str = "period"
+    drives: str = DRIVES[0]
+    torque: bool = True
+
+    @property
+    def key(self) -> str:
+        """Its name in the file; what is as always is left out."""
+        more = [*([self.drives] if self.drives != DRIVES[0] else []), *([] if self.torque else ["no torque"])]
+        return "/".join([self.loop, str(self.every), self.effect, str(self.number), self.given, *more])
+
+    @property
+    def lags(self) -> set[str]:
+        """Names of lags that are no wrong ones."""
+        return LAGS if self.drives == "industry" or self.loop == "computing delay" else set()
+
+    def drawn(self) -> tuple[Any, ...]:
+        """What `random_case` gives. Raises RuntimeError where no drive is stable or the effect does not act."""
+        loop, every, effect, number = self.loop, self.every, self.effect, self.number
+        rng = np.random.default_rng([number, zlib.crc32(f"{loop} {every} {effect}".encode())])
+        if self.drives == "servo":
+            plant = loop_plant(loop, every, rng, True if {effect} & {*COUPLING, "extra_resonance"} else None)
+            noise = loop_noise("white" if rng.integers(2) else "encoder", number)
+            return random_case(number, (effect,) if effect else (), loop_kind(loop), noise, self.torque, plant=plant)
         plant = industrial_plant(loop, every, rng)
         factor = float(rng.uniform(*CURRENT_LOOP)) / 1e-3
         noise = Noise(white=0.0, encoder=2 * np.pi / 2.0 ** int(rng.integers(*INDUSTRY_BITS)), differenced=True)
         hidden = ("torque_lag", effect) if effect else ("torque_lag",)
-        record, validation, whole, truth = random_case(number, hidden, loop_kind(loop), noise, factor=factor, plant=plant)
+        return random_case(number, hidden, loop_kind(loop), noise, self.torque, factor, plant)
+
+
+def run(case: Case) -> dict[str, Any]:
+    """One diagnosis, judged."""
+    loop, every, given = case.loop, case.every, case.given
+    line: dict[str, Any] = {"key": case.key, "loop": loop, "every": every, "effect": case.effect}
+    try:
+        record, validation, whole, truth = case.drawn()
     except RuntimeError as none:
         return line | {"impossible": str(none)}
+    plant = truth.plant
     pi = ga.PI(plant.kp, plant.ki)
     if given == "unknown":
         pi = ga.PI(kp=None, ki=None)
@@ -96,6 +136,7 @@ def run(loop: str, every: int, effect: str, number: int, given: str) -> dict[str
     found = dia.mechanics.get("inertia") or dia.mechanics.get("total_inertia")
     motor, load = dia.mechanics.get("motor_inertia"), dia.mechanics.get("load_inertia")
     inertia = found.value if found is not None else motor.value + load.value if motor and load else np.nan
+    deviation = found.std if found is not None else np.hypot(motor.std, load.std) if motor and load else np.nan
     return line | {
         "limit": whole.velocity.torque_limit is not None,
         "expected": sorted(expected),
@@ -104,10 +145,11 @@ def run(loop: str, every: int, effect: str, number: int, given: str) -> dict[str
         "false_form": sorted(set(form) - expected),
         "mechanical": named,
         "sets": sets,
-        "wrong": [name for name in named if name not in true | LAGS],
-        "missing": [name for name in true - LAGS if not any(name in s for s in sets)],
+        "wrong": [name for name in named if name not in true | case.lags],
+        "missing": [name for name in true - case.lags if not any(name in s for s in sets)],
         "verdict": dia.verdict,
         "inertia_off": inertia / total - 1.0,
+        "inertia_deviations": (inertia - total) / deviation,
         "before": dia.before.rmse,
         "after": dia.after.rmse,
         "seconds": time.perf_counter() - started,
@@ -134,7 +176,7 @@ def report(lines: list[dict[str, Any]]) -> str:
         if not x["form_right"] or x["wrong"] or x["missing"]:
             said.append(
                 f"  {x['key']}: {x['verdict']}, form {x['form']} of {x['expected']}, mechanics {x['sets']}, "
-                f"inertia {100 * x['inertia_off']:+.1f} %"
+                f"inertia {100 * x['inertia_off']:+.1f} % ({x.get('inertia_deviations', np.nan):+.1f} deviations)"
             )
     said += [f"  {x['key']}: {x.get('crash') or x.get('impossible')}" for x in lines if "verdict" not in x]
     return "\n".join(said)
@@ -149,6 +191,8 @@ def main() -> None:
     parser.add_argument("--loops", nargs="+", choices=list(EXPECTED), default=list(EXPECTED))
     parser.add_argument("--every", nargs="+", type=int, choices=EVERY, default=list(EVERY))
     parser.add_argument("--effects", nargs="+", default=[""], help="hidden beside the current loop; default: none")
+    parser.add_argument("--drives", choices=DRIVES, default=DRIVES[0])
+    parser.add_argument("--no-torque", action="store_true", help="leave the torque out of the log")
     parser.add_argument("--bare", action="store_true", help="give the PI alone where the log is slower, too")
     parser.add_argument("--unknown", action="store_true", help="give PI(kp=None, ki=None)")
     parser.add_argument("--whole", action="store_true", help="give all of the controller")
@@ -158,14 +202,14 @@ def main() -> None:
     given = "whole" if options.whole else "unknown" if options.unknown else "bare" if options.bare else "period"
     if not options.report:
         there = read(options.out)
-        jobs = [
-            (run, loop, every, effect, options.seed * 1000 + k, given)
+        cases = [
+            Case(loop, every, effect, options.seed * 1000 + k, given, options.drives, not options.no_torque)
             for k in range(options.cases)
             for loop in options.loops
             for every in options.every
             for effect in options.effects
         ]
-        jobs = [job for job in jobs if f"{job[1]}/{job[2]}/{job[3]}/{job[4]}/{job[5]}" not in there]
+        jobs = [(run, case) for case in cases if case.key not in there]
         work(options.out, jobs, options.workers)
     print(report(list(read(options.out).values())))
 

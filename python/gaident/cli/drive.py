@@ -34,8 +34,8 @@ def drive_of(args: argparse.Namespace) -> Drive:
             if (name, key) == ("controller", "drive"):  # --drive names the file
                 continue
             value = getattr(args, key, None)
-            if value is not None:
-                sections[name][key] = value
+            if value is not None:  # a number with its unit is read as the drive file's
+                sections[name][key] = keys[key](value, key) if not name and isinstance(value, str) else value
     if sections["controller"].get("loop") is not None:
         one_of(sections["controller"]["loop"], "loop", (*LOOPS, "open"), ControllerError)
     sections["units"] = {k: _as_number(v) for k, v in sections["units"].items()}

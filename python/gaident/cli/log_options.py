@@ -77,10 +77,15 @@ _WITH_UNIT = re.compile(r"\s*[-+\d.eE]+\s+\S")
 
 def gain(text: str) -> float | str:
     """argparse's number of a controller: with its unit, or the word for one that is not known, as text."""
+    return text if text == UNKNOWN else length(text)
+
+
+def length(text: str) -> float | str:
+    """argparse's number; with its unit, as text."""
     try:
         return float(text)
     except ValueError:
-        return text if _WITH_UNIT.match(text) or text == UNKNOWN else number(text)
+        return text if _WITH_UNIT.match(text) else number(text)
 
 
 def add_log_options(parser: argparse.ArgumentParser) -> None:
@@ -137,8 +142,8 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
     for name, text in CONSTANT_HELP.items():
         g.add_argument(f"--{name.replace('_', '-')}", type=number, metavar="X", help=text)
     _add_text_options(g)
-    pitch = "of a linear axis, the length with which its cogging returns [m]: pitch of the screw or of the poles"
-    g.add_argument("--pitch", type=number, metavar="M", help=pitch)
+    pitch = "of a linear axis, the length with which its cogging returns [m], or '10 mm': pitch of the screw or of the poles"
+    g.add_argument("--pitch", type=length, metavar="M", help=pitch)
     g.add_argument("--axis", choices=AXES, help="linear: print m, m/s, N, kg (default: rotary)")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+
 from gaident.arguments import Argument
 from gaident.errors import GaidentError
 
@@ -41,7 +43,7 @@ def _option(a: Argument) -> str:
         return WHOLE[a.name, a.value]
     if a.name in ("columns", "units", "shift") and a.key:
         value = "" if a.value == "None" else a.value.strip("'")
-        return f"--{a.name} {a.key}={value}"
+        return f"--{a.name} {shlex.quote(f'{a.key}={value}')}"
     if a.name in ("p", "q"):
         return f"--{a.name} {a.value.strip('()').replace(', ', '..')}"
     if a.name in _OTHER_NAME:

@@ -9,7 +9,7 @@ __all__ = ["REPORT_EXAMPLES", "REPORT_HELP", "add_report_option", "add_report_op
 REPORT_HELP = """\
 Writes a saved diagnosis or identification as one HTML page that can be sent to a colleague: verdict, measured
 against simulated, what is wrong, cause and evidence, parameters, before and after, what could not be tested, the
-next experiment with its command, how it was computed. The page needs no network and no other file (about 5 MB,
+next experiment with its command, how it was computed. The page needs no network and no other file (about 2.5 MB,
 with --pictures 0.3).
 A saved result holds no samples: give the logs it was made from, and the page has its curves.
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 
 import numpy as np
@@ -16,6 +17,7 @@ from gaident.data.record import CHANNELS, Record
 from gaident.data.signals.arrays import MINIMUM_SAMPLES
 from gaident.data.signals.conditioning import differentiate, low_pass
 from gaident.data.signals.decimation import Decimator, decimated, factor_of
+from gaident.data.signals.difference import backward_difference
 from gaident.data.signals.resampling import resampled
 from gaident.data.timeaxis import SLOW_STEP, TimeAxis
 from gaident.data.torque_kind import COMMANDED, kind_of_torque
@@ -26,6 +28,11 @@ from gaident.errors import ReadError, RecordError
 __all__ = ["assemble", "channels_of"]
 
 SAID = 3  # no decision: columns that a sentence names
+AS_THE_DRIVE = (
+    "Neither velocity nor torque is logged: the velocity is the difference of the last two positions, as a drive forms it of its "
+    "encoder, and the torque is what the given controller makes of it. What the drive's controller has beside that (filters, "
+    "feedforward, other gains, a clock faster than the log) shows only in what the model misses."
+)
 
 
 def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
@@ -59,7 +66,11 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
             if wanted.velocity_cutoff_hz is not None:  # all channels alike: filtered alone, a velocity is that of another plant
                 values = {channel: low_pass(x, dt, wanted.velocity_cutoff_hz) for channel, x in values.items()}
                 said.append(f"All channels went through the same zero-phase low-pass of {wanted.velocity_cutoff_hz:g} Hz.")
-            values["velocity"] = differentiate(values["position"], dt)
+            if _placed_alone(values) and wanted.velocity_cutoff_hz is None:
+                values["velocity"] = backward_difference(values["position"], dt)
+                said.append(AS_THE_DRIVE)
+            else:
+                values["velocity"] = differentiate(values["position"], dt)
         if not ELECTRICAL.isdisjoint(named):
             values["torque"], kind, note = torque_of_winding(table, wanted, values, dt)
             said += [note] if note else []
@@ -69,6 +80,13 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
         return rec.shifted(**wanted.shift) if wanted.shift else rec
     except RecordError as error:
         raise RecordError(f"{table.path}: {error.marked}") from None
+
+
+def _placed_alone(values: Mapping[str, NDArray[np.float64]]) -> bool:
+    """Whether the channels are a position, its command, and nothing of what a velocity controller reads or makes."""
+    return (
+        "position_command" in values and not {"velocity", "command", "torque"} & values.keys() and not ELECTRICAL & values.keys()
+    )
 
 
 def _torque_kind(table: Table, wanted: Wanted, column: Column | None) -> str:
@@ -99,7 +117,7 @@ def _unnamed_torque(table: Table, wanted: Wanted, named: dict[str, Column]) -> l
     which = " or ".join(repr(key) for key in found[:SAID])
     return [
         f"No torque is read, but by its name {which} may be it: give columns={{'torque': {found[0]!r}}} "
-        f"(--columns torque={found[0]}). A logged torque shows what the controller does."
+        f"(--columns {shlex.quote(f'torque={found[0]}')}). A logged torque shows what the controller does."
     ]
 
 
@@ -209,7 +227,7 @@ def channels_of(table: Table, wanted: Wanted) -> dict[str, Column]:
         }
     if wanted.measured and "velocity" not in found and "position" not in found:
         raise ReadError(_say_missing(table, wanted, "velocity", "the velocity (or the position, to derive it from)"))
-    if found.keys().isdisjoint(("command", "torque", *(() if wanted.measured else ("position_command",)), *ELECTRICAL)):
+    if found.keys().isdisjoint(("command", "torque", "position_command", *ELECTRICAL)):
         raise ReadError(_say_missing(table, wanted, "torque", "the command or the torque"))
     if "velocity" in found and wanted.velocity_cutoff_hz is not None:
         raise ReadError(

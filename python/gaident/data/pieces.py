@@ -21,6 +21,7 @@ from gaident.data.formats.table import Column, Table
 from gaident.data.readers import open_log
 from gaident.data.record import Record
 from gaident.data.signals.arrays import MINIMUM_SAMPLES
+from gaident.data.signals.decimation import factor_of
 from gaident.data.wanted import Wanted, wanted_of
 from gaident.errors import ReadError
 from gaident.policy.table import POLICY
@@ -68,7 +69,8 @@ def read_pieces(
     Returns
     -------
     list of Record
-        In the order of the log. Pieces of fewer than 20 lines are left out, and the first record's notes say how many.
+        In the order of the log. Pieces of fewer than 20 samples, resampled and decimated as asked, are left out, and the first
+        record's notes say how many.
 
     Raises
     ------
@@ -99,13 +101,13 @@ def read_pieces(
         stamps = {key: _stamps(table, wanted, whole, clocks[channel], key) for channel, key in _keys(named).items()}
         origin = min(float(t[0]) for t in stamps.values() if len(t))
         spans = _spans(list(stamps.values()), (origin + low, origin + high), pieces)
-        parts = [_part(table, whole, stamps, clocks, named, span) for span in spans]
+        parts = [_part(table, whole, stamps, clocks, named, span, wanted) for span in spans]
         kept = [part for part in parts if part is not None]
         if not kept:
             asked = f"{low:g} to {high:g} s" if start is not None or stop is not None else "the log"
             raise ReadError(
-                f"{table.path}: no piece of {MINIMUM_SAMPLES} lines without a gap lies in {asked}; take more of it, or put it on "
-                f"an even axis with {arg('resample')} [s]"
+                f"{table.path}: no piece of {MINIMUM_SAMPLES} samples without a gap lies in {asked}; take more of it, or put it "
+                f"on an even axis with {arg('resample')} [s]"
             )
         several = len(spans) > 1
         found = [
@@ -114,7 +116,7 @@ def read_pieces(
         ]
     short = len(parts) - len(kept)
     if short:
-        note = f"{short} {'piece' if short == 1 else 'pieces'} of the log of fewer than {MINIMUM_SAMPLES} lines left out."
+        note = f"{short} {'piece' if short == 1 else 'pieces'} of the log of fewer than {MINIMUM_SAMPLES} samples left out."
         first = found[0]
         found[0] = Record(
             first.dt, name=first.name, torque_is=first.torque_is, notes=(*first.notes, note), **dict(first.channels())
@@ -192,15 +194,16 @@ def _part(
     clocks: Mapping[str, Column | None],
     named: Mapping[str, Column],
     span: Span,
+    wanted: Wanted,
 ) -> Table | None:
-    """The rows of a span as a table of their own; None where they are too few."""
+    """The rows of a span as a table of their own; None where they are too few for a record, decimated as it is wanted."""
     rows: dict[str, slice] = {}
     for channel, column in named.items():
         t = stamps[column.key]
         # no decision: a stamp that is printed with few digits may stand a rounding beside the bound
         slack = 1e-6 * float(np.median(np.diff(t))) if len(t) > 1 else 0.0
         inside = np.flatnonzero((t >= span[0] - slack) & (t <= span[1] + slack))
-        if len(inside) < MINIMUM_SAMPLES:
+        if _samples(t[inside], wanted) < MINIMUM_SAMPLES:
             return None
         taken = slice(int(inside[0]), int(inside[-1]) + 1)
         rows[column.key] = taken
@@ -214,6 +217,14 @@ def _part(
     lines = table.lines[one] if table.lines is not None and one is not None else None
     start = one.start if one is not None else 0
     return replace(table, columns=(*columns, *extra), lines=lines, first=start, batches=None)
+
+
+def _samples(t: Vector, wanted: Wanted) -> int:
+    """Samples that a record of lines at these times has."""
+    lines = len(t)
+    if wanted.resample is not None and lines:
+        lines = int((t[-1] - t[0]) / wanted.resample + 1e-9) + 1  # no decision: rounding
+    return -(-lines // factor_of(wanted.decimate))
 
 
 def _cut(column: Column, rows: slice) -> Column:

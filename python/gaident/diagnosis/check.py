@@ -8,6 +8,10 @@ They contradict each other where
 
 and, for a torque, |a - b| > check_torque of the torque's rms.
 The second and third say that the difference matters. Then a note names both.
+
+The force errors of both are held against each other by the same rule: a note says that the diagnosed model, a, loses where
+
+    a - b > 0 beyond the variation over blocks of the held-out data,   a > loses b,   a - b > check_torque of the torque's rms.
 """
 
 from __future__ import annotations
@@ -22,7 +26,7 @@ from numpy.typing import NDArray
 from gaident.axis import Text, joined, say, unit_text
 from gaident.data.record import Record
 from gaident.diagnosis.gains import Gains, interval_of_fall
-from gaident.diagnosis.library.terms import LIBRARY
+from gaident.diagnosis.library.terms import LIBRARY, level_of
 from gaident.errors import GaidentError
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.regression.force_error import FilteredRecords, ForceError, band_of, effects_before_the_shaft
@@ -75,7 +79,8 @@ def checked(data: DataSet, gains: Gains, model: Model, mechanics: Mapping[str, E
 
     data: the records as they were fitted; model: the extended one; mechanics: name -> Estimate; effects: effect -> parameters.
     """
-    records, driven = [data.as_old(r) for r in data.records], data.open_runs
+    # A logged angle gives the motion as it was, and not as old as the velocity.
+    records, driven = [data.as_old(r) if r.position is None else r for r in data.records], data.open_runs
     nothing = Check(None, None, (), gains.before, gains.after, (), Text(""))
     if not all(r.torque is not None for r in records):
         return nothing
@@ -86,7 +91,7 @@ def checked(data: DataSet, gains: Gains, model: Model, mechanics: Mapping[str, E
     comparisons = tuple(_compared(found, mechanics, effects, after.torque_rms or 0.0, bool(effects_before_the_shaft(model))))
     verdict = _verdict(after.force_error, second)
     notes = tuple(_sentence(c) for c in comparisons if c.differs)
-    notes = (*notes[:-1], joined("", (notes[-1], verdict))) if notes else _lost(after, second)
+    notes = (*notes[:-1], joined("", (notes[-1], verdict))) if notes else _lost(after, second, better)
     return Check(found, second, comparisons, before, after, notes, _reason(effects, driven), better)
 
 
@@ -167,7 +172,7 @@ def _of_diagnosis(mechanics: Mapping[str, Estimate], effects: Effects) -> dict[s
         if term.levels and (term.time_varying or term.beside):  # no one number: it changes in time, or with the load
             found.pop("dry friction", None)
         elif term.levels and elsewhere is not None:
-            here = _level(parameters)
+            here = level_of(parameters)
             found["dry friction"] = replace(here, value=here.value + elsewhere.value, std=math.hypot(here.std, elsewhere.std))
         elif _is_gravity(term):
             found["gravity"] = parameters["amplitude"]
@@ -180,7 +185,7 @@ def _of_regression(found: InverseDynamics) -> dict[str, Estimate]:
     rows = {"inertia": parameters["inertia"]}
     untold = {text.partition(":")[0] for text in found.not_tried}
     if any(name.startswith("coulomb") for name in parameters):
-        rows["dry friction"] = _level({name.replace("coulomb", "torque"): e for name, e in parameters.items()})
+        rows["dry friction"] = level_of({name.replace("coulomb", "torque"): e for name, e in parameters.items()})
     elif "coulomb" not in untold:
         rows["dry friction"] = Estimate(0.0, 0.0, NONE["dry friction"])
     pair = {"gravity": "gravity_amplitude", "ground stiffness": "spring"}
@@ -191,14 +196,6 @@ def _of_regression(found: InverseDynamics) -> dict[str, Estimate]:
         elif not there and {"gravity": "gravity", "ground stiffness": "spring"}[name] not in untold:
             rows[name] = Estimate(0.0, 0.0, NONE[name])
     return rows
-
-
-def _level(parameters: Mapping[str, Estimate]) -> Estimate:
-    """Of dry friction: its torque, or the mean of its two levels."""
-    if "torque" in parameters:
-        return parameters["torque"]
-    up, down = parameters["torque_positive"], parameters["torque_negative"]
-    return Estimate(0.5 * (up.value + down.value), 0.5 * math.hypot(up.std, down.std), up.unit)
 
 
 def _is_gravity(term: Term) -> bool:
@@ -228,10 +225,15 @@ def _sentence(c: Comparison) -> Text:
     return say(text, mine, other, LIKELY[c.name])
 
 
-def _lost(after: Fitness, second: float | None) -> tuple[Text, ...]:
-    """A note where the regression explains the held-out torque far better than the diagnosed model."""
-    own = after.force_error
-    if own is None or second is None or own < POLICY.loses * max(second, after.force_floor or 0.0):
+def _lost(after: Fitness, second: float | None, better: bool) -> tuple[Text, ...]:
+    """A note where the regression explains the held-out torque far better than the diagnosed model, and that matters.
+
+    better: whether it does so beyond the variation over blocks of the held-out data.
+    """
+    own, torque = after.force_error, after.torque_rms or 0.0
+    if own is None or second is None or not better or own < POLICY.loses * max(second, after.force_floor or 0.0):
+        return ()
+    if own - second < POLICY.check_torque * torque:
         return ()
     shares = [f"{100.0 * x / after.torque_rms:.3g} %" for x in (own, second)] if after.torque_rms else ["more", "less"]
     text = (

@@ -8,10 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from gaident.axis import say
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
-from gaident.diagnosis.controller.driving import driving_of
+from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.note import Note
 from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_order, noise_std_of, records_of
@@ -24,6 +25,10 @@ from gaident.results.identification import Identification
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
 
+IDENTIFIED_AGAIN = say(
+    "The given identification is one under the given gains, which these records contradict: another one, under the gains that "
+    "were found, is in its place."
+)
 ROUNDS = 3  # no decision: work; searches under gains that the one before has shown
 
 
@@ -65,9 +70,10 @@ def diagnose(
     progress : callable, optional
         Called now and then with (fraction done, message), see `gaident.progress`.
     axis : {"rotary", "linear"}
-        "linear" (m, m/s, N): positions are lengths, and what returns with every turn is tried where a `pitch` is given.
+        "linear" (m, m/s, N): positions are lengths, and what returns with every turn is tried with every `pitch`.
     pitch : float, optional
         Of a linear axis, the length with which its cogging returns: pitch of the screw or of the poles [m].
+        None: what the records show, if they do; a note says so.
 
     Returns
     -------
@@ -112,26 +118,38 @@ def diagnose(
         note(0.01, "replaying the controller")
         driving = driving_of(records, held, asked, driven, origin)
         note(0.02, "identifying the linear model")
-        moved, pi = driving.moved, bare_pi(driving.controller)
-        idn = identification if identification is not None else identify(list(moved.records), pi, seed=seed)
-        work = Work(moved.records, moved.held, driving, idn, noise_std, note, axis, pitch)
-        work.search()
+
+        def searched(driving: Driving, idn: Identification | None = None) -> Work:
+            here, pi = driving.moved, bare_pi(driving.controller)
+            idn = identify(list(here.records), pi, seed=seed) if idn is None else idn
+            work = Work(here.records, here.held, driving, idn, noise_std, note, axis, pitch)
+            work.search()
+            return work
+
+        work = searched(driving, identification)
+        if (form := work.other_form()) is not None:
+            note(0.03, "once more, under another form of controller")
+            formed = searched(driving.formed(form))
+            if formed.confirms(work):
+                work = formed
+            else:
+                work.refused(form)
         given_work = work
         for _ in range(ROUNDS):
-            other = work.other_gains()
+            other = work.other_gains(given_work)
             if other is None:
                 break
             note(0.03, "once more, under other gains")
-            driving = driving.regained(other)
-            idn = identify(list(moved.records), driving.logged.controller, seed=seed)
-            work = Work(moved.records, moved.held, driving, idn, noise_std, note, axis, pitch)
-            work.search()
+            work = searched(work.driving.regained(other))
         if work is not given_work and (stands := work.under_given()) is not None:
             # What was found under other gains explains the records under the given ones as well.
-            work, driving = given_work, given_work.driving
+            work = given_work
             work.settle(stands)
+        driving = work.driving
         result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
-        result = moved.noted(result)
+        result = driving.moved.noted(result)
+        if identification is not None and work.idn is not identification:
+            result = replace(result, notes=(IDENTIFIED_AGAIN, *result.notes))
         answered = work.at_controller.decided or any(f.place == "controller" for f in result.findings)
         result = replace(result, notes=(*driving.notes, *(() if answered else driving.doubts), *result.notes))
         if bootstrap:

@@ -25,7 +25,8 @@ from gaident.estimation.prediction import torque_noise_in
 from gaident.models import simulate
 from gaident.models.model import Model
 from gaident.models.simulate import initial_state
-from gaident.models.starts import noise_std, starts_moving, stored_torque
+from gaident.models.starts import noise_std, starts_moving
+from gaident.models.stored_torque import stored_torque
 from gaident.policy.table import POLICY
 from gaident.results.fitness import Fitness
 
@@ -99,6 +100,7 @@ def measured_gains(
         words = f"the last 30 % of {'the record' if by_time else 'its path'}, parameters fitted to the first 70 %"
     else:
         scored, words, part = [(r, 0) for r in records], IN_SAMPLE, None
+    angles = [r.position is not None for r, _ in scored]
     scored = [(_turned(r, loop, final), first) for r, first in scored]
     stages = _stages(final, objective, part)
     named = list(at_controller.items())
@@ -110,6 +112,7 @@ def measured_gains(
     # Where the simulated loop is known not to be the drive's, the torque drives the models that are compared and printed.
     driver = controller if objective.data.loop_follows or not objective.data.torque_logged else None
     shaft = [(objective.data.as_old(r), first) for r, first in scored]
+    timed = [one if logged else old for logged, one, old in zip(angles, scored, shaft, strict=True)]
     scored = shaft if driver is None else scored
     errors = [free_run_errors(m, scored, driver, loop) for m in chain]
     levels = [float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for e in errors]
@@ -148,7 +151,7 @@ def measured_gains(
         interval=interval_of_fall(errors[0], errors[-1]),
         held_out=words,
         steps=steps,
-        scored=tuple(shaft),
+        scored=tuple(timed),
         mechanism=bare,
         extended=chain[-1],
         closed=driver is not None,
@@ -246,9 +249,10 @@ def start_state(model: Model, rec: Record, controller: Controller | None, read: 
     At rest the integrator may hold a load's torque, which the logged torque shows. In motion a model with effects is not linear
     in its state: two steps of Gauss and Newton over the record's head, from the first velocity.
     """
-    pi = bare_pi(read or controller)
-    if controller is not None and pi is not None and (held := stored_torque(rec, pi)):
+    loop = read or controller
+    if controller is not None and loop is not None and (held := stored_torque(rec, loop)):
         return np.append(np.zeros(model.linear.order), held)
+    pi = bare_pi(loop)
     if not starts_moving(rec, pi) or (controller is not None and (controller.limited or model.effects)):
         return None
     if not model.effects:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from gaident.diagnosis.controller.controller_place import as_read, controller_fi
 from gaident.diagnosis.controller.driving import Driving
 from gaident.diagnosis.experiments.candidates import candidates, loop_notes
 from gaident.diagnosis.experiments.excitation import excitation
-from gaident.diagnosis.explain.alternatives import alternatives_of
+from gaident.diagnosis.explain.alternatives import alternatives_of, impossible_here
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import (
@@ -26,7 +26,9 @@ from gaident.diagnosis.explain.wording import (
     evidence_of,
     far_off,
     hidden_by_torque_noise,
+    or_other_form,
     or_other_gains,
+    period_seen,
     torque_unlogged,
 )
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
@@ -45,6 +47,7 @@ from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains, gai
 from gaident.diagnosis.selection.rivals import Replacement
 from gaident.diagnosis.selection.select import Selection, by_whitened_errors, compared, selected
 from gaident.diagnosis.selection.sensor_age import searched
+from gaident.diagnosis.selection.unlogged_form import UnloggedForm, in_series, leaves_noise, unlogged_form
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.term import Term
@@ -86,6 +89,8 @@ class Work:
         whole = self.driving.read
         read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, hit, strict=True)], self.controller)
         data = DataSet.of(clean, self.controller, any(len(h) for h in hit), read, self.step, self.axis, self.pitch)
+        data = data.with_its_period()
+        self.notes += period_seen(data)
         self.scales = scales_of(data)
         self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.driving.logged.replays)
         self.notes += notes
@@ -99,7 +104,9 @@ class Work:
         self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
         data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
-        self.excited = excitation(self.clean, self.data.loop, axis=self.axis, pitch=self.pitch)
+        self.excited = excitation(
+            self.clean, self.data.loop, axis=self.axis, pitch=data.period if data.period_seen else self.pitch
+        )
         kept = [~np.isin(np.arange(n), h) for h, n in zip(hit, self.data.lengths, strict=True)]
         self.objective = Objective(self.data, np.concatenate(kept).astype(np.float64))
         self.notes += torque_unlogged(self.data)
@@ -117,19 +124,48 @@ class Work:
         simpler = simplified(found.space, found.final, self.left)
         if simpler is not found.final:
             self.take(compared(found, simpler, self._equivalent_here, self._say))
-        self._doubt_gains()
+        self._doubt_controller()
 
     def settle(self, found: Selection) -> None:
-        """The result of the search, and whether other gains would explain the records better."""
+        """The result of the search, and whether another controller would explain the records better."""
         self.take(found)
-        self._doubt_gains()
+        self._doubt_controller()
 
-    def _doubt_gains(self) -> None:
-        self.gain_doubt = gain_doubt(self.found.space, self.final, self.driving.regained_from is not None)
+    def _doubt_controller(self) -> None:
+        again = self.driving.regained_from is not None
+        self.gain_doubt = gain_doubt(self.found.space, self.final, again)
+        self.form = None if again else unlogged_form(self.found.space, self.final)
 
-    def other_gains(self) -> OtherGains | None:
-        """Gains with which these records are explained better, where no torque shows which they are."""
-        return self.gain_doubt.better
+    def other_form(self) -> UnloggedForm | None:
+        """A form of controller with which these records are explained better, also than with other gains; no torque shows it."""
+        gains, margin = self.gain_doubt.better, self.found.space.margin
+        if self.form is None or not self.form.better(margin):
+            return None
+        return self.form if gains is None or self.form.score < gains.score - margin else None
+
+    def confirms(self, given: Work) -> bool:
+        """Whether a search under another form of controller leaves noise, and fewer effects or less than under the given one."""
+        if not leaves_noise(self.found.space, self.final):
+            return False
+        return not leaves_noise(given.found.space, given.final) or len(self.final.effects) < len(given.final.effects)
+
+    def refused(self, form: UnloggedForm) -> None:
+        """Another form comes closer, but a search under it does not end in noise: what is known is said."""
+        self.form = None
+        self.notes.append(or_other_form(form.finding.effect))
+
+    def other_gains(self, first: Work | None = None) -> OtherGains | None:
+        """Gains with which these records are explained better, where no torque shows which they are.
+
+        first: the work under the given gains, where this one is under others already: its model is the one that is worse.
+        """
+        better = self.gain_doubt.better
+        if better is None or first is None or first is self:
+            return better
+        same = first.found.space.whitens == self.found.space.whitens  # else the two are no BIC of the same errors
+        before = first.gain_doubt.better
+        worse = first.final.bic - better.bic if same or before is None else before.gain
+        return replace(better, gain=worse)
 
     def under_given(self) -> Selection | None:
         """What was found under other gains, under the given ones, where it explains the records as well there; else None."""
@@ -192,7 +228,8 @@ class Work:
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         for effect in causes:
             gain, rivals = self.rivals[effect]
-            alternatives = self._alternatives(effect, rivals, offset)
+            never = impossible_here(effect, {e: estimates[e] for e in causes})
+            alternatives = self._alternatives(effect, rivals, offset, never)
             if effect in self.gain_doubt.rivals:
                 self.notes.append(or_other_gains(effect))
             sides = sides_of(effect, [r.effect for r in rivals], masses := self.final.parameters.masses)
@@ -281,12 +318,17 @@ class Work:
             shorter = self.found.space.without(self.final, effect)
             self.take(compared(self.found, shorter, self._equivalent_here, self._say))
 
-    def _alternatives(self, effect: str, rivals: Sequence[Replacement], offset: Offset | None) -> tuple[str, ...]:
+    def _alternatives(
+        self, effect: str, rivals: Sequence[Replacement], offset: Offset | None, never: Collection[str]
+    ) -> tuple[str, ...]:
         """Rivals, equivalent effects and, where the loop is not the drive's, the controller; no untestable ones."""
         shown = shown_by_the_records(self.found.space, self.final, effect)
         here = sorted(self._equivalent_here(effect))
-        names = alternatives_of(effect, rivals, here, bool(shown), offset, not (self.data.slower and self.driving.in_doubt))
+        follows = not (self.data.slower and self.driving.in_doubt)
+        names = alternatives_of(effect, rivals, here, bool(shown), offset, follows, never)
         names += [OTHER_GAINS] * (effect in self.gain_doubt.rivals)
+        if self.form is not None and self.form.as_good(self.found.space.margin) and effect in in_series(self.final):
+            names.append(self.form.finding.effect)
         return tuple(n for n in dict.fromkeys(map(name_of, names)) if n != name_of(effect) and n not in self.not_testable)
 
     def _only_describes(self, effect: str, driver: str | None) -> bool:

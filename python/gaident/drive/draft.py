@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from gaident.axis import Text, said, say, unit, word
 from gaident.data.formats.units import Constants, factor, needed_constant
-from gaident.data.guess import Guess, guess_channels, position_and_velocity, unit_from_position, unit_from_velocity
+from gaident.data.guess import Guess, guess_channels, unit_from_position, unit_from_velocity
 from gaident.data.listing import Listing
 from gaident.data.timeaxis import SLOW_STEP, stamp_unit
 from gaident.data.torque_kind import kind_of_torque
+from gaident.drive.log_content import axes_of, gaps_of, with_content
 from gaident.errors import ReadError
 
 __all__ = ["DriveDraft", "draft"]
@@ -28,6 +29,8 @@ _CONSTANTS = {
     "torque_per_volt": ("0.24", say("{N m/V}")),
     "counts_per_turn": ("4096", Text("encoder counts per turn of the motor")),
 }
+SPACE = "where to look, if you know; what is not given is derived from the data"
+LIMITS = "what an experiment may do, for `gaident experiment`"
 _COMMENT = 26  # no decision: column where comments begin; column of a page
 
 
@@ -35,13 +38,15 @@ _COMMENT = 26  # no decision: column where comments begin; column of a page
 class DriveDraft:
     """text: the drive.toml; fill_in: what a person must add, one line each; channels: channel -> column.
 
-    torque_is: what the torque is, as its column's name says; None where it does not, or there is none.
+    torque_is: what the torque is, as its column's name says; None where it does not, or there is none, or there are several axes.
+    axes: their names where the log holds several; channels are called "NAME.velocity" then.
     """
 
     text: str
     fill_in: tuple[str, ...]
     channels: Mapping[str, str]
     torque_is: str | None
+    axes: tuple[str, ...] = ()
 
 
 def draft(listing: Listing, values: Mapping[str, NDArray[np.float64]]) -> DriveDraft:
@@ -49,43 +54,47 @@ def draft(listing: Listing, values: Mapping[str, NDArray[np.float64]]) -> DriveD
 
     Raises ReadError where the log holds nothing that could be a channel.
     """
-    guess = _with_content(listing, guess_channels(listing), values)
+    several = axes_of(listing)
+    if several:
+        drafts = {name: _Draft(own, with_content(own, guess, values), values, name) for name, (own, guess) in several.items()}
+        return _together(drafts)
+    guess = with_content(listing, guess_channels(listing), values)
     if not guess.channels and not any(c.samples > 1 for c in listing.columns):
         raise ReadError(f"{listing.path}: the log holds no column of more than one number; give a log of a run")
     return _Draft(listing, guess, values).done()
 
 
-def _with_content(listing: Listing, guess: Guess, values: Mapping[str, NDArray[np.float64]]) -> Guess:
-    """What no name tells: a pair of columns of which one is the derivative of the other."""
-    if "velocity" in guess.channels:
-        return guess
-    taken = {c.name for channel, c in guess.channels.items() if channel != "position"} | {guess.time.name if guess.time else ""}
-    # no decision: a shorter one shows no derivative
-    moving = [c for c in listing.columns if c.samples > 20 and c.lowest != c.highest and not c.note and not c.rises_evenly]
-    longest = max((c.samples for c in moving), default=0)
-    candidates = {c.name: values[c.name] for c in moving if c.samples == longest and c.name not in taken and c.name in values}
-    pair = position_and_velocity(candidates, 1.0) if len(candidates) <= 30 else None  # no decision: work; pairs of columns
-    if pair is None or ("position" in guess.channels and pair[0] != guess.channels["position"].name):
-        return guess
-    by_name = {c.name: c for c in listing.columns}
-    found = dict(zip(("position", "velocity"), (by_name[name] for name in pair), strict=True))
-    reasons = {"position": "the log's velocity is its derivative", "velocity": "the derivative of the log's position"}
-    rest = {channel: c for channel, c in guess.channels.items() if c.name not in pair}
-    return replace(guess, channels={**rest, **found}, reasons={**guess.reasons, **reasons})
+def _together(drafts: Mapping[str, _Draft]) -> DriveDraft:
+    """One file for several axes: the time above, what belongs to one axis below [axes.NAME]."""
+    first = next(iter(drafts.values()))
+    head = _HEAD.format(log=_quoted(Path(first.listing.path).name)).replace(" identify LOG", " diagnose LOG")
+    parts = [head, *first.clock(), "", "[columns]", *first.time(), "", "[units]", *first.unit_of_time(), ""]
+    fill = list(first.fill)
+    channels: dict[str, str] = {}
+    for name, d in drafts.items():
+        d.fill = []
+        parts += [f"[axes.{name}]", *d.of_axis(), "", *d.sections(), ""]
+        fill += [f"axes.{name}: {line}" for line in d.fill]
+        channels |= {f"{name}.{channel}": column.name for channel, column in d.guess.channels.items()}
+    return DriveDraft("\n".join(parts), tuple(fill), channels, None, tuple(drafts))
 
 
 class _Draft:
     """The lines, as they are put together."""
 
-    def __init__(self, listing: Listing, guess: Guess, values: Mapping[str, NDArray[np.float64]]) -> None:
+    def __init__(self, listing: Listing, guess: Guess, values: Mapping[str, NDArray[np.float64]], name: str = "") -> None:
         self.listing, self.guess, self.values = listing, guess, values
+        self.prefix = f"axes.{name}." if name else ""  # of the sections of one axis of several
         self.fill: list[str] = []
         self.units = {channel: column.unit for channel, column in guess.channels.items()}
         self.axis = "linear" if any(_is_linear(channel, unit) for channel, unit in self.units.items()) else "rotary"
         torque = guess.channels.get("torque")
         self.torque_is = None if torque is None else kind_of_torque((torque.name, *torque.names))
+        self.gaps, usual = gaps_of(values.get(guess.time.name) if guess.time else None)
         self.dt = (
-            next((c.sample_time for c in guess.channels.values() if c.sample_time is not None), None) or self._step_of_time()
+            next((c.sample_time for c in guess.channels.values() if c.sample_time is not None), None)
+            or (float(f"{usual * self._second():.9g}") if self.gaps else None)
+            or self._step_of_time()
         )
         self.compared: dict[str, tuple[str, str]] = {}  # channel -> (unit, what it was compared with)
         self._compare_velocity()
@@ -96,8 +105,14 @@ class _Draft:
         time = self.guess.time
         if time is None or not time.rises_evenly or time.lowest is None or time.highest is None or time.samples < 2:
             return time.sample_time if time is not None else None
-        second = factor("time", time.unit) if time.unit else stamp_unit(time.lowest)
-        return float(f"{(time.highest - time.lowest) / (time.samples - 1) * second:.9g}")
+        return float(f"{(time.highest - time.lowest) / (time.samples - 1) * self._second():.9g}")
+
+    def _second(self) -> float:
+        """One unit of the time column in s."""
+        time = self.guess.time
+        if time is None or time.lowest is None:
+            return 1.0
+        return factor("time", time.unit) if time.unit else stamp_unit(time.lowest)
 
     def _compare_velocity(self) -> None:
         """The unit of the velocity by comparison with the position, where the log does not say it."""
@@ -128,23 +143,23 @@ class _Draft:
             self.compared["command"] = found, "velocity"
 
     def done(self) -> DriveDraft:
-        top, columns, units = self._top(), self._columns(), self._units()
-        parts = [
-            _HEAD.format(log=_quoted(Path(self.listing.path).name)),
-            *top,
-            "",
-            "[columns]",
-            *columns,
-            "",
-            "[units]",
-            *units,
-            "",
-        ]
-        parts += [*self._controller(), "", *self._space(), "", *self._limits()]
+        head = _HEAD.format(log=_quoted(Path(self.listing.path).name))
+        parts = [head, *self.of_axis(), *self.clock(), "", *self.sections(), ""]
         names = {channel: column.name for channel, column in self.guess.channels.items()}
-        return DriveDraft("\n".join([*parts, ""]), tuple(self.fill), names, self.torque_is)
+        return DriveDraft("\n".join(parts), tuple(self.fill), names, self.torque_is)
 
-    def _top(self) -> list[str]:
+    def sections(self) -> list[str]:
+        """All sections of the axis."""
+        time = ([], []) if self.prefix else (self.time(), self.unit_of_time())
+        parts = [*self._section("columns", [*time[0], *self._columns()]), "", *self._section("units", [*self._units(), *time[1]])]
+        parts += ["", *self._section("controller", self._controller()), "", *self._section("space", self._space(), SPACE)]
+        return [*parts, "", *self._section("limits", self._limits(), LIMITS)]
+
+    def _section(self, name: str, lines: list[str], comment: str = "") -> list[str]:
+        return [_line(f"[{self.prefix}{name}]", comment), *lines]
+
+    def of_axis(self) -> list[str]:
+        """What stands at the top and belongs to the axis."""
         lines = [
             _line(
                 f'axis = "{self.axis}"',
@@ -153,18 +168,6 @@ class _Draft:
         ]
         if self.axis == "linear":
             lines.append(_line('# pitch = "24 mm"', "with which a cogging returns: pitch of the screw, or of the poles"))
-        time = self.guess.time
-        if time is None and self.dt is None:
-            lines.append(self._todo("# dt = 1e-3", "dt", "s; no column looks like time"))
-        elif self.dt is None:
-            lines.append(
-                self._todo(
-                    "# resample = 1e-3", "resample", f"s; the time stamps are irregular: {_plain(time.note if time else '')}"
-                )
-            )
-        else:
-            source = f"from the column {_quoted(time.name)}" if time is not None else "as the file states"
-            lines.append(_line(f"# dt = {self.dt:.9g}", f"s, {source}; needed for logs without it, and for gaident experiment"))
         for name in dict.fromkeys(needed_constant(channel, stated) for channel, stated in self.units.items() if stated):
             if name is not None:
                 value, meaning = _CONSTANTS[name]
@@ -184,13 +187,37 @@ class _Draft:
             _line("# gear_ratio = 10.0", 'turns of the motor per turn of the load, with load_side = ["position"], what was')
         )
         lines.append(_line("", "measured behind the gear"))
+        return lines
+
+    def clock(self) -> list[str]:
+        """What stands at the top and says how lines follow each other."""
+        lines = []
+        time = self.guess.time
+        if time is None and self.dt is None:
+            lines.append(self._todo("# dt = 1e-3", "dt", "s; no column looks like time"))
+        elif self.gaps:
+            some = "a gap" if self.gaps == 1 else f"{self.gaps} gaps"
+            lines.append(_line("pieces = true", f"the time has {some}: what lies around them are records of their own"))
+            lines.append(_line(f"# dt = {self.dt:.9g}", "s, between the gaps; needed for gaident experiment"))
+        elif self.dt is None:
+            lines.append(
+                self._todo(
+                    "# resample = 1e-3", "resample", f"s; the time stamps are irregular: {_plain(time.note if time else '')}"
+                )
+            )
+        else:
+            source = f"from the column {_quoted(time.name)}" if time is not None else "as the file states"
+            lines.append(_line(f"# dt = {self.dt:.9g}", f"s, {source}; needed for logs without it, and for gaident experiment"))
         lines.append(_line("# decimate = 10", "keep every tenth sample behind a low-pass, for very long logs"))
         return lines
 
+    def time(self) -> list[str]:
+        """The column of the time."""
+        found = self.guess.time
+        return [] if found is None else [_line(f"time = {_quoted(found.name)}", "" if found.is_time else "rises evenly")]
+
     def _columns(self) -> list[str]:
         lines = []
-        if self.guess.time is not None:
-            lines.append(_line(f"time = {_quoted(self.guess.time.name)}", "rises evenly" if not self.guess.time.is_time else ""))
         for channel, column in self.guess.channels.items():
             lines.append(_line(f"{channel} = {_quoted(column.name)}", self.guess.reasons.get(channel, "")))
         rest = [
@@ -214,13 +241,18 @@ class _Draft:
             if channel not in self.guess.channels:
                 either = self._either(channel)
                 told = f"{text}: {either}" if either else f"{text}{others}"
-                needed = bool(either) or other not in self.guess.channels
+                needed = bool(either) or (other not in self.guess.channels and not self._placed)
                 line = f'# {channel} = "..."'
                 lines.append(self._todo(line, channel, told) if needed else _line(line, told))
         for channel in ("position", "position_command"):
             if channel not in self.guess.channels and (either := self._either(channel)):
                 lines.append(_line(f'# {channel} = "..."', either))
         return lines
+
+    @property
+    def _placed(self) -> bool:
+        """Whether a position controller drives the axis: what it is given and what it reads are logged."""
+        return {"position", "position_command"} <= self.guess.channels.keys()
 
     def _either(self, *channels: str) -> str:
         """The columns of which one may be the channel, where only the user knows; "" where there are none."""
@@ -247,6 +279,11 @@ class _Draft:
                         f'# {channel} = "{si[channel]}"', f"units.{channel}", f"the log does not say it; {si[channel]} is taken"
                     )
                 )
+        return lines
+
+    def unit_of_time(self) -> list[str]:
+        """The unit of the time, where the log does not say it."""
+        lines: list[str] = []
         time = self.guess.time
         if time is not None and time.unit is None and (time.lowest is None or stamp_unit(time.lowest) == 1.0):
             if self.dt is not None and self.dt >= SLOW_STEP:
@@ -260,14 +297,19 @@ class _Draft:
         text = "as set in the drive"
         if "torque" in self.guess.channels:
             text += ', "unknown", or loop = "open"'
-        mark = self._todo if "command" in self.guess.channels else lambda line, _, comment: _line(line, comment)
+        alone = self._placed and not {"command", "torque"} & self.guess.channels.keys()
+        mark = self._todo if alone or "command" in self.guess.channels else lambda line, _, comment: _line(line, comment)
         torque = word("torque", self.axis)
         positioned = "position_command" in self.guess.channels
+        place = "# position_gain = 40.0"
+        if alone:
+            gain = self._todo(place, "controller.position_gain", "1/s; position command and position drive the loop")
+        else:
+            gain = _line(place, "1/s; without it the velocity command drives the loop")
         return [
-            "[controller]",
             mark("# kp = 0.0232", "controller.kp", f"{unit('N m s/rad', self.axis)}; proportional gain {text}"),
             mark("# ki = 1.367", "controller.ki", f"{unit('N m/rad', self.axis)}; integral gain"),
-            *([_line("# position_gain = 40.0", "1/s; without it the velocity command drives the loop")] if positioned else []),
+            *([gain] if positioned else []),
             _line('# loop = "sampled"', f'a digital drive; or "continuous"; or "open": the {torque} drives the model'),
             _line("# torque_limit = 2.4", "a known limit of the controller, and integrator_limit"),
             _line('# drive = "sinamics"', "with p1460 and p1462 in place of kp and ki: gains as the drive shows them"),
@@ -276,13 +318,12 @@ class _Draft:
 
     def _space(self) -> list[str]:
         return [
-            "[space]                   # where to look, if you know; what is not given is derived from the data",
             _line("# inertia = [1e-4, 5e-3]", said(Text("total inertia at the motor, kg m^2", "total mass, kg"), self.axis)),
             _line("# resonance_hz = [5, 200]", "where the mechanism may resonate"),
         ]
 
     def _limits(self) -> list[str]:
-        lines = ["[limits]                  # what an experiment may do, for `gaident experiment`"]
+        lines = []
         for name, channels, rotary in (("speed", ("velocity", "command"), "rad/s"), ("torque", ("torque",), "N m")):
             largest = self._largest(channels)
             if largest is None:

@@ -285,7 +285,7 @@ def unfilled_of(path: str, axis: str | None = None) -> dict[tuple[str, str], str
     found, section = {}, ""
     for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):
         if (header := _SECTION.match(line)) is not None:
-            section = header[1]
+            section = "" if header[1] == f"axes.{axis}" else header[1]
         elif (mark := _MARK.match(line)) is not None:
             found[section.removeprefix(f"axes.{axis}."), mark[1]] = f"{path}: line {number}"
     return found

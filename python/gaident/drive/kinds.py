@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from gaident.axis import AXES
 from gaident.checks import one_of, real_number
-from gaident.data.formats.units import factor
+from gaident.data.formats.units import factor, of_other_axis
 from gaident.data.record import CHANNELS
 from gaident.data.torque_kind import TORQUE_KINDS
 from gaident.errors import ReadError
@@ -87,6 +87,8 @@ def length(value: object, name: str) -> float:
     if isinstance(value, str):
         number_, _, unit_ = value.strip().partition(" ")
         try:
+            if of_other_axis("position", unit_.strip(), "linear"):
+                raise ValueError(unit_)
             return positive(float(number_) * factor("position", unit_.strip()), name)
         except (ValueError, ReadError):
             raise ReadError(f'{name} is {value!r}: give a length in m, or with its unit, "24 mm"') from None

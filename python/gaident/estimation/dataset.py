@@ -24,10 +24,12 @@ from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.estimation.mean_velocity import means, with_middles
+from gaident.estimation.period import period_of_place
 from gaident.estimation.term import Term
 from gaident.models.drive_torque import late, torque_of
 from gaident.models.simulate_many import LoadedRecord
-from gaident.models.starts import noise_std, starts_moving, stored_torque
+from gaident.models.starts import noise_std, starts_moving
+from gaident.models.stored_torque import stored_torque
 
 __all__ = ["DataSet", "with_angle"]
 
@@ -48,7 +50,8 @@ class DataSet:
     shorter [s]; resolution: step of the lattice that all velocities lie on [rad/s], 0: none; known_noise: standard deviation
     of the velocity's noise where the records cannot show it; loop_follows: whether the logged torque is what the controller
     makes; torque_measured: whether it is a measured one, with noise on it, behind the actuator; axis: "rotary" or "linear".
-    period: with which returns what is tied to the place [rad, m], of which orders count; None: not known.
+    period: with which returns what is tied to the place [rad, m], of which orders count; None: not known. period_seen: it is the
+    one that the records show.
     age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample old. What
     drives a model is late by as much, here and in the loop that is simulated.
     """
@@ -68,6 +71,7 @@ class DataSet:
     torque_measured: bool = False
     axis: str = "rotary"
     period: float | None = TURN
+    period_seen: bool = False
     age: float = 0.0
 
     @classmethod
@@ -91,10 +95,16 @@ class DataSet:
         found = cls(tuple(records), controller, driven, turned, free, moving, spoiled, seen, resolution=resolution)
         return replace(found, torque_measured=measured, axis=axis, period=period_of(axis, pitch))
 
-    def under(self, controller: PI) -> DataSet:
-        """The same records, whose torque is not logged, under a PI with other gains."""
-        driven = tuple(_driven(r, torque_of(r, controller)) for r in self.records)
+    def under(self, controller: Controller) -> DataSet:
+        """The same records, whose torque is not logged, under another controller."""
+        pi = bare_pi(controller)
+        driven = tuple(_driven(r, controller.torque_of(r) if pi is None else torque_of(r, pi)) for r in self.records)
         return replace(self, controller=controller, driven=driven, free=_freed(self.records, driven))
+
+    def with_its_period(self) -> DataSet:
+        """The same with the period that the records show, where none is known."""
+        shown = period_of_place(self.driven) if self.period is None else None
+        return self if shown is None else replace(self, period=shown, period_seen=True)
 
     def aged(self, lines: float) -> DataSet:
         """The same with a measured velocity that is so many lines of the log old."""
@@ -152,8 +162,8 @@ class DataSet:
 
     @cached_property
     def torque_logged(self) -> bool:
-        """Whether every record holds the controller's torque."""
-        return all(r.torque is not None for r in self.records)
+        """Whether every record holds the controller's torque, and not one that the given controller was made to give."""
+        return all(r.torque is not None for r in (self.read or self.records))
 
     @cached_property
     def substeps(self) -> int:
@@ -172,16 +182,20 @@ class DataSet:
 
     @cached_property
     def loopable(self) -> bool:
-        """Whether command and controller can drive a model too, from rest."""
-        if self.loop is None or any(self.moving) or not self.from_rest or (self.slower and not self.loop_follows):
+        """Whether command and controller can drive a model too, from standstill: of a log at the controller's rate, whose torque
+        is as good, only where the integrator was empty."""
+        if self.loop is None or any(self.moving) or (self.slower and not self.loop_follows):
+            return False
+        if self.pi is not None and any(self.stored):
             return False
         loop = self.loop
         return all(loop.command_of(r) is not None for r in self.records)
 
     @cached_property
-    def from_rest(self) -> bool:
-        """Whether the integrator held no torque before any of the records."""
-        return self.pi is None or not any(stored_torque(r, self.pi) for r in self.records)
+    def stored(self) -> tuple[float, ...]:
+        """What the integrator held before each of the records, for a load [N m]."""
+        loop = None if self.controller is None else self.controller.simulated_with(self.dt)
+        return tuple(0.0 if loop is None else stored_torque(r, loop) for r in self.records)
 
     @cached_property
     def loop(self) -> Controller | None:

@@ -227,6 +227,14 @@ class Parameterisation:
             own = np.array([np.convolve(s, np.poly(r).real) for s, r in zip(own, roots, strict=True)])
         return own
 
+    def standing(self, count: int, held: float) -> Matrix | None:
+        """So many rows of start states in a loop whose integrator held a torque [N m] at standstill; None where it held none."""
+        if held == 0.0:
+            return None
+        s = self.structure
+        own = s.real_poles + 2 * s.pole_pairs + sum(2 for t in self.terms if t.poles is not None)
+        return np.concatenate([np.zeros((count, own)), np.full((count, 1), held)], axis=1)
+
     def linear(self, x: Vector) -> Model:
         """The linear mechanism of one x."""
         values = self.base_values(x[None, :])[0]

@@ -129,7 +129,13 @@ class ClosedLoop:
         steps = substeps(data, parameters.terms)
         records = data.records if self.own_angle else data.turned
         loaded = data.loaded(records, data.loop)
-        return _side_by_side([r.velocities(parameters.structure, names, values, substeps=steps) for r in loaded])
+        starts = [parameters.standing(len(X), held) for held in data.stored]
+        return _side_by_side(
+            [
+                r.velocities(parameters.structure, names, values, initial_states=start, substeps=steps)
+                for r, start in zip(loaded, starts, strict=True)
+            ]
+        )
 
     def torque_response(self, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
         """See `Predictor`; the controller answers: G d - T (G d), T the closed loop's response to the command.
@@ -202,7 +208,8 @@ def _of_true_angle(
         for true_angle, own in bent:
             assert true_angle is not None
             angle = true_angle(angle, driven.velocity, own)
-        states = None if controller is not None else parameters.start_values(x[None, :], i)
+        closed = controller is not None
+        states = parameters.standing(1, data.stored[i]) if closed else parameters.start_values(x[None, :], i)
         turned = with_angle(record, angle)
         ready = data.ready(turned, i) if controller is None else turned
         taken = data.steps_of(steps) if controller is None else steps

@@ -41,6 +41,7 @@ class Scales:
     two_masses: bool
     integral: float  # N m, largest torque: no integrator state is larger
     blocks: int = 1  # samples of the log in one of dt: a long record is searched on a coarser grid first
+    period_seen: bool = False  # with which length the place returns is what the records show: a fit may move it
 
     @property
     def log_dt(self) -> float:
@@ -54,7 +55,8 @@ class Term:
 
     natural: coordinates (n, k) -> parameters (n, m) in the order of the effects table; coordinates: its inverse for one vector.
     limits, starts: bounds (k pairs) and start rows for given scales. steps: size of each coordinate that makes a difference; 0
-    for one that is chosen by search, not by slope (an order). nested: names of simpler effects that this one contains.
+    for one that is chosen by search, not by slope (an order, of a period that is known). nested: names of simpler effects that
+    this one contains.
     family: of effects that exclude each other in one model, "" for none; excludes: names of others that it does not stand beside;
     beside: names of others of which it needs one in the model, on whose torque its own depends; empty where it needs none.
     """
@@ -115,6 +117,11 @@ class Term:
     def in_controller(self) -> bool:
         """Whether it changes what the controller makes of command and velocity."""
         return self.limiting is not None
+
+    @property
+    def in_series(self) -> bool:
+        """Whether it is linear: a delay, a lag, a filter or a resonance between the torque and the measured velocity."""
+        return not (self.domains or self.harmonic or self.in_controller)
 
     @property
     def in_coupling(self) -> bool:

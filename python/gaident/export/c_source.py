@@ -32,7 +32,7 @@ from gaident.models.model import Model
 from gaident.models.simulation_input import checked_substeps
 from gaident.version import version
 
-__all__ = ["c_source", "write_c"]
+__all__ = ["c_name", "c_source", "write_c"]
 
 FINEST = 16  # no decision: substeps that the core takes at most by itself; substeps
 
@@ -48,12 +48,17 @@ def write_c(
 ) -> str:
     """Writes the file, where a path is given, and returns its text; see `Model.to_c`."""
     if name is None:
-        name = re.sub(r"\W", "_", Path(path).stem) if path is not None else "drive"
-        name = f"drive_{name}" if not name or name[0].isdigit() else name
+        name = "drive" if path is None else c_name(Path(path).stem)
     text = c_source(model, dt, controller, name, substeps, axis)
     if path is not None:
         write_whole(path, text.encode())
     return text
+
+
+def c_name(stem: str) -> str:
+    """A name that C takes, of the file that the source goes to."""
+    name = re.sub(r"[^A-Za-z0-9_]", "_", stem)
+    return name if re.match(r"[A-Za-z]", name) else f"drive_{name}"
 
 
 def c_source(model: Model, dt: float, controller: PI | None, name: str, substeps: int | None, axis: str = "rotary") -> str:

@@ -6,6 +6,8 @@ from dataclasses import asdict
 from math import nan
 from typing import Any
 
+from gaident.results.estimate import of_axis
+
 __all__ = ["diagnosis_table", "identification_table"]
 
 
@@ -38,7 +40,8 @@ def diagnosis_table(dia: Any) -> Any:
     """One row per parameter of each finding; see `Diagnosis.to_pandas`."""
     rows = []
     for order, finding in enumerate(dia.findings, 1):
-        for name, estimate in finding.parameters.items():
+        for name in finding.parameters:
+            estimate = of_axis(name, finding.parameters[name], dia.axis)
             rows.append(
                 {
                     "order": order,

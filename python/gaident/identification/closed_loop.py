@@ -16,7 +16,7 @@ from gaident.data.record import Record
 from gaident.errors import RecordError
 from gaident.identification.logged_torque import corrected, not_followed
 from gaident.identification.space import derive_space
-from gaident.models.drive_torque import straight_driven, torque_driven
+from gaident.models.drive_torque import as_old_as_its_velocity, straight_driven, torque_driven
 from gaident.models.search_space import SearchSpace
 from gaident.models.starts import starts_moving
 from gaident.results.estimate import Estimate
@@ -62,6 +62,7 @@ def looped_over(records: Sequence[Record], controller: Controller | None, space:
         return Looped(straight, None, (*torque_driven(records, controller).notes, *doubts, NOT_THE_LOOP))
     driven = torque_driven(records, controller)
     given = [r.with_channels(command=None) for r in driven.records] if driven.slower else list(driven.records)
+    given = given if driven.slower or driven.loop is not None else [as_old_as_its_velocity(r) for r in given]
     return Looped(given, driven.loop, (*driven.notes, *driven.doubts, *doubts))
 
 

@@ -16,15 +16,18 @@ from gaident.control.pi import PI, bare_pi
 from gaident.control.pi_torque import pi_block
 from gaident.control.ticks import at_the_clock, smooth_between
 from gaident.data.record import Record
+from gaident.data.signals.difference import is_backward_difference
 from gaident.errors import RecordError
-from gaident.models.starts import starts_moving
+from gaident.models.starts import constant_beside, starts_moving
 from gaident.policy.table import POLICY
 
 __all__ = [
     "Driven",
+    "as_old_as_its_velocity",
     "driven_by",
     "follows_not",
     "late",
+    "made_at_its_clock",
     "made_by",
     "straight_driven",
     "torque_blocks",
@@ -33,6 +36,8 @@ __all__ = [
 ]
 
 Vector = NDArray[np.float64]
+
+HALF = 0.5  # no decision: of a sample, the age of a mean over it
 
 
 class Driven(NamedTuple):
@@ -72,7 +77,9 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
         if rec.torque is None or not controller.replayable(rec):
             continue
         known = len(rec) - controller.ahead(rec.dt)
-        off = float(np.sqrt(np.mean((rec.torque - controller.torque_of(rec))[:known] ** 2)))
+        left = (rec.torque - controller.torque_of(rec))[:known]
+        left = left - constant_beside(left, float(np.abs(rec.torque).max()))
+        off = float(np.sqrt(np.mean(left**2)))
         size = float(np.sqrt(np.mean(rec.torque**2)))
         if off > POLICY.negligible * size:
             doubts.append(follows_not(rec.name if len(records) > 1 else "", off, size))
@@ -125,16 +132,24 @@ def _at_its_clock(rec: Record, torque: Vector, controller: Controller) -> Vector
     straight. Where that changes more from line to line than the torque itself, the torque goes straight.
     """
     every = controller.log_every(rec.dt)
-    source = controller.command_of(rec)
-    if source is not None and all(getattr(rec, channel) is not None for channel in controller.reads):
-        placed = controller.driven_by == "position_command"
-        ticks = controller.ticks(rec.dt, source, rec.position if placed else None)
-        made = core.servo_torque(rec.dt, ticks, smooth_between(rec.velocity, every), controller.core_loop(rec.dt))
+    made = made_at_its_clock(rec, controller)
+    if made is not None:
         off = torque - made[::every]
         if np.sum(np.diff(off) ** 2) < np.sum(np.diff(torque) ** 2):
             between: Vector = made + at_the_clock(off, every)
             return between
     return at_the_clock(torque, every)
+
+
+def made_at_its_clock(rec: Record, controller: Controller) -> Vector | None:
+    """The torque that a controller makes from rest at all of its samples [N m] (n every,), of command and of the velocity smooth
+    between the lines; None where the record lacks what it reads."""
+    source = controller.command_of(rec)
+    if source is None or any(getattr(rec, channel) is None for channel in controller.reads):
+        return None
+    ticks = controller.ticks(rec.dt, source, rec.position if controller.driven_by == "position_command" else None)
+    velocity = smooth_between(rec.velocity, controller.log_every(rec.dt))
+    return core.servo_torque(rec.dt, ticks, velocity, controller.core_loop(rec.dt))
 
 
 def late(torque: Vector, delay: float, before: float) -> Vector:
@@ -146,6 +161,17 @@ def late(torque: Vector, delay: float, before: float) -> Vector:
     f = delay - m
     padded = np.concatenate([np.full(m + 1, before), torque])
     return f * padded[: len(torque)] + (1.0 - f) * padded[1 : 1 + len(torque)] if delay > 0.0 else torque
+
+
+def as_old_as_its_velocity(rec: Record) -> Record:
+    """The record with a torque that is half a sample late where its velocity is the difference of its last two positions.
+
+    Such a velocity is the mean over the last sample: under that torque a linear model gives it to second order in dt.
+    """
+    if rec.torque is None or not is_backward_difference(rec.velocity, rec.position, rec.dt):
+        return rec
+    before = rec.torque[0] if starts_moving(rec, None) else 0.0
+    return rec.with_channels(torque=late(rec.torque, HALF, before))
 
 
 def made_by(rec: Record, controller: Controller) -> Vector:

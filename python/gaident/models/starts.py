@@ -7,12 +7,10 @@ from numpy.typing import NDArray
 
 from gaident.axis import Text, say
 from gaident.control.controller import Controller
-from gaident.control.pi import PI
-from gaident.control.pi_torque import pi_torque
 from gaident.data.record import Record
 from gaident.policy.table import POLICY
 
-__all__ = ["doubtful_start", "noise_std", "starts_moving", "stored_torque", "stretches"]
+__all__ = ["constant_beside", "doubtful_start", "noise_std", "starts_moving", "stretches"]
 
 
 def noise_std(velocity: NDArray[np.float64], step: float = 0.0) -> float:
@@ -61,17 +59,15 @@ def starts_moving(rec: Record, controller: Controller | None) -> bool:
     return _first_is_motion(rec, controller) and not _constant_input(rec, controller)
 
 
-def stored_torque(rec: Record, pi: PI) -> float:
-    """What the integrator held before a record [N m], for a load: the logged torque's constant distance from the replayed one.
+def constant_beside(off: NDArray[np.float64], size: float) -> float:
+    """The mean of what a torque of this size is off by [N m], where it stands out of the rest and is not to be neglected; or 0.
 
-    0 where that does not stand out of what else is off, or nothing shows it.
+    That is what an integrator held before the record, for a load, where `off` is the logged torque minus that made from rest.
     """
-    if rec.torque is None or rec.command is None:
+    if not len(off):
         return 0.0
-    off = rec.torque - pi_torque(rec.command, rec.velocity, rec.dt, pi)
     held = float(np.mean(off))
-    aside = max(POLICY.above_noise * float(np.std(off)), POLICY.negligible * float(np.abs(rec.torque).max()))
-    return held if abs(held) > aside else 0.0
+    return held if abs(held) > max(POLICY.above_noise * float(np.std(off)), POLICY.negligible * size) else 0.0
 
 
 def doubtful_start(rec: Record, controller: Controller | None) -> Text | None:

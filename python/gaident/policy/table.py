@@ -187,7 +187,7 @@ class Policy:
     )
     check_share: float = check(0.1, "1", "part of the larger value: a smaller difference does not matter", DRIVES)
     check_torque: float = check(
-        0.05, "1", "of the torque's rms: a smaller difference of friction or gravity does not matter", REAL
+        0.05, "1", "of the torque's rms: a smaller difference of friction, gravity or force errors does not matter", REAL
     )
     velocity_part: float = check(
         0.95,

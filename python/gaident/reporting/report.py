@@ -45,7 +45,7 @@ def report(
 
     From top to bottom: the verdict, measured against simulated, what is wrong, cause and evidence, parameters, before and after,
     what could not be tested, the next experiment with its command as CSV, how it was computed.
-    About 5 MB, most of it plotly.js.
+    About 2.5 MB, most of it plotly.js, packed: a browser older than 2023 shows pictures.
     The file appears whole or not at all.
 
     Parameters

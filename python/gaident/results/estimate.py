@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
-__all__ = ["Estimate"]
+from gaident.axis import unit
+
+__all__ = ["ANGULAR", "Estimate", "of_axis"]
+
+ANGULAR = frozenset({"phase", "frequency", "zero_frequency", "bandwidth"})
+"""Parameters of effects that are an angle within a period or an angular frequency: in rad and rad/s on a linear axis too."""
 
 
 @dataclass(frozen=True)
@@ -38,3 +44,13 @@ class Estimate:
     unit: str
     at_bound: bool = False
     identifiable: bool = True
+
+
+def of_axis(name: str, estimate: Estimate, axis: str) -> Estimate:
+    """A parameter as a reader of the axis has it: on a linear one N for N m, and an order in periods to a metre.
+
+    There a model counts an order as a rotary axis does, periods in 2 pi m: 628.3 of it are 100 1/m.
+    """
+    if axis == "linear" and estimate.unit == "1/turn":
+        return replace(estimate, value=estimate.value / math.tau, std=estimate.std / math.tau, unit="1/m")
+    return estimate if name in ANGULAR else replace(estimate, unit=unit(estimate.unit, axis))

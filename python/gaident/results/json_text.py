@@ -7,7 +7,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["decoded", "json_text"]
+from gaident.results.estimate import Estimate, of_axis
+
+__all__ = ["decoded", "json_text", "on_axis"]
+
+ROOTS = "rad/s"
+"""Unit of the poles and zeros of a model, on a linear axis too: no motion of the axis."""
 
 
 def json_text(data: Mapping[str, Any]) -> str:
@@ -37,3 +42,27 @@ def decoded(x: Any) -> Any:
     if isinstance(x, list):
         return [decoded(v) for v in x]
     return x
+
+
+def on_axis(data: Mapping[str, Any], axis: str) -> dict[str, Any]:
+    """Plain data of a result in the words and units of its axis: what `to_dict` gives has those of a rotary one.
+
+    Its sentences on a linear axis, `linear_axis`, stand in the places of the others then.
+    """
+    return dict(data) if axis == "rotary" else _on_linear(dict(data), {}, "", False)
+
+
+def _on_linear(x: Any, sentences: Mapping[str, str], name: str, of_model: bool) -> Any:
+    """name: the key above x; of_model: whether x is one of the numbers of a linear model."""
+    if isinstance(x, list):
+        return [_on_linear(v, sentences, name, of_model) for v in x]
+    if not isinstance(x, dict):
+        return sentences.get(x, x) if isinstance(x, str) else x
+    if {"value", "std", "unit"} <= x.keys():
+        if of_model and x["unit"] == ROOTS:
+            return x
+        e = of_axis(name, Estimate(x["value"], x["std"], x["unit"]), "linear")
+        return {**x, "value": e.value, "std": e.std, "unit": e.unit}
+    known = {**sentences, **x.get("linear_axis", {})}
+    numbers = "fitness" in x and "model" in x  # of an identification
+    return {k: _on_linear(v, known, k, of_model or (numbers and k == "parameters")) for k, v in x.items() if k != "linear_axis"}

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from gaident.axis import Text, called, identifier_words, joined, said, say, unit, velocity_unit, word
 from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
-from gaident.results.estimate import Estimate
+from gaident.results.estimate import Estimate, of_axis
 from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
@@ -32,7 +32,6 @@ __all__ = [
 
 WIDTH = 100  # no decision: letters of a line
 TESTED_UP_TO = "Tested up to what these records asked for"
-NOT_OF_THE_AXIS = ("phase", "frequency", "zero_frequency")  # an angle within a period and angular frequencies: rad on any axis
 DRIVERS = {
     "velocity": "on the velocity",
     "position": "on the position",
@@ -147,13 +146,11 @@ def chance_words(finding: Finding, bootstrap: int) -> str:
 
 def parameter_row(name: str, e: Estimate, axis: str, scales: Scales) -> tuple[str, str, str, str, str]:
     """Name, value with its standard deviation, unit, the same in the user's unit, remark."""
-    value, std, u = e.value, e.std, e.unit
-    if axis == "linear" and u == "1/turn":  # a turn is 2 pi m
-        value, std, u = value / math.tau, std / math.tau, "1/m"
-        return identifier_words(name, axis), with_std(value, std), u, "", f"every {number(1e3 / value)} mm" if value > 0.0 else ""
-    elif name not in NOT_OF_THE_AXIS:
-        u = unit(u, axis)
-    remark = "at a bound" if e.at_bound else "" if e.identifiable else "not determined"
+    shown = of_axis(name, e, axis)
+    value, std, u = shown.value, shown.std, shown.unit
+    doubt = "at a bound" if e.at_bound else "" if e.identifiable else "not determined"
+    every = f"every {number(1e3 / value)} mm" if u == "1/m" and value > 0.0 else ""
+    remark = ", ".join(part for part in (every, doubt) if part)
     return identifier_words(name, axis), with_std(value, std), "" if u == "1" else u, beside(scales, name, value, std, u), remark
 
 

@@ -24,7 +24,8 @@ def force_rows(dia: Diagnosis, axis: str) -> list[tuple[str, str, str]]:
 
 def force_words(dia: Diagnosis, axis: str) -> str:
     """What the force error is, and where it is the figure to go by."""
-    text = say("The logged {torque} minus the {torque} that the model needs for the measured motion.")
+    which = "logged {torque}" if dia.torque_logged else "{torque} that the controller makes of the logged signals"
+    text = say("The " + which + " minus the {torque} that the model needs for the measured motion.")
     if dia.force_reason:
         text = say("{} It is the figure to go by here: {}.", text, dia.force_reason)
     return said(text, axis)

@@ -14,10 +14,10 @@ import numpy as np
 
 from gaident.axis import unit as unit_of
 from gaident.checks import one_of, real_number
-from gaident.data.formats.units import Constants, factor
+from gaident.data.formats.units import Constants, factor, known_units, of_other_axis
 from gaident.errors import SettingsError
 from gaident.results.diagnosis import Diagnosis
-from gaident.results.estimate import Estimate
+from gaident.results.estimate import ANGULAR, Estimate, of_axis
 from gaident.results.identification import Identification
 from gaident.show.chart import Chart, Panel, Trace
 from gaident.show.wording import number, with_std
@@ -32,7 +32,6 @@ Scales = Mapping[str, tuple[str, float]]
 """SI unit as the axis has it -> (the user's unit, its number in one SI unit)."""
 
 _SI = {"velocity": "rad/s", "torque": "N m", "position": "rad"}
-_ANGULAR = ("frequency", "zero_frequency", "bandwidth")  # angular frequencies: no motion of the axis
 _TITLE = re.compile(r"\[([^\]]+)\]$")
 
 
@@ -40,7 +39,8 @@ def scales_of(units: Mapping[str, str | float] | None, axis: str) -> Scales:
     """The user's units: {"velocity": "rpm", "torque": "%", "position": "deg"}, and the constants that they need.
 
     Constants are those of `gaident.read` (rated_torque, torque_constant, counts_per_turn).
-    Raises SettingsError for another key, ReadError for a unit that is not known or that lacks its constant.
+    Raises SettingsError for another key and for a unit of the other kind of axis, ReadError for one that is not known or that
+    lacks its constant.
     """
     if units is None:
         return {}
@@ -56,6 +56,9 @@ def scales_of(units: Mapping[str, str | float] | None, axis: str) -> Scales:
             continue
         if not isinstance(wanted, str):
             raise SettingsError(f"units: {quantity} is {wanted!r}: name a unit, for example 'rpm'")
+        if of_other_axis(quantity, wanted, axis):
+            listed = ", ".join(known_units(quantity, axis))
+            raise SettingsError(f"units: {quantity} is {wanted!r}, which no {axis} axis is measured in: give one of {listed}")
         size, si = factor(quantity, wanted, constants), unit_of(rotary, axis)
         if wanted != si:
             found[si] = wanted, 1.0 / size
@@ -64,7 +67,7 @@ def scales_of(units: Mapping[str, str | float] | None, axis: str) -> Scales:
 
 def beside(scales: Scales, name: str, value: float, std: float | None, si: str) -> str:
     """A value in the user's unit, "5.01 +- 0.02 %"; "" where it has none."""
-    if si not in scales or name in _ANGULAR or not np.isfinite(value):
+    if si not in scales or name in ANGULAR or not np.isfinite(value):
         return ""
     shown, size = scales[si]
     return f"{with_std(size * value, None if std is None else size * std) if std else number(size * value)} {shown}"
@@ -88,8 +91,8 @@ def shown_in(result: Diagnosis | Identification, scales: Scales, axis: str) -> d
 
 
 def _estimate(name: str, e: Estimate, scales: Scales, axis: str) -> dict[str, object]:
-    si = unit_of(e.unit, axis)
-    shown, size = (si, 1.0) if name in _ANGULAR else scales.get(si, (si, 1.0))
+    e = of_axis(name, e, axis)
+    shown, size = (e.unit, 1.0) if name in ANGULAR else scales.get(e.unit, (e.unit, 1.0))
     return {"value": size * e.value, "std": None if e.std is None else size * e.std, "unit": shown}
 
 

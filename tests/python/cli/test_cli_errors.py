@@ -31,6 +31,11 @@ def test_messages_speak_of_options(here: Path, capsys: pytest.CaptureFixture[str
             "set --columns time= to trust dt",
         ),
         (
+            f"give {arg('columns', repr('M soll [%]'), 'torque')}",
+            "give columns={'torque': 'M soll [%]'}",
+            "give --columns 'torque=M soll [%]'",
+        ),
+        (
             f"give {arg('units', repr('ms'), 'time')}; give {arg('dt')} [s] then",
             "give units={'time': 'ms'}; give dt= [s] then",
             "give --units time=ms; give --dt [s] then",

@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import runpy
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +46,16 @@ def test_c_is_what_the_model_writes(here: Path, result: ga.Diagnosis, capsys: py
     assert "give --dt" in capsys.readouterr().err
 
 
+def test_c_of_any_file_name_compiles(here: Path) -> None:
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler: cc")
+    for stem in ("1run", "achse-ä", "int", "_"):
+        assert main(["export", "run.json", "--to", "c", "--dt", "1e-3", "--out", f"{stem}.c"]) == 0
+        done = subprocess.run([compiler, "-std=c99", "-Wall", "-Werror", "-c", f"{stem}.c", "-o", "any.o"], capture_output=True)
+        assert done.returncode == 0, done.stderr.decode()
+
+
 def test_a_python_file_makes_the_plant(here: Path, result: ga.Diagnosis, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", "run.json", "--to", "scipy"]) != 0
     assert "coulomb_friction" in capsys.readouterr().err
@@ -66,6 +78,10 @@ def test_a_table_of_all_numbers(here: Path, result: ga.Diagnosis) -> None:
     assert main(["export", "run.json", "--to", "csv", "--axis", "linear", "--out", "linear.csv"]) == 0
     assert ",N\n" in Path("linear.csv").read_text()
     assert main(["export", "idn.json", "--to", "csv"]) == 0 and "model,gain" in Path("idn.csv").read_text()
+    assert main(["export", "idn.json", "--to", "csv", "--axis", "linear", "--out", "linear.csv"]) == 0
+    lines = Path("linear.csv").read_text().splitlines()
+    units = {line.split(",")[1]: line.rpartition(",")[2] for line in lines if line.startswith("model,")}
+    assert units.pop("gain") == "m/s^2/N" and set(units.values()) == {"rad/s"}  # poles are no motion of the axis
 
 
 def test_a_record_is_no_result(here: Path, result: ga.Diagnosis, capsys: pytest.CaptureFixture[str]) -> None:

@@ -54,6 +54,17 @@ def test_a_wrong_ratio_of_the_gains_is_found_and_is_no_mechanics(wrong: float, f
         assert dia.causes[1].parameters["torque"].value == pytest.approx(FRICTION, rel=0.01)
 
 
+def test_a_given_identification_is_not_replaced_in_silence() -> None:
+    """And the gain of a second round counts against the model under the given gains, not against that of the first round."""
+    rec, given = record(), ga.PI(TRUE.kp, 0.85 * TRUE.ki)
+    idn = ga.identify(rec, given)
+    dia = ga.diagnose(rec, given, idn)
+    assert dia.identification.controller != given and any("another one, under the gains that were found" in n for n in dia.notes)
+    assert dia.causes[0].delta_bic > 100.0
+    right = ga.identify(rec, TRUE)
+    assert not any("another one" in n for n in ga.diagnose(rec, TRUE, right).notes)
+
+
 def test_what_gains_would_explain_as_well_has_them_beside_its_name() -> None:
     """Gains that are both a tenth too low, and a limit that is given, are the same as a lower limit."""
     free, rng = record(), np.random.default_rng(3)

@@ -38,12 +38,23 @@ def test_the_pieces_around_gaps_are_records_of_their_own(tmp_path: Path) -> None
         ga.read(path, COLUMNS)
     found = ga.read_pieces(path, COLUMNS)
     assert [(rec.name, len(rec)) for rec in found] == [("run 1", 300), ("run 2", 500), ("run 3", 200)]
-    assert "1 piece of the log of fewer than 20 lines left out" in found[0].notes[0] and not found[1].notes
+    assert "1 piece of the log of fewer than 20 samples left out" in found[0].notes[0] and not found[1].notes
     whole = ga.read(log(tmp_path / "whole.csv"), COLUMNS)
     np.testing.assert_array_equal(found[1].velocity, whole.velocity[400:900])
     assert all(rec.dt == pytest.approx(1e-3, rel=1e-9) for rec in found)
     mechanics = ga.identify(found).mechanics
     assert isinstance(mechanics, ga.OneMass) and pytest.approx(0.01, rel=0.01) == mechanics.J
+
+
+def test_pieces_are_counted_as_they_are_read(tmp_path: Path) -> None:
+    """A piece of 50 lines is too short once every fifth line is kept."""
+    path = log(tmp_path / "run.csv", ((300, 350), (400, 500)))
+    assert [len(rec) for rec in ga.read_pieces(path, COLUMNS)] == [300, 50, 700]
+    for coarser in ({"decimate": 5}, {"resample": 0.001, "decimate": 5}):
+        found = ga.read_pieces(path, COLUMNS, **coarser)
+        assert [len(rec) for rec in found] == [60, 140] and "1 piece of the log" in found[0].notes[0]
+    with pytest.raises(ReadError, match="no piece of 20 samples"):
+        ga.read_pieces(path, COLUMNS, decimate=50)
 
 
 def test_a_part_by_its_times(tmp_path: Path) -> None:
@@ -60,7 +71,7 @@ def test_a_part_by_its_times(tmp_path: Path) -> None:
 def test_what_leaves_nothing_is_refused(tmp_path: Path) -> None:
     path = log(tmp_path / "run.csv")
     for bounds in ({"start": 1.3}, {"start": 0.1, "stop": 0.11}):
-        with pytest.raises(ReadError, match="no piece of 20 lines"):
+        with pytest.raises(ReadError, match="no piece of 20 samples"):
             ga.read_pieces(path, COLUMNS, **bounds)
     with pytest.raises(ReadError, match=r"start=0\.5 and stop=0\.2: the first has to be the earlier one"):
         ga.read_pieces(path, COLUMNS, start=0.5, stop=0.2)

@@ -100,6 +100,16 @@ def test_a_model_that_loses_to_the_regression_is_told_so_whatever_its_deviations
     assert "the diagnosed model leaves" in note and "trust those of the regression" in note
 
 
+def test_a_difference_that_does_not_matter_is_no_disagreement() -> None:
+    """A model that leaves 1.6 % of the torque where the regression leaves 0.5 %: far beyond both deviations, and nothing."""
+    rec = rig(PLANT, COMMAND, {"coulomb_friction": FRICTION}, noise="none", seed=3, position_logged=True)
+    rec = ga.Record(rec.dt, velocity=rec.velocity, torque=rec.torque, position=rec.position)
+    check = check_of(rec, inertia=3.1e-4, share=0.9, coulomb_friction=FRICTION)
+    own, second, torque = check.after.force_error, check.force_error, check.after.torque_rms
+    assert check.regression_better and own > 2.0 * max(second, check.after.force_floor)
+    assert own - second < 0.05 * torque and check.notes == ()
+
+
 def test_friction_of_two_levels_is_compared_by_its_mean() -> None:
     levels = {"torque_positive": 0.04, "torque_negative": 0.06, "viscous_positive": 0.0, "viscous_negative": 0.0}
     rec = record(asymmetric_friction=levels)

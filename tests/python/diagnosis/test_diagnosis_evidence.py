@@ -14,6 +14,7 @@ import gaident as ga
 from gaident.data.signals.lattice import lattice_step, rounding_step
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.experiments.excitation import excitation
+from gaident.diagnosis.explain.alternatives import alternatives_of, impossible_here
 from gaident.diagnosis.explain.missing_torque import missing_torque
 from gaident.diagnosis.library import terms
 from gaident.diagnosis.library.coordinates import HIGHEST_ORDER
@@ -128,6 +129,21 @@ def test_the_digits_of_a_text_log_are_found_and_not_invented() -> None:
         assert rounding_step(np.array([float(f"{v:.{digits}g}") for v in x])) == pytest.approx(10.0 ** (3 - digits))
     assert rounding_step(x) == 0.0 and rounding_step(np.zeros(10)) == 0.0
     assert rounding_step(np.round(x / 0.3) * 0.3) == pytest.approx(0.3)
+
+
+def test_a_load_above_the_dry_friction_is_no_friction_of_two_levels() -> None:
+    def found(load: float, **friction: float) -> dict[str, dict[str, ga.Estimate]]:
+        levels = {"coulomb_friction": {n: ga.Estimate(v, 0.5, "N m") for n, v in friction.items()}} if friction else {}
+        return {"load_torque": {"torque": ga.Estimate(load, 0.5, "N m")}, **levels}
+
+    for load in (250.0, -250.0):
+        assert impossible_here("load_torque", found(load, torque=25.0)) == {"asymmetric_friction"}
+    assert impossible_here("load_torque", found(10.0)) == {"asymmetric_friction"}  # without friction: levels of 10 and -10
+    assert impossible_here("load_torque", found(1.0)) == impossible_here("load_torque", found(26.0, torque=25.0)) == frozenset()
+    assert impossible_here("coulomb_friction", found(250.0, torque=25.0)) == frozenset()
+    here = impossible_here("load_torque", found(250.0, torque=25.0))
+    assert alternatives_of("load_torque", [], [], False, None, True, here) == []
+    assert alternatives_of("load_torque", [], [], False, None, True) == ["asymmetric_friction"]
 
 
 def test_lattices_are_found_and_not_invented() -> None:

@@ -139,3 +139,14 @@ def test_limits_of_records_are_what_the_records_did() -> None:
     assert short.torque == 2.0 and short.travel == pytest.approx(np.ptp(done.position[:100]) / 0.9, rel=1e-3)
     with pytest.raises(SettingsError, match="speed is 0"):
         Limits.of(ga.Record(DT, 0.0 * command, 0.0 * command), ga.PI(**GAINS))
+
+
+def test_without_a_torque_a_load_that_was_held_before_does_not_show() -> None:
+    w = 20.0 * np.sin(0.02 * np.arange(600))
+    loop = ga.PI(**GAINS)
+    said = excitation(ga.Record(DT, command=w, velocity=w), loop).one_sided["load_torque"]
+    assert (
+        said == "no torque is logged: a load that the controller's integrator held when the record began shows in no other signal"
+    )
+    assert "load_torque" not in excitation(ga.Record(DT, command=w, velocity=w, torque=w), loop).one_sided
+    assert "load_torque" not in excitation(ga.Record(DT, command=w, velocity=w), ga.PI(kp=0.02, ki=0.0)).one_sided

@@ -14,6 +14,7 @@ from gaident.axis import said
 from gaident.cli import main
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.errors import SettingsError
+from gaident.estimation.period import period_of_place
 from gaident.reporting.report import view_of
 
 DT, N = 5e-3, 2000
@@ -103,6 +104,44 @@ def test_cogging_of_a_linear_axis_is_found_by_its_pitch(given: float) -> None:
     assert "every 24 mm" in dia.summary() and "torque" not in dia.summary().lower()
 
 
+def test_a_pitch_that_nobody_gave_is_seen() -> None:
+    """The same screw, and one of 10.3 mm; its length is then a number of the fit."""
+    for pitch in (0.024, 0.0103):
+        dia = ga.diagnose(screw(pitch), LOOP, axis="linear")
+        found = {f.effect: f for f in dia.causes}
+        assert dia.verdict == "explained" and all(f.named for f in dia.causes) and set(found) == {"coulomb_friction", "cogging"}
+        order = found["cogging"].parameters["order"]
+        assert order.value == pytest.approx(2.0 * np.pi / pitch, rel=1e-3) and 0.0 < order.std < 1e-3 * order.value
+        assert found["cogging"].parameters["amplitude"].value == pytest.approx(8.0, rel=0.01)
+        (note,) = (n for n in dia.notes if "No pitch is given" in n)
+        assert f"the force returns with every {1e3 * pitch:g} mm of the path" in said(note, "linear")
+
+
+def test_no_period_is_seen_where_none_is() -> None:
+    """In friction, in a force of the place that passes once, in a hum at one speed."""
+    assert period_of_place([record()]) is None and period_of_place([record(60.0)]) is None
+    rng, t = np.random.default_rng(2), 1e-3 * np.arange(4000)
+    speed = 0.05 + 1e-4 * rng.standard_normal(len(t))
+    hum = ga.Record(1e-3, velocity=speed, torque=5.0 + np.sin(2.0 * np.pi * 11.0 * t), position=np.cumsum(1e-3 * speed))
+    assert period_of_place([hum]) is None
+    still = ga.Record(1e-3, velocity=0.0 * t, torque=rng.standard_normal(len(t)), position=0.0 * t)
+    assert period_of_place([still]) is None
+
+
+def test_a_period_is_the_longest_that_its_waves_share() -> None:
+    """Poles of 24 mm whose second order is the stronger one; the two records begin elsewhere."""
+    t = 1e-3 * np.arange(4000)
+    records = []
+    for k in range(2):
+        w = 0.08 * np.sin(2.0 * np.pi * (0.2 + 0.1 * k) * t) + 0.03
+        x = np.cumsum(1e-3 * w) + 0.007 * k
+        waves = 8.0 * np.sin(2.0 * np.pi * x / 0.012 + 1.0) + 3.0 * np.sin(2.0 * np.pi * x / 0.024)
+        noise = 0.2 * np.random.default_rng(k).standard_normal(len(t))
+        torque = 20.0 * np.gradient(w, 1e-3) + 100.0 * w + 15.0 * np.sign(w) + waves + noise
+        records.append(ga.Record(1e-3, velocity=w, torque=torque, position=x))
+    assert period_of_place(records) == pytest.approx(0.024, rel=1e-4)
+
+
 def test_a_pitch_that_is_none() -> None:
     rec = record()[:400]
     for wrong in (0.0, -0.01, np.nan, True):
@@ -138,11 +177,14 @@ def test_the_command_line_takes_the_axis_of_the_drive_file(
     assert main(["diagnose", "axis.csv", "--drive", "drive.toml", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["axis"] == "linear" and set(data["not_testable"]) >= PERIODIC
-    assert main(["diagnose", "axis.csv", "--drive", "drive.toml", "--pitch", "0.5", "--json"]) == 0
+    assert main(["diagnose", "axis.csv", "--drive", "drive.toml", "--pitch", "500 mm", "--json"]) == 0
     assert set(json.loads(capsys.readouterr().out)["not_testable"]) & PERIODIC == {"unbalance"}
-    Path("drive.toml").write_text('axis = "linear"\npitch = "24 parsec"\n')
-    assert main(["diagnose", "axis.csv", "--drive", "drive.toml"]) == 2
-    assert "pitch is '24 parsec': give a length in m" in capsys.readouterr().err
+    assert main(["diagnose", "axis.csv", "--drive", "drive.toml", "--pitch", "ten"]) == 2
+    assert "argument --pitch: 'ten' is no number" in capsys.readouterr().err
+    for wrong in ("24 parsec", "24 deg", "1 turn"):
+        Path("drive.toml").write_text(f'axis = "linear"\npitch = "{wrong}"\n')
+        assert main(["diagnose", "axis.csv", "--drive", "drive.toml"]) == 2
+        assert f"pitch is '{wrong}': give a length in m" in capsys.readouterr().err
     limits = "[limits]\nspeed = 1.0\ntorque = 300.0\ntravel = 2.0\nduration = 20.0\n"
     Path("drive.toml").write_text('axis = "linear"\ndt = 1e-3\n' + limits)
     assert main(["experiment", "--drive", "drive.toml", "--json"]) == 0

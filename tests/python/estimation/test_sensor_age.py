@@ -56,6 +56,8 @@ def test_the_step_of_an_encoder_is_seen_behind_the_rounding_of_a_log() -> None:
     rpm = np.round(true / q) * q * 30.0 / np.pi + 1e-9 * np.random.default_rng(2).normal(size=4000)
     for decimals in (4, 3, 2):
         assert encoder_step(np.round(rpm, decimals) * np.pi / 30.0) == pytest.approx(q, rel=1e-5)
+    scale = np.round(true / 0.1) * 1e-4  # m/s, of a linear scale of 0.1 micrometres read each millisecond
+    assert encoder_step(scale, linear=True) == pytest.approx(1e-4) and encoder_step(scale) == 0.0
     assert encoder_step(true) == encoder_step(np.round(true, 2)) == encoder_step(np.round(rpm) * np.pi / 30.0) == 0.0
 
 
@@ -164,3 +166,14 @@ def test_a_peak_that_the_found_model_follows_is_no_outlier() -> None:
     weight[10] = 0.0
     assert unexplained(w, w, weight) == 1
     assert unexplained(w, 0.1 * w, weight) == 0
+
+
+def test_a_linear_scale_has_decimal_lines_and_a_load_beside_it_is_no_friction() -> None:
+    """A vertical axis whose brake opens on a held load: 25 N of friction, 250 N of load, a scale of 0.1 micrometres."""
+    skip_without_library()
+    axis = Plant(J=60.0, D=150.0, kp=6000.0, ki=2.4e5, dt=1e-3, name="vertical")
+    speeds = np.repeat([0.0, 0.05, -0.08, 0.15, -0.02, 0.02, -0.2, 0.1, -0.01, 0.01, 0.0], 200)
+    effects = {"load_torque": {"torque": 250.0}, "coulomb_friction": {"torque": 25.0}}
+    rec = rig(axis, speeds, effects, Noise(white=0.0, encoder=1e-7, differenced=True), 1)
+    dia = ga.diagnose(rec, axis.controller, axis="linear", seed=1)
+    assert {f.effect: f.alternatives for f in dia.causes} == {"load_torque": (), "coulomb_friction": ()}

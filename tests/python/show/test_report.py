@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import html
 import io
 import json
@@ -27,8 +28,9 @@ from gaident.show.html import Html, tag, typeset
 from gaident.show.report import parts
 from gaident.show.report.charts import held_out_chart, run_chart
 from gaident.show.report.command import proposal_csv
-from gaident.show.report.live import figure, script_json
-from page import Reader, charts_of
+from gaident.show.report.live import figure, json_of
+from gaident.show.report.page import packed
+from page import Reader, charts_of, unpacked
 from report_cases import HOSTILE, ambiguous, diagnosed, hostile
 
 CHAPTERS = ["measured", "wrong", "cause", "parameters", "gain", "untested", "next", "how"]
@@ -73,7 +75,7 @@ def test_a_diagnosis_reads_from_verdict_to_how_it_was_computed(dia: ga.Diagnosis
     sizes = dia.one_sided["torque_saturation"]
     assert "Tested up to what these records asked for" in seen.text and sizes in seen.text
     assert "Tested up to" not in Reader(report_page(replace(dia, one_sided={}))).text
-    linear = report_page(dia, axis="linear")
+    linear = unpacked(report_page(dia, axis="linear"))
     assert sizes.replace("N m", "N").replace("torque", "force") in Reader(linear).text
     assert "velocity [m/s]" in linear and "rad/s" not in json.dumps(charts_of(linear)["charts"]["run-0"])
 
@@ -92,7 +94,7 @@ def test_the_command_is_in_the_page_as_csv(dia: ga.Diagnosis, fast: None) -> Non
 def test_nothing_of_a_file_gets_out_of_its_place(dia: ga.Diagnosis, fast: None) -> None:
     plain, evil = (Reader(report_page(r)) for r in (ambiguous(dia), hostile(dia)))
     page = report_page(hostile(dia))
-    assert "window.hacked=1</script>" not in page and "<img src=x" not in page and "\u2028" not in page.partition("figures")[2]
+    assert "window.hacked=1</script>" not in page and "<img src=x" not in page and "\u2028" not in page.partition("library")[2]
     for name in ("script", "style", "iframe", "object", "link"):  # what may run or load
         assert len(evil.found(name)) == len(plain.found(name)), name
     assert all(a["src"].startswith("data:image/png;base64,") for a in evil.found("img") if a["src"])
@@ -105,10 +107,16 @@ def test_nothing_of_a_file_gets_out_of_its_place(dia: ga.Diagnosis, fast: None) 
         assert "<script" not in shown and "<img" not in shown and "window.hacked=1" in shown
 
 
-def test_json_in_a_script_survives_what_ends_a_script() -> None:
-    text = script_json({"a": HOSTILE, "b": "<!--<script>"})
-    assert not re.search(r"[<>&\u2028\u2029]", text)
-    assert json.loads(text) == {"a": HOSTILE, "b": "<!--<script>"}
+def test_what_a_script_unpacks_survives_what_ends_a_script() -> None:
+    data = {"a": HOSTILE, "b": "<!--<script>"}
+    text = packed(json_of(data))
+    assert re.fullmatch(r"[A-Za-z0-9+/]+=*", text) and packed(json_of(data)) == text
+    assert json.loads(gzip.decompress(base64.b64decode(text))) == data
+
+
+def test_a_page_with_its_library_is_small(dia: ga.Diagnosis, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parts, "picture", lambda chart: b"png")
+    assert 1.5e6 < len(report_page(dia)) < 2.5e6
 
 
 def test_texts_are_escaped_unless_they_are_html() -> None:
@@ -132,7 +140,8 @@ def test_a_loaded_result_says_what_needs_the_record(dia: ga.Diagnosis, fast: Non
     seen = Reader(report_page(back))
     assert seen.text.count("gaident report RESULT.json LOG") == 4 and charts_of(report_page(back))["charts"] == {}
     assert "inertia" in seen.text and dia.digests[0] in seen.text and "not at hand" in seen.text
-    assert "plotly()" in report_page(dia) and "plotly()" not in report_page(back)  # nothing to draw: 5 MB less
+    # Without anything to draw 2 MB less.
+    assert "plotly()" in unpacked(report_page(dia)) and "plotly()" not in unpacked(report_page(back))
     whole = Reader(report_page(back, drive_record(), drive_record(1)))
     assert whole.text == Reader(report_page(dia)).text
     other = Reader(report_page(back, drive_record(5)))

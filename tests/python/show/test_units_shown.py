@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import gaident as ga
+from gaident.axis import say
 from gaident.cli import main
 from gaident.errors import GaidentError, ReadError, SettingsError
+from gaident.results.estimate import of_axis
+from gaident.results.json_text import on_axis
 from gaident.show.chart import Band, Chart, Mark, Panel, Trace
-from gaident.show.units import beside, in_units, scales_of
+from gaident.show.diagnosis_summary import parameter_row
+from gaident.show.units import beside, in_units, scales_of, shown_in
+from page import unpacked
 
 RPM = 60.0 / math.tau
 UNITS = {"velocity": "rpm", "torque": "%", "position": "deg", "rated_torque": 2.4}
@@ -63,6 +69,40 @@ def test_the_units_and_what_they_need() -> None:
         scales_of({"velocity": "rmp"}, "rotary")
 
 
+def test_a_unit_of_the_other_kind_of_axis_is_refused() -> None:
+    for axis, wrong, listed in (
+        ("linear", {"velocity": "rpm"}, "m/s, mm/s"),
+        ("rotary", {"velocity": "mm/s"}, "rad/s, rpm"),
+        ("linear", {"position": "deg"}, "m, mm, um"),
+        ("rotary", {"torque": "kN", "rated_torque": 2.4}, "N m, mN m"),
+    ):
+        quantity = next(iter(wrong))
+        with pytest.raises(SettingsError, match=f"{quantity} is .*, which no {axis} axis is measured in: give one of {listed}"):
+            scales_of(wrong, axis)
+    assert scales_of({"torque": "%", "rated_torque": 200.0}, "linear") == {"N": ("%", pytest.approx(0.5))}
+
+
+def test_numbers_of_a_linear_axis_bear_its_units(diagnosis: ga.Diagnosis) -> None:
+    order = ga.Estimate(200.0 * math.pi, 0.02 * math.pi, "1/turn", at_bound=True)
+    assert of_axis("order", order, "linear") == ga.Estimate(pytest.approx(100.0), pytest.approx(0.01), "1/m", at_bound=True)
+    assert of_axis("order", order, "rotary") == order
+    assert of_axis("frequency", ga.Estimate(9.0, 1.0, "rad/s"), "linear").unit == "rad/s"  # turns no axis
+    assert parameter_row("order", order, "linear", {})[1:] == ("100.000 +- 0.010", "1/m", "", "every 10 mm, at a bound")
+    cogging = ga.Finding("cogging", {"order": order}, evidence=say("{Torque} ripple, {:g} {N m}", 0.3))
+    dia = replace(diagnosis, axis="linear", findings=(cogging,), notes=(say("a {torque}"),))
+    data = on_axis(dia.to_dict(), "linear")
+    assert data["findings"][0]["parameters"]["order"]["unit"] == "1/m"
+    assert data["findings"][0]["parameters"]["order"]["value"] == pytest.approx(100.0)
+    assert (data["findings"][0]["evidence"], data["notes"]) == ("Force ripple, 0.3 N", ["a force"])
+    assert data["mechanics"]["inertia"]["unit"] == "kg" and "N m" not in json.dumps(data)
+    numbers = data["identification"]["parameters"]
+    assert numbers["gain"]["unit"] == "m/s^2/N" and {e["unit"] for n, e in numbers.items() if n != "gain"} == {"rad/s"}
+    assert ga.Diagnosis.from_dict(data).findings[0].evidence == "Force ripple, 0.3 N"
+    assert on_axis(diagnosis.to_dict(), "rotary") == diagnosis.to_dict()
+    assert shown_in(dia, {"N": ("kN", 1e-3)}, "linear")["findings"][0]["parameters"]["order"]["unit"] == "1/m"  # type: ignore[index]
+    assert list(dia.to_pandas()["unit"]) == ["1/m"] and "Force ripple, 0.3 N" in dia._repr_html_()
+
+
 def test_a_value_beside_its_si() -> None:
     scales = scales_of(UNITS, "rotary")
     assert beside(scales, "torque", 0.12, 0.0024, "N m") == "5.00 +- 0.10 %"
@@ -101,6 +141,8 @@ def test_the_page_says_whose_it_is_and_draws_in_units(record: ga.Record, diagnos
     about = {"date": "2026-11-22", "customer": "Miller & Co", "text": "after <the> repair"}
     ga.report(diagnosis, tmp_path / "page.html", record, units=UNITS, about=about)
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    page = unpacked(page)
+    assert "&amp;times;" not in page and "&times;10<sup>&minus;3</sup> rad/s" in page  # in a tile: a small number beside rpm
     assert "velocity [rpm]" in page and "missing torque [%]" in page and "missing torque [N m]" not in page
     assert "Miller &amp; Co" in page and "after &lt;the&gt; repair" in page and "2026-11-22" in page
     assert "The model lacks coulomb friction (0.3 N m)" in page

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 import re
 from html.parser import HTMLParser
@@ -39,6 +41,15 @@ class Reader(HTMLParser):
         return [attributes for tag, attributes in self.tags if tag == name]
 
 
+def unpacked(page: str) -> str:
+    """The page with what its script unpacks, figures and the library that draws them, as text."""
+
+    def text(found: re.Match[str]) -> str:
+        return f"{found[1]}{gzip.decompress(base64.b64decode(found[2])).decode()}</script>"
+
+    return re.sub(r'(<script type="application/gzip"[^>]*>)([A-Za-z0-9+/=]*)</script>', text, page)
+
+
 def charts_of(page: str) -> dict[str, Any]:
-    data: dict[str, Any] = json.loads(re.search(r'id="figures">(.*?)</script>', page, re.DOTALL)[1])  # type: ignore[index]
+    data: dict[str, Any] = json.loads(re.search(r'id="figures">(.*?)</script>', unpacked(page), re.DOTALL)[1])  # type: ignore[index]
     return data

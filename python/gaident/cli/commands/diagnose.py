@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import starmap
 from pathlib import Path
+from typing import Any
 
 from gaident.axis import velocity_unit
 from gaident.cli.drive import drive_of, read_all, reading_notes
@@ -21,6 +22,7 @@ from gaident.identification.space import derive_space
 from gaident.models.drive_torque import torque_driven
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
+from gaident.results.json_text import on_axis
 from gaident.results.store import load
 from gaident.show.progress_bar import Progress
 from gaident.show.wording import either, number, table, words
@@ -34,7 +36,7 @@ def diagnose_command(args: Namespace) -> int | None:
         return _several(args, args.select or names)
     drive, dia, written = _diagnosed(args)
     if args.json:
-        print_json({**dia.to_dict(), **shown_block(dia, drive)})
+        print_json(_data(drive, dia))
         return None
     print(dia.summary(drive.axis, drive.units_shown))
     if args.next_command is not None and dia.next_experiment is None:
@@ -42,6 +44,11 @@ def diagnose_command(args: Namespace) -> int | None:
     if written:
         print(f"\nwritten: {', '.join(map(str, written))}")
     return None
+
+
+def _data(drive: Drive, dia: Diagnosis) -> dict[str, Any]:
+    """A diagnosis as --json prints it: in the words and units of its axis, and in those of [show]."""
+    return {**on_axis(dia.to_dict(), drive.axis), **shown_block(dia, drive)}
 
 
 def _several(args: Namespace, names: Sequence[str]) -> int | None:
@@ -64,7 +71,7 @@ def _several(args: Namespace, names: Sequence[str]) -> int | None:
             written += more
     failed = sum(isinstance(result, GaidentError) for result in found.values())
     if args.json:
-        said = {n: {"error": in_options(r)} if isinstance(r, GaidentError) else r[1].to_dict() for n, r in found.items()}
+        said = {n: {"error": in_options(r)} if isinstance(r, GaidentError) else _data(*r) for n, r in found.items()}
         print_json({"schema": "gaident/axes", "schema_version": 1, "axes": said})
         return 1 if failed else None
     print("\n".join(table([("axis", "verdict", "cause", "rmse, linear", "extended", ""), *starmap(_row, found.items())], "")))

@@ -6,18 +6,18 @@ import argparse
 import csv
 import io
 import math
-import re
 from pathlib import Path
 
-from gaident.axis import unit
 from gaident.cli.export_options import FORMS
 from gaident.cli.output import print_json, target_of, write
 from gaident.control.pi import bare_pi
 from gaident.errors import SettingsError
+from gaident.export.c_source import c_name
 from gaident.models.model import Model
 from gaident.results.diagnosis import Diagnosis
-from gaident.results.estimate import Estimate
+from gaident.results.estimate import Estimate, of_axis
 from gaident.results.identification import Identification
+from gaident.results.json_text import ROOTS
 from gaident.results.store import load
 
 __all__ = ["export_command"]
@@ -56,7 +56,7 @@ def _c_source(result: Diagnosis | Identification, target: Path, args: argparse.N
         raise SettingsError(
             "--closed: in C the controller is a bare PI at the steps of the model; leave it out: torque to velocity"
         )
-    return model.to_c(None, dt=args.dt, controller=loop if args.closed else None, name=re.sub(r"\W", "_", target.stem))
+    return model.to_c(None, dt=args.dt, controller=loop if args.closed else None, name=c_name(target.stem))
 
 
 def _linear(result: Diagnosis | Identification, args: argparse.Namespace) -> tuple[Model, str]:
@@ -102,5 +102,7 @@ def _table(result: Diagnosis | Identification, axis: str) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("of", "parameter", "value", "std", "unit"))
     for of, name, e in rows:
-        writer.writerow((of, name, repr(float(e.value)), repr(float(e.std)), unit(e.unit, axis)))
+        if of != "model" or e.unit != ROOTS:
+            e = of_axis(name, e, axis)
+        writer.writerow((of, name, repr(float(e.value)), repr(float(e.std)), e.unit))
     return text.getvalue()

@@ -16,6 +16,7 @@ from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.controller.replay import Replay, replay
 from gaident.identification.identify import identify
+from gaident.results.json_text import on_axis
 from gaident.results.settings import Settings
 from gaident.show.progress_bar import Progress
 
@@ -50,7 +51,7 @@ def identify_command(args: argparse.Namespace) -> None:
     idn = replace(idn, warnings=(*reading_notes(drive, records), *off, *idn.warnings))
     written = files.write(idn, records, (), drive, lambda: idn.plot(records, drive.axis))
     if args.json:
-        print_json({**idn.to_dict(), **shown_block(idn, drive)})
+        print_json({**on_axis(idn.to_dict(), drive.axis), **shown_block(idn, drive)})
         return
     print(summary_of(idn, drive.axis, drive.units_shown))
     if written:

@@ -59,7 +59,8 @@ def init_command(args: argparse.Namespace) -> None:
         for line in found.fill_in:
             print(f"  {line}")
     then = "then, once that is done" if found.fill_in else "then"
-    print(f"{then}: {program()} identify {shlex.quote(str(args.log))} --drive {shlex.quote(str(target))}")
+    command = "diagnose" if found.axes else "identify"
+    print(f"{then}: {program()} {command} {shlex.quote(str(args.log))} --drive {shlex.quote(str(target))}")
 
 
 def _text_options(args: argparse.Namespace) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 from gaident.arguments import arg
 from gaident.errors import ReadError
 
-__all__ = ["QUANTITIES", "Constants", "factor", "is_any_unit", "is_unit", "known_units", "needed_constant"]
+__all__ = ["QUANTITIES", "Constants", "factor", "is_any_unit", "is_unit", "known_units", "needed_constant", "of_other_axis"]
 
 _TURN = 2.0 * math.pi  # no decision: rad
 
@@ -23,44 +23,56 @@ _RATED = ("rated_torque", "[N m, or N]")
 
 @dataclass(frozen=True)
 class _Unit:
-    """SI value = factor * value, times (or, for counts, divided by) the constant of the drive it needs."""
+    """SI value = factor * value, times (or, for counts, divided by) the constant of the drive it needs.
+
+    axis: "rotary" or "linear" where only such an axis is measured in it; "": either.
+    """
 
     factor: float
     constant: tuple[str, str] | None = None
     divide: bool = False
+    axis: str = ""
+
+
+def _turning(factor: float, constant: tuple[str, str] | None = None, divide: bool = False) -> _Unit:
+    return _Unit(factor, constant, divide, "rotary")
+
+
+def _straight(factor: float) -> _Unit:
+    return _Unit(factor, axis="linear")
 
 
 # First spelling of each row is what messages list.
 _VELOCITY: dict[tuple[str, ...], _Unit] = {
-    ("rad/s", "rad/sec", "rad s-1", "rad s^-1"): _Unit(1.0),
-    ("rpm", "1/min", "r/min", "rev/min", "u/min", "min-1", "min^-1", "min⁻¹", "turns/min", "tr/min", "giri/min", "upm"): _Unit(
+    ("rad/s", "rad/sec", "rad s-1", "rad s^-1"): _turning(1.0),
+    ("rpm", "1/min", "r/min", "rev/min", "u/min", "min-1", "min^-1", "min⁻¹", "turns/min", "tr/min", "giri/min", "upm"): _turning(
         _TURN / 60.0
     ),
-    ("rps", "rev/s", "turn/s", "turns/s"): _Unit(_TURN),
-    ("deg/s", "°/s", "deg/sec", "degree/s", "degrees/s"): _Unit(_TURN / 360.0),
-    ("counts/s", "count/s", "cnt/s", "inc/s", "pulses/s", "ticks/s"): _Unit(_TURN, _COUNTS, divide=True),
-    ("m/s", "m/sec", "m s-1"): _Unit(1.0),
-    ("mm/s", "mm/sec", "mm s-1"): _Unit(1e-3),
-    ("m/min",): _Unit(1.0 / 60.0),
-    ("mm/min",): _Unit(1e-3 / 60.0),
+    ("rps", "rev/s", "turn/s", "turns/s"): _turning(_TURN),
+    ("deg/s", "°/s", "deg/sec", "degree/s", "degrees/s"): _turning(_TURN / 360.0),
+    ("counts/s", "count/s", "cnt/s", "inc/s", "pulses/s", "ticks/s"): _turning(_TURN, _COUNTS, divide=True),
+    ("m/s", "m/sec", "m s-1"): _straight(1.0),
+    ("mm/s", "mm/sec", "mm s-1"): _straight(1e-3),
+    ("m/min",): _straight(1.0 / 60.0),
+    ("mm/min",): _straight(1e-3 / 60.0),
 }
 _POSITION: dict[tuple[str, ...], _Unit] = {
-    ("rad", "radian", "radians"): _Unit(1.0),
-    ("mrad",): _Unit(1e-3),
-    ("deg", "°", "degree", "degrees"): _Unit(_TURN / 360.0),
-    ("turn", "turns", "rev", "revs"): _Unit(_TURN),
-    ("counts", "count", "cnt", "inc", "pulses", "ticks"): _Unit(_TURN, _COUNTS, divide=True),
-    ("m", "metre", "meter"): _Unit(1.0),
-    ("mm",): _Unit(1e-3),
-    ("um",): _Unit(1e-6),
+    ("rad", "radian", "radians"): _turning(1.0),
+    ("mrad",): _turning(1e-3),
+    ("deg", "°", "degree", "degrees"): _turning(_TURN / 360.0),
+    ("turn", "turns", "rev", "revs"): _turning(_TURN),
+    ("counts", "count", "cnt", "inc", "pulses", "ticks"): _turning(_TURN, _COUNTS, divide=True),
+    ("m", "metre", "meter"): _straight(1.0),
+    ("mm",): _straight(1e-3),
+    ("um",): _straight(1e-6),
 }
 _TORQUE: dict[tuple[str, ...], _Unit] = {
-    ("N m", "newton metre", "newton meter"): _Unit(1.0),
-    ("mN m", "N mm"): _Unit(1e-3),
-    ("kN m",): _Unit(1e3),
-    ("N", "newton"): _Unit(1.0),
-    ("mN",): _Unit(1e-3),
-    ("kN",): _Unit(1e3),
+    ("N m", "newton metre", "newton meter"): _turning(1.0),
+    ("mN m", "N mm"): _turning(1e-3),
+    ("kN m",): _turning(1e3),
+    ("N", "newton"): _straight(1.0),
+    ("mN",): _straight(1e-3),
+    ("kN",): _straight(1e3),
     ("%", "percent", "% rated", "% of rated", "% of rated torque"): _Unit(0.01, _RATED),
     ("‰", "per mille", "0.1 %", "promille"): _Unit(1e-3, _RATED),
     ("A", "amp", "ampere", "arms", "aeff"): _Unit(1.0, _AMPERE),
@@ -144,9 +156,15 @@ class Constants:
                 raise ReadError(f"{arg(name, repr(value))}, but it must be a positive finite number; correct it or leave it out")
 
 
-def known_units(quantity: str) -> tuple[str, ...]:
-    """The units of a quantity ("velocity", "time", ...), main spellings."""
-    return tuple(names[0] for names in _TABLES[quantity])
+def known_units(quantity: str, axis: str = "") -> tuple[str, ...]:
+    """The units of a quantity ("velocity", "time", ...), main spellings; axis: without those of the other kind of axis."""
+    return tuple(names[0] for names, unit in _TABLES[quantity].items() if not axis or unit.axis in ("", axis))
+
+
+def of_other_axis(quantity: str, unit: str, axis: str) -> bool:
+    """Whether only the other kind of axis is measured in this unit: a linear one turns at no rpm."""
+    row = _UNITS[quantity].get(_spelling(unit))
+    return row is not None and row.axis not in ("", axis)
 
 
 def is_unit(text: str, quantity: str | None = None) -> bool:

@@ -12,6 +12,7 @@ __all__ = ["encoder_lines", "encoder_step", "lattice_step", "rounding_step"]
 Vector = NDArray[np.float64]
 
 FEWEST = 4  # no decision: distinct values that a lattice could be told from chance by
+SAME = 1e-9  # no decision: of the largest value, the last digits of a float, in which two values are the same
 FEWEST_LINES = 100  # no decision: of a turn; no encoder of a drive has fewer
 SPEEDS = (1.0, np.pi / 30.0, np.pi / 180.0, 2.0 * np.pi)  # no decision: units of a speed; rad/s in each: rad/s, rpm, deg/s, 1/s
 EXACT = 1e-4  # no decision: steps, what a decimal number is exact to in binary and scaled by ten
@@ -19,22 +20,32 @@ EXACT = 1e-4  # no decision: steps, what a decimal number is exact to in binary 
 DIGITS = range(4, 10)  # no decision: significant digits that text logs are written with; more round off nothing that matters
 
 
-def lattice_step(values: Vector) -> float:
+def lattice_step(values: Vector, rounded: bool = False) -> float:
     """The step q of the lattice x = x0 + k q, k whole, that all `values` lie on, in their unit; 0.0 where there is none.
 
     The gaps between neighbouring distinct values are multiples of q; their sum over the sum of the multiples gives q to the
-    accuracy of the numbers. A signal of fewer than four distinct values has no lattice that could be told from chance.
+    accuracy of the numbers. How many steps a wide gap is, only a step shows that is known well enough: it is taken from gaps of
+    up to twice the smallest, then of up to twice as many steps, and so on.
+    rounded: a log may have rounded the values to a part of q. A value on the edge of two decimals may be rounded to either: gaps
+    that are small against the median are within one place.
+    A signal of fewer than four distinct values has no lattice that could be told from chance.
     """
     distinct = np.unique(values)
     size = float(np.abs(distinct).max())
     if len(distinct) < FEWEST or not size > 0.0:
         return 0.0
-    gaps = np.diff(distinct)
-    gaps = gaps[gaps > 1e-9 * size]  # below, the same value in the last digits of a float
+    gaps = np.sort(np.diff(distinct))
+    within = POLICY.on_lattice * float(np.median(gaps)) if rounded else 0.0
+    gaps = gaps[gaps > max(within, SAME * size)]
     if len(gaps) < FEWEST - 1:
         return 0.0
-    multiples = np.round(gaps / gaps.min())
-    step = float(gaps.sum() / multiples.sum())
+    step, reach = float(gaps[0]), 2.0
+    while True:
+        near = gaps[: int(np.searchsorted(gaps, (reach + 0.5) * step))]
+        step = float(near.sum() / np.round(near / step).sum())
+        if len(near) == len(gaps):
+            break
+        reach *= 2.0
     places = (values - distinct[0]) / step
     off = np.abs(places - np.round(places))
     # On no lattice, the gaps are no multiples of the least one and `off` is spread evenly over 0..0.5.
@@ -56,31 +67,14 @@ def encoder_lines(velocity: Vector, period: float, turn: float) -> int:
     return whole if whole >= FEWEST_LINES and abs(lines - whole) < POLICY.whole_lines else 0
 
 
-def encoder_step(velocity: Vector) -> float:
-    """The step of the lattice that velocities lie on [rad/s], also where a log has rounded them to a part of it; 0.0: none.
+def encoder_step(velocity: Vector, linear: bool = False) -> float:
+    """The step of the lattice that an encoder's velocities lie on [rad/s], also where a log has rounded them; 0.0: none.
 
-    Rounded, two neighbours are nearer or farther apart than the step, and only small gaps tell how many steps they are. So the
-    step is taken from gaps of up to twice the smallest, then of up to twice as many steps, and so on. A value on the edge of two
-    decimals may be rounded to either: gaps that are small against the median are within one place.
-    A step of 1, 2 or 5 in some decimal place of a unit of speed is the log's rounding itself.
+    A step of 1, 2 or 5 in some decimal place of a unit of speed is the log's rounding itself, but on a linear axis: a scale of
+    0.1 micrometres, differenced over 1 ms, has steps of 0.1 mm/s.
     """
-    distinct = np.unique(velocity)
-    if len(distinct) < FEWEST:
-        return 0.0
-    gaps = np.sort(np.diff(distinct))
-    gaps = gaps[gaps > POLICY.on_lattice * float(np.median(gaps))]
-    if len(gaps) < FEWEST - 1:
-        return 0.0
-    step, reach = float(gaps[0]), 2.0
-    while True:
-        near = gaps[: int(np.searchsorted(gaps, (reach + 0.5) * step))]
-        step = float(near.sum() / np.round(near / step).sum())
-        if len(near) == len(gaps):
-            break
-        reach *= 2.0
-    places = (velocity - distinct[0]) / step
-    on = float(np.abs(places - np.round(places)).max()) < POLICY.on_lattice
-    return step if on and not any(_decimal(step / unit) for unit in SPEEDS) else 0.0
+    step = lattice_step(velocity, rounded=True)
+    return 0.0 if step > 0.0 and not linear and any(_decimal(step / unit) for unit in SPEEDS) else step
 
 
 def _decimal(x: float) -> bool:

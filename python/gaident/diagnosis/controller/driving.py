@@ -15,8 +15,9 @@ from gaident.diagnosis.controller.limit_not_given import by_a_limit
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.diagnosis.controller.other_form import other_form
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains
+from gaident.diagnosis.selection.unlogged_form import UnloggedForm
 from gaident.identification.logged_torque import corrected, not_followed
-from gaident.models.drive_torque import Driven, straight_driven
+from gaident.models.drive_torque import Driven, driven_by, straight_driven
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
@@ -55,6 +56,15 @@ class Driving:
             findings=(*kept, other.finding(given)),
             regained_from=given,
         )
+
+    def formed(self, other: UnloggedForm) -> Driving:
+        """The same under another form of controller, which makes the torque that drives a model; a finding says so."""
+        pairs = [[(driven_by(here, other.controller), here) for here in part] for part in (self.moved.records, self.moved.held)]
+        records, held = (tuple(driven for driven, _ in part) for part in pairs)
+        given = {driven.digest: self.moved.given[here.digest] for part in pairs for driven, here in part}
+        moved = replace(self.moved, records=records, held=held, given=given)
+        findings = (*self.findings, other.finding)
+        return replace(self, moved=moved, controller=other.controller, logged=as_logged(records, None), findings=findings)
 
     @property
     def regained_by(self) -> int:

@@ -155,7 +155,8 @@ def _motion(rec: Record, controller: Controller | None, top: float) -> Motion:
     held, early, late = _held(smooth, rec.dt, floor, top)
     torque_floor = max(POLICY.above_noise * noise_std(u), POLICY.still * float(np.abs(u).max()), TINY)
     repeated = any(abs(a - b) < POLICY.apart * top for a in early for b in late if a)
-    return Motion(rec.dt, w, smooth, u, position, command, floor, torque_floor, moving, tuple(held), tuple(jumps), repeated)
+    shape = moving, tuple(held), tuple(jumps), repeated
+    return Motion(rec.dt, w, smooth, u, position, command, floor, torque_floor, *shape, rec.torque is not None)
 
 
 def _smoothed(x: Vector, width: int) -> Vector:

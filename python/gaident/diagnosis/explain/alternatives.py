@@ -2,35 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 
-from gaident.diagnosis.library.equivalences import equivalents
+from gaident.diagnosis.library.equivalences import equivalents, impossible
 from gaident.diagnosis.library.sides import name_of
-from gaident.diagnosis.library.terms import LIBRARY
+from gaident.diagnosis.library.terms import LIBRARY, level_of
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS
 from gaident.diagnosis.selection.rivals import Replacement
+from gaident.results.estimate import Estimate
 
-__all__ = ["alternatives_of"]
+__all__ = ["alternatives_of", "impossible_here"]
 
 OF_THE_CONTROLLER = (OTHER_GAINS, "torque_filter")
 """What a controller that is not the drive's may lack, in words of the findings."""
 
 
 def alternatives_of(
-    effect: str, rivals: Sequence[Replacement], here: Sequence[str], shown: bool, offset: Offset | None, follows: bool
+    effect: str,
+    rivals: Sequence[Replacement],
+    here: Sequence[str],
+    shown: bool,
+    offset: Offset | None,
+    follows: bool,
+    never: Collection[str] = (),
 ) -> list[str]:
     """Names of what these records cannot tell from an effect.
 
     here: what they cannot tell from it for lack of reversals or of sizes of steps. shown: whether the records show the torque's
     jump by themselves; then nothing without such a jump stands for it, nor does a controller. offset: what an effect is not the
     same as. follows: whether the logged torque is what the controller makes, where the whole loop is simulated; what a wrong loop
-    leaves looks like mechanics.
+    leaves looks like mechanics. never: equivalents that cannot be in its place with the sizes that were found.
     """
     names = [r.effect for r in rivals if not shown or LIBRARY[r.effect].levels]
     names += here
     if offset is None or effect != offset.effect:
-        names += equivalents(name_of(effect))
+        names += [name for name in equivalents(name_of(effect)) if name not in never]
     if not follows and not shown:
         names += OF_THE_CONTROLLER
     return list(dict.fromkeys(names))
+
+
+def impossible_here(effect: str, found: Mapping[str, Mapping[str, Estimate]]) -> frozenset[str]:
+    """Equivalents of an effect that are no friction with the sizes that were found; found: effect -> its parameters.
+
+    A load of 250 N beside 25 N of dry friction is no friction of two levels: one of these would be -225 N.
+    """
+    if not LIBRARY[effect].constant:
+        return frozenset()
+    (constant,) = found[effect].values()
+    levels = [level_of(own) for name, own in found.items() if LIBRARY[name].levels and not LIBRARY[name].beside]
+    return impossible(name_of(effect), levels[0] if levels else Estimate(0.0, 0.0, constant.unit), constant)

@@ -19,7 +19,9 @@ __all__ = [
     "evidence_of",
     "far_off",
     "hidden_by_torque_noise",
+    "or_other_form",
     "or_other_gains",
+    "period_seen",
     "torque_unlogged",
 ]
 
@@ -109,7 +111,7 @@ def drives_itself(damping: Estimate) -> Text:
 
 def torque_unlogged(data: DataSet) -> list[Text]:
     """What stays open where the gains alone say which torque drove the motor."""
-    if data.pi is None or any(r.torque is not None for r in data.records):
+    if data.controller is None or any(r.torque is not None for r in data.read):
         return []
     text = (
         "No {torque} is logged: the given gains make it of command and velocity. Where both are wrong by one factor, every "
@@ -118,7 +120,27 @@ def torque_unlogged(data: DataSet) -> list[Text]:
     return [say(text)]
 
 
+def period_seen(data: DataSet) -> list[Text]:
+    """What is said where nobody gave the pitch of a linear axis and the records show one."""
+    if not data.period_seen or data.period is None:
+        return []
+    text = (
+        "No pitch is given, and the {torque} returns with every {:.6g} mm of the path: this was taken for it. Where it is that "
+        "of the screw or of the poles, give it; orders are then exact."
+    )
+    return [say(text, 1e3 * data.period)]
+
+
 def or_other_gains(effect: str) -> Text:
     """What is said of a finding in whose place other gains would explain as much."""
     text = "Other gains than the given ones would explain these records as well as the {}: log the {torque}, it shows the gains."
     return say(text, called_of(effect))
+
+
+def or_other_form(form: str) -> Text:
+    """What is said where another form of controller comes closer, but does not explain the records either."""
+    text = (
+        "No {torque} is logged; a controller with another {} than the given one would come closer to these records, but does not "
+        "explain them by itself: {inertia} and causes are not to be trusted. Log the {torque}, it shows what the controller does."
+    )
+    return say(text, called(form))

@@ -84,6 +84,7 @@ def harmonic(effect: str, place: str, first: int, with_order: bool, kind: str, *
 
     def steps(s: Scales) -> tuple[float, ...]:
         a = 0.05 * amplitude(s)
-        return (a, a, 0.0)[: 3 if with_order else 2]
+        order = 0.05 / s.travel if s.period_seen else 0.0  # no decision: rad over the travel
+        return (a, a, order)[: 3 if with_order else 2]
 
     return Cause(effect, place, natural, coordinates, limits, lambda s: [], steps, harmonic=kind, **known)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from gaident.diagnosis.library import triggers as t
 from gaident.diagnosis.library.cause import AT_THE_SHAFT, NO_REVERSAL, Cause
 from gaident.diagnosis.library.kinds import linear
 
@@ -26,5 +27,6 @@ CAUSES: tuple[Cause, ...] = (
         excited_by=("holds up and down",),
         alike={NO_REVERSAL: ("constant torque",)},
         regressed=_load_of_regression,
+        unseen=t.held_before,
     ),
 )  # fmt: skip

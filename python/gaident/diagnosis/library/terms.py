@@ -6,6 +6,7 @@ asked for by property.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from gaident.axis import Text
@@ -13,8 +14,18 @@ from gaident.diagnosis.library import actuator, controller, coupling, friction, 
 from gaident.diagnosis.library.cause import NO_REVERSAL, ONE_SIZE, ONE_SIZE_UNLOGGED, Cause
 from gaident.diagnosis.library.triggers import Motions
 from gaident.diagnosis.library.user_defined import Library
+from gaident.results.estimate import Estimate
 
-__all__ = ["LIBRARY", "conditional_classes", "excited", "in_controller", "not_testable", "of_inverse_dynamics", "one_sided"]
+__all__ = [
+    "LIBRARY",
+    "conditional_classes",
+    "excited",
+    "in_controller",
+    "level_of",
+    "not_testable",
+    "of_inverse_dynamics",
+    "one_sided",
+]
 
 PLACES = (plant, friction, load, harmonic, coupling, actuator, sensor, controller)
 """The files with the rows of the library, in its order."""
@@ -37,6 +48,14 @@ def one_sided(motions: Motions) -> dict[str, Text]:
     """Effect -> which sizes of it could not have shown in these records; what stands there is tested, but not beyond."""
     bounded = ((name, row.unseen(motions)) for name, row in LIBRARY.items() if row.unseen is not None)
     return {name: text for name, text in bounded if text is not None}
+
+
+def level_of(parameters: Mapping[str, Estimate]) -> Estimate:
+    """Of dry friction: its torque, or the mean of its two levels."""
+    if "torque" in parameters:
+        return parameters["torque"]
+    up, down = parameters["torque_positive"], parameters["torque_negative"]
+    return Estimate(0.5 * (up.value + down.value), 0.5 * math.hypot(up.std, down.std), up.unit)
 
 
 def excited(command: str) -> tuple[str, ...]:

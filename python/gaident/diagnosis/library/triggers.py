@@ -29,7 +29,7 @@ class Motion:
 
     velocity as measured and smooth [rad/s], torque [N m], position [rad], command [rad/s] or None; floors: what is taken for
     noise around zero; moving: |smooth| above its floor; held: speeds held; jumps: sizes of command jumps; repeated: a speed held
-    in the first third is held again in the last.
+    in the first third is held again in the last; logged: whether the torque is that of the log.
     """
 
     dt: float
@@ -44,6 +44,7 @@ class Motion:
     held: tuple[float, ...]
     jumps: tuple[float, ...]
     repeated: bool
+    logged: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,6 +236,14 @@ def torque_beyond(s: Motions) -> Text | None:
     own = s.highest_torque > POLICY.at_limit * limit
     why = Text("the controller's own limit lets no more through") if own else say("no more {torque} was asked for")
     return say("a limit above {:.3g} {N m} would not have shown: {}", s.highest_torque, why)
+
+
+def held_before(s: Motions) -> Text | None:
+    """A constant load that the integrator of the controller held when a record without a torque began."""
+    if s.controller is None or s.controller.gains.ki == 0.0 or all(m.logged for m in s.records):
+        return None
+    text = "no {torque} is logged: a load that the controller's integrator held when the record began shows in no other signal"
+    return say(text)
 
 
 def integral_beyond(s: Motions) -> Text | None:

@@ -32,4 +32,5 @@ def scales_of(data: DataSet) -> Scales:
         resonance=float("nan"),
         two_masses=False,
         integral=integral,
+        period_seen=data.period_seen,
     )

@@ -26,11 +26,11 @@ from gaident.axis import Text, joined, say, unit_text
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.select import Selection
+from gaident.diagnosis.selection.under_controller import STEP, UnderController
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, gained
-from gaident.estimation.dataset import DataSet
-from gaident.estimation.noise_model import WHITE, NoiseFilter
-from gaident.estimation.objective import Fit, Hypothesis, Objective
+from gaident.estimation.noise_model import WHITE
+from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.projection import WORST, project_out
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
@@ -39,13 +39,9 @@ from gaident.results.finding import Finding
 __all__ = ["OTHER_GAINS", "GainDoubt", "OtherGains", "gain_doubt", "under_given"]
 
 Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 OTHER_GAINS = "other_gains"
 """The finding."""
-STEP = 1e-3  # no decision: of the logarithm of a gain, for a difference
-STEPS = 6  # no decision: work, of Gauss and Newton
-SETTLED = 1e-4  # no decision: of the logarithm of a gain, a step that ends them
 
 
 @dataclass(frozen=True)
@@ -84,7 +80,7 @@ class OtherGains:
 class GainDoubt:
     """better: the model under other gains that explains the records better than the selected one, None where none does.
 
-    rivals: effects of the selected model in whose place other gains are within reach.
+    rivals: effects of the selected model in whose place other gains are within reach, and those that the better model lacks.
     """
 
     better: OtherGains | None = None
@@ -111,8 +107,9 @@ def gain_doubt(space: Moves, final: Fit, again: bool = False) -> GainDoubt:
     best = min(known, key=lambda g: g.score, default=None)
     if best is not None and not search.better(best, is_more=best is beside):
         best = None
-    rivals = frozenset(e for e, g in instead.items() if g is not None and g.bic - final.bic < space.margin)
-    return GainDoubt(best, frozenset() if best is not None else rivals)
+    rivals = {e for e, g in instead.items() if g is not None and g.bic - final.bic < space.margin}
+    lacking = set() if best is None else set(final.effects) - set(best.fit.effects)
+    return GainDoubt(best, frozenset(rivals | lacking))
 
 
 def _bare(space: Moves, fit: Fit) -> Fit:
@@ -146,6 +143,12 @@ class _Search:
         kp = self.pi.kp * float(np.exp(z[1])) if self.freedom > 1 else self.pi.kp
         return replace(self.pi, kp=kp, ki=self.pi.ki * float(np.exp(z[0])))
 
+    @property
+    def under(self) -> UnderController:
+        """Models under the PI of these logarithms."""
+        ends = np.full(self.freedom, self.reach)
+        return UnderController(self.space.data, self.controller, -ends, ends)
+
     def inside(self, g: OtherGains) -> bool:
         """Whether the gains are not at the end of what is taken to be possible."""
         return not any(e.at_bound for e in g.estimates.values())
@@ -155,7 +158,7 @@ class _Search:
         objective = replace(self.space.objective)
         z = np.zeros(self.freedom)
         for noise in {f.key: f for f in (fit.noise, WHITE)}.values():
-            v, C = self._slopes(objective, fit.hypothesis, fit.x, noise, z)
+            v, C = self.under.slopes(objective, fit.hypothesis, fit.x, noise, z)
             power = float(v @ v)
             rest = project_out(C, v[None, :])[0]
             fall = gained(power, float(rest @ rest), objective.information)
@@ -187,16 +190,13 @@ class _Search:
             return None
         objective = replace(self.space.objective)  # with a memory of its own: every gain tried makes a data set
         z, found = np.zeros(self.freedom), fit
-        z, found = self._closest(objective, found, WHITE, z)
+        z, found = self.under.closest(objective, found, WHITE, z)
         if self.space.whitens:
-            z, found = self._closest(objective, found, objective.own_noise(found), z)
+            z, found = self.under.closest(objective, found, objective.own_noise(found), z)
         found = ls.reestimated(objective, found)
         if found.cost >= WORST:
             return None
-        v, C = self._slopes(objective, found.hypothesis, found.x, found.noise, z)
-        variance = float(v @ v) / objective.information
-        spread = np.linalg.pinv(C @ C.T * objective.information / max(objective.count, 1.0)) * variance
-        stds = np.sqrt(np.maximum(np.diag(spread), 0.0))
+        stds = self.under.deviations(objective, found, z)
         pi = self.controller(z)
         at_end = np.abs(z) > (1.0 - STEP) * self.reach
         rows = [("ki", pi.ki, "N m/rad"), ("kp", pi.kp, "N m s/rad")][: self.freedom]
@@ -207,41 +207,6 @@ class _Search:
         bic = found.bic + cost_of(self.freedom, objective.information)
         score = self.space.score(found) + cost_of(self.freedom, objective.information) + self.space.penalty
         return OtherGains(found, pi, estimates, score, bic, self.final.bic - bic)
-
-    def _closest(self, objective: Objective, fit: Fit, noise: NoiseFilter, z: Vector) -> tuple[Vector, Fit]:
-        """(z, model) of the least cost under one noise filter."""
-        found = ls.fit(objective, self._under(fit.hypothesis, z), fit.x, noise, POLICY.usual)
-        for _ in range(STEPS):
-            v, C = self._slopes(objective, found.hypothesis, found.x, noise, z)
-            step = -np.linalg.lstsq(C.T, v, rcond=1e-9)[0]
-            for part in (1.0, 0.3, 0.1):  # no decision: of a step
-                to = np.clip(z + part * step, -self.reach, self.reach)
-                trial = ls.fit(objective, self._under(found.hypothesis, to), found.x, noise, POLICY.usual)
-                if trial.cost < found.cost:
-                    break
-            else:
-                break
-            moved, z, found = float(np.abs(to - z).max()), to, trial
-            if moved < SETTLED:
-                break
-        return z, found
-
-    def _under(self, hypothesis: Hypothesis, z: Vector) -> Hypothesis:
-        data: DataSet = self.space.data.under(self.controller(z))
-        return hypothesis.driven_by(replace(hypothesis.predictor, data=data))  # type: ignore[type-var]
-
-    def _slopes(
-        self, objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, z: Vector
-    ) -> tuple[Vector, Matrix]:
-        """(whitened errors, their slopes with z beside what the model's own numbers can explain)."""
-        v, J = objective.linearised(self._under(hypothesis, z), x, noise)
-        rows = []
-        for i in range(self.freedom):
-            to = z.copy()
-            to[i] += STEP if z[i] < self.reach - STEP else -STEP
-            E = objective.errors(self._under(hypothesis, to), x[None, :])
-            rows.append((objective.whitened(E, noise)[0] - v) / (to[i] - z[i]))
-        return v, project_out(J, np.array(rows))
 
 
 def under_given(found: Selection, given: PI, gains: int) -> Selection | None:

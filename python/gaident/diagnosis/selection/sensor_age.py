@@ -5,6 +5,7 @@
 is the mean over that sample, to second order in T the velocity in its middle. That is no cause: every drive that differences its
 encoder has it. Left out, it is fitted as a delay or, beside a current loop, as a resonance.
 
+- Where the angle is logged and the velocity is its difference, nothing is left to ask.
 - The lattice of the velocities says how many lines the encoder had. Where they are a whole number, the velocity is taken for a
   difference. Not every velocity on such a lattice is one: an observer or the drive's firmware may round to it. So both ages are
   fitted, with the linear mechanism alone and with the lag of a current loop, and it is none where the age of 0 scores better
@@ -21,6 +22,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gaident.axis import TURN, Text, say
+from gaident.data.signals.difference import is_backward_difference
 from gaident.data.signals.lattice import encoder_lines, encoder_step
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.bases import Task
@@ -47,6 +49,12 @@ def searched(
     if controller is not None and (controller.loop == "continuous" or (data.loop is not None and any(data.moving))):
         return search(objective), []
     every = 1 if controller is None else controller.log_every(data.dt)
+    if every == 1 and all(is_backward_difference(r.velocity, r.position, data.dt) for r in data.records):
+        text = (
+            "The velocity is the difference of the last two {angles}: half a sample old ({:.3g} ms). The simulation has it; "
+            "it is no finding."
+        )
+        return search(Objective(data.aged(HALF), objective.weight, counter=objective.counter)), [say(text, 1e3 * HALF * data.dt)]
     lines = encoder_lines(data.velocity, data.dt / every, TURN if data.axis == "rotary" else 1.0)
     older = Objective(data.aged(HALF / every), objective.weight, counter=objective.counter)
     age = 1e3 * HALF * data.dt / every
@@ -59,7 +67,8 @@ def searched(
         )
         return search(older), [say(text, lines, each, age)]
     found = search(objective)
-    step = encoder_step(data.velocity) if any(_in_series(t) for t in found.final.parameters.terms) else 0.0
+    in_series = any(t.in_series for t in found.final.parameters.terms)
+    step = encoder_step(data.velocity, data.axis == "linear") if in_series else 0.0
     if not step > 0.0:
         return found, []
     again = search(older)
@@ -71,11 +80,6 @@ def searched(
         "difference of an encoder's {angle} over one sample. The simulation has it; it is no finding."
     )
     return again, [say(text, step, age)]
-
-
-def _in_series(term: Term) -> bool:
-    """Whether an effect is linear: a delay, a lag, a filter or a resonance between the torque and the measured velocity."""
-    return not (term.domains or term.harmonic or term.in_controller)
 
 
 def _score(objective: Objective, scales: Scales, model: Model) -> float:

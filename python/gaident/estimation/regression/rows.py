@@ -26,6 +26,8 @@ class Rows:
     terms: tuple[str, ...]
     columns: Matrix  # (n, k)
     torque: Vector  # (n,) N m
+    position: Vector  # (n,) rad
+    time: Vector  # (n,) s
     threshold: float  # rad/s, the velocity of standstill
     travel: float  # rad, over the whole record
 
@@ -41,7 +43,8 @@ class Rows:
         return self._cut(slice(0, at)), self._cut(slice(at, None))
 
     def _cut(self, part: slice) -> Rows:
-        return replace(self, columns=self.columns[part], torque=self.torque[part])
+        kept = {name: getattr(self, name)[part] for name in ("columns", "torque", "position", "time")}
+        return replace(self, **kept)
 
 
 def decimation_of(decimation: object, cutoff_hz: float, dt: float) -> int:
@@ -68,4 +71,6 @@ def rows_of(rec: Record, terms: tuple[str, ...], cutoff_hz: float, order: int, d
     kept = ~motion.still[::decimation]
     kept[:2] = kept[-2:] = False
     travel = float(np.ptp(motion.position))
-    return Rows(terms, regressor[kept], decimated(torque, decimation)[kept], motion.threshold, travel)
+    position = motion.position[::decimation][kept]
+    time = (rec.dt * decimation * np.arange(len(kept), dtype=np.float64))[kept]
+    return Rows(terms, regressor[kept], decimated(torque, decimation)[kept], position, time, motion.threshold, travel)

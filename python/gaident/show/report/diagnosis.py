@@ -119,9 +119,9 @@ def tiles(dia: Diagnosis, view: View) -> Html:
     return joined(shown)
 
 
-def _unit_of(value: float, si: str, view: View) -> str:
+def _unit_of(value: float, si: str, view: View) -> Html:
     """The unit in which a value is shown, with the value in SI behind where that is another."""
-    return f"{view.scales[si][0]} ({number(value)} {si})" if si in view.scales else si
+    return joined((typeset(view.scales[si][0]), " (", number(value), " ", typeset(si), ")")) if si in view.scales else typeset(si)
 
 
 def percent(share: float) -> str:

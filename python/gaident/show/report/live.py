@@ -10,9 +10,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from gaident.show.chart import Chart, Trace, Vector, bar_width
-from gaident.show.html import Html
 
-__all__ = ["figure", "script_json"]
+__all__ = ["figure", "json_of"]
 
 GAP = 0.04  # of the height, between two panels
 DIGITS = 6  # significant ones of what is drawn
@@ -65,12 +64,9 @@ def figure(chart: Chart) -> dict[str, object]:
     return {"data": data, "layout": layout}
 
 
-def script_json(data: object) -> Html:
-    """JSON that may stand inside a script element: no < > & and no line separators of JavaScript."""
-    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
-    for letter in ("<", ">", "&", "\u2028", "\u2029"):
-        text = text.replace(letter, f"\\u{ord(letter):04x}")
-    return Html(text)
+def json_of(data: object) -> str:
+    """JSON without a blank."""
+    return json.dumps(data, separators=(",", ":"), allow_nan=False)
 
 
 def _spans(heights: Iterable[float]) -> list[list[float]]:

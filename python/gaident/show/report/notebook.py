@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from gaident.axis import said
 from gaident.results.diagnosis import Diagnosis
+from gaident.results.estimate import of_axis
 from gaident.results.identification import Identification
 from gaident.show.html import Html, Row, joined, number, table, tag, typeset
 from gaident.show.report import diagnosis, identification
 from gaident.show.report.parts import Head, estimate
 from gaident.show.summary import meaning_of
-from gaident.show.wording import structure_words
+from gaident.show.wording import structure_words, words
 
 __all__ = ["diagnosis_html", "identification_html"]
 
@@ -20,11 +22,16 @@ def diagnosis_html(dia: Diagnosis) -> Html:
     """Verdict, causes with their parameters and evidence, error before and after."""
     rows: list[Row] = []
     for f in (f for f in dia.findings if not f.is_noise):
-        name = " or ".join((f.effect, *f.alternatives)).replace("_", " ")
-        for i, (parameter, e) in enumerate(f.parameters.items()):
-            cells = (parameter.replace("_", " "), estimate(e.value, e.std), typeset("" if e.unit == "1" else e.unit))
+        name = " or ".join(words(effect, dia.axis) for effect in (f.effect, *f.alternatives))
+        for i, parameter in enumerate(f.parameters):
+            e = of_axis(parameter, f.parameters[parameter], dia.axis)
+            cells = (words(parameter, dia.axis), estimate(e.value, e.std), typeset("" if e.unit == "1" else e.unit))
             rows.append((name if i == 0 else "", *cells))
-    evidence = [tag("li", tag("b", f.effect.replace("_", " ")), ": ", typeset(f.evidence)) for f in dia.findings if f.evidence]
+    evidence = [
+        tag("li", tag("b", words(f.effect, dia.axis)), ": ", typeset(said(f.evidence, dia.axis)))
+        for f in dia.findings
+        if f.evidence
+    ]
     causes = table(("cause", "parameter", "value", "unit"), [rows], left=(0, 1, 3)) if rows else Html("")
     if evidence:
         causes = joined((causes, tag("ul", *evidence)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 from functools import lru_cache
 from importlib.resources import files
 
@@ -10,11 +12,11 @@ from gaident.results.identification import Identification
 from gaident.show.chart import PALETTES
 from gaident.show.html import Html, joined, tag, typeset
 from gaident.show.report import diagnosis, identification
-from gaident.show.report.live import figure, script_json
+from gaident.show.report.live import figure, json_of
 from gaident.show.report.parts import Charts, box, sentences, title_of
 from gaident.show.report.views import View
 
-__all__ = ["page"]
+__all__ = ["packed", "page"]
 
 # Nothing is fetched, whatever a page holds.
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:"
@@ -55,8 +57,8 @@ def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
         tag("script", Html('document.documentElement.classList.add("js");')) if plotly_js else "",
     )
     scripts = (
-        tag("script", Html(plotly_js.replace("</script", "<\\/script"))) if drawn.all else "",
-        tag("script", script_json(data), type="application/json", id="figures"),
+        tag("script", _packed(plotly_js), type="application/gzip", id="library") if drawn.all else "",
+        tag("script", packed(json_of(data)), type="application/gzip", id="figures"),
         tag("script", _asset("page.js")),
     )
     licence = " Figures: plotly.js, MIT licence." if plotly_js else ""
@@ -72,6 +74,14 @@ def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
     )
     whole = tag("html", Html("\n"), tag("head", joined(head, "\n")), Html("\n"), tag("body", joined(body, "\n")), lang="en")
     return f"<!DOCTYPE html>\n{whole}\n"
+
+
+def packed(text: str) -> Html:
+    """The text for a script element that page.js unpacks: gzip in base64, the same for the same text."""
+    return Html(base64.b64encode(gzip.compress(text.encode(), compresslevel=9, mtime=0)).decode())
+
+
+_packed = lru_cache(maxsize=1)(packed)  # of the library, which is the same in every page
 
 
 def _about(view: View) -> Html:

@@ -1,0 +1,112 @@
+"""A log of position command and position alone: read, drafted, identified and diagnosed.
+
+The drive of these logs is written out here: one mass between two samples by its closed form, with dry friction that comes to
+exact rest, under a position and a velocity controller that read the counts of an encoder and the difference of the last two.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import gaident as ga
+from gaident.cli.main import main
+from gaident.data.signals.difference import backward_difference, is_backward_difference
+
+DT = 0.5e-3
+J, D, FRICTION = 3e-4, 2e-3, 0.05
+KP, KI, KV = 0.03, 1.9, 25.0
+COUNTS = 1 << 17
+CASCADE = ga.Cascade(ga.PI(KP, KI), position=ga.P(KV), velocity_feedforward=1.0)
+
+
+def command() -> NDArray[np.float64]:
+    """Moves back and forth with dwells [rad]."""
+    ramp, hold, dwell = np.linspace(0.0, 1.0, 50), np.ones(140), np.zeros(120)
+    move = np.convolve(np.concatenate([ramp, hold, ramp[::-1], np.zeros(16)]), np.ones(17) / 17, "same")
+    speeds = np.concatenate([part for s in (60, -60, 30, -45, 80, -65) for part in (dwell, s * move)])
+    return np.round(np.cumsum(speeds) * DT, 7)
+
+
+def counts(friction: float) -> NDArray[np.int_]:
+    """What the encoder showed."""
+    line, step, rate = command(), 2.0 * np.pi / COUNTS, D / J
+    q = w = integral = error = 0.0
+    last, shown = 0, np.empty(len(line), dtype=int)
+    for n, wanted in enumerate(line):
+        shown[n] = now = int(np.floor(q / step))
+        slope = (line[n + 1] - wanted) / DT if n + 1 < len(line) else 0.0
+        newest = KV * (wanted - now * step) + slope - (now - last) * step / DT
+        integral, error, last = integral + KI * DT * (newest + error) / 2.0, newest, now
+        u, left = KP * newest + integral, DT
+        while left > 0.0 and (w != 0.0 or abs(u) > friction):
+            end = (u - friction * np.sign(w or u)) / D
+            after, passed = end + (w - end) * np.exp(-rate * left), left
+            if after * w < 0.0:  # it comes to rest on the way
+                after, passed = 0.0, np.log((w - end) / -end) / rate
+            q += end * passed + (w - end) * (1.0 - np.exp(-rate * passed)) / rate
+            w, left = after, left - passed
+    return shown
+
+
+def log_of(folder: Path, friction: float = 0.0) -> Path:
+    path = folder / "axis.csv"
+    rows = [f"{n * DT:.4f},{r:.7f},{q}" for n, (r, q) in enumerate(zip(command(), counts(friction), strict=True))]
+    path.write_text("\n".join(["t [s],pos_cmd [rad],pos [counts]", *rows]))
+    return path
+
+
+def read(path: Path) -> ga.Record:
+    return ga.read(
+        path, columns={"time": "t", "position_command": "pos_cmd", "position": "pos"}, counts_per_turn=COUNTS, name="axis"
+    )
+
+
+def test_the_velocity_is_the_difference_that_the_drive_forms_and_the_note_says_what_is_not_known(tmp_path: Path) -> None:
+    rec = read(log_of(tmp_path))
+    assert rec.position is not None and rec.torque is None and rec.command is None
+    assert is_backward_difference(rec.velocity, rec.position, rec.dt)
+    assert not is_backward_difference(ga.differentiate(rec.position, rec.dt), rec.position, rec.dt)
+    assert not is_backward_difference(rec.velocity, None, rec.dt)
+    np.testing.assert_allclose(backward_difference(np.array([0.0, 1.0, 3.0]), 0.5), [2.0, 2.0, 4.0])
+    assert any("Neither velocity nor torque is logged" in note and "filters" in note for note in rec.notes)
+
+
+def test_init_asks_for_the_gains_of_the_loop_and_for_no_torque(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    log_of(tmp_path)
+    assert main(["init", "axis.csv", "--out", "drive.toml"]) == 0
+    asked = capsys.readouterr().out
+    assert all(f"controller.{name}" in asked for name in ("kp", "ki", "position_gain"))
+    assert "torque:" not in asked and "command:" not in asked
+    text = Path("drive.toml").read_text()
+    for mark, value in (("# counts_per_turn = 4096", f"counts_per_turn = {COUNTS}"), ("# kp = 0.0232", f"kp = {KP}"),
+                        ("# ki = 1.367", f"ki = {KI}"), ("# position_gain = 40.0", f"position_gain = {KV}")):  # fmt: skip
+        assert mark in text
+        text = text.replace(mark, value)
+    Path("drive.toml").write_text(text.replace("[controller]\n", "[controller]\nvelocity_feedforward = 1.0\n"))
+    assert main(["identify", "axis.csv", "--drive", "drive.toml"]) == 0
+    assert "one mass; the linear model stands" in capsys.readouterr().out
+
+
+def test_the_mechanics_come_out_of_position_and_its_command(tmp_path: Path) -> None:
+    """The torque is what the given controller makes of them; half a sample of age is no second mass."""
+    idn = ga.identify(read(log_of(tmp_path)), CASCADE, seed=1)
+    assert (idn.p, idn.q) == (1, 0) and isinstance(idn.mechanics, ga.OneMass)
+    assert abs(idn.mechanics.J - J) < 1e-3 * J
+
+
+def test_friction_is_found_without_velocity_and_torque(tmp_path: Path) -> None:
+    dia = ga.diagnose(read(log_of(tmp_path, FRICTION)), CASCADE, seed=1)
+    assert dia.verdict == "explained", dia.summary()
+    assert [(f.effect, f.alternatives) for f in dia.causes] == [("coulomb_friction", ())]
+    assert dia.causes[0].parameters["torque"].value == pytest.approx(FRICTION, rel=1e-3)
+    assert dia.mechanics["inertia"].value == pytest.approx(J, rel=1e-3)
+    said = " ".join(dia.summary().split())
+    assert "half a sample old" in said and "nothing shows it: log the torque" in said
+    assert not dia.torque_logged and "The logged torque" not in said

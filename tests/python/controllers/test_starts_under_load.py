@@ -1,0 +1,89 @@
+"""Records that begin under a load that the integrator held before, as on a vertical axis: any controller, any clock."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from test_servo import KI, KP, T
+
+import gaident as ga
+from drive_rig import Noise, Plant, rig, skip_without_library
+from gaident.estimation.dataset import DataSet
+from gaident.models.drive_torque import driven_by, torque_driven
+from gaident.models.stored_torque import stored_torque
+
+skip_without_library()
+
+LOAD = 0.3
+LOOPS: dict[str, dict[str, Any]] = {
+    "bare": {},
+    "IP": {"velocity": {"command_weight": 0.0}},
+    "limit": {"velocity": {"torque_limit": 1.2, "anti_windup": "hold"}},
+    "low pass": {"torque_filters": ga.LowPass(time_constant=0.4e-3)},
+    "notch": {"torque_filters": ga.Notch(frequency=200.0, numerator_damping=0.1, denominator_damping=0.7)},
+    "velocity filter": {"velocity_filters": ga.LowPass(time_constant=0.5e-3)},
+    "delay": {"delay": T},
+    "position": {"position": ga.P(30.0), "position_period": 2 * T},
+}
+
+
+def case(loop: str, every: int, load: float = LOAD) -> tuple[ga.Record, ga.Cascade]:
+    """A log, with noise, of one mass that has stood under the load for 0.4 s."""
+    given = dict(LOOPS[loop])
+    cascade = ga.Cascade(ga.PI(KP, KI, **given.pop("velocity", {})), period=T, **given)
+    plant = Plant(J=1e-3, D=0.01, kp=KP, ki=KI, dt=every * T, cascade=cascade)
+    n = np.arange(1600)
+    speeds = np.array([0.0, 20.0, -15.0, 5.0, -30.0, 10.0, 30.0, -5.0])[n // 200]
+    line = 5.0 * np.sin(2 * np.pi * n / 1600) if plant.placed else speeds
+    rec = rig(plant, line, {"load_torque": {"torque": load}}, Noise(white=0.005), seed=1, position_logged=plant.placed,
+              settle=round(0.4 / plant.dt))  # fmt: skip
+    return rec, cascade
+
+
+@pytest.mark.parametrize("every", [1, 4])
+@pytest.mark.parametrize("loop", LOOPS)
+def test_what_the_integrator_held_is_read_from_the_torque(loop: str, every: int) -> None:
+    rec, cascade = case(loop, every)
+    driven = driven_by(rec, cascade) if every > 1 else rec
+    assert stored_torque(driven, cascade) == pytest.approx(LOAD, rel=0.03)
+    empty, _ = case(loop, every, 0.0)
+    assert stored_torque(driven_by(empty, cascade) if every > 1 else empty, cascade) == 0.0
+
+
+def test_nothing_shows_it_without_a_torque_or_what_the_controller_reads() -> None:
+    rec, cascade = case("position", 4)
+    assert stored_torque(rec.with_channels(torque=None), cascade) == 0.0
+    assert stored_torque(rec.with_channels(position=None), cascade) == 0.0
+
+
+def test_a_constant_beside_the_torque_is_no_doubt_of_the_controller() -> None:
+    rec, cascade = case("IP", 1)
+    assert torque_driven([rec], cascade).doubts == ()
+    (doubt,) = torque_driven([rec], replace(cascade, velocity=ga.PI(2.0 * KP, KI))).doubts
+    assert "does not follow" in str(doubt)
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_the_simulated_loop_begins_as_the_drive_did(loop: str) -> None:
+    rec, cascade = case(loop, 4)
+    driven = torque_driven([rec], cascade).records
+    data = DataSet.of(driven, cascade)
+    assert data.loopable and data.stored[0] == pytest.approx(LOAD, rel=0.03)
+    model = ga.OneMass(J=1e-3, D=0.01).model().with_effect("load_torque", torque=LOAD)
+    state = np.append(np.zeros(model.linear.order), data.stored[0])
+    off = ga.simulate(model, rec, cascade, state) - rec.velocity
+    assert np.sqrt(np.mean(off**2)) < 0.1  # the noise, which acts in the loop as well
+    assert np.sqrt(np.mean((ga.simulate(model, rec, cascade) - rec.velocity)[:200] ** 2)) > 0.3
+
+
+@pytest.mark.parametrize("loop", ["IP", "notch"])
+def test_the_load_is_named(loop: str) -> None:
+    rec, cascade = case(loop, 4)
+    dia = ga.diagnose(rec, cascade)
+    (found,) = [f for f in dia.findings if not f.is_noise]
+    assert "load_torque" in (found.effect, *found.alternatives)
+    assert dia.verdict == "explained"
+    assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.01)
