@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.filtering import filtered
-from gaident.diagnosis.selection.load_end import LoadEnd
 from gaident.diagnosis.selection.mechanisms import evenly_damped
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import gained
+from gaident.estimation.load_end import LoadEnd
 from gaident.estimation.noise_model import WHITE, NoiseFilter
 from gaident.estimation.objective import LOST, Fit, Hypothesis, Objective
 from gaident.estimation.prediction import ClosedLoop
