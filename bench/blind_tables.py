@@ -12,7 +12,7 @@ from scipy.stats import beta
 
 from blind_judge import CLASSES, DRIVERS, EQUIVALENT
 from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS
-from drive_rig import OUTSIDE
+from drive_rig import AT_LOAD, OUTSIDE
 
 Line = dict[str, Any]
 DELAYS = {"transport_delay", "velocity_filter", "torque_lag"}
@@ -257,6 +257,29 @@ def seconds_table(lines: list[Line]) -> str:
     return table(["record", "n", "median [s]", "95 %", "longest"], rows)
 
 
+def sides_table(lines: list[Line]) -> str:
+    """At which end of the shaft an effect is said to be: its own alone, both, only the other one."""
+    rows = []
+    for hidden in [*dict.fromkeys(key.removesuffix(AT_LOAD) for x in lines for key in x["cell"]["effects"]), "", "all"]:
+        for end in ("motor", "load"):
+            some = [x for x in lines if any(_matches(key, hidden, end) for key in x["cell"]["effects"] or [""])]
+            if not some or (not hidden and end == "load"):
+                continue
+            there = [x for x in some if right(x, "in_set") and x["ends"]]
+            wrong = Counter(name for x in some for name in x["judged"]["wrong"])
+            ends = [sum(x["ends"] == [end] for x in there), sum(len(x["ends"]) > 1 for x in there)]
+            rows.append([hidden or "clean", end if hidden else "-", len(some), share(right(x, "exact") for x in some),
+                         share(right(x, "in_set") for x in some), f"{100 * sum(ends) / len(some):.0f} %" if hidden else "-",
+                         *ends, len(there) - sum(ends), listing(wrong)])  # fmt: skip
+    return table(["effect", "end", "n", "exact", "in set", "in set with its end", "its end alone", "both ends", "wrong end",
+                  "named wrong"], rows)  # fmt: skip
+
+
+def _matches(key: str, hidden: str, end: str) -> bool:
+    name = key.removesuffix(AT_LOAD)
+    return (hidden == name or (hidden == "all" and name != "")) and (not name or (end == "load") == (key != name))
+
+
 def measured_table(lines: list[Line]) -> str:
     """A torque that was measured: names, and how far the inertia is off."""
     rows = []
@@ -297,6 +320,7 @@ def report(lines: list[Line]) -> str:
     add("An encoder that is really differenced", groups.get("encoder", []), encoder_table)
     add("A load settled before the record", groups.get("settled", []), effect_table)
     add("Loops of servo drives, wholly known", groups.get("loops", []), loop_table)
+    add("Ends of an elastic shaft", groups.get("sides", []), sides_table)
     add("A measured torque that drives the axis", groups.get("measured", []), measured_table)
     add("Time of a diagnosis", done, seconds_table)
     crashed = [x for x in lines if "crash" in x]

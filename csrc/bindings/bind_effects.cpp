@@ -21,6 +21,7 @@ const char* name_of(Place place) {
 py::list table() {
     py::list rows;
     for (const EffectInfo& info : effect_table) {
+        if (info.at_load) continue;  // as at the motor
         py::list parameters;
         for (const EffectParameter& p : info.parameters)
             parameters.append(py::make_tuple(p.name, p.unit, p.neutral, p.lowest, p.highest, p.above_lowest));
@@ -100,8 +101,9 @@ struct PyEffectRecord {
           velocity(measured_velocity),
           velocity_feedforward(std::move(fed_velocity)),
           torque_feedforward(std::move(fed_torque)) {
-        for (const auto& [signal, name] : {std::pair(&position, "position"), std::pair(&velocity_feedforward, "velocity_feedforward"),
-                                           std::pair(&torque_feedforward, "torque_feedforward")})
+        for (const auto& [signal, name] :
+             {std::pair(&position, "position"), std::pair(&velocity_feedforward, "velocity_feedforward"),
+              std::pair(&torque_feedforward, "torque_feedforward")})
             if (signal->size() != 0 && signal->size() != input.size())
                 throw std::invalid_argument(std::string(name) + ": as many samples as the input are needed");
         if (clock.log_every < 1 || input.size() % clock.log_every != 0)
@@ -294,9 +296,8 @@ void bind_effects(py::module_& m) {
         .def(py::init(&make_model), py::arg("gain"), py::arg("poles"), py::arg("zeros"), py::arg("effects"));
     py::class_<PyEffectRecord>(m, "EffectRecord")
         .def(py::init<const Clock&, RealArray, RealArray, const RealArray&, double, const Loop&, RealArray, RealArray>(),
-             py::kw_only(), py::arg("clock"), py::arg("input"), py::arg("position"), py::arg("velocity"),
-             py::arg("start_angle"), py::arg("loop"), py::arg("velocity_feedforward") = RealArray(),
-             py::arg("torque_feedforward") = RealArray())
+             py::kw_only(), py::arg("clock"), py::arg("input"), py::arg("position"), py::arg("velocity"), py::arg("start_angle"),
+             py::arg("loop"), py::arg("velocity_feedforward") = RealArray(), py::arg("torque_feedforward") = RealArray())
         .def("simulate", &simulate_models, py::arg("models"), py::arg("initial_states"), py::arg("substeps"), py::arg("workers"),
              py::arg("all"), py::arg("kernel") = "", py::arg("lanes") = true, py::arg("own") = OwnList())
         .def("simulate_values", &simulate_values, py::arg("values"), py::arg("structure"), py::arg("effects"),

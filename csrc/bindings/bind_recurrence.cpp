@@ -23,9 +23,9 @@ py::list numbers_of(Value... value) {
 // Name -> coefficients of each effect there, in the order of its header.
 py::dict effect_numbers(const PreparedEffects& made, EffectSet effects) {
     py::dict d;
-    Effects::each([&]<class E>() {
+    AllEffects::each([&]<class E>() {
         if (!effects.has<E>()) return;
-        const auto& c = made.constants.effects.of<E>();
+        const auto& c = made.constants.of<E>();
         double flat[sizeof c / sizeof(double) + 1];
         std::memcpy(flat, &c, HasCoefficients<E> ? sizeof c : 0);
         d[E::info.name] = numbers(flat, HasCoefficients<E> ? static_cast<int>(sizeof c / sizeof(double)) : 0);

@@ -5,6 +5,7 @@
 //   load    J2 dw2/dt = Tc - D2 w2          Tc = K x + DG dx/dt + k3 x^3 beyond the gap, 0 inside; x = theta - theta2
 //
 // T: torque behind saturation, dead band, delay and lag; q: smooth shaft torques; f: dry friction.
+// Both act at the motor, or with `at_load` as q - f on the load, with its velocity and angle.
 // Every sample is cut at the instant where the delayed torque changes and into substeps of a Runge-Kutta step of fourth order.
 // Dry friction has three regimes (sliding +, sliding -, at rest); the instant of a zero crossing is found by a secant iteration,
 // and at rest w is exactly 0 until the torque that holds the shaft exceeds the friction's level.
@@ -84,6 +85,7 @@ struct Drive {  // SI units, rad; neutral values
     double root = 0;        // drag root sqrt|w| sign(w),
     double hysteretic = 0;  // share of a Bouc-Wen spring in K,
     double yield = 1;       // and its yield twist, rad
+    double at_load = 0;     // not 0: the shaft's effects act at the load, without a further resonance
     // end of fields
 };
 
@@ -99,6 +101,8 @@ public:
           dry(d.friction_positive != 0 || d.friction_negative != 0 || d.viscous_positive != 0 || d.viscous_negative != 0 ||
               d.stribeck != 0 || d.drifting != 0 || d.uneven != 0 || d.loaded != 0),
           extra(d.wp > 0),
+          at_load(d.at_load != 0),
+          shaft(at_load ? w2 : w1),
           g(extra ? (d.wp / d.wz) * (d.wp / d.wz) : 1) {}
 
     State s{};
@@ -123,6 +127,8 @@ private:
     const Drive& d;
     const bool dry;
     const bool extra;
+    const bool at_load;
+    const Index shaft;  // whose velocity the shaft's effects have
     const double g;
     int regime = 0;  // -1, 0 (at rest), 1
 
@@ -131,34 +137,42 @@ private:
         return x[w1] * (1 + d.ripple * d.ripple_order * std::cos(d.ripple_order * x[angle] + d.ripple_phase));
     }
 
+    double turned(const State& x) const { return at_load ? x[angle] - x[twist] : x[angle]; }
+
     // Magnitude of dry friction when the shaft turns, or is about to turn, in the direction `way`.
     double level(const State& x, double t, int way) const {
-        const double speed = std::abs(x[w1]);
+        const double speed = std::abs(x[shaft]);
         double f = way > 0 ? d.friction_positive + d.viscous_positive * speed : d.friction_negative + d.viscous_negative * speed;
         if (d.stribeck != 0) f += d.stribeck * std::exp(-(speed / d.stribeck_velocity) * (speed / d.stribeck_velocity));
         if (d.drifting != 0) f += d.drifting * (1 + d.drift_rate * t);
-        if (d.uneven != 0) f += d.uneven * (1 + d.uneven_depth * std::sin(d.uneven_order * x[angle] + d.uneven_phase));
-        if (d.loaded != 0) f += d.loaded * std::abs(d.load + d.unbalance * std::sin(x[angle] + d.unbalance_phase));
+        if (d.uneven != 0) f += d.uneven * (1 + d.uneven_depth * std::sin(d.uneven_order * turned(x) + d.uneven_phase));
+        if (d.loaded != 0) f += d.loaded * std::abs(d.load + d.unbalance * std::sin(turned(x) + d.unbalance_phase));
         return f;
     }
 
     // dz/dt of the LuGre bristle
     double bending(const State& x) const {
-        const double ratio = x[w1] / d.lugre_velocity;
+        const double ratio = x[shaft] / d.lugre_velocity;
         const double g = d.lugre + (d.lugre_static - d.lugre) * std::exp(-ratio * ratio);
-        return x[w1] - d.lugre_stiffness * std::abs(x[w1]) * x[bent] / g;
+        return x[shaft] - d.lugre_stiffness * std::abs(x[shaft]) * x[bent] / g;
     }
 
+    double grounded(const State& x) const { return d.ground * (x[angle] - d.rest); }
+
+    // Torque of the actuator and what disturbs it.
+    double driving(const State& x) const { return (d.lag > 0 ? x[lagged] : held) + disturbed; }
+
+    // The smooth torques where the shaft's effects are.
     double smooth(const State& x, double t) const {
-        double q = (d.lag > 0 ? x[lagged] : held) + disturbed - d.load;
-        if (d.drag != 0) q -= d.drag * x[w1] * std::abs(x[w1]);
+        double q = (at_load ? 0 : driving(x)) - d.load;
+        if (d.drag != 0) q -= d.drag * x[shaft] * std::abs(x[shaft]);
         if (d.dahl != 0) q -= d.dahl_stiffness * x[bristle];
         if (d.lugre != 0) q -= d.lugre_stiffness * x[bent] + d.lugre_damping * bending(x);
-        q -= d.ground * (x[angle] - d.rest);
-        if (d.unbalance != 0) q -= d.unbalance * std::sin(x[angle] + d.unbalance_phase);
-        if (d.cogging != 0) q -= d.cogging * std::sin(d.cogging_order * x[angle] + d.cogging_phase);
+        if (!at_load) q -= grounded(x);
+        if (d.unbalance != 0) q -= d.unbalance * std::sin(turned(x) + d.unbalance_phase);
+        if (d.cogging != 0) q -= d.cogging * std::sin(d.cogging_order * turned(x) + d.cogging_phase);
         if (d.hum != 0) q += d.hum * std::sin(d.hum_frequency * t + d.hum_phase);
-        if (d.root != 0) q -= d.root * std::sqrt(std::abs(x[w1])) * sign(x[w1]);
+        if (d.root != 0) q -= d.root * std::sqrt(std::abs(x[shaft])) * sign(x[shaft]);
         return q;
     }
 
@@ -179,7 +193,10 @@ private:
     }
 
     // The friction torque that keeps the shaft at rest.
-    double holding(const State& x, double t) const { return smooth(x, t) + (stored(x) - (d.J2 > 0 ? coupling(x) : 0)) / g; }
+    double holding(const State& x, double t) const {
+        if (at_load) return smooth(x, t) + coupling(x);
+        return smooth(x, t) + (stored(x) - (d.J2 > 0 ? coupling(x) : 0)) / g;
+    }
 
     State slope(const State& x, double t, int way) const {
         State dx{};
@@ -187,15 +204,18 @@ private:
         const double q = smooth(x, t);
         const bool resting = dry && way == 0;
         double net = q;
-        if (resting) {
+        if (at_load) {
+            net = driving(x) - grounded(x);
+        } else if (resting) {
             net = (tc - stored(x)) / g;
         } else if (dry) {
             net = q - way * level(x, t, way);
         }
-        dx[w1] = resting ? 0 : (g * net + stored(x) - d.D1 * x[w1] - tc) / d.J1;
+        dx[w1] = resting && !at_load ? 0 : (g * net + stored(x) - d.D1 * x[w1] - tc) / d.J1;
         dx[angle] = x[w1];
         if (d.J2 > 0) {
             dx[w2] = (tc - d.D2 * x[w2]) / d.J2;
+            if (at_load) dx[w2] = resting ? 0 : dx[w2] + (q - (dry ? way * level(x, t, way) : 0)) / d.J2;
             dx[twist] = x[w1] - x[w2];
             if (d.hysteretic != 0) {
                 // z turns at the rate of the twist, less the more it is yielded: Bouc-Wen with n = 2, beta = gamma = 1/2.
@@ -204,7 +224,7 @@ private:
             }
         }
         if (d.lag > 0) dx[lagged] = (held - x[lagged]) / d.lag;
-        if (d.dahl != 0) dx[bristle] = x[w1] - d.dahl_stiffness * std::abs(x[w1]) * x[bristle] / d.dahl;
+        if (d.dahl != 0) dx[bristle] = x[shaft] - d.dahl_stiffness * std::abs(x[shaft]) * x[bristle] / d.dahl;
         if (d.lugre != 0) dx[bent] = bending(x);
         if (d.filter > 0) dx[filtered] = (rippled(x) - x[filtered]) / d.filter;
         if (extra) {
@@ -243,26 +263,26 @@ private:
                 return;
             }
             const State whole = runge_kutta(s, t, left, regime);
-            if (regime * whole[w1] >= 0) {
+            if (regime * whole[shaft] >= 0) {
                 s = whole;
                 return;
             }
             // w(a) >= 0 >= w(b), seen in the direction of motion: regula falsi between the two, Illinois.
-            double a = 0, b = left, wa = s[w1], wb = whole[w1];
+            double a = 0, b = left, wa = s[shaft], wb = whole[shaft];
             State crossing = s;
             for (int i = 0; i < 40 && b - a > 1e-9 * h; ++i) {
                 const double middle = wa == wb ? b : a + (b - a) * wa / (wa - wb);
                 crossing = runge_kutta(s, t, middle, regime);
-                if (std::abs(crossing[w1]) < 1e-13) {
+                if (std::abs(crossing[shaft]) < 1e-13) {
                     a = b = middle;
-                } else if (regime * crossing[w1] > 0) {
-                    a = middle, wa = crossing[w1], wb /= 2;
+                } else if (regime * crossing[shaft] > 0) {
+                    a = middle, wa = crossing[shaft], wb /= 2;
                 } else {
-                    b = middle, wb = crossing[w1], wa /= 2;
+                    b = middle, wb = crossing[shaft], wa /= 2;
                 }
             }
             s = crossing;
-            s[w1] = 0;
+            s[shaft] = 0;
             t += b;
             regime = from_rest(t);
         }

@@ -16,19 +16,8 @@ namespace {
 
 constexpr double inf = std::numeric_limits<double>::infinity();
 
-struct Case {  // SI units, rad; neutral values; effect_parameter
-    // fields
-    double dt = 1e-3;  // s
-    double closed = 0;
-    double analog = 0;
-    double kp = 0;  // N m s/rad
-    double ki = 0;  // N m/rad
-    double JM = 1;  // kg m2
-    double DM = 0;  // N m s/rad
-    double JL = 0;  // 0: one mass
-    double DL = 0;
-    double K = 0;  // N m/rad
-    double D = 0;
+struct Shaft {  // effects at one end of the shaft
+    // shaft fields
     double coulomb_friction_torque = 0;
     double stribeck_friction_torque = 0;
     double stribeck_friction_static_torque = 0;
@@ -55,6 +44,22 @@ struct Case {  // SI units, rad; neutral values; effect_parameter
     double friction_drift_rate = 0;
     double load_dependent_friction_torque = 0;
     double load_dependent_friction_share = 0;
+    // end of shaft fields
+};
+
+struct Case {  // SI units, rad; neutral values; effect_parameter
+    // fields
+    double dt = 1e-3;  // s
+    double closed = 0;
+    double analog = 0;
+    double kp = 0;  // N m s/rad
+    double ki = 0;  // N m/rad
+    double JM = 1;  // kg m2
+    double DM = 0;  // N m s/rad
+    double JL = 0;  // 0: one mass
+    double DL = 0;
+    double K = 0;  // N m/rad
+    double D = 0;
     double backlash_gap = 0;
     double hardening_stiffness_cubic_stiffness = 0;
     double torque_saturation_limit = inf;
@@ -73,6 +78,7 @@ struct Case {  // SI units, rad; neutral values; effect_parameter
     double extra_resonance_zero_frequency = 1;
     double extra_resonance_zero_damping = 1;
     // end of fields
+    Shaft at_motor, at_load;
 };
 
 double clip(double x, double limit) { return std::clamp(x, -limit, limit); }
@@ -83,12 +89,66 @@ double beyond(double x, double width) { return std::copysign(std::max(std::abs(x
 // A lag in steps of h by the midpoint rule: its share of the way to the input; without a time constant it follows at once.
 double share(double h, double time_constant) { return time_constant > 0 ? h / (time_constant + 0.5 * h) : 1; }
 
+// One end of the shaft: what its effects do at velocity w [rad/s] and angle theta [rad].
+class End {
+public:
+    End(const Shaft& its, double step) : c(its), h(step) {}
+
+    // What the torque there is less, before friction.
+    double load(double theta) const {
+        double T = c.load_torque_torque;
+        if (c.unbalance_amplitude != 0) T += c.unbalance_amplitude * std::sin(theta + c.unbalance_phase);
+        if (c.cogging_amplitude != 0) T += c.cogging_amplitude * std::sin(c.cogging_order * theta + c.cogging_phase);
+        return T;
+    }
+
+    // Friction and drag without a jump at standstill.
+    double smooth(double w) {
+        const double viscous = w > 0 ? c.asymmetric_friction_viscous_positive : c.asymmetric_friction_viscous_negative;
+        double T = c.quadratic_drag_coefficient * w * std::abs(w) + viscous * w;
+        if (const double s0 = c.presliding_friction_stiffness; s0 > 0) {
+            const double per_zc = s0 / c.presliding_friction_torque;
+            const double half = z + 0.5 * h * (w - std::abs(w) * z * per_zc);
+            T += s0 * half;
+            z += h * (w - std::abs(w) * half * per_zc);
+        }
+        if (const double s0 = c.lugre_friction_stiffness; s0 > 0) {
+            const double ratio = w / c.lugre_friction_stribeck_velocity, Tc = c.lugre_friction_torque;
+            const double g = Tc + (c.lugre_friction_static_torque - Tc) * std::exp(-ratio * ratio);
+            const double half = bend + 0.5 * h * (w - s0 * std::abs(w) * bend / g);
+            const double rate = w - s0 * std::abs(w) * half / g;
+            T += s0 * half + c.lugre_friction_damping * rate;
+            bend += h * rate;
+        }
+        return T;
+    }
+
+    // Dry friction, where the other torques bring the velocity `free`, under what the torques there brake with [N m].
+    double level(double w, double free, double t, double braking) const {
+        double T =
+            c.coulomb_friction_torque + c.stribeck_friction_torque + c.friction_drift_torque * (1 + c.friction_drift_rate * t);
+        T += c.load_dependent_friction_torque + c.load_dependent_friction_share * std::abs(braking);
+        if (const double more = c.stribeck_friction_static_torque - c.stribeck_friction_torque; more != 0) {
+            const double ratio = 0.5 * (w + free) / c.stribeck_friction_stribeck_velocity;
+            T += more * std::exp(-ratio * ratio);
+        }
+        return T + (free > 0 ? c.asymmetric_friction_torque_positive : c.asymmetric_friction_torque_negative);
+    }
+
+private:
+    const Shaft& c;
+    const double h;
+    double z = 0, bend = 0;
+};
+
 class Drive {
 public:
     Drive(const Case& its, int steps)
         : c(its),
           h(c.dt / steps),
           control_time(c.analog != 0 ? h : c.dt),
+          motor(c.at_motor, h),
+          load(c.at_load, h),
           delay(c.transport_delay_delay / h),
           ring(static_cast<std::size_t>(delay) + 3) {}
 
@@ -111,17 +171,22 @@ public:
 
     // One fine step under the torque command v, its middle at time t.
     void step(double v, double t) {
-        const double braking = shaft_torque();
+        const double braking = motor.load(angle + 0.5 * h * w);
         const double T = resonant(lagged(late(beyond(clip(v, c.torque_saturation_limit), c.torque_dead_band_width)))) - braking;
-        const bool load = c.JL > 0;
+        const bool two = c.JL > 0;
         twist += 0.5 * h * (w - wL);
-        const double Tc = load ? coupling() : 0;
+        const double Tc = two ? coupling() : 0;
         const double damp = 0.5 * h * c.DM / c.JM;
-        const double free = ((1 - damp) * w + h / c.JM * (T - Tc - smooth())) / (1 + damp);
-        const double next = beyond(free, h / c.JM * level(free, t, braking));
-        if (load) {
+        const double free = ((1 - damp) * w + h / c.JM * (T - Tc - motor.smooth(w))) / (1 + damp);
+        const double next = beyond(free, h / c.JM * motor.level(w, free, t, braking));
+        if (two) {
             const double damp_L = 0.5 * h * c.DL / c.JL;
-            wL = ((1 - damp_L) * wL + h / c.JL * Tc) / (1 + damp_L);
+            const double braking_load = load.load(angle_load + 0.5 * h * wL);
+            const double pull = Tc - braking_load - load.smooth(wL);
+            const double free_L = ((1 - damp_L) * wL + h / c.JL * pull) / (1 + damp_L);
+            const double next_L = beyond(free_L, h / c.JL * load.level(wL, free_L, t, braking_load));
+            angle_load += 0.5 * h * (wL + next_L);
+            wL = next_L;
         }
         angle += 0.5 * h * (w + next);
         w = next;
@@ -134,10 +199,11 @@ public:
 private:
     const Case& c;
     const double h, control_time;
+    End motor, load;
     const double delay;  // fine steps
     std::vector<double> ring;
     std::size_t k = 0;
-    double w = 0, wL = 0, twist = 0, z = 0, bend = 0, x1 = 0, x2 = 0, lag = 0, filtered = 0, integral = 0, error = 0, command = 0;
+    double w = 0, wL = 0, angle_load = 0, twist = 0, x1 = 0, x2 = 0, lag = 0, filtered = 0, integral = 0, error = 0, command = 0;
 
     // The torque at the middle of the fine step, `delay` steps ago.
     double late(double v) {
@@ -168,51 +234,10 @@ private:
         return (wp / wz) * (wp / wz) * (T + (zz * wz - zp * wp) * (old2 + x2) + (wz * wz - wp * wp) * x1_mean);
     }
 
-    double shaft_torque() const {
-        const double theta = angle + 0.5 * h * w;
-        double T = c.load_torque_torque;
-        if (c.unbalance_amplitude != 0) T += c.unbalance_amplitude * std::sin(theta + c.unbalance_phase);
-        if (c.cogging_amplitude != 0) T += c.cogging_amplitude * std::sin(c.cogging_order * theta + c.cogging_phase);
-        return T;
-    }
-
     double coupling() const {
         const double half_gap = 0.5 * c.backlash_gap, x = beyond(twist, half_gap);
         const double damping = std::abs(twist) < half_gap ? 0 : c.D * (w - wL);
         return c.K * x + c.hardening_stiffness_cubic_stiffness * x * x * x + damping;
-    }
-
-    // Friction and drag without a jump at standstill.
-    double smooth() {
-        const double viscous = w > 0 ? c.asymmetric_friction_viscous_positive : c.asymmetric_friction_viscous_negative;
-        double T = c.quadratic_drag_coefficient * w * std::abs(w) + viscous * w;
-        if (const double s0 = c.presliding_friction_stiffness; s0 > 0) {
-            const double per_zc = s0 / c.presliding_friction_torque;
-            const double half = z + 0.5 * h * (w - std::abs(w) * z * per_zc);
-            T += s0 * half;
-            z += h * (w - std::abs(w) * half * per_zc);
-        }
-        if (const double s0 = c.lugre_friction_stiffness; s0 > 0) {
-            const double ratio = w / c.lugre_friction_stribeck_velocity, Tc = c.lugre_friction_torque;
-            const double g = Tc + (c.lugre_friction_static_torque - Tc) * std::exp(-ratio * ratio);
-            const double half = bend + 0.5 * h * (w - s0 * std::abs(w) * bend / g);
-            const double rate = w - s0 * std::abs(w) * half / g;
-            T += s0 * half + c.lugre_friction_damping * rate;
-            bend += h * rate;
-        }
-        return T;
-    }
-
-    // Dry friction, where the other torques bring the velocity `free`, under a load [N m].
-    double level(double free, double t, double load) const {
-        double T =
-            c.coulomb_friction_torque + c.stribeck_friction_torque + c.friction_drift_torque * (1 + c.friction_drift_rate * t);
-        T += c.load_dependent_friction_torque + c.load_dependent_friction_share * std::abs(load);
-        if (const double more = c.stribeck_friction_static_torque - c.stribeck_friction_torque; more != 0) {
-            const double ratio = 0.5 * (w + free) / c.stribeck_friction_stribeck_velocity;
-            T += more * std::exp(-ratio * ratio);
-        }
-        return T + (free > 0 ? c.asymmetric_friction_torque_positive : c.asymmetric_friction_torque_negative);
     }
 };
 

@@ -8,7 +8,7 @@
 //     template <class R> struct State            its memory, all zero where the record begins; absent: none
 //   - static double substeps(p, Circumstances)   how many a sample it asks for beyond its pace
 //
-// and a hook, the place in the loop where it acts.
+// and a hook, the place in the loop where it acts; those of a shaft effect are asked at the motor, or at the load (at_load.hpp).
 // R is double or lanes of doubles; on R there are selections and no branches.
 //
 //   - command             r' = command(c, s, r)                  what the controller is asked to follow [rad/s]
@@ -74,6 +74,7 @@ enum class Hooks : std::uint32_t {
     tabulate = 1U << 17,
     later = 1U << 18,
     loaded = 1U << 19,
+    load = 1U << 20,
 };
 constexpr Hooks operator|(Hooks a, Hooks b) {
     return static_cast<Hooks>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
@@ -105,6 +106,7 @@ struct EffectInfo {
     bool (*allowed)(const double*) = nullptr;   // a relation that parameters have to meet,
     const char* relation = "";                  // in words
     const char* remark = "";                    // what the table says after the meaning
+    bool at_load = false;                       // acts at the load of two masses (at_load.hpp)
 
     constexpr int count() const { return static_cast<int>(parameters.size()); }
 
@@ -138,7 +140,8 @@ enum class Pace {
 struct Circumstances {
     const Factors<double>& plant;
     const Loop& loop;
-    double sample_time, top_speed;  // [s], [rad/s]
+    double sample_time, top_speed;         // [s], [rad/s]
+    double inverse_inertia, inverse_load;  // of the motor's side and of the load's, 0 where there is none [1/(kg m^2)]
 
     // Substeps in which a shaft at the top speed turns little of one period.
     double for_turns(double order) const { return order * top_speed * sample_time / 0.3; }

@@ -27,6 +27,7 @@
 #include "sensor/velocity_quantisation.hpp"
 #include "sensor/velocity_ripple.hpp"
 
+#include "at_load.hpp"
 #include "registry.hpp"
 
 namespace gaident {
@@ -56,12 +57,17 @@ using Effects = EffectList<CoulombFriction,        //
                            ExtraResonance,         //
                            Outliers>;
 
-inline constexpr auto& effect_table = Effects::table;
-inline constexpr int effect_count = Effects::size;
+// Those of the shaft once more, at the load: a list of its own, so that a loop without them holds nothing of theirs.
+using LoadEffects = LoadSideOf<Effects>;
+// What models are made of, numbered in this order.
+using AllEffects = Joined<Effects, LoadEffects>;
+
+inline constexpr auto& effect_table = AllEffects::table;
+inline constexpr int effect_count = AllEffects::size;
 
 // An effect's number: its place in the list.
 template <class E>
-inline constexpr Effect effect = Effects::number<E>;
+inline constexpr Effect effect = AllEffects::number<E>;
 
 // By name; throws std::invalid_argument for a name that is none.
 inline Effect effect_named(std::string_view name) {
@@ -71,12 +77,12 @@ inline Effect effect_named(std::string_view name) {
 }
 constexpr const EffectInfo& info_of(Effect e) { return effect_table[static_cast<std::size_t>(e)]; }
 
-// A set of effects; in a model each appears at most once.
+// A set of effects; in a model each appears at most once at a side.
 struct EffectSet {
-    std::uint32_t bits = 0;
-    static_assert(effect_count <= 32);
+    std::uint64_t bits = 0;
+    static_assert(effect_count <= 64);
 
-    static constexpr std::uint32_t bit(Effect e) { return std::uint32_t{1} << static_cast<unsigned>(e); }
+    static constexpr std::uint64_t bit(Effect e) { return std::uint64_t{1} << static_cast<unsigned>(e); }
     constexpr bool has(Effect e) const { return (bits & bit(e)) != 0; }
     template <class E>
     constexpr bool has() const {
@@ -101,15 +107,23 @@ struct EffectSet {
 // The effects that have one of these functions.
 constexpr EffectSet effects_with(Hooks hooks) {
     EffectSet set;
-    Effects::each([&]<class E>() {
+    AllEffects::each([&]<class E>() {
         if ((E::hooks & hooks) != Hooks::none) set.add(effect<E>);
+    });
+    return set;
+}
+// Those at the load of which the effect itself has one of these functions.
+constexpr EffectSet load_effects_with(Hooks hooks) {
+    EffectSet set;
+    LoadEffects::each([&]<class E>() {
+        if ((E::AtMotor::hooks & hooks) != Hooks::none) set.add(effect<E>);
     });
     return set;
 }
 // Those that depend on the shaft's angle.
 constexpr EffectSet effects_that_turn() {
     EffectSet set;
-    Effects::each([&]<class E>() {
+    AllEffects::each([&]<class E>() {
         if (E::info.turns) set.add(effect<E>);
     });
     return set;
@@ -119,15 +133,15 @@ constexpr EffectSet effects_that_turn() {
 struct EffectModel {
     Factors<double> linear;
     EffectSet effects;
-    double parameter[Effects::parameters] = {};  // one effect's after the other's
+    double parameter[AllEffects::parameters] = {};  // one effect's after the other's
 
-    const double* of(Effect e) const { return parameter + Effects::first_parameter[static_cast<std::size_t>(e)]; }
+    const double* of(Effect e) const { return parameter + AllEffects::first_parameter[static_cast<std::size_t>(e)]; }
     void add(Effect e, const double* values) {
         effects.add(e);
         for (int i = 0; i < info_of(e).count(); ++i)
-            parameter[Effects::first_parameter[static_cast<std::size_t>(e)] + i] = values[i];
+            parameter[AllEffects::first_parameter[static_cast<std::size_t>(e)] + i] = values[i];
     }
-    double* of(Effect e) { return parameter + Effects::first_parameter[static_cast<std::size_t>(e)]; }
+    double* of(Effect e) { return parameter + AllEffects::first_parameter[static_cast<std::size_t>(e)]; }
 };
 
 }  // namespace gaident

@@ -43,6 +43,17 @@ struct StateOf<E, R> {
     using Type = typename E::template State<R>;
 };
 
+// Of an effect that is another at the load: empty members have a type of their own there, too.
+template <class Here, class E, class R>
+struct StateAt {
+    using Type = Nothing<Here>;
+};
+template <class Here, class E, class R>
+    requires requires { typename E::template State<R>; }
+struct StateAt<Here, E, R> {
+    using Type = typename E::template State<R>;
+};
+
 template <class E>
 struct TableOf {
     using Type = Nothing<E>;
@@ -136,6 +147,8 @@ concept tabulate = HasTable<E> && requires(const double* p, const Timing& time, 
 };
 template <class E>
 concept later = requires(double* p, double delay) { E::later(p, delay); };
+template <class E>
+concept load = requires { typename E::AtMotor; };  // another effect's, at the load (at_load.hpp)
 
 // What every effect has, not listed in `hooks`.
 template <class E>
@@ -156,13 +169,13 @@ constexpr Hooks all_of() {
            if_there(sensor<E>, Hooks::sensor) | if_there(sensor_dynamics<E>, Hooks::sensor_dynamics) |
            if_there(reading<E>, Hooks::reading) | if_there(plant<E>, Hooks::plant) | if_there(begin<E>, Hooks::begin) |
            if_there(substeps<E>, Hooks::substeps) | if_there(possible<E>, Hooks::possible) |
-           if_there(tabulate<E>, Hooks::tabulate) | if_there(later<E>, Hooks::later);
+           if_there(tabulate<E>, Hooks::tabulate) | if_there(later<E>, Hooks::later) | if_there(load<E>, Hooks::load);
 }
 
 // Those of which an effect at this place has to have one.
 constexpr Hooks acting_at(Place place) {
     switch (place) {
-        case Place::shaft: return Hooks::torque | Hooks::law | Hooks::level | Hooks::loaded | Hooks::friction;
+        case Place::shaft: return Hooks::torque | Hooks::law | Hooks::level | Hooks::loaded | Hooks::friction | Hooks::load;
         case Place::coupling: return Hooks::coupling;
         case Place::actuator: return Hooks::actuator | Hooks::actuator_dynamics;
         case Place::controller: return Hooks::command | Hooks::controller;

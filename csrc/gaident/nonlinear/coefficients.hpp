@@ -23,6 +23,19 @@ struct EffectConstants {
 
     R stored;  // the controller's stored torque at the start
     R before;  // torque that acted before the record's start
+
+    typename LoadEffects::Coefficients<R> at_load;
+
+    // Those of an effect at its side.
+    template <class E>
+    auto& of() {
+        if constexpr (hook::load<E>) return at_load.template of<E>();
+        else return effects.template of<E>();
+    }
+    template <class E>
+    const auto& of() const {
+        return const_cast<EffectConstants&>(*this).template of<E>();
+    }
 };
 
 inline constexpr std::size_t effect_constants = sizeof(EffectConstants<double>) / sizeof(double);

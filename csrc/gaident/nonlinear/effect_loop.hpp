@@ -11,6 +11,7 @@
 
 #include "../control/servo.hpp"
 #include "effect_run.hpp"
+#include "load_side.hpp"
 #include "mechanism.hpp"
 #include "sample_mean.hpp"
 
@@ -27,7 +28,12 @@ class EffectLoop {
 
 public:
     [[gnu::always_inline]] EffectLoop(const EffectRun& run, const EffectConstants<R>& constants)
-        : run_(run), c_(constants), plant_(constants, run.order), pi_(controller_of(run)), own_(run, plant_.velocity()) {
+        : run_(run),
+          c_(constants),
+          plant_(constants, run.order),
+          pi_(controller_of(run)),
+          own_(run, plant_.velocity()),
+          load_(run, plant_.twist()) {
         const bool continuous = run.loop.kind == LoopKind::continuous;
         h_ = run.sample_time / run.substeps;
         if constexpr (!is_servo)
@@ -43,6 +49,7 @@ public:
             if constexpr (hook::law<E>) E::law(c, law_);
             if constexpr (hook::begin<E>) E::begin(c, states_.template of<E>(), start);
         });
+        if constexpr (Plant::both_ends) begin_at_load();
         if constexpr (!is_servo) pi_.s = c_.stored;
         else if (run.moving) pi_.rest(start.command, start.velocity, c_.stored);
         angle_ = R(run.start_angle);
@@ -145,6 +152,23 @@ private:
         const std::size_t last = run_.position.size() - 1;
         if (n < last) return run_.position[n + 1];
         return last == 0 ? run_.position[0] : 2.0 * run_.position[last] - run_.position[last - 1];
+    }
+
+    void begin_at_load() {
+        plant_.correcting = run_.effects.meets(effects_with(Hooks::coupling));
+        const Beginning<R> start{plant_.load_velocity(), c_.before, first_command()};
+        each_at<Side::load>([&]<class Key, class E>() {
+            if (!run_.effects.has<Key>()) return;
+            const auto& c = c_.template of<Key>();
+            if constexpr (hook::law<E>) E::law(c, load_.law);
+            if constexpr (hook::begin<E>) E::begin(c, load_.states.template of<Key>(), start);
+        });
+        turning_ = turning_ || load_.turning;
+        // As for friction at the motor; where the step is too coarse for the resonance both ends cannot be solved.
+        if (load_.dry) {
+            const R alone = plant_.load_beta() - (plant_.back() / plant_.beta()) * plant_.across();
+            plant_.x[0] = greater(minimum(plant_.load_beta(), alone), R(0.0), plant_.x[0], R(any_value));
+        }
     }
 
     // theta in the middle of the substep
@@ -263,62 +287,100 @@ private:
         const R w = plant_.velocity();
         if (own_.shaft()) [[unlikely]]
             T = own_.with_torque(w, theta_, T, t);
-        const R w_free = plant_.free_velocity(T, friction_torque_);
-        R w_next = w_free;
-        if (dry_) {
-            w_next = under_friction(w, w_free, t);
-            friction_torque_ = (w_free - w_next) * per_beta_;
-            T = T - friction_torque_;
+        R w_next;
+        if constexpr (Plant::both_ends) {
+            w_next = move_both(T, w, t);
+        } else {
+            const R w_free = plant_.free_velocity(T, friction_torque_);
+            w_next = w_free;
+            if (dry_) {
+                w_next = under_friction<Side::motor>(states_, law_, {w, w_free, plant_.beta()}, t);
+                friction_torque_ = (w_free - w_next) * per_beta_;
+                T = T - friction_torque_;
+            }
+            plant_.move(T, w_next);
         }
-        plant_.move(T, w_next);
         angle_ = angle_ + (w + w_next) * R(0.5 * h_);
     }
 
-    // The dry friction that follows from what the effects at the shaft brake with, both in N m.
-    [[gnu::always_inline]] static R loaded_level(const EffectRun& run, const EffectConstants<R>& c, R theta) {
-        const R load = Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
-            if constexpr (hook::torque<E>)
-                if (run.effects.has<E>()) return x + E::torque(c.effects.template of<E>(), theta);
-            return x;
-        });
-        return Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
-            if constexpr (hook::loaded<E>)
-                if (run.effects.has<E>()) return x + E::loaded(c.effects.template of<E>(), load);
-            return x;
-        });
-    }
-
-    // The same called with values: few models have it, and a candidate alone keeps its registers for a coupling (492 instructions
-    // a sample with backlash; 510 without the call).
-    [[gnu::noinline]] static R loaded_level_apart(const EffectRun& run, const EffectConstants<R>& c, R theta) {
-        return loaded_level(run, c, theta);
-    }
-
-    [[gnu::always_inline]] R under_friction(R w, R w_free, double t) {
-        FrictionStep<R> step{R(h_), w, w_free, plant_.beta(), law_};
+    // The velocity at the substep's end at one end of the shaft, and the state of its friction there.
+    template <Side side, class States>
+    [[gnu::always_inline]] R under_friction(States& states, const FrictionLaw<R>& law, const FreeEnd<R>& end, double t) {
+        const R w = end.w;
+        FrictionStep<R> step{R(h_), w, end.w_free, end.beta, law};
         const auto add = [&](R level) __attribute__((always_inline)) {
             step.law.level_positive = step.law.level_positive + level;
             step.law.level_negative = step.law.level_negative + level;
         };
-        if (own_.friction()) add(own_.level());
-        Effects::each([&]<class E>() __attribute__((always_inline)) {
+        if constexpr (side == Side::motor)
+            if (own_.friction()) add(own_.level());
+        each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
             if constexpr (hook::level<E>)
-                if (run_.effects.has<E>()) add(E::level(c_.effects.template of<E>(), R(t > 0.0 ? t : 0.0)));
+                if (run_.effects.has<Key>()) add(E::level(c_.template of<Key>(), R(t > 0.0 ? t : 0.0)));
+            if constexpr (hook::loaded<E> && side == Side::load)
+                if (run_.effects.has<Key>()) add(E::loaded(c_.template of<Key>(), load_.braking));
         });
-        if (run_.effects.meets(effects_with(Hooks::loaded))) [[unlikely]]
-            add(width == 1 ? loaded_level_apart(run_, c_, theta_) : loaded_level(run_, c_, theta_));
-        Effects::each([&]<class E>() __attribute__((always_inline)) {
+        if constexpr (side == Side::motor)
+            if (run_.effects.meets(effects_with(Hooks::loaded))) [[unlikely]]
+                add(width == 1 ? loaded_level_apart(run_, c_, theta_) : loaded_level(run_, c_, theta_));
+        each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
             if constexpr (hook::friction<E>)
-                if (run_.effects.has<E>()) [[unlikely]]  // keeps what it needs out of the registers of the others
-                    E::friction(c_.effects.template of<E>(), states_.template of<E>(), step);
+                if (run_.effects.has<Key>()) [[unlikely]]  // keeps what it needs out of the registers of the others
+                    E::friction(c_.template of<Key>(), states.template of<Key>(), step);
         });
         const R w_next = velocity_under_friction(step.law, w, step.w_free, step.beta);
-        Effects::each([&]<class E>() __attribute__((always_inline)) {
+        each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
             if constexpr (hook::after_friction<E>)
-                if (run_.effects.has<E>()) [[unlikely]]
-                    E::after_friction(c_.effects.template of<E>(), states_.template of<E>(), step, w_next);
+                if (run_.effects.has<Key>()) [[unlikely]]
+                    E::after_friction(c_.template of<Key>(), states.template of<Key>(), step, w_next);
         });
         return w_next;
+    }
+
+    // The same where effects act at the load, too, under the torque T at the motor: the motor's velocity at the end.
+    [[gnu::always_inline]] R move_both(R T, R w, double t) {
+        const R w_load = plant_.load_velocity();
+        R T_load = R(0.0);
+        if (load_.turning || run_.effects.meets(load_effects_with(Hooks::torque))) {
+            const R middle = (run_.position.empty() ? angle_ + w * R(0.5 * h_) : theta_) -
+                             (plant_.twist() - load_.twist_at_start) - (w - w_load) * R(0.5 * h_);
+            each_at<Side::load>([&]<class Key, class E>() __attribute__((always_inline)) {
+                if constexpr (hook::torque<E>)
+                    if (run_.effects.has<Key>()) T_load = T_load - E::torque(c_.template of<Key>(), middle);
+            });
+        }
+        load_.braking = R(0.0) - T_load;
+        plant_.free_velocities(T, T_load, friction_torque_, load_.friction);
+        const FreeEnd<R> motor{w, plant_.free[0], plant_.beta()}, load{w_load, plant_.free[1], plant_.load_beta()};
+        R w_next = motor.w_free, w_next_load = load.w_free;
+        if (dry_ && load_.dry) {
+            typename Effects::States<R> trial = states_;
+            typename LoadEffects::States<R> trial_at_load = load_.states;
+            under_friction_at_both(
+                motor, load, plant_.across(), plant_.back(), w_next, w_next_load, friction_torque_, load_.friction,
+                [&](int round, R w_free, R beta) __attribute__((always_inline)) {
+                    return apart<Side::motor>(round == 0 ? trial : states_, law_, {w, w_free, beta}, t);
+                },
+                [&](int round, R w_free, R beta) __attribute__((always_inline)) {
+                    return apart<Side::load>(round == 0 ? trial_at_load : load_.states, load_.law, {w_load, w_free, beta}, t);
+                });
+        } else if (load_.dry) {
+            w_next_load = apart<Side::load>(load_.states, load_.law, load, t);
+            load_.friction = (load.w_free - w_next_load) / load.beta;
+            w_next = w_next - plant_.across() * load_.friction;
+        } else if (dry_) {
+            w_next = apart<Side::motor>(states_, law_, motor, t);
+            friction_torque_ = (motor.w_free - w_next) * per_beta_;
+            w_next_load = w_next_load - plant_.back() * friction_torque_;
+        }
+        plant_.move(friction_torque_, load_.friction, w_next, w_next_load);
+        return w_next;
+    }
+
+    // With friction at both ends it is asked four times a substep: a call, so that it is compiled once.
+    template <Side side, class States>
+    [[gnu::noinline]] R apart(States& states, const FrictionLaw<R>& law, const FreeEnd<R>& end, double t) {
+        return under_friction<side>(states, law, end, t);
     }
 
     const EffectRun& run_;
@@ -332,48 +394,12 @@ private:
     OwnInLoop<R> own_;
     typename Effects::States<R> states_{};  // all zero
     FrictionLaw<R> law_;
+    [[no_unique_address]] std::conditional_t<Plant::both_ends, LoadSide<R>, NoLoadSide> load_;
     R angle_, theta_ = R(0.0), theta_middle_;
     R held_ = R(0.0);
     R friction_torque_ = R(0.0), per_beta_;
     [[no_unique_address]] std::conditional_t<is_servo, SampleMean<R>, std::monostate> mean_;
     std::size_t issued_ = 0;
 };
-
-template <class Loop>
-[[gnu::noinline]] void run_in_memory(Loop& loop) {
-    loop();
-}
-
-// Where a number takes one register, the compiler keeps the loop's state in registers.
-// Where it takes several, moving the state took up to 25 % more instructions: behind a call it stays in memory.
-template <class R, class Plant>
-[[gnu::always_inline]] inline void run_effects_on(const EffectRun& run, const EffectConstants<R>& c) {
-    EffectLoop<R, Plant, ControllerState<R>> loop(run, c);
-    if constexpr (Pack<R>::registers == 1) loop();
-    else run_in_memory(loop);
-}
-
-template <class R, class Plant>
-[[gnu::noinline]] void run_servo_on(const EffectRun& run, const EffectConstants<R>& c) {
-    EffectLoop<R, Plant, Servo<R>> loop(run, c);
-    run_in_memory(loop);
-}
-
-// Runs the lanes whose constants are given, with the plant's order known to the compiler where it is a usual one.
-template <class R>
-void run_effects(const EffectRun& run, const EffectConstants<R>& c) {
-    if (run.loop.kind == LoopKind::servo) {
-        if (run.two_masses) return run_servo_on<R, TwoMassPlant<R>>(run, c);
-        return run_servo_on<R, ObserverPlant<R, -1>>(run, c);
-    }
-    if (run.two_masses) return run_effects_on<R, TwoMassPlant<R>>(run, c);
-    switch (run.order) {
-        case 1: return run_effects_on<R, ObserverPlant<R, 1>>(run, c);
-        case 2: return run_effects_on<R, ObserverPlant<R, 2>>(run, c);
-        case 3: return run_effects_on<R, ObserverPlant<R, 3>>(run, c);
-        case 5: return run_effects_on<R, ObserverPlant<R, 5>>(run, c);
-        default: return run_effects_on<R, ObserverPlant<R, -1>>(run, c);
-    }
-}
 
 }  // namespace gaident

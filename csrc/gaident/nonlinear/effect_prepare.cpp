@@ -146,10 +146,12 @@ void delay_torque(EffectModel& model, double delay) {
 int substeps_for(const EffectModel& model, const EffectRecord& record, const Loop& loop, bool own) {
     const Factors<double>& g = model.linear;
     const double Ts = record.sample_time;
-    const Circumstances at{g, loop, Ts, record.top_speed};
+    TwoMasses m{};
+    const bool both_ends = model.effects.meets(effects_with(Hooks::load)) && two_masses_of(g, m);
+    const Circumstances at{g, loop, Ts, record.top_speed, g.structure.p == 1 ? g.gain : 0.0, both_ends ? 1.0 / m.JL : 0.0};
     double wanted = 1.0;
     Pace pace = own ? Pace::fine : Pace::sample;
-    Effects::each([&]<class E>() {
+    AllEffects::each([&]<class E>() {
         if (!model.effects.has<E>()) return;
         pace = std::max(pace, E::pace);
         if constexpr (hook::substeps<E>) wanted = std::max(wanted, E::substeps(model.of(effect<E>), at));
@@ -163,9 +165,9 @@ int substeps_for(const EffectModel& model, const EffectRecord& record, const Loo
     }
     if (loop.kind == LoopKind::continuous && g.structure.p == 1)
         wanted = std::max({wanted, 8.0, std::abs(g.gain * loop.controller.kp) * Ts / 0.06});
-    int m = 1;
-    while (m < wanted && m < 16) m *= 2;
-    return m;
+    int steps = 1;
+    while (steps < wanted && steps < 16) steps *= 2;
+    return steps;
 }
 
 void prepare_effects(const EffectModel& model, const EffectRecord& record, const Loop& loop, int substeps, const double* start,
@@ -183,10 +185,10 @@ void prepare_effects(const EffectModel& model, const EffectRecord& record, const
     c.stored = u;
     c.before = !moving ? 0.0 : open && !record.input.empty() ? record.input[0] : u;
     bool possible = true;
-    Effects::each([&]<class E>() {
+    AllEffects::each([&]<class E>() {
         if (!model.effects.has<E>()) return;
         const double* const p = model.of(effect<E>);
-        if constexpr (HasCoefficients<E>) E::prepare(p, time, c.effects.template of<E>());
+        if constexpr (HasCoefficients<E>) E::prepare(p, time, c.of<E>());
         if constexpr (HasTable<E>) E::tabulate(p, time, out.tables.template of<E>());
         if constexpr (hook::possible<E>) possible = possible && E::possible(p);
     });

@@ -9,6 +9,7 @@ namespace gaident {
 // Any linear plant, in the delta observer form of closed_loop.hpp; N its order, -1 where it is known only at run time.
 template <class R, int N>
 struct ObserverPlant {
+    static constexpr bool both_ends = false;  // whether effects act at the load, too
     static constexpr int capacity = N >= 0 ? N : max_plant_order;
     R a[capacity], b[capacity + 1], x[capacity];
     int order;
@@ -20,6 +21,7 @@ struct ObserverPlant {
     }
 
     [[gnu::always_inline]] R velocity() const { return x[0]; }
+    [[gnu::always_inline]] R twist() const { return R(0.0); }
     [[gnu::always_inline]] R beta() const { return b[1]; }
 
     [[gnu::always_inline]] R free_velocity(R T, R) {
@@ -50,6 +52,7 @@ struct ObserverPlant {
 // Each leaves in x is left of the twist to the effects that follow.
 template <class R>
 struct TwoMassPlant {
+    static constexpr bool both_ends = false;
     R phi[3][3], motor[3], coupling[3];
     R KG, DG, per_scale;
     R x[3];  // w_M, w_L, psi
@@ -66,6 +69,7 @@ struct TwoMassPlant {
     }
 
     [[gnu::always_inline]] R velocity() const { return x[0]; }
+    [[gnu::always_inline]] R twist() const { return x[2] * per_scale; }
     [[gnu::always_inline]] R beta() const { return motor[0]; }
 
     [[gnu::always_inline]] R linear(int i, R T) const {
@@ -73,20 +77,27 @@ struct TwoMassPlant {
     }
 
     [[gnu::always_inline]] R free_velocity(R T, R friction_before) {
-        const R x0 = x[2] * per_scale, dx0 = x[0] - x[1], T_total = T - friction_before;
+        const R T_total = T - friction_before;
+        correct([&](int i) __attribute__((always_inline)) { return linear(i, T_total); });
+        return linear(0, T) + coupling[0] * correction;
+    }
+
+    // The correction; end(i): where w_M, w_L and psi would come to without it.
+    template <class End>
+    [[gnu::always_inline]] void correct(End&& end) {
+        const R x0 = x[2] * per_scale, dx0 = x[0] - x[1];
         R left0 = x0;
         const R now = Effects::chain(R(0.0), [&]<class E>(R sum) __attribute__((always_inline)) {
             if constexpr (hook::coupling<E>) return sum + E::coupling(effects.template of<E>(), KG, DG, left0, dx0);
             else return sum;
         });
-        R left1 = (linear(2, T_total) + coupling[2] * now) * per_scale;
-        const R dx1 = (linear(0, T_total) - linear(1, T_total)) + (coupling[0] - coupling[1]) * now, dx = (dx0 + dx1) * R(0.5);
+        R left1 = (end(2) + coupling[2] * now) * per_scale;
+        const R dx1 = (end(0) - end(1)) + (coupling[0] - coupling[1]) * now, dx = (dx0 + dx1) * R(0.5);
         left0 = x0;
         correction = Effects::chain(R(0.0), [&]<class E>(R sum) __attribute__((always_inline)) {
             if constexpr (hook::coupling<E>) return sum + E::mean_coupling(effects.template of<E>(), KG, DG, left0, left1, dx);
             else return sum;
         });
-        return linear(0, T) + coupling[0] * correction;
     }
 
     [[gnu::always_inline]] void move(R T, R w_next) {
@@ -94,6 +105,43 @@ struct TwoMassPlant {
         x[0] = w_next;
         x[1] = w_L;
         x[2] = psi;
+    }
+};
+
+// The same with torques and friction at the load, too (load_side.hpp solves it).
+template <class R>
+struct LoadedTwoMassPlant : TwoMassPlant<R> {
+    static constexpr bool both_ends = true;
+    using TwoMassPlant<R>::x, TwoMassPlant<R>::motor, TwoMassPlant<R>::coupling, TwoMassPlant<R>::correction;
+    // Response to a unit torque at the load. The coupling's pulls the motor back by what it drives the load with, so that with a
+    // unit torque at the motor beside it only the load is driven.
+    R load[3];
+    R free[3];                // w_M, w_L, psi at the substep's end without friction
+    bool correcting = false;  // whether the coupling is not linear
+
+    LoadedTwoMassPlant(const EffectConstants<R>& c, int order) : TwoMassPlant<R>(c, order) {
+        for (int i = 0; i < 3; ++i) load[i] = motor[i] + coupling[i];
+    }
+
+    [[gnu::always_inline]] R load_velocity() const { return x[1]; }
+    [[gnu::always_inline]] R load_beta() const { return load[1]; }
+    [[gnu::always_inline]] R across() const { return load[0]; }  // of the motor's velocity to a torque at the load
+    [[gnu::always_inline]] R back() const { return motor[1]; }   // and the other way
+
+    // T and T_L at motor and load; the friction of the substep before.
+    [[gnu::always_inline]] void free_velocities(R T, R T_load, R friction_before, R load_friction_before) {
+        for (int i = 0; i < 3; ++i) free[i] = this->linear(i, T) + load[i] * T_load;
+        if (!correcting) return;
+        this->correct([&](int i) __attribute__((always_inline)) {
+            return free[i] - (motor[i] * friction_before + load[i] * load_friction_before);
+        });
+        for (int i = 0; i < 3; ++i) free[i] = free[i] + coupling[i] * correction;
+    }
+
+    [[gnu::always_inline]] void move(R friction, R load_friction, R w_next, R w_next_load) {
+        x[0] = w_next;
+        x[1] = w_next_load;
+        x[2] = free[2] - (motor[2] * friction + load[2] * load_friction);
     }
 };
 

@@ -168,10 +168,12 @@ def _of_diagnosis(mechanics: Mapping[str, Estimate], effects: Effects) -> dict[s
     found |= {name.replace("_", " "): e for name, e in mechanics.items() if name.replace("_", " ") in NONE}
     for effect, parameters in effects.items():
         term = LIBRARY[effect]
-        if term.levels and not (term.time_varying or term.beside):
-            found["dry friction"] = level_of(parameters)
-        elif term.levels:  # no one number: it changes in time, or with the load
-            del found["dry friction"]
+        elsewhere = found.get("dry friction")  # of both ends of the shaft the sum shows
+        if term.levels and (term.time_varying or term.beside):  # no one number: it changes in time, or with the load
+            found.pop("dry friction", None)
+        elif term.levels and elsewhere is not None:
+            here = level_of(parameters)
+            found["dry friction"] = replace(here, value=here.value + elsewhere.value, std=math.hypot(here.std, elsewhere.std))
         elif _is_gravity(term):
             found["gravity"] = parameters["amplitude"]
     return found

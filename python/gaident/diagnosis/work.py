@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, called, say
+from gaident.axis import Text, say
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
@@ -34,6 +34,7 @@ from gaident.diagnosis.explain.wording import (
 from gaident.diagnosis.gains import Gains, measured_gains, with_effects
 from gaident.diagnosis.judged import Judged
 from gaident.diagnosis.library.record import findings_of_the_record
+from gaident.diagnosis.library.sides import called_of, name_of, sides_of
 from gaident.diagnosis.library.terms import LIBRARY, conditional_classes, in_controller
 from gaident.diagnosis.mechanics import base_shift, mechanics_of, negative_damping
 from gaident.diagnosis.note import Note
@@ -231,12 +232,10 @@ class Work:
             alternatives = self._alternatives(effect, rivals, offset, never)
             if effect in self.gain_doubt.rivals:
                 self.notes.append(or_other_gains(effect))
-            said_by = evidence_of(effect, gain, alternatives, offset)
-            findings.append(
-                Finding(
-                    effect, estimates[effect], alternatives, gains.of(effect), gain, None, said_by, place=LIBRARY[effect].place
-                )
-            )
+            sides = sides_of(effect, [r.effect for r in rivals], masses := self.final.parameters.masses)
+            said_by = evidence_of(effect, gain, alternatives, offset, sides if masses > 1 else ())
+            what = name_of(effect), estimates[effect], alternatives, gains.of(effect), gain, None, said_by, False
+            findings.append(Finding(*what, LIBRARY[effect].place, sides))
         if driver is None and (damping := negative_damping(mechanics)) is not None:
             driver = "velocity"
             self.notes.append(drives_itself(damping))
@@ -315,7 +314,7 @@ class Work:
                 return gains
             effect = gains.harmful[-1]
             text = "{} would come closer to these records, but makes the held-out data worse: it is not accepted."
-            self.notes.append(say(text, called(effect).begun()))
+            self.notes.append(say(text, called_of(effect).begun()))
             shorter = self.found.space.without(self.final, effect)
             self.take(compared(self.found, shorter, self._equivalent_here, self._say))
 
@@ -330,7 +329,7 @@ class Work:
         names += [OTHER_GAINS] * (effect in self.gain_doubt.rivals)
         if self.form is not None and self.form.as_good(self.found.space.margin) and effect in in_series(self.final):
             names.append(self.form.finding.effect)
-        return tuple(dict.fromkeys(name for name in names if name not in self.not_testable))
+        return tuple(n for n in dict.fromkeys(map(name_of, names)) if n != name_of(effect) and n not in self.not_testable)
 
     def _only_describes(self, effect: str, driver: str | None) -> bool:
         of_class = bool(self._equivalent_here(effect))
@@ -342,6 +341,7 @@ class Work:
         # Speeds held in either direction, in whichever record, split what a reversal splits.
         turns = max(e.reversals, int(min(e.speeds, default=0.0) < 0.0 < max(e.speeds, default=0.0)))
         classes = conditional_classes(turns, len(e.steps), self.data.torque_logged)
+        effect = name_of(effect)
         return set().union(*(c for c in classes if effect in c)) - {effect} - set(self.not_testable)
 
     def _determined(self, effect: str, parameters: Mapping[str, Estimate]) -> bool:
@@ -349,5 +349,5 @@ class Work:
         if any(e.identifiable and not e.at_bound for e in parameters.values()):
             return True
         text = "{} comes closer to these records, but they do not determine one of its parameters: it is not named."
-        self.notes.append(say(text, called(effect).begun()))
+        self.notes.append(say(text, called_of(effect).begun()))
         return False

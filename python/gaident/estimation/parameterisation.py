@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.estimation.term import Scales, Term
-from gaident.models.effects import place_of, table
+from gaident.models.effect_rows import effect_and_side
+from gaident.models.effects import place_of, row_of
 from gaident.models.factors import FactorCounts
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
@@ -34,7 +35,7 @@ Matrix = NDArray[np.float64]
 
 def parameter_names(effect: str) -> tuple[str, ...]:
     """Names of an effect's parameters, in the order of the effects table."""
-    return next(tuple(p.name for p in row.parameters) for row in table() if row.name == effect)
+    return tuple(p.name for p in row_of(effect).parameters)
 
 
 def mechanism(model: Model) -> Vector:
@@ -251,7 +252,9 @@ class Parameterisation:
         model = self.linear(x)
         for t in self.terms:
             row = t.natural(x[None, self.slot(t.name)])[0]
-            model = model.with_effect(t.name, **dict(zip(parameter_names(t.name), (float(v) for v in row), strict=True)))
+            name, side = effect_and_side(t.name)
+            values = dict(zip(parameter_names(t.name), (float(v) for v in row), strict=True))
+            model = model.with_effect(name, side=side, **values)
         return model
 
     def limits(self) -> Matrix:

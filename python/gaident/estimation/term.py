@@ -86,6 +86,8 @@ class Term:
     poles: Callable[[Vector], tuple[complex, ...]] | None = None  # poles in series [rad/s] of natural parameters
     seen_angle: Callable[[Vector, Vector, Vector], Vector] | None = None  # (seen angle, velocity, parameters) -> true angle
     limiting: Callable[[Vector], Limiting] | None = None  # what an effect in the controller limits there
+    other_side: str = ""  # name of the same effect at the other end of the shaft
+    at_load: bool = False  # of two masses: it acts there
     curve: Callable[[Vector, Mapping[str, float]], Vector] | None = None  # static torque at velocities [rad/s], as friction
 
     def stands_with(self, effects: Iterable[str]) -> bool:
@@ -123,8 +125,13 @@ class Term:
 
     @property
     def in_coupling(self) -> bool:
-        """Whether it needs two masses, between which it acts."""
+        """Whether it acts between two masses."""
         return self.place == "coupling"
+
+    @property
+    def needs_two_masses(self) -> bool:
+        """Whether only a model of two masses may have it."""
+        return self.in_coupling or self.at_load
 
 
 _UNIT = Scales(1e-3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 100.0, True, 1.0)

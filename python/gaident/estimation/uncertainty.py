@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gaident.estimation.criterion import effective_samples
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.objective import Fit, Innovations, Objective
-from gaident.models.effects import table
+from gaident.models.effects import row_of
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
@@ -98,7 +98,7 @@ def estimates_of(objective: Objective, fit: Fit) -> dict[str, dict[str, Estimate
         span = np.maximum(limits[1, slot] - limits[0, slot], 1e-300)
         near = (z <= limits[0, slot] + 1e-6 * span) | (z >= limits[1, slot] - 1e-6 * span)  # no decision: rounding at a bound
         bound = np.any((np.abs(slopes) > 0.0) & near[:, None], axis=0)
-        row = next(r for r in table() if r.name == effect)
+        row = row_of(effect)
         result[effect] = {}
         for i, (name, unit) in enumerate((p.name, p.unit) for p in row.parameters):
             std = float("inf") if lost[i] else float(np.sqrt(max(variances[i], 0.0)))

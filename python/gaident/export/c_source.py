@@ -25,7 +25,10 @@ from gaident.control import core
 from gaident.control.pi import PI, checked_pi
 from gaident.errors import ModelError
 from gaident.files import write_whole
-from gaident.models.model import Model, require_strictly_proper
+from gaident.models.discrete import require_strictly_proper
+from gaident.models.effect_rows import effect_and_side
+from gaident.models.effects import row_of
+from gaident.models.model import Model
 from gaident.models.simulation_input import checked_substeps
 from gaident.version import version
 
@@ -119,18 +122,28 @@ def _table(dt: float, controller: PI | None, name: str, found: dict[str, Any]) -
     effects: dict[str, Sequence[float]] = found.get("effects", {})
     if found["substeps"]:
         rows += [("substeps", str(found["substeps"])), ("h", _number(dt / found["substeps"]))]
-        rows.append(("effects", " | ".join(f"GAIDENT_{effect.upper()}" for effect in effects) or "0"))
+        of: dict[str, list[str]] = {"": []}
+        for effect in effects:
+            of.setdefault(_part(effect)[0], []).append(f"GAIDENT_{_part(effect)[1].upper()}")
+        rows += [(f"{part}effects", " | ".join(names) or "0") for part, names in of.items()]
     for effect, values in effects.items():
+        field = "".join(_part(effect))
         if effect in found["tables"]:
             back, share = found["tables"][effect]
             length = max(length, max(back) + 1)
             before.append(f"static const int {name}_back[] = {{{', '.join(str(b) for b in back)}}};")
             before.append(f"static const double {name}_share[] = {_array(share)};")
-            rows.append((effect, f"{{{max(back) + 1}, {name}_back, {name}_share}}"))
+            rows.append((field, f"{{{max(back) + 1}, {name}_back, {name}_share}}"))
         else:
-            rows.append((effect, _array(values)))
+            rows.append((field, _array(values)))
     table = [f"static const gaident_drive {name}_drive = {{", *(f"    .{key} = {value}," for key, value in rows), "};"]
     return [*before, *table], length
+
+
+def _part(effect: str) -> tuple[str, str]:
+    """(part of the drive's structure, field there) of an effect's key."""
+    name, side = effect_and_side(effect)
+    return (f"at_{side}." if row_of(effect).sides else "", name)
 
 
 def _runtime(file: str) -> str:
@@ -202,7 +215,8 @@ def _head(model: Model, dt: float, controller: PI | None, name: str, version: st
         f" *   gain  {_number(model.gain)}",
         *(f" *   {kind}  {root.real:.10g}" + (f" {root.imag:+.10g}j" if root.imag else "") + " rad/s"
           for kind, roots in (("pole", model.poles), ("zero", model.zeros)) for root in roots),
-        *(f" *   {effect.name}: " + ", ".join(f"{k} {v:.10g}" for k, v in effect.parameters.items()) for effect in model.effects),
+        *(f" *   {e.name}{' at the load' if e.at_load else ''}: " + ", ".join(f"{k} {v:.10g}" for k, v in e.parameters.items())
+          for e in model.effects),
         " *",
         f" * {name}_state s;  {name}_reset(&s);  then once per sample  w = {name}_step(&s, input);",
         f" * In other files that use it, #define {name.upper()}_DECLARATIONS_ONLY before #include of this one.",

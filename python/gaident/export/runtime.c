@@ -40,7 +40,7 @@ static double gaident_falling(double Tc, double Ts, double slowness, double w, d
     return Tc + (Ts - Tc) * exp(-x * x);
 }
 
-static void gaident_stribeck(const gaident_drive *k, gaident_memory *s, gaident_friction *f) {
+static void gaident_stribeck(const gaident_shaft *k, gaident_shaft_memory *s, gaident_friction *f) {
     const double level = gaident_falling(k->stribeck_friction.torque, k->stribeck_friction.static_torque,
                                          k->stribeck_friction.slowness, f->w, s->stribeck_friction.w_before);
     gaident_add_level(f, level);
@@ -74,33 +74,27 @@ static void gaident_move(gaident_bristle *r, const gaident_friction *f, double w
     r->z = gaident_clip(r->z + (zm - r->z) / r->theta, limit);
 }
 
-static void gaident_presliding(const gaident_drive *k, gaident_memory *s, gaident_friction *f) {
+static void gaident_presliding(const gaident_shaft *k, gaident_shaft_memory *s, double h, gaident_friction *f) {
     const double stiffness = k->presliding_friction.stiffness, per_break = k->presliding_friction.per_break;
-    gaident_weigh(&s->presliding_friction, k->h, k->h * fabs(f->w) * per_break, f->beta * k->h * stiffness);
+    gaident_weigh(&s->presliding_friction, h, h * fabs(f->w) * per_break, f->beta * h * stiffness);
     gaident_join(&s->presliding_friction, stiffness, per_break, f);
 }
 
-static void gaident_lugre(const gaident_drive *k, gaident_memory *s, gaident_friction *f) {
+static void gaident_lugre(const gaident_shaft *k, gaident_shaft_memory *s, double h, gaident_friction *f) {
     const double Ts = k->lugre_friction.static_torque, stiffness = k->lugre_friction.stiffness, damping = k->lugre_friction.damping;
     const double g = gaident_falling(k->lugre_friction.torque, Ts, k->lugre_friction.slowness, f->w, s->lugre_friction.w_before);
     const double per_break = stiffness / fmax(g, 1e-6 * Ts);
     gaident_bristle *r = &s->lugre_friction.bristle;
     double bending;
-    gaident_weigh(r, k->h, k->h * fabs(f->w) * per_break + f->beta * damping, f->beta * k->h * stiffness);
+    gaident_weigh(r, h, h * fabs(f->w) * per_break + f->beta * damping, f->beta * h * stiffness);
     bending = damping / r->e;
     f->w_free += f->beta * bending * r->z;
     gaident_join(r, stiffness + bending, per_break, f);
     s->lugre_friction.w_before = f->w;
 }
 
-/* What the effects at the shaft brake with [N m]. */
-static double gaident_load(const gaident_drive *k, const gaident_memory *s) {
-    return k->load_torque.load + k->unbalance.amplitude * sin(s->middle + k->unbalance.phase) +
-           k->cogging.amplitude * sin(k->cogging.order * s->middle + k->cogging.phase);
-}
-
-/* w+ of a motor at w, and w_free without friction; t: time in the middle of the substep. */
-static double gaident_dry(const gaident_drive *k, gaident_memory *s, double w, double w_free, double beta, double t) {
+/* w+ of this end of the shaft at w, and w_free without friction; t: time in the middle of the substep h. */
+static double gaident_dry(const gaident_shaft *k, gaident_shaft_memory *s, double h, double w, double w_free, double beta, double t) {
     gaident_friction f = {0.0, 0.0, 0.0, {0.0, 0.0}, {0.0, 0.0}, 0.0, 0.0};
     double w_next;
     f.w = w;
@@ -115,16 +109,25 @@ static double gaident_dry(const gaident_drive *k, gaident_memory *s, double w, d
     if (k->effects & GAIDENT_FRICTION_DRIFT)
         gaident_add_level(&f, k->friction_drift.torque * fmax(1.0 + k->friction_drift.rate * t, 0.0));
     if (k->effects & GAIDENT_LOAD_DEPENDENT_FRICTION)
-        gaident_add_level(&f, k->load_dependent_friction.torque + k->load_dependent_friction.share * fabs(gaident_load(k, s)));
+        gaident_add_level(&f, k->load_dependent_friction.torque + k->load_dependent_friction.share * fabs(s->braking));
     if (k->effects & GAIDENT_STRIBECK_FRICTION) gaident_stribeck(k, s, &f);
-    if (k->effects & GAIDENT_PRESLIDING_FRICTION) gaident_presliding(k, s, &f);
-    if (k->effects & GAIDENT_LUGRE_FRICTION) gaident_lugre(k, s, &f);
+    if (k->effects & GAIDENT_PRESLIDING_FRICTION) gaident_presliding(k, s, h, &f);
+    if (k->effects & GAIDENT_LUGRE_FRICTION) gaident_lugre(k, s, h, &f);
     w_next = gaident_under_friction(&f);
     if (k->effects & GAIDENT_PRESLIDING_FRICTION)
         gaident_move(&s->presliding_friction, &f, w_next, 1.0 / k->presliding_friction.per_break);
     if (k->effects & GAIDENT_LUGRE_FRICTION)
         gaident_move(&s->lugre_friction.bristle, &f, w_next, k->lugre_friction.static_torque / k->lugre_friction.stiffness);
     return w_next;
+}
+
+/* The torque that brakes at the angle theta. */
+static double gaident_braking(const gaident_shaft *k, double theta) {
+    double T = 0.0;
+    if (k->effects & GAIDENT_LOAD_TORQUE) T += k->load_torque.load;
+    if (k->effects & GAIDENT_UNBALANCE) T += k->unbalance.amplitude * sin(theta + k->unbalance.phase);
+    if (k->effects & GAIDENT_COGGING) T += k->cogging.amplitude * sin(k->cogging.order * theta + k->cogging.phase);
+    return T;
 }
 
 /* -- coupling: what play and hardening add to the linear coupling torque -------------------------------------------------- */
@@ -154,8 +157,8 @@ static void gaident_observer(const gaident_drive *k, gaident_memory *s, double T
     const double w = s->x[0], w_free = (w + (n > 1 ? s->x[1] : 0.0) + k->b[1] * T) - k->a[0] * w;
     double w_next = w_free;
     int i;
-    if (k->effects & GAIDENT_DRY) {
-        w_next = gaident_dry(k, s, w, w_free, k->b[1], t);
+    if (k->at_motor.effects & GAIDENT_DRY) {
+        w_next = gaident_dry(&k->at_motor, &s->at_motor, k->h, w, w_free, k->b[1], t);
         T -= (w_free - w_next) / k->b[1];
     }
     for (i = 1; i + 1 < n; ++i) s->x[i] = (s->x[i] + s->x[i + 1] + k->b[i + 1] * T) - k->a[i] * w;
@@ -163,24 +166,64 @@ static void gaident_observer(const gaident_drive *k, gaident_memory *s, double T
     s->x[0] = w_next;
 }
 
-static void gaident_masses(const gaident_drive *k, gaident_memory *s, double T, double t) {
-    double part[3], total = T - s->friction, x0 = s->x[2] * k->per_scale, dx0 = s->x[0] - s->x[1], now, x1, dx1, mean, w_free, w_next;
-    int i;
-    for (i = 0; i < 3; ++i)
-        part[i] = s->x[i] + k->phi[3 * i] * s->x[0] + k->phi[3 * i + 1] * s->x[1] + k->phi[3 * i + 2] * s->x[2];
-    now = gaident_correction(k, x0, dx0);
-    x1 = (part[2] + k->motor[2] * total + k->coupling[2] * now) * k->per_scale;
-    dx1 = (part[0] - part[1]) + (k->motor[0] - k->motor[1]) * total + (k->coupling[0] - k->coupling[1]) * now;
-    mean = gaident_mean_correction(k, x0, x1, 0.5 * (dx0 + dx1));
-    w_free = part[0] + k->motor[0] * T + k->coupling[0] * mean;
-    w_next = w_free;
-    if (k->effects & GAIDENT_DRY) {
-        w_next = gaident_dry(k, s, s->x[0], w_free, k->motor[0], t);
-        s->friction = (w_free - w_next) / k->motor[0];
-        T -= s->friction;
+/* Both ends of the shaft under friction: each mass sticks or slips. The load's equation is solved with what the motor does, which
+   is found with the load's friction of the round before; the rounds converge to rounding error. */
+static void gaident_both_dry(const gaident_drive *k, gaident_memory *s, double w_free, double w_free_load, double t, double *w_next,
+                             double *w_next_load) {
+    const double across = k->motor[0] + k->coupling[0], back = k->motor[1], beta = k->motor[0], beta_load = k->motor[1] + k->coupling[1];
+    const gaident_shaft_memory motor = s->at_motor, load = s->at_load;
+    double f = 0.0, f_load = load.friction;
+    int round;
+    for (round = 0; round < 2; ++round) {
+        double free = w_free - across * f_load, b = beta_load;
+        s->at_motor = motor;
+        s->at_load = load;
+        *w_next = gaident_dry(&k->at_motor, &s->at_motor, k->h, s->x[0], free, beta, t);
+        f = (free - *w_next) / beta;
+        free = w_free_load - back * f;
+        if (*w_next == 0.0) {
+            free = w_free_load - back / beta * w_free;
+            b -= back / beta * across;
+        }
+        *w_next_load = gaident_dry(&k->at_load, &s->at_load, k->h, s->x[1], free, b, t);
+        f_load = (free - *w_next_load) / b;
     }
-    for (i = 1; i < 3; ++i) s->x[i] = part[i] + k->motor[i] * T + k->coupling[i] * mean;
+    s->at_motor.friction = (w_free - across * f_load - *w_next) / beta;
+    s->at_load.friction = f_load;
+}
+
+static void gaident_masses(const gaident_drive *k, gaident_memory *s, double T, double t) {
+    const double x0 = s->x[2] * k->per_scale, dx0 = s->x[0] - s->x[1];
+    double free[3], end[3], load[3], T_load, now, mean, w_next, w_next_load;
+    int i;
+    for (i = 0; i < 3; ++i) load[i] = k->motor[i] + k->coupling[i];
+    s->at_load.braking = gaident_braking(&k->at_load, s->angle + 0.5 * k->h * s->x[1] - x0);
+    T_load = -s->at_load.braking;
+    for (i = 0; i < 3; ++i) {
+        free[i] = s->x[i] + k->phi[3 * i] * s->x[0] + k->phi[3 * i + 1] * s->x[1] + k->phi[3 * i + 2] * s->x[2];
+        free[i] += k->motor[i] * T + load[i] * T_load;
+        end[i] = free[i] - k->motor[i] * s->at_motor.friction - load[i] * s->at_load.friction;
+    }
+    now = gaident_correction(k, x0, dx0);
+    mean = gaident_mean_correction(k, x0, (end[2] + k->coupling[2] * now) * k->per_scale,
+                                   0.5 * (dx0 + (end[0] - end[1]) + (k->coupling[0] - k->coupling[1]) * now));
+    for (i = 0; i < 3; ++i) free[i] += k->coupling[i] * mean;
+    w_next = free[0];
+    w_next_load = free[1];
+    if ((k->at_motor.effects & GAIDENT_DRY) && (k->at_load.effects & GAIDENT_DRY)) {
+        gaident_both_dry(k, s, free[0], free[1], t, &w_next, &w_next_load);
+    } else if (k->at_load.effects & GAIDENT_DRY) {
+        w_next_load = gaident_dry(&k->at_load, &s->at_load, k->h, s->x[1], free[1], load[1], t);
+        s->at_load.friction = (free[1] - w_next_load) / load[1];
+        w_next -= load[0] * s->at_load.friction;
+    } else if (k->at_motor.effects & GAIDENT_DRY) {
+        w_next = gaident_dry(&k->at_motor, &s->at_motor, k->h, s->x[0], free[0], k->motor[0], t);
+        s->at_motor.friction = (free[0] - w_next) / k->motor[0];
+        w_next_load -= k->motor[1] * s->at_motor.friction;
+    }
     s->x[0] = w_next;
+    s->x[1] = w_next_load;
+    s->x[2] = free[2] - k->motor[2] * s->at_motor.friction - load[2] * s->at_load.friction;
 }
 
 /* -- the loop ------------------------------------------------------------------------------------------------------------- */
@@ -247,10 +290,8 @@ static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, do
             s->torque_lag.T = T + gap * k->torque_lag.decay;
             T += gap * k->torque_lag.mean;
         }
-        s->middle = s->theta;
-        if (k->effects & GAIDENT_LOAD_TORQUE) T -= k->load_torque.load;
-        if (k->effects & GAIDENT_UNBALANCE) T -= k->unbalance.amplitude * sin(s->middle + k->unbalance.phase);
-        if (k->effects & GAIDENT_COGGING) T -= k->cogging.amplitude * sin(k->cogging.order * s->middle + k->cogging.phase);
+        s->at_motor.braking = gaident_braking(&k->at_motor, s->theta);
+        T -= s->at_motor.braking;
         s->theta = s->angle + 1.5 * k->h * w;
         if (k->two_masses) gaident_masses(k, s, T, s->time + 0.5 * k->h);
         else gaident_observer(k, s, T, s->time + 0.5 * k->h);

@@ -35,19 +35,7 @@ enum { /* the effects that act */
                   GAIDENT_FRICTION_DRIFT | GAIDENT_LOAD_DEPENDENT_FRICTION
 };
 
-typedef struct {
-    int closed;                            /* whether there is a controller: the input is a command [rad/s], else a torque [N m] */
-    double kp, g;                          /* proportional gain, integral gain times dt/2 [N m s/rad] */
-    double torque_limit, integrator_limit; /* N m */
-    int order;                             /* of the mechanism */
-    double a[GAIDENT_ORDER], b[GAIDENT_ORDER + 1]; /* its denominator and numerator in delta = z - 1, at the substep */
-    int substeps;                          /* of a sample; 0: the mechanism is linear and no effect acts */
-    double h;                              /* substep [s] */
-    int two_masses;                        /* with a nonlinear coupling: in place of a and b */
-    double phi[9];                         /* e^(A h) - 1 over motor velocity, load velocity, twist to scale */
-    double motor[3], coupling[3];          /* response to 1 N m at the motor, to 1 N m more in the coupling */
-    double stiffness, damping, per_scale;  /* of the coupling [N m/rad], [N m s/rad]; twist per scaled twist */
-
+typedef struct { /* what acts at one end of the shaft */
     long effects;
     struct { double torque; } coulomb_friction;
     struct { double torque, static_torque, slowness; } stribeck_friction;
@@ -60,6 +48,23 @@ typedef struct {
     struct { double amplitude, order, phase; } cogging;
     struct { double torque, rate; } friction_drift;
     struct { double torque, share; } load_dependent_friction;
+} gaident_shaft;
+
+typedef struct {
+    int closed;                            /* whether there is a controller: the input is a command [rad/s], else a torque [N m] */
+    double kp, g;                          /* proportional gain, integral gain times dt/2 [N m s/rad] */
+    double torque_limit, integrator_limit; /* N m */
+    int order;                             /* of the mechanism */
+    double a[GAIDENT_ORDER], b[GAIDENT_ORDER + 1]; /* its denominator and numerator in delta = z - 1, at the substep */
+    int substeps;                          /* of a sample; 0: the mechanism is linear and no effect acts */
+    double h;                              /* substep [s] */
+    int two_masses;                        /* with a nonlinear coupling, or effects at the load: in place of a and b */
+    double phi[9];                         /* e^(A h) - 1 over motor velocity, load velocity, twist to scale */
+    double motor[3], coupling[3];          /* response to 1 N m at the motor, to 1 N m more in the coupling */
+    double stiffness, damping, per_scale;  /* of the coupling [N m/rad], [N m s/rad]; twist per scaled twist */
+
+    gaident_shaft at_motor, at_load;
+    long effects; /* the others */
     struct { double half_gap; } backlash;
     struct { double cubic; } hardening_stiffness;
     struct { double limit; } torque_saturation;
@@ -79,16 +84,20 @@ typedef struct {
 } gaident_bristle;
 
 typedef struct {
-    double x[GAIDENT_ORDER]; /* the mechanism */
-    double stored;           /* of the controller [N m] */
-    double angle, theta;     /* of the motor; in the middle of the next substep, foreseen [rad] */
-    double middle;           /* the same of this one */
-    double friction;         /* of the substep before [N m] */
-    double time;             /* s */
-    int newest;              /* of the torques on their way */
+    double friction; /* of the substep before [N m] */
+    double braking;  /* what the torques there brake with in this one [N m] */
     struct { double w_before; } stribeck_friction;
     gaident_bristle presliding_friction;
     struct { gaident_bristle bristle; double w_before; } lugre_friction;
+} gaident_shaft_memory;
+
+typedef struct {
+    double x[GAIDENT_ORDER]; /* the mechanism */
+    double stored;           /* of the controller [N m] */
+    double angle, theta;     /* of the motor; in the middle of the substep, foreseen [rad] */
+    double time;             /* s */
+    int newest;              /* of the torques on their way */
+    gaident_shaft_memory at_motor, at_load;
     struct { double T; } torque_lag;
     struct { double before; } command_rate_limit;
     struct { double output, w; } velocity_filter;

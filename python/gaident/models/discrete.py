@@ -7,7 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Discrete"]
+from gaident.arguments import CONTINUOUS_LOOP
+from gaident.control.controller import Controller
+from gaident.errors import ModelError
+
+__all__ = ["Discrete", "require_strictly_proper"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,3 +42,13 @@ class Discrete:
 
     alpha: NDArray[np.float64]
     beta: NDArray[np.float64]
+
+
+def require_strictly_proper(p: int, controller: Controller | None) -> None:
+    """Raises ModelError for p = 0 outside the continuous loop."""
+    if p == 0 and (controller is None or controller.loop != "continuous"):
+        where = "the sampled loop" if controller is not None else "an open loop"
+        raise ModelError(
+            f"the model has p = 0 (as many zeros as poles), which does not exist in {where}: "
+            f"use a model with more poles than zeros, or {CONTINUOUS_LOOP}"
+        )

@@ -10,93 +10,17 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from html import escape
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 from gaident import _core
 from gaident.axis import Text, say
 from gaident.checks import known_keys, one_of, real_number
 from gaident.errors import ModelError
+from gaident.models.effect_rows import SIDES, Row, Table
 from gaident.models.own_effects import OWN, PLACES, Function, Own, Parameter, Signals, checked
 
 __all__ = ["Effect", "Parameter", "Row", "Signals", "Table", "register", "table", "unregister"]
-
-
-class Row(NamedTuple):
-    """One effect of the table.
-
-    Attributes
-    ----------
-    name : str
-        Name of the effect.
-    place : {"shaft", "coupling", "actuator", "controller", "sensor", "plant", "record"}
-        Where it acts.
-    parameters : tuple of Parameter
-        Its parameters with units and bounds.
-    meaning : str
-        What it does, one line.
-    simulated : bool
-        False: found in records, but not part of a model.
-    needs_two_masses : bool
-        Whether it acts between two masses, p = 1 and q = 2.
-    relation : str
-        What the parameters have to meet among themselves; empty if nothing.
-    own : bool
-        Whether it is user-defined, registered from Python.
-    says : Text
-        The meaning without what the table says after it, for sentences.
-    turns : bool
-        Whether it depends on the shaft's angle; False for a user-defined effect, of which it is not known.
-
-    See Also
-    --------
-    table : All rows, with an example.
-    """
-
-    name: str
-    place: str  # shaft, coupling, actuator, controller, sensor, plant or record
-    parameters: tuple[Parameter, ...]
-    meaning: str
-    simulated: bool  # False: found in records, but not part of a model
-    needs_two_masses: bool
-    relation: str  # what the parameters have to meet among themselves, empty if nothing
-    own: bool = False  # registered from Python
-    says: Text = Text("")  # the meaning without what the table says after it, for sentences
-    turns: bool = False  # depends on the shaft's angle
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the row for JSON."""
-        parameters = [p.to_dict() for p in self.parameters]
-        return {"name": self.name, "place": self.place, "parameters": parameters, "meaning": self.meaning}
-
-
-class Table(tuple[Row, ...]):
-    """All effects, in the order of the documentation; prints as a table.
-
-    See Also
-    --------
-    table : Makes it, with an example.
-    """
-
-    __slots__ = ()
-
-    def __str__(self) -> str:
-        rows = [("effect", "place", "parameters", "meaning")]
-        for row in self:
-            units = ", ".join(f"{p.name} [{p.unit}]" for p in row.parameters)
-            rows.append((row.name, row.place, units, row.meaning))
-        widths = [max(len(row[i]) for row in rows) for i in range(3)]
-        lines = ["  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[3]]) for row in rows]
-        return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows."""
-        rows = [(r.name, r.place, ", ".join(f"{p.name} [{p.unit}]" for p in r.parameters), r.meaning) for r in self]
-        left = 'style="text-align:left"'
-        head = "".join(f"<th {left}>{title}</th>" for title in ("effect", "place", "parameters", "meaning"))
-        body = "".join("<tr>" + "".join(f"<td {left}>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-        return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
 @lru_cache(maxsize=1)
@@ -138,9 +62,25 @@ def _by_name() -> dict[str, tuple[int, Row]]:
     return {row.name: (i, row) for i, row in enumerate(table())}
 
 
-def place_of(name: str) -> int:
-    """Row of an effect in the table, which is the order in which the core takes effects."""
-    return _by_name()[name][0]
+@lru_cache(maxsize=1)
+def _by_key() -> dict[str, tuple[int, Row]]:
+    at_load = (row.there() for row in table() if SIDES[1] in row.sides)
+    return {row.key: (i, row) for i, row in enumerate((*table(), *at_load))}
+
+
+def place_of(key: str) -> int:
+    """Where an effect stands among all: in the order of the table, those at the load behind them."""
+    return _by_key()[key][0]
+
+
+def row_of(key: str) -> Row:
+    """The row of an effect's key (`Row.key`)."""
+    return _by_key()[key][1]
+
+
+def parameter_count(key: str) -> int:
+    """How many parameters an effect has; 0 of what is none."""
+    return len(_by_key()[key][1].parameters) if key in _by_key() else 0
 
 
 def register(
@@ -256,11 +196,12 @@ def unregister(name: str) -> None:
 def _forget() -> None:
     table.cache_clear()
     _by_name.cache_clear()
+    _by_key.cache_clear()
 
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """One effect with its parameters, checked; equal where name and parameters are.
+    """One effect with its parameters, checked; equal where name, parameters and side are.
 
     Parameters
     ----------
@@ -268,6 +209,8 @@ class Effect:
         Name of the effect in `gaident.effects.table()`.
     parameters : mapping of str to float
         All its parameters, name -> value in SI units.
+    side : {"motor", "load"}
+        Where a shaft effect acts; "" in the effect made where it has no side.
 
     Attributes
     ----------
@@ -277,7 +220,7 @@ class Effect:
     Raises
     ------
     ModelError
-        For an unknown name, unknown or missing parameters and values outside the physical bounds.
+        For an unknown name, unknown or missing parameters, values outside the physical bounds, and a side that it cannot have.
 
     Examples
     --------
@@ -289,6 +232,7 @@ class Effect:
 
     name: str
     parameters: Mapping[str, float]
+    side: str = SIDES[0]
     own: bool = field(init=False, repr=False)  # one's own, registered from Python
 
     def __post_init__(self) -> None:
@@ -308,6 +252,7 @@ class Effect:
                 shown = ", ".join(f"{k} {v:g}" for k, v in values.items())
                 raise ModelError(f"effect {self.name} has {shown}: {broken}")
         object.__setattr__(self, "parameters", MappingProxyType(values))
+        object.__setattr__(self, "side", _checked_side(row, self.side))
         object.__setattr__(self, "own", row.own)
 
     @property
@@ -315,7 +260,18 @@ class Effect:
         """The effect's row in the table; raises ModelError for a user-defined effect that is no longer registered."""
         if self.name not in _by_name():
             raise ModelError(_unknown(self.name))
-        return _by_name()[self.name][1]
+        row = _by_name()[self.name][1]
+        return row.there() if self.at_load else row
+
+    @property
+    def at_load(self) -> bool:
+        """Whether it acts at the load."""
+        return self.side == SIDES[1]
+
+    @property
+    def key(self) -> str:
+        """What tells it from the other effects of a model: its name, at the load with that behind it."""
+        return self.row.key
 
     @property
     def neutral(self) -> bool:
@@ -330,45 +286,85 @@ class Effect:
     def to_dict(self) -> dict[str, Any]:
         """Return {"name": ..., "parameters": {...}} for JSON.
 
-        An infinite limit is None, a user-defined effect has "own": true.
+        An infinite limit is None, a user-defined effect has "own": true, one at the load "side": "load".
         """
-        data = {"name": self.name, "parameters": {k: v if math.isfinite(v) else None for k, v in self.parameters.items()}}
+        parameters = {k: v if math.isfinite(v) else None for k, v in self.parameters.items()}
+        data: dict[str, Any] = {"name": self.name, "parameters": parameters}
+        if self.at_load:
+            data["side"] = self.side
         return {**data, "own": True} if self.own else data
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Effect:
         """Return the effect of what `to_dict` gave; raise ModelError for a user-defined effect that is not registered."""
         keys = ("name", "parameters")
-        values: dict[str, Any] = known_keys(data, "an effect", (*keys, "own"), keys, ModelError)
+        values: dict[str, Any] = known_keys(data, "an effect", (*keys, "own", "side"), keys, ModelError)
         if values.get("own") and values["name"] not in OWN:
             raise ModelError(_unknown(values["name"]))
         if not isinstance(values["parameters"], Mapping):
             raise ModelError(f"the parameters of an effect are {values['parameters']!r}: give a dictionary, name -> value")
-        return cls(values["name"], {k: math.inf if v is None else v for k, v in values["parameters"].items()})
+        parameters = {k: math.inf if v is None else v for k, v in values["parameters"].items()}
+        return cls(values["name"], parameters, values.get("side", SIDES[0]))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Effect):
             return NotImplemented
-        return self.name == other.name and self.values == other.values
+        return (self.name, self.values, self.side) == (other.name, other.values, other.side)
 
     def __hash__(self) -> int:
-        return hash((self.name, self.values))
+        return hash((self.name, self.values, self.side))
 
     def __repr__(self) -> str:
-        return f"Effect({self.name!r}, {dict(self.parameters)!r})"
+        side = f", side={self.side!r}" if self.at_load else ""
+        return f"Effect({self.name!r}, {dict(self.parameters)!r}{side})"
 
     def __reduce__(self) -> tuple[type[Effect], tuple[Any, ...]]:
-        return type(self), (self.name, dict(self.parameters))
+        return type(self), (self.name, dict(self.parameters), self.side or SIDES[0])
 
 
 def _unknown(name: object) -> str:
     return f"{name!r} is an effect of your own that is not registered here: call gaident.effects.register({name!r}, ...) first"
 
 
+def _checked_side(row: Row, side: object) -> str:
+    """The side; "" of an effect that has none."""
+    one_of(side, f"side of {row.name}", SIDES, ModelError)
+    if side in row.sides:
+        return str(side)
+    if side == SIDES[1]:
+        what = "an effect of your own, a torque at the motor" if row.own else f"in the {row.place}"
+        raise ModelError(f"side of {row.name} is {side!r}: it is {what} and has no other side; leave side out")
+    return SIDES[0] if row.sides else ""
+
+
 def ordered(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """Effects in the order of the table, a later one of the same name in place of an earlier."""
-    latest = {effect.name: effect for effect in effects}
-    return tuple(sorted(latest.values(), key=lambda effect: (effect.row, place_of(effect.name))[1]))
+    """Effects in the order of the table, those at the load behind them; of the same name and side the last one given."""
+    latest = {effect.key: effect for effect in effects}
+    return tuple(sorted(latest.values(), key=lambda effect: place_of(effect.key)))
+
+
+def checked_effects(effects: Iterable[Effect], p: int, q: int) -> tuple[Effect, ...]:
+    """Effects in their order, where a model with p and q can carry them; raises ModelError."""
+    found = ordered(effects)
+    in_series = next((effect.name for effect in found if effect.row.place == "plant"), None)
+    if found and p == 0:
+        raise ModelError(
+            f"the model has p = 0 (as many zeros as poles) and cannot carry {found[0].name}: effects need a drive "
+            "with inertia; use a model with more poles than zeros"
+        )
+    for effect in found:
+        if not effect.row.needs_two_masses:
+            continue
+        what = f"{effect.name} at the load" if effect.at_load else effect.name
+        if (p, q) != (1, 2):
+            acts = "needs two masses" if effect.at_load else "acts between two masses"
+            raise ModelError(
+                f"the model has p = {p}, q = {q}, but {what} {acts}: use a model "
+                "with p = 1 and q = 2, for example TwoMass(...).model()"
+            )
+        if in_series is not None:
+            raise ModelError(f"{what} and {in_series} cannot be simulated together: take one of them out with without_effect")
+    return found
 
 
 def _value(row: Row, parameter: Parameter, value: object) -> float:

@@ -6,20 +6,18 @@ import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gaident import _core
-from gaident.arguments import CONTINUOUS_LOOP
 from gaident.checks import known_keys, real_number
 from gaident.control import core
-from gaident.control.controller import Controller
 from gaident.control.pi import PI, checked_pi
 from gaident.errors import ModelError
-from gaident.models.discrete import Discrete
-from gaident.models.effects import Effect, ordered
+from gaident.models.discrete import Discrete, require_strictly_proper
+from gaident.models.effects import Effect, checked_effects
 from gaident.models.effects_linear import LINEAR
 from gaident.models.roots import Mode, canonical_roots, modes_of, roots_of, text_of
 from gaident.providers import provided
@@ -81,15 +79,22 @@ class Model:
                 f"zeros has {len(self.zeros)} roots and poles {len(self.poles)}: a drive has at "
                 "least as many poles as zeros; drop zeros or add poles"
             )
-        object.__setattr__(self, "effects", self._checked(effects))
+        object.__setattr__(self, "effects", checked_effects(effects, self.p, self.q))
 
-    def with_effect(self, name: str, **parameters: float) -> Model:
-        """Return the same drive with one more effect, in place of one of the same name.
+    @overload
+    def with_effect(self, name: str, **parameters: float) -> Model: ...
+    @overload
+    def with_effect(self, name: str, *, side: str, **parameters: float) -> Model: ...
+    def with_effect(self, name: str, *, side: Any = "motor", **parameters: float) -> Model:
+        """Return the same drive with one more effect, in place of one of the same name and side.
 
         Parameters
         ----------
         name : str
             Name of the effect, see `gaident.effects.table()`.
+        side : {"motor", "load"}
+            Where a shaft effect acts. With two masses it may be the load: the effect then has the load's velocity and angle,
+            which starts where the motor's does. An effect may be present at both sides, with parameters of its own at each.
         **parameters : float
             All its parameters by name, SI units.
 
@@ -102,14 +107,39 @@ class Model:
         ------
         ModelError
             For an unknown effect, unknown or missing parameters, values outside their physical bounds, and where the model cannot
-            carry it: p = 0; backlash and hardening_stiffness without the structure of two masses (p = 1, q = 2) or together with
-            extra_resonance.
-        """
-        return self._with((*self.effects, Effect(name, parameters)))
+            carry it: p = 0; backlash, hardening_stiffness and effects at the load without the structure of two masses (p = 1,
+            q = 2) or together with extra_resonance.
 
-    def without_effect(self, name: str) -> Model:
-        """Return the same drive without this effect; raise ModelError where it has none of that name."""
-        rest = tuple(effect for effect in self.effects if effect.name != name)
+        Examples
+        --------
+        >>> import gaident as ga
+        >>> drive = ga.TwoMass(JM=1e-4, DM=0.003, JL=5.8e-4, DL=0.008, KG=2.6).model()
+        >>> drive.with_effect("coulomb_friction", side="load", torque=0.05).effects
+        (Effect('coulomb_friction', {'torque': 0.05}, side='load'),)
+        """
+        return self._with((*self.effects, Effect(name, parameters, side)))
+
+    def without_effect(self, name: str, *, side: str | None = None) -> Model:
+        """Return the same drive without this effect.
+
+        Parameters
+        ----------
+        name : str
+            Name of the effect.
+        side : {"motor", "load"}, optional
+            The side where it is taken out; None: wherever it is.
+
+        Returns
+        -------
+        Model
+            A new model; this one stays as it is.
+
+        Raises
+        ------
+        ModelError
+            Where the model has none of that name there.
+        """
+        rest = tuple(effect for effect in self.effects if effect.name != name or side not in (None, effect.side))
         if len(rest) == len(self.effects):
             names = ", ".join(effect.name for effect in self.effects) or "none"
             raise ModelError(f"the model has no effect {name!r}: its effects are {names}")
@@ -131,28 +161,8 @@ class Model:
         model = object.__new__(Model)
         for name in ("gain", "poles", "zeros"):
             object.__setattr__(model, name, getattr(self, name))
-        object.__setattr__(model, "effects", model._checked(effects))
+        object.__setattr__(model, "effects", checked_effects(effects, self.p, self.q))
         return model
-
-    def _checked(self, effects: Iterable[Effect]) -> tuple[Effect, ...]:
-        found = ordered(effects)
-        in_series = next((effect.name for effect in found if effect.row.place == "plant"), None)
-        if found and self.p == 0:
-            raise ModelError(
-                f"the model has p = 0 (as many zeros as poles) and cannot carry {found[0].name}: effects need a drive "
-                "with inertia; use a model with more poles than zeros"
-            )
-        for effect in found:
-            if effect.row.needs_two_masses and (self.p, self.q) != (1, 2):
-                raise ModelError(
-                    f"the model has p = {self.p}, q = {self.q}, but {effect.name} acts between two masses: use a model "
-                    "with p = 1 and q = 2, for example TwoMass(...).model()"
-                )
-            if effect.row.needs_two_masses and in_series is not None:
-                raise ModelError(
-                    f"{effect.name} and {in_series} cannot be simulated together: take one of them out with without_effect"
-                )
-        return found
 
     def _require_linear(self, what: str) -> None:
         if self.effects:
@@ -383,17 +393,7 @@ class Model:
         made: _core.EffectModel | None = self.__dict__.get("_core_model")
         if made is None:
             poles, zeros = (np.array(roots, dtype=np.complex128) for roots in (self.poles, self.zeros))
-            built_in = [(effect.name, effect.values) for effect in self.effects if not effect.own]
+            built_in = [(effect.key, effect.values) for effect in self.effects if not effect.own]
             made = _core.EffectModel(self.gain, poles, zeros, built_in)
             object.__setattr__(self, "_core_model", made)
         return made
-
-
-def require_strictly_proper(p: int, controller: Controller | None) -> None:
-    """Raises ModelError for p = 0 outside the continuous loop."""
-    if p == 0 and (controller is None or controller.loop != "continuous"):
-        where = "the sampled loop" if controller is not None else "an open loop"
-        raise ModelError(
-            f"the model has p = 0 (as many zeros as poles), which does not exist in {where}: "
-            f"use a model with more poles than zeros, or {CONTINUOUS_LOOP}"
-        )

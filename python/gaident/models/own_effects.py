@@ -181,8 +181,8 @@ def checked(own: Own) -> Own:
 
 def _check_parameter(effect: str, p: Parameter) -> None:
     what = f"{p.name} of {effect}"
-    if not (isinstance(p.name, str) and p.name.isidentifier()):
-        raise ModelError(f"a parameter of {effect} is named {p.name!r}: give letters, digits and _, as of a variable")
+    if not (isinstance(p.name, str) and p.name.isidentifier()) or p.name == "side":
+        raise ModelError(f"a parameter of {effect} is named {p.name!r}: give letters, digits and _, as of a variable, not side")
     if not isinstance(p.unit, str) or not p.unit:
         raise ModelError(f'the unit of {what} is {p.unit!r}: give its SI unit, "1" for none')
     if not (math.isfinite(p.lowest) and math.isfinite(p.highest) and p.lowest < p.highest):

@@ -13,9 +13,10 @@ from gaident import _core
 from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.errors import GaidentError, ModelError
-from gaident.models.effects import table as effect_table
+from gaident.models.discrete import require_strictly_proper
+from gaident.models.effects import parameter_count
 from gaident.models.factors import FactorCounts
-from gaident.models.model import Model, require_strictly_proper
+from gaident.models.model import Model
 from gaident.models.own_effects import OWN
 from gaident.models.simulation_input import (
     AnyModel,
@@ -113,7 +114,7 @@ def simulate_values(
     structure : FactorCounts
         That of the linear part.
     effects : sequence of str
-        Names of effects.
+        Names of effects, with "@load" behind those at the load.
     values : array_like, shape (m, k)
         A row per model: the natural parameters of the linear part in the order of `factor_parameters`, then those of each effect
         named, in the order of `gaident.effects.table()`.
@@ -205,12 +206,11 @@ def _parted(structure: FactorCounts, effects: Sequence[str], values: Signal) -> 
     """Rows of values of `simulate_values` without the columns of user-defined effects, and these."""
     if not any(e in OWN for e in effects):
         return values, []
-    sizes = {row.name: len(row.parameters) for row in effect_table()}
     at = 1 + structure.real_poles + 2 * structure.pole_pairs + structure.real_zeros + 2 * structure.zero_pairs
     kept, own = [values[:, :at]], []
     for e in effects:
-        columns = values[:, at : at + sizes.get(e, 0)]
-        at += sizes.get(e, 0)
+        columns = values[:, at : at + parameter_count(e)]
+        at += parameter_count(e)
         if e in OWN:
             own.append((OWN[e].acts, OWN[e].ask, np.ascontiguousarray(columns)))
         else:

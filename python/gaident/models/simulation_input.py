@@ -12,8 +12,9 @@ from gaident.control.controller import Controller, checked_controller
 from gaident.data.record import Record
 from gaident.data.torque_kind import COMMANDED, MEASURED
 from gaident.errors import ModelError, RecordError
+from gaident.models.discrete import require_strictly_proper
 from gaident.models.mechanics import OneMass, TwoMass
-from gaident.models.model import Model, require_strictly_proper
+from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
 Signal = NDArray[np.float64]

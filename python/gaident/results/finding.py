@@ -38,6 +38,9 @@ class Finding:
     place : {"controller", "actuator", "shaft", "coupling", "plant", "sensor", "record"}
         Where it is: the effect's place in `gaident.effects.table()`.
         It is "controller" for all that the logged torque shows to differ from the given controller.
+    sides : tuple of {"motor", "load"}
+        Where on the shaft the data allow it, one or both; () where an effect has no side.
+        In a model of one mass both ends are the same place.
 
     Examples
     --------
@@ -57,6 +60,7 @@ class Finding:
     evidence: str = ""
     is_noise: bool = False
     place: str = ""
+    sides: tuple[str, ...] = ()
 
     @property
     def named(self) -> bool:
@@ -67,8 +71,9 @@ class Finding:
 def finding_of(data: Mapping[str, Any], linear: Mapping[str, str]) -> Finding:
     """The finding of plain data; linear: the sentences of a linear axis, see `linear_sentences`."""
     parameters = {name: Estimate(**e) for name, e in data["parameters"].items()}
-    held = {"alternatives": tuple(data["alternatives"]), "evidence": restored(data["evidence"], linear)}
-    return Finding(**{**data, **held, "parameters": parameters, "place": data.get("place") or _place_of(data["effect"])})
+    listed = {"alternatives": tuple(data["alternatives"]), "sides": tuple(data.get("sides", ()))}
+    said = {"parameters": parameters, "evidence": restored(data["evidence"], linear)}
+    return Finding(**{**data, **listed, **said, "place": data.get("place") or _place_of(data["effect"])})
 
 
 def _place_of(effect: str) -> str:

@@ -127,7 +127,7 @@ def _causes(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
     for f in dia.findings:
         if f.is_noise:
             continue
-        place = ", in the controller" if f.place == "controller" else ""
+        place = ", in the controller" if f.place == "controller" else ", at the load" if f.sides == ("load",) else ""
         lines.append(words(f.effect, axis) + place + "".join(f", or {words(a, axis)}" for a in f.alternatives))
         lines += table([parameter_row(n, e, axis, scales) for n, e in f.parameters.items()], "    ")
         lines += _wrapped(said(f.evidence, axis), "    ")

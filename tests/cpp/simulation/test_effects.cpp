@@ -113,9 +113,9 @@ TEST_CASE("the registry: names are unique, the enumeration has the table's order
     }
     CHECK(std::string(effect_table[static_cast<std::size_t>(effect<Backlash>)].name) == "backlash");
     CHECK(std::string(effect_table[static_cast<std::size_t>(effect<VelocityFilter>)].name) == "velocity_filter");
-    CHECK(static_cast<int>(effect<Outliers>) + 1 == effect_count);
+    CHECK(static_cast<int>(effect<Outliers>) + 1 == Effects::size);
     std::size_t simulated = 0;
-    for (const EffectInfo& info : effect_table) simulated += info.simulated;
+    for (const EffectInfo& info : Effects::table) simulated += info.simulated;
     CHECK(simulated == std::size(sizes));
     for (const Sizes& s : sizes) {
         const EffectInfo& info = effect_table[static_cast<std::size_t>(s.effect)];

@@ -9,10 +9,23 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS, nominal_plants, random_case, random_plant, random_truth
+from drive_cases import (
+    EFFECTS,
+    KINDS,
+    NOISE_EFFECTS,
+    comes_to_rest,
+    draw_effect,
+    nominal_plants,
+    random_case,
+    random_plant,
+    random_truth,
+    two_masses,
+)
 from drive_rig import (
+    AT_LOAD,
     NOISES,
     OUTSIDE,
+    SHAFT,
     Array,
     Effects,
     Plant,
@@ -23,6 +36,7 @@ from drive_rig import (
     run_drive,
     skip_without_library,
 )
+from fine_integrator import FineCase, integrate
 
 skip_without_library()
 
@@ -297,3 +311,36 @@ def test_wrong_use_is_refused() -> None:
     with pytest.raises(RanAwayError):
         run_drive(replace(ONE, kp=50.0), levels(ONE), {"transport_delay": {"delay": 5e-3}})
     assert drive_values(ONE, {}) | {"J1": 1e-3, "D1": 0} == fields()
+
+
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if e in SHAFT])
+def test_effects_at_the_load_agree_with_the_fine_integrator(effect: str) -> None:
+    """Two simulations that share no code: event by event, and 200 explicit steps a sample with friction by clipping."""
+    command = levels(TWO, 30)[:200]
+    values = draw_effect(effect, 1.0, TWO, len(command), np.random.default_rng(1))
+    masses = (TWO.J, TWO.D), (TWO.JL, TWO.DL), (TWO.KG, TWO.DG)
+    case = FineCase(TWO.dt, "sampled", command, *masses, TWO.kp, TWO.ki, at_load={effect: values})
+    fine = integrate([case], fine=200).velocity[:, 0]
+    here, motor, without = (
+        run_drive(TWO, command, effects).truth for effects in ({effect + AT_LOAD: values}, {effect: values}, {})
+    )
+    changed = float(np.sqrt(np.mean((here - without) ** 2)))
+    assert np.sqrt(np.mean((here - fine) ** 2)) < 0.01 * changed
+    assert np.sqrt(np.mean((here - motor) ** 2)) > 0.02 * changed, "the end of the shaft shows"
+
+
+def test_the_load_s_end_takes_two_masses_and_all_effects_of_the_shaft() -> None:
+    friction = {"torque": 0.05}
+    for plant, effects in (
+        (ONE, {"coulomb_friction@load": friction}),
+        (TWO, {"coulomb_friction@load": friction, "load_torque": friction}),
+    ):
+        with pytest.raises(ValueError, match="at one side, at the load only of two masses"):
+            drive_values(plant, effects)
+
+
+def test_random_drives_of_two_masses_come_to_rest() -> None:
+    plants = [two_masses(np.random.default_rng(seed)) for seed in range(30)]
+    ratios = [p.JL / p.J for p in plants]
+    assert 0.3 <= min(ratios) < 0.6 and 5.0 < max(ratios) <= 10.0
+    assert all(comes_to_rest(p, {}) for p in plants)

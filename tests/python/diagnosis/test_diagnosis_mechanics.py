@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import gaident as ga
+from fine_integrator import FineCase, integrate
 from gaident.diagnosis.mechanics import MECHANICS, moved
 from gaident.diagnosis.selection.mechanisms import evenly_damped, held, is_mechanism, reduced, rigid
 from gaident.estimation.dataset import DataSet
@@ -133,6 +136,39 @@ def test_poles_below_the_zeros_are_no_two_masses() -> None:
     found = moved(fit(below), fit(below))
     assert list(found) == ["inertia", "viscous_friction"]
     assert found["viscous_friction"][1] == pytest.approx(1.0 * (60.0**2 + 4.0) / (2000.0 * (90.0**2 + 4.0)))
+
+
+@pytest.mark.parametrize("side", ["motor", "load"])
+def test_dry_friction_is_found_at_its_end_of_the_shaft(side: str) -> None:
+    """Against the independent integrator, which shares no code with the library."""
+    JM, JL, K, dt = 2e-4, 4e-4, 3.0, 1e-3
+    rng = np.random.default_rng(3)
+    command = np.repeat(rng.uniform(-60.0, 60.0, 10), 150)
+    friction = {"coulomb_friction": {"torque": 0.05}}
+    case = FineCase(dt, "sampled", command, (JM, 0.002), (JL, 0.003), (K, 2e-3), 0.01, 0.08)
+    case = replace(case, **{"effects" if side == "motor" else "at_load": friction})  # type: ignore[arg-type]
+    run = integrate([case], fine=60)
+    velocity = run.velocity[:, 0] + 2e-3 * rng.standard_normal(len(command))
+    rec = ga.Record(dt, command=command, velocity=velocity, torque=run.torque[:, 0])
+    dia = ga.diagnose(rec, controller=ga.PI(case.kp, case.ki))
+    (found,) = dia.causes
+    assert (found.effect, found.alternatives, found.sides) == ("coulomb_friction", (), (side,))
+    assert found.parameters["torque"].value == pytest.approx(0.05, rel=0.02)
+    assert [e.side for e in dia.model.effects] == [side]
+    assert ("coulomb friction, at the load" in dia.summary()) is (side == "load")
+    assert ga.Diagnosis.from_dict(json.loads(json.dumps(dia.to_dict()))).findings == dia.findings
+
+
+def test_in_one_mass_both_ends_are_the_same_place() -> None:
+    rng = np.random.default_rng(4)
+    command = np.repeat(rng.uniform(-60.0, 60.0, 6), 100)
+    ctl = ga.PI(0.03, 0.3)
+    still = ga.Record(1e-3, command=command, velocity=np.zeros(len(command)))
+    run = ga.run(ga.OneMass(5e-4, 0.004).model().with_effect("coulomb_friction", torque=0.05), still, ctl)
+    velocity = run.velocity + 2e-3 * rng.standard_normal(len(command))
+    dia = ga.diagnose(ga.Record(1e-3, command=command, velocity=velocity, torque=run.torque), controller=ctl)
+    assert [(f.effect, f.sides) for f in dia.causes] == [("coulomb_friction", ("motor", "load"))]
+    assert "end of the shaft" not in dia.summary()
 
 
 @pytest.mark.parametrize("frequency", [1250.0, 1450.0])

@@ -17,9 +17,10 @@ from scipy.stats import chi2
 
 import gaident as ga
 from gaident.control.controller import Limiting
-from gaident.diagnosis.selection import model_space, moves, score_test
+from gaident.diagnosis.selection import model_space, moves, score_test, side_moves
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.bootstrap import largest_gains
+from gaident.diagnosis.selection.rivals import rivals_of
 from gaident.diagnosis.selection.select import specification
 from gaident.estimation import least_squares as ls
 from gaident.estimation import prediction
@@ -85,7 +86,9 @@ RIPPLE = toy("ripple", [(0.5, 0.0)], harmonic="velocity", orders=(1, 8))
 LAG = toy("lag", [(0.5,)])
 SEEN = toy("seen", [(0.5,)], seen_angle=lambda angle, w, v: angle)
 TERMS = (A, B, C, LEVEL, GENERAL, DEEP, GAP, RESONANCE, LIMIT, PLACED, VALLEY, RIPPLE, LAG, SEEN)
-LIBRARY = {t.name: t for t in TERMS}
+NEAR = toy("near", [(0.5,)], family="near end", levels=True, other_side="far")
+FAR = toy("far", [(0.5,)], family="far end", levels=True, other_side="near", at_load=True)
+LIBRARY = {t.name: t for t in (*TERMS, NEAR, FAR)}
 
 SHAPES: dict[str, Callable[[Vector], Vector]] = {
     "a": lambda z: z[0] * wave(12.0),
@@ -102,6 +105,8 @@ SHAPES: dict[str, Callable[[Vector], Vector]] = {
     "ripple": lambda z: z[0] * wave(21.0) + z[1] * wave(23.0),
     "lag": lambda z: z[0] * wave(18.1),
     "seen": lambda z: z[0] * wave(20.3),
+    "near": lambda z: z[0] * wave(22.1),
+    "far": lambda z: z[0] * (0.9 * wave(22.1) + 0.4 * wave(25.3)),
 }
 
 
@@ -133,6 +138,7 @@ def _no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(prediction, "simulate_values", simulated)
     monkeypatch.setattr(LoadedRecord, "velocities", simulated)
+    monkeypatch.setattr(side_moves, "LIBRARY", LIBRARY)
     for module in (moves, model_space):
         monkeypatch.setattr(module, "LIBRARY", LIBRARY)
         monkeypatch.setattr(module, "equivalents", lambda effect: {"lag": ("seen",), "seen": ("lag",)}.get(effect, ()))
@@ -507,6 +513,56 @@ def test_exchange_tries_an_equivalent_effect_beside_a_harmonic() -> None:
     logged = Bench({"seen": (0.4,), "ripple": (0.5, 0.2)}, angle=True)
     assert logged.space.exchange(logged.fit(LAG, RIPPLE)) == [], "a logged angle tells"
     assert replace(bench.space, allowed=(LAG, RIPPLE)).exchange(fit) == []
+
+
+def test_an_effect_of_the_shaft_goes_to_the_other_side_where_it_explains_more() -> None:
+    """Of two masses; what acts at the far end is no candidate of its own, and is found from the near one."""
+    bench = Bench({"far": (0.6,)}, masses=2, allowed=(NEAR, A, RESONANCE), plain=True)
+    near, far = bench.fit(NEAR), bench.fit(FAR)
+    (other,) = bench.space.other_side(near)
+    assert other.effects == ("far",) and bench.space.prefers(other, near) and not bench.space.quiet(near)
+    assert bench.space.at_other_side(far, FAR) is not None and not bench.space.prefers(near, far)
+    assert bench.space.other_side(far) == [], "where it leaves noise nothing is tried"
+    assert FAR not in bench.space.candidates(bench.fit())
+    assert bench.space.add(bench.fit())[0].effects == ("far",)
+    # Not in one mass, not where a resonance changes the mechanism, and not where it is there already.
+    assert bench.space.at_other_side(bench.fit(NEAR, masses=1), NEAR) is None
+    assert bench.space.at_other_side(bench.fit(NEAR, RESONANCE), NEAR) is None
+    assert bench.space.at_other_side(bench.fit(NEAR, FAR), NEAR) is None
+    assert bench.space.demote(far) == []
+    only = Bench({"far": (0.6,)}, masses=2, allowed=(A,)).space
+    assert not only.may(FAR) and bench.space.may(FAR)
+
+
+def test_dry_friction_is_tried_at_both_ends() -> None:
+    bench = Bench({"near": (0.5,), "far": (0.6,)}, masses=2, allowed=(NEAR, A), plain=True)
+    assert ("near", "far") in names(bench.space.at_the_load(bench.fit(NEAR), [bench.fit(NEAR, A)]))
+    grown = bench.space.add(bench.fit(NEAR))
+    assert sorted(grown[0].effects) == ["far", "near"]
+    assert bench.space.worth(grown[0], bench.fit(NEAR)) and bench.space.worth(grown[0], bench.fit(FAR))
+
+
+@pytest.mark.parametrize("size", [0.05, 0.6])
+def test_what_shows_at_the_far_end_alone_is_screened_there(size: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(SHAPES, "far", lambda z: z[0] * wave(25.3))
+    monkeypatch.setattr(model_space.ModelSpace, "swings", lambda space, fit: True)  # the toy's numbers are no mechanism
+    bench = Bench({"far": (size,)}, masses=2, allowed=(NEAR, A), plain=True)
+    assert bench.space.screened_at_load(bench.fit()) == [FAR]
+    assert bench.space.screened_at_load(bench.fit(NEAR)) == [FAR]
+    assert bench.space.screened_at_load(bench.fit(FAR)) == []
+    assert bench.space.screened_at_load(bench.fit(masses=1)) == []
+    assert bench.space.add(bench.fit())[0].effects == ("far",)
+
+
+def test_where_the_near_end_leaves_noise_the_far_end_is_a_rival_only() -> None:
+    bench = Bench({"near": (0.6,)}, masses=2, allowed=(NEAR, A), plain=True)
+    found = bench.space.add(bench.fit())
+    assert found[0].effects == ("near",) and ("far",) not in names(found)
+    gain, rivals = rivals_of(bench.space, found[0], "near")
+    assert gain > 100.0 and rivals == [], "the far end is told apart"
+    weak = Bench({"near": (0.025,)}, masses=2, allowed=(NEAR, A), plain=True)
+    _, rivals = rivals_of(weak.space, weak.fit(NEAR), "near")
+    assert [r.effect for r in rivals] == ["far"]
 
 
 def test_one_mass_with_a_resonance_is_two_masses() -> None:

@@ -47,6 +47,12 @@ CASES: dict[str, tuple[ga.Model, ga.PI | None, dict[str, object]]] = {
 }
 for _name, _values in SIZES.items():
     CASES[_name] = (TWO.with_effect(_name, **_values), CONTROLLER, {})
+for _name in (row.name for row in ga.effects.table() if row.place == "shaft"):
+    _load = TWO.with_effect(_name, side="load", **SIZES[_name])
+    CASES[f"load_{_name}"] = (_load, CONTROLLER, {})
+    if "friction" in _name:
+        CASES[f"both_{_name}"] = (_load.with_effect(_name, **SIZES[_name]), CONTROLLER, {})
+CASES["play_before_a_load"] = (CASES["both_stribeck_friction"][0].with_effect("backlash", gap=0.01), None, {"substeps": 4})
 _all = ONE
 for _name in ("coulomb_friction", "stribeck_friction", "presliding_friction", "friction_drift", "cogging", "torque_saturation",
               "torque_dead_band", "transport_delay", "torque_lag", "command_rate_limit", "velocity_filter"):  # fmt: skip
@@ -113,6 +119,12 @@ def test_the_file_says_what_it_is(tmp_path: Path) -> None:
     assert "transport_delay: delay 0.00073" in text and "command [rad/s]" in text
     assert re.findall(r"#include <(.*)>", text) == ["math.h"]
     assert "drive_step" in ONE.to_c(None, DT) and list(tmp_path.iterdir()) == [tmp_path / "my-axis.c"]
+
+
+def test_the_file_says_what_acts_at_the_load() -> None:
+    text = CASES["both_coulomb_friction"][0].to_c(None, DT, CONTROLLER)
+    assert " *   coulomb_friction: torque 0.05\n *   coulomb_friction at the load: torque 0.05\n" in text
+    assert ".at_motor.effects = GAIDENT_COULOMB_FRICTION," in text and ".at_load.effects = GAIDENT_COULOMB_FRICTION," in text
 
 
 def test_what_c_refuses() -> None:

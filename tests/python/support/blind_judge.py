@@ -76,6 +76,12 @@ def judge(dia: Any, effects: dict[str, dict[str, float]]) -> Judgement:
     return judged
 
 
+def ends_of(dia: Any, truth: tuple[str, ...]) -> list[str]:
+    """At which ends of the shaft the finding with a hidden effect in its set is said to be; empty where there is none."""
+    found = (f for f in counted(dia.findings, truth) if set(truth) & {f.effect, *f.alternatives})
+    return next((list(f.sides) for f in found), [])
+
+
 def parameter_errors(findings: list[Any], effects: dict[str, dict[str, float]]) -> dict[str, float]:
     """Relative errors of the parameters of what was rightly found first in its set; phases and zeros have none."""
     errors = {}

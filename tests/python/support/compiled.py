@@ -20,9 +20,9 @@ MATH = ("-std=c++20", "-O2", "-ffp-contract=off", "-shared", "-fPIC")
 
 
 @lru_cache
-def fields(source: Path) -> dict[str, float]:
-    """Name -> neutral value of the fields of the C++ source's parameters, in their order."""
-    block = source.read_text().split("// fields")[1].split("// end of fields")[0]
+def fields(source: Path, of: str = "") -> dict[str, float]:
+    """Name -> neutral value of the fields of the C++ source's parameters, in their order; of: "shaft " for another list."""
+    block = source.read_text().split(f"// {of}fields")[1].split(f"// end of {of}fields")[0]
     found = re.findall(r"^\s*double (\w+) = ([^;]+);", block, re.MULTILINE)
     return {name: float(value) for name, value in found}
 

@@ -13,9 +13,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import gaident as ga
-from drive_rig import COUPLING, NOISES, Array, Noise, Plant, RanAwayError, between_lines, rig, run_drive
+from drive_rig import AT_LOAD, COUPLING, NOISES, Array, Noise, Plant, RanAwayError, between_lines, rig, run_drive
 
-__all__ = ["EFFECTS", "KINDS", "NOISE_EFFECTS", "PAIRS", "Truth", "command_for", "draw_effect", "random_case", "random_plant"]
+__all__ = [
+    "EFFECTS",
+    "KINDS",
+    "NOISE_EFFECTS",
+    "PAIRS",
+    "Truth",
+    "command_for",
+    "draw_effect",
+    "random_case",
+    "random_plant",
+    "two_masses",
+]
 
 EFFECTS = (
     "coulomb_friction",
@@ -107,9 +118,27 @@ def random_plant(rng: np.random.Generator, two_masses: bool | None = None) -> Pl
     return plant if plant.kp else tuned(plant, rng)
 
 
-def tuned(plant: Plant, rng: np.random.Generator) -> Plant:
-    """With a PI controller, the poles of the rigid loop at wn with damping zeta: kp = 2 zeta wn J - D, ki = wn^2 J."""
-    wn, zeta = BANDWIDTH[plant.name] * rng.uniform(0.8, 1.2), rng.uniform(0.6, 0.9)
+RATIOS, ANTIRESONANCE = (0.3, 10.0), (60.0, 400.0)  # load to motor, rad/s
+
+
+def two_masses(rng: np.random.Generator) -> Plant:
+    """A drive of two masses of any usual inertia ratio, whose antiresonance a log of 0.444 or 1 ms shows."""
+    whole, ratio, swing = (float(np.exp(rng.uniform(*np.log(r)))) for r in ((4e-4, 1e-3), RATIOS, ANTIRESONANCE))
+    load = whole * ratio / (1 + ratio)
+    stiffness, damped = load * swing**2, float(np.exp(rng.uniform(*np.log((0.005, 0.03)))))
+    D, DL = (float(np.exp(rng.uniform(*np.log((0.7e-3, 4e-3))))) for _ in range(2))
+    plant = Plant(J=whole - load, D=D, JL=load, DL=DL, KG=stiffness, DG=2 * damped * swing * load, kp=0, ki=0,
+                  dt=float(rng.choice([0.444e-3, 1e-3])), name=f"ratio {ratio:.2g}")  # fmt: skip
+    for bandwidth in (0.5, 0.35, 0.25, 0.15, 0.1):
+        slow = tuned(plant, rng, min(bandwidth * swing, 80.0))
+        if comes_to_rest(slow, {}):
+            return slow
+    return two_masses(rng)
+
+
+def tuned(plant: Plant, rng: np.random.Generator, bandwidth: float | None = None) -> Plant:
+    """With a PI controller, the poles of the rigid loop at wn [rad/s] with damping zeta: kp = 2 zeta wn J - D, ki = wn^2 J."""
+    wn, zeta = (bandwidth or BANDWIDTH[plant.name]) * rng.uniform(0.8, 1.2), rng.uniform(0.6, 0.9)
     inertia, damping = plant.J + plant.JL, plant.D + plant.DL
     return replace(plant, kp=float(f"{2 * zeta * wn * inertia - damping:.4g}"), ki=float(f"{wn**2 * inertia:.4g}"))
 
@@ -180,7 +209,8 @@ def move_command(plant: Plant, rng: np.random.Generator, other_order: bool) -> A
 
 
 def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.random.Generator) -> dict[str, float]:
-    """Parameters of one effect at `factor` times its typical size."""
+    """Parameters of one effect, also "name@load", at `factor` times its typical size."""
+    name = name.removesuffix(AT_LOAD)
     sign = float(rng.choice([-1, 1]))
     phase = float(rng.uniform(-np.pi, np.pi))
     near = float(np.exp(rng.uniform(-0.35, 0.35)))  # for parameters that are no size
@@ -242,12 +272,15 @@ def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.ra
 def stable(plant: Plant, effects: dict[str, dict[str, float]]) -> bool:
     """Whether the loop with its linear effects comes to rest at a level; a bare PI without such an effect does."""
     linear = {name: values for name, values in effects.items() if name in LINEAR}
-    if not linear and plant.cascade is None:
-        return True
+    return (not linear and plant.cascade is None) or comes_to_rest(plant, linear)
+
+
+def comes_to_rest(plant: Plant, effects: dict[str, dict[str, float]]) -> bool:
+    """Whether the loop settles at a level."""
     every = plant.log_every
     try:
         level = np.full(round(0.9 / plant.dt) * every, 1.0 if plant.placed else 50.0)
-        end = run_drive(plant, level, linear).truth[-round(0.15 / plant.dt) * every :]
+        end = run_drive(plant, level, effects).truth[-round(0.15 / plant.dt) * every :]
     except RanAwayError:
         return False
     return bool(np.ptp(end) < 0.5)

@@ -141,6 +141,17 @@ FRICTION: dict[str, dict[str, str]] = {
         "viscous_negative": "viscous_negative",
     },
 }
+AT_LOAD = "@load"
+SHAFT = (
+    *FRICTION,
+    "presliding_friction",
+    "lugre_friction",
+    "quadratic_drag",
+    "load_torque",
+    "unbalance",
+    "cogging",
+    "friction_drift",
+)
 OUTSIDE = ("torque_hum", "uneven_friction", "root_drag", "hysteretic_spring")
 COUPLING = ("backlash", "hardening_stiffness", "hysteretic_spring")
 
@@ -185,14 +196,22 @@ def skip_without_library() -> None:
 
 
 def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:
-    """The fields of the simulated drive that has these effects."""
+    """The fields of the simulated drive that has these effects; "name@load": at the load, where then all of the shaft are.
+
+    Raises ValueError for parameters that an effect does not take, and where its place is not in the plant.
+    """
     values = dict(fields())
     values.update(J1=plant.J, D1=plant.D, J2=plant.JL, D2=plant.DL, K=plant.KG, DG=plant.DG)
     values.update(ground=plant.ground, rest=plant.rest)
     delay = 0.0 if plant.cascade is None else plant.cascade.delay
     if plant.cascade is not None and plant.cascade.velocity.integrator_limit is not None:
         values["integrator_limit"] = plant.cascade.velocity.integrator_limit
-    for effect, parameters in effects.items():
+    sides = {key.partition("@")[2] for key in effects if AT_LOAD in key or key in SHAFT}
+    if len(sides) > 1 or (sides == {"load"} and not plant.two_masses):
+        raise ValueError(f"{sorted(effects)}: all effects of the shaft are at one side, at the load only of two masses")
+    values["at_load"] = float(sides == {"load"})
+    for key, parameters in effects.items():
+        effect = key.removesuffix(AT_LOAD)
         if effect == "outliers":
             continue  # they spoil the log, not the drive
         known = FIELDS.get(effect) or FRICTION[effect]

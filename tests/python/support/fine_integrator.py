@@ -20,7 +20,7 @@ SOURCE = ROOT / "tests" / "cpp" / "fine_integrator.cpp"
 
 @dataclass
 class FineCase:
-    """One drive, loop and set of effects (name -> parameters).
+    """One drive, loop and set of effects (name -> parameters), those of the shaft at the motor unless they are `at_load`.
 
     motor, load: (inertia, damping); shaft: (stiffness, damping); without a load one mass.
     """
@@ -34,6 +34,7 @@ class FineCase:
     kp: float = 0.0
     ki: float = 0.0
     effects: dict[str, dict[str, float]] = field(default_factory=dict)
+    at_load: dict[str, dict[str, float]] = field(default_factory=dict)
 
 
 @dataclass
@@ -47,14 +48,16 @@ class FineRun:
 
 def values(case: FineCase) -> Array:
     """The case as fields of the C++."""
-    found = dict(fields(SOURCE))
+    shaft = fields(SOURCE, "shaft ")
+    found = fields(SOURCE) | shaft | {f"load_{name}": value for name, value in shaft.items()}
     names = ("dt", "closed", "analog", "kp", "ki", "JM", "DM", "K", "D")
     loop = (float(case.loop != "open"), float(case.loop == "continuous"))
     given = dict(zip(names, (case.dt, *loop, case.kp, case.ki, *case.motor, *case.shaft), strict=True))
     if case.load is not None:
         given.update(zip(("JL", "DL"), case.load, strict=True))
-    for effect, parameters in case.effects.items():
-        given.update({f"{effect}_{name}": value for name, value in parameters.items()})
+    for side, effects in (("", case.effects), ("load_", case.at_load)):
+        for effect, parameters in effects.items():
+            given.update({f"{side}{effect}_{name}": value for name, value in parameters.items()})
     assert set(given) <= set(found), set(given) - set(found)
     return np.array(list((found | given).values()))
 

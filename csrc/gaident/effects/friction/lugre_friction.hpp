@@ -45,8 +45,7 @@ struct LugreFriction {
     static constexpr Pace pace = Pace::finer;
     static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[0], p[1], 1.0 / p[2], p[3], p[4]}; }
     static double substeps(const double* p, const Circumstances& at) {
-        if (at.plant.structure.p != 1) return 1.0;
-        return __builtin_sqrt(__builtin_fabs(at.plant.gain * p[3])) * at.sample_time / 0.3;
+        return __builtin_sqrt(__builtin_fabs(at.inverse_inertia * p[3])) * at.sample_time / 0.3;
     }
     template <class R>
     static void begin(const Coefficients<R>&, State<R>& s, const Beginning<R>& start) {

@@ -32,8 +32,7 @@ struct PreslidingFriction {
     static constexpr Pace pace = Pace::fine;
     static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[1], p[1] / p[0]}; }
     static double substeps(const double* p, const Circumstances& at) {
-        if (at.plant.structure.p != 1) return 1.0;
-        return __builtin_sqrt(__builtin_fabs(at.plant.gain * p[1])) * at.sample_time / 0.3;
+        return __builtin_sqrt(__builtin_fabs(at.inverse_inertia * p[1])) * at.sample_time / 0.3;
     }
 
     template <class R>

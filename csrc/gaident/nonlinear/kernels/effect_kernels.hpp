@@ -1,7 +1,7 @@
 // The sample loop with effects over eight candidates, compiled once per instruction set and chosen when the program starts.
 #pragma once
 
-#include "../effect_loop.hpp"
+#include "../run_effects.hpp"
 
 namespace gaident {
 

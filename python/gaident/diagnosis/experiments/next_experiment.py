@@ -28,6 +28,7 @@ from gaident.data.record import Record
 from gaident.data.torque_kind import COMMANDED, MEASURED
 from gaident.diagnosis.experiments.first_experiment import MenuItem, candidate_commands
 from gaident.diagnosis.library.equivalences import EQUIVALENT, equivalents
+from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.rivals import Replacement
 from gaident.errors import GaidentError
@@ -38,6 +39,7 @@ from gaident.estimation.objective import Fit, Hypothesis, Objective
 from gaident.estimation.prediction import ClosedLoop, OpenLoop
 from gaident.estimation.projection import WORST, project_out
 from gaident.models.drive_torque import driven_by
+from gaident.models.effect_rows import SIDES
 from gaident.models.simulate import run
 from gaident.policy.table import POLICY
 from gaident.results.experiment import Limits, Proposal
@@ -133,16 +135,17 @@ def propose(
     """
     notes = [e.otherwise for e in EQUIVALENT if any(e.effects <= {f.effect, *f.alternatives} for f in findings)]
     pairs = [
-        (f.effect, rival)
+        (effect, rival)
         for f in findings
-        if f.effect in rivals
-        for rival in rivals[f.effect][1]
-        if rival.effect not in equivalents(f.effect)
+        for effect, (_, others) in rivals.items()
+        if name_of(effect) == f.effect and (effect != f.effect) == (f.sides == SIDES[1:])
+        for rival in others
+        if name_of(rival.effect) not in (f.effect, *equivalents(f.effect))
     ]
     pairs = sorted(pairs, key=lambda p: p[1].behind)[: POLICY.starts]
     if not pairs:
         return None, notes
-    names = tuple(dict.fromkeys(name for effect, rival in pairs for name in (effect, rival.effect)))
+    names = tuple(dict.fromkeys(name_of(e) for effect, rival in pairs for e in (effect, rival.effect)))
     controller = data.controller
     if controller is None or (data.pi is not None and data.command is None):
         text = (
@@ -164,7 +167,7 @@ def propose(
     table = [row for row in table if id(row[0]) not in hopeless]
     pairs = [pair for pair in pairs if id(pair) not in hopeless]
     if pairs:
-        names = tuple(dict.fromkeys(name for effect, rival in pairs for name in (effect, rival.effect)))
+        names = tuple(dict.fromkeys(name_of(e) for effect, rival in pairs for e in (effect, rival.effect)))
     trials = [trial for _, trial, _ in table]
     rough = np.min([T for *_, T in table], axis=0) if table and items else np.zeros(0)
     best, most = None, -1.0

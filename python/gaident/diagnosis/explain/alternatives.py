@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from gaident.diagnosis.library.equivalences import equivalents, impossible
+from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.library.terms import LIBRARY, level_of
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS
@@ -36,7 +37,7 @@ def alternatives_of(
     names = [r.effect for r in rivals if not shown or LIBRARY[r.effect].levels]
     names += here
     if offset is None or effect != offset.effect:
-        names += [name for name in equivalents(effect) if name not in never]
+        names += [name for name in equivalents(name_of(effect)) if name not in never]
     if not follows and not shown:
         names += OF_THE_CONTROLLER
     return list(dict.fromkeys(names))
@@ -51,4 +52,4 @@ def impossible_here(effect: str, found: Mapping[str, Mapping[str, Estimate]]) ->
         return frozenset()
     (constant,) = found[effect].values()
     levels = [level_of(own) for name, own in found.items() if LIBRARY[name].levels and not LIBRARY[name].beside]
-    return impossible(effect, levels[0] if levels else Estimate(0.0, 0.0, constant.unit), constant)
+    return impossible(name_of(effect), levels[0] if levels else Estimate(0.0, 0.0, constant.unit), constant)

@@ -19,6 +19,7 @@ from collections.abc import Callable, Collection, Sequence
 from gaident.axis import Text, say
 from gaident.diagnosis.check import Check
 from gaident.diagnosis.gains import IN_SAMPLE, Gains
+from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.library.terms import LIBRARY, of_inverse_dynamics
 from gaident.policy.table import POLICY
 
@@ -63,4 +64,4 @@ def _witnessed(effects: Sequence[str], check: Check, same: Callable[[str], Colle
         return []
     terms = of_inverse_dynamics({name: e.value for name, e in check.regression.parameters.items()})
     names, families = {t.name for t in terms}, {t.family for t in terms if t.family}
-    return [e for e in effects if LIBRARY[e].family in families or names & {e, *same(e)}]
+    return [e for e in effects if LIBRARY[name_of(e)].family in families or names & {name_of(e), *same(e)}]

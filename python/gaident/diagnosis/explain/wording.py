@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gaident.axis import Text, called, joined, say
+from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
 from gaident.estimation.dataset import DataSet
-from gaident.models.effects import table
+from gaident.models.effects import row_of
 from gaident.results.estimate import Estimate
 
 __all__ = [
@@ -25,11 +26,20 @@ __all__ = [
 ]
 
 
-def evidence_of(effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None) -> Text:
-    """What speaks for a finding: what it does, how sure that is, what these data cannot tell from it."""
+def evidence_of(
+    effect: str, gain: float, alternatives: Sequence[str], offset: Offset | None = None, sides: Sequence[str] = ()
+) -> Text:
+    """What speaks for a finding: what it does, how sure that is, what these data cannot tell from it.
+
+    sides: where on an elastic shaft it may be; the motor goes without saying.
+    """
     from gaident.show.wording import certainty
 
-    what = next(row.says for row in table() if row.name == effect).begun()
+    what = row_of(effect).says.begun()
+    if len(sides) > 1:
+        what = say("{} (at the {}: these data do not say at which end of the shaft)", what, " or the ".join(sides))
+    elif row_of(effect).at_load:
+        what = say("{}, at the load", what)
     sure, worse = certainty(gain), f"(the model without it is {gain:.0f} BIC units worse)"
     if alternatives:
         others = joined(" or ", map(called, alternatives))
@@ -69,7 +79,7 @@ def closest(effects: Sequence[str], driver: str | None, named: bool) -> Text:
         text = "With {} the model would come closer still, but an error{} stays: this fits no effect of the library."
     else:
         text = "The closest description is {}, but it leaves an error{}: no effect of the library fits, so none is named."
-    return say(text, joined(" and ", map(called, effects)), on)
+    return say(text, joined(" and ", map(called_of, effects)), on)
 
 
 def far_off(ratio: float) -> Text:
@@ -124,7 +134,7 @@ def period_seen(data: DataSet) -> list[Text]:
 def or_other_gains(effect: str) -> Text:
     """What is said of a finding in whose place other gains would explain as much."""
     text = "Other gains than the given ones would explain these records as well as the {}: log the {torque}, it shows the gains."
-    return say(text, called(effect))
+    return say(text, called_of(effect))
 
 
 def or_other_form(form: str) -> Text:

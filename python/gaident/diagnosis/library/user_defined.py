@@ -1,4 +1,4 @@
-"""User-defined effects as terms of a diagnosis: coordinates, bounds and starts from their parameters alone."""
+"""A library with rows that are made: of user-defined effects, from their parameters alone, and of shaft effects at the load."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.library.cause import Cause
+from gaident.diagnosis.library.sides import at_load, at_motor, name_of
 from gaident.models.effects import Row, table
 from gaident.models.own_effects import starts
 
@@ -21,15 +22,26 @@ MOST_STARTS = 64  # no decision: starts of a fit, as many as the built-in effect
 
 
 class Library(Mapping[str, Cause]):
-    """The built-in terms, and behind them those of the user-defined effects that are registered now."""
+    """The built-in terms, and behind them those of the user-defined effects that are registered now.
+
+    Those at the load are made where they are asked for by key, and are not iterated over: a search comes to them from the motor's
+    side.
+    """
 
     def __init__(self, built_in: Mapping[str, Cause]) -> None:
-        self._built_in = dict(built_in)
+        self._built_in = {name: at_motor(row) for name, row in built_in.items()}
         self._own: dict[str, tuple[Row, Cause]] = {}
+        self._at_load: dict[str, Cause] = {}
 
     def __getitem__(self, effect: str) -> Cause:
         if effect in self._built_in:
             return self._built_in[effect]
+        if effect in self._at_load:
+            return self._at_load[effect]
+        name = name_of(effect)
+        if name in self._built_in and self._built_in[name].other_side == effect:
+            linear = frozenset(t.name for t in self._built_in.values() if t.resonates)
+            return self._at_load.setdefault(effect, at_load(self._built_in[name], linear))
         row = next((row for row in table() if row.own and row.name == effect), None)
         if row is None:
             raise KeyError(effect)

@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from gaident.diagnosis.library.equivalences import equivalents
-from gaident.diagnosis.library.terms import of_inverse_dynamics
+from gaident.diagnosis.library.sides import name_of
+from gaident.diagnosis.library.terms import LIBRARY, of_inverse_dynamics
 from gaident.diagnosis.selection.attribution import friction_shown
 from gaident.diagnosis.selection.mechanisms import is_mechanism, one_mass, reduced, resonant, rigid, swings
 from gaident.diagnosis.selection.moves import Moves
@@ -293,8 +294,9 @@ def _holds(fit: Fit, term: str, turns_back: bool) -> bool:
     if "spring" in names:
         return fit.parameters.held
     causes = of_inverse_dynamics(dict.fromkeys(names, 1.0))
-    there = {name for effect in fit.effects for name in (effect, *equivalents(effect))}
-    families = {t.family for t in fit.parameters.terms if t.family}
+    effects = {name_of(effect) for effect in fit.effects}
+    there = {name for effect in effects for name in (effect, *equivalents(effect))}
+    families = {LIBRARY[effect].family for effect in effects} - {""}
     return not causes or any(
         cause.name in there or cause.family in families or (cause.constant and bool(families) and not turns_back)
         for cause in causes

@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.selection.moves import Moves
 from gaident.estimation.least_squares import fit, reestimated
 from gaident.estimation.noise_model import WHITE, NoiseFilter, stationary_autoregression
@@ -58,7 +59,7 @@ def with_p_value(
     result: Diagnosis, space: Moves, base: Fit, final: Fit, draws: int, seed: int, note: Callable[[str], None]
 ) -> Diagnosis:
     """The result with the p-value of its first finding of the plant."""
-    causes = [i for i, f in enumerate(result.findings) if f.effect in final.effects]
+    causes = [i for i, f in enumerate(result.findings) if f.effect in {name_of(e) for e in final.effects}]
     if not causes:
         return result
     gains = largest_gains(space, base, final, draws, seed, note)

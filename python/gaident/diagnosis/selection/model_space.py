@@ -26,6 +26,7 @@ from gaident.estimation.noise_model import WHITE, NoiseFilter
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
 from gaident.estimation.term import Term
+from gaident.models.effect_rows import AT_LOAD
 from gaident.policy.table import POLICY, Policy
 
 __all__ = ["ModelSpace", "words"]
@@ -35,7 +36,7 @@ Vector = NDArray[np.float64]
 
 def words(effects: Iterable[str]) -> str:
     """Effects as people write them."""
-    return ", ".join(e.replace("_", " ") for e in effects)
+    return ", ".join(e.replace("_", " ").replace(AT_LOAD, " at the load") for e in effects)
 
 
 def _representative(term: Term) -> str:

@@ -6,6 +6,7 @@ A model is a mechanism (one mass or two) with effects. The moves are
     drop        an effect                                                                      (backward elimination)
     simplify    a generalisation to what it contains
     exchange    an effect for one of its equivalence class, where only others tell them apart
+    other side  a shaft effect of two masses at the other end of the shaft
     resettle    the mechanism's resonance at the place of an extra one
     hold        one mass by a spring to the ground
     demote      two masses to one, or the spring away
@@ -36,8 +37,9 @@ from gaident.diagnosis.selection.mechanisms import (
     released,
     resonance,
 )
-from gaident.diagnosis.selection.model_space import ModelSpace, words
+from gaident.diagnosis.selection.model_space import words
 from gaident.diagnosis.selection.score_test import ScoreTest
+from gaident.diagnosis.selection.side_moves import SideMoves, better_sides
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import gained
 from gaident.estimation.noise_model import WHITE, NoiseFilter
@@ -60,7 +62,7 @@ def _nested(hypothesis: Hypothesis, x: NDArray[np.float64], term: Term, simple: 
 
 
 @dataclass(frozen=True, eq=False)
-class Moves(ModelSpace):
+class Moves(SideMoves):
     """The models over one objective, and the moves between them."""
 
     # Moves that add.
@@ -76,7 +78,7 @@ class Moves(ModelSpace):
             if t.name not in blocked
             and t.family not in families
             and t.stands_with(fit.effects)
-            and (fit.parameters.masses == 2 or not t.in_coupling)
+            and (fit.parameters.masses == 2 or not t.needs_two_masses)
             and (self.whitens or not t.in_controller or fit.predictor.closed)
         ]
 
@@ -98,12 +100,12 @@ class Moves(ModelSpace):
         self.note(f"looking beyond {words(now.effects) or 'the linear model'}")
         test = ScoreTest(self.objective)
         addable = self.candidates(now)
-        test.add(now.hypothesis, now.x, [t for t in addable if not t.nested])
+        test.add(now.hypothesis, now.x, [t for t in addable if not t.nested] + self.screened_at_load(now))
         fits: list[Fit] = []
-        simple = next((t for t in now.parameters.terms if t.family), None)
-        if simple is not None:
+        families = [t for t in now.parameters.terms if t.family]
+        for simple in families:
             self._generalisations(test, now, now, simple)
-        else:
+        if all(t.at_load for t in families):
             for first in [t for t in addable if t.family and not t.nested]:
                 # The simplest of a family first: its generalisations are tried at its level.
                 start = next((s for s in test.ranked(WHITE) if s.term is first), None)
@@ -121,7 +123,7 @@ class Moves(ModelSpace):
         done = {f.parameters.terms[-1] for f in fits}
         short: dict[Term, tuple[Fit, NoiseFilter]] = {}
         for ranking in rankings:
-            for s in [s for s in ranking if s.term not in done][: self.policy.screened]:
+            for s in better_sides([s for s in ranking if s.term not in done])[: self.policy.screened]:
                 for x in s.starts[: len(s.starts) if s.term.resonates else 2]:  # a valley at every frequency
                     fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, self.policy.glance))
                     if s.term not in short or fit.bic < short[s.term][0].bic:
@@ -132,6 +134,7 @@ class Moves(ModelSpace):
         fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
         if fits:
             fits += self.resettled(min(fits, key=self.score))
+            fits += self.at_the_load(now, fits)
         return self._best(now, fits)
 
     def _best(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
@@ -154,7 +157,8 @@ class Moves(ModelSpace):
         """
         parameters = source.parameters.without(simple.name)
         x = source.parameters.removed(source.x, simple.name)
-        wanted = [t for t in self.allowed if t.family == simple.family and simple.name in t.nested and t.stands_with(now.effects)]
+        rows = [LIBRARY[t.other_side] for t in self.allowed if t.other_side] if simple.at_load else self.allowed
+        wanted = [t for t in rows if t.family == simple.family and simple.name in t.nested and t.stands_with(now.effects)]
         level = abs(float(source.x[source.parameters.slot(simple.name)][0]))
         torque = parameters.scales.torque
         for friction in {max(level, LEAST * torque), max(level, MISSED * torque)}:
@@ -242,10 +246,7 @@ class Moves(ModelSpace):
     def simplify(self, fit: Fit) -> list[Fit]:
         """Each generalisation as what it contains, at its level."""
         return [
-            self.as_nested(fit, t, LIBRARY[name])
-            for t in fit.parameters.terms
-            for name in t.nested
-            if LIBRARY[name] in self.allowed
+            self.as_nested(fit, t, LIBRARY[name]) for t in fit.parameters.terms for name in t.nested if self.may(LIBRARY[name])
         ]
 
     def as_nested(self, fit: Fit, term: Term, simple: Term) -> Fit:
@@ -258,7 +259,7 @@ class Moves(ModelSpace):
         if fit.parameters.held:
             hypothesis, x = released(fit)
             return [self.continued(hypothesis, fit, x, self.policy.long)]
-        if fit.parameters.masses == 1 or not fit.effects or any(t.in_coupling or t.resonates for t in fit.parameters.terms):
+        if fit.parameters.masses == 1 or not fit.effects or any(t.needs_two_masses or t.resonates for t in fit.parameters.terms):
             return []
         hypothesis, x = as_one_mass(fit)
         return [self.continued(hypothesis, fit, x, self.policy.long)]
@@ -326,7 +327,7 @@ class Moves(ModelSpace):
         for t in fit.parameters.terms:
             if t.in_coupling or t.resonates:
                 x, bare = bare.parameters.removed(x, t.name), bare.without(t.name)
-        if fit.parameters.masses == 1 or not bare.parameters.terms:
+        if fit.parameters.masses == 1 or not bare.parameters.terms or any(t.at_load for t in bare.parameters.terms):
             return []
         bare, x = as_one_mass(replace(fit, hypothesis=bare, x=x))
         one = ls.fit(self.objective, bare, x, WHITE, self.policy.usual)

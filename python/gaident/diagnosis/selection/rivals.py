@@ -33,11 +33,15 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
     gain = space.under_predictor_of(less, final).bic - final.bic
     term = final.parameters.term(effect)
     found = []
+    turned = space.at_other_side(final, term)
+    elsewhere = None if turned is None else turned.parameters.terms[-1].name
     for f in space.add(less):
         new = [t for t in f.parameters.terms if t.name not in final.effects]
         if len(new) != 1 or len(f.effects) != len(final.effects):
             continue
         (other,) = new
+        if other.name == elsewhere:
+            continue
         behind = f.bic - final.bic
         if other.name in equivalent:
             found.append(Replacement(other.name, behind, f))
@@ -54,4 +58,7 @@ def rivals_of(space: Moves, final: Fit, effect: str, equivalent: Collection[str]
                 continue
         if behind < space.margin:
             found.append(Replacement(other.name, behind, f))
+    if turned is not None and elsewhere is not None and turned.bic - final.bic < space.margin:
+        there = Replacement(elsewhere, turned.bic - final.bic, turned)
+        found.insert(0 if not found or there.behind < found[0].behind else len(found), there)
     return float(gain), found

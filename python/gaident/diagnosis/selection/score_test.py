@@ -27,6 +27,7 @@ from gaident.control.filtering import filtered
 from gaident.diagnosis.selection.mechanisms import evenly_damped
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import gained
+from gaident.estimation.load_end import LoadEnd
 from gaident.estimation.noise_model import WHITE, NoiseFilter
 from gaident.estimation.objective import LOST, Fit, Hypothesis, Objective
 from gaident.estimation.prediction import ClosedLoop
@@ -164,7 +165,8 @@ class ScoreTest:
 
     def _columns(self, hypothesis: Hypothesis, x: Vector, term: Term, error: Vector) -> tuple[Vector, Matrix]:
         """(orders, columns): what the raw error loses per unit of the two components, pairs of rows per order."""
-        angle = self.data.angle
+        end = LoadEnd.of(hypothesis.parameters, x, self.data) if term.at_load else None
+        angle = self.data.angle if end is None else end.angle(self.data.angle)
         first, last = term.orders
         per_period = TURN / (self.data.period or TURN)  # 1 but on a linear axis, whose orders count in its pitch
         orders = np.arange(float(first if per_period == 1.0 else 1), last + 1.0) * per_period
@@ -181,6 +183,7 @@ class ScoreTest:
         waves = _harmonics(per_period * angle, np.rint(orders / per_period))
         if term.harmonic == "torque":
             pairs = np.stack([-waves.imag, -waves.real], axis=1).reshape(-1, len(angle))
+            pairs = pairs if end is None else end.carried(pairs)
             return orders, hypothesis.predictor.torque_response(hypothesis.parameters, x, pairs)
         w = (self.objective.measured - error) * orders[:, None]
         return orders, np.stack([w * waves.real, -w * waves.imag], axis=1).reshape(-1, len(angle))

@@ -243,7 +243,7 @@ def _beam(space: Moves) -> Beam[Fit]:
 
 
 def _reductions(space: Moves) -> tuple[Callable[[Fit], list[Fit]], ...]:
-    return space.close, space.exchange, space.drop, space.simplify, space.demote
+    return space.close, space.exchange, space.other_side, space.drop, space.simplify, space.demote
 
 
 def _improved(space: Moves, other: Fit, best: Fit) -> Fit:

@@ -1,0 +1,58 @@
+"""A shaft effect at the load of two masses: the row of the same effect at the motor, under keys of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from gaident.axis import Text, called, say
+from gaident.diagnosis.library.cause import Cause
+from gaident.models.effect_rows import AT_LOAD, SIDES, effect_and_side
+from gaident.models.effects import row_of
+
+__all__ = ["at_load", "at_motor", "called_of", "name_of", "sides_of"]
+
+
+def at_load(cause: Cause, excludes: frozenset[str]) -> Cause:
+    """The same effect at the load; excludes: what changes the mechanism linearly, which does not go together with it."""
+
+    def there(name: str) -> str:
+        return f"{name}{AT_LOAD}"
+
+    return replace(
+        cause,
+        name=there(cause.name),
+        nested=tuple(there(n) for n in cause.nested),
+        shared={there(n): places for n, places in cause.shared.items()},
+        family=f"{cause.family} at the load" if cause.family else "",
+        excludes=cause.excludes | excludes,
+        beside=frozenset(there(n) for n in cause.beside),
+        other_side=cause.name,
+        at_load=True,
+        alike={},
+    )
+
+
+def name_of(key: str) -> str:
+    """An effect's name, whatever its side."""
+    return effect_and_side(key)[0]
+
+
+def called_of(key: str) -> Text:
+    """An effect in words for a field of `say`, at the load with its side."""
+    name, side = effect_and_side(key)
+    return say("{} at the load", called(name)) if side == SIDES[1] else called(name)
+
+
+def at_motor(cause: Cause) -> Cause:
+    """The row with the name of the same effect at the load, where there is one."""
+    return replace(cause, other_side=f"{cause.name}{AT_LOAD}") if SIDES[1] in row_of(cause.name).sides else cause
+
+
+def sides_of(key: str, rivals: Sequence[str], masses: int) -> tuple[str, ...]:
+    """The sides that data allow for an effect; rivals: keys of what they cannot tell from it.
+
+    In a model of one mass both ends are the same place.
+    """
+    allowed = {effect_and_side(k)[1] for k in (key, *rivals) if name_of(k) == name_of(key)}
+    return tuple(s for s in row_of(key).sides if masses == 1 or s in allowed)

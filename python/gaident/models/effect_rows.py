@@ -1,0 +1,121 @@
+"""The rows of the table of effects, and the table as it prints.
+
+A shaft effect may act at either side of an elastic shaft.
+What acts at the load has a key of its own, "coulomb_friction@load": the core's name for it, and what fits, searches and exports
+tell effects apart by.
+"""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any, NamedTuple
+
+from gaident.axis import Text
+from gaident.models.own_effects import Parameter
+
+__all__ = ["AT_LOAD", "SIDES", "Row", "Table", "effect_and_side"]
+
+SHAFT = "shaft"
+SIDES = ("motor", "load")
+AT_LOAD = "@load"
+
+
+def effect_and_side(key: str) -> tuple[str, str]:
+    """(name, side) of a key; the side is "motor" for effects that have none, too."""
+    name, at, _ = key.partition(AT_LOAD)
+    return name, SIDES[1] if at else SIDES[0]
+
+
+class Row(NamedTuple):
+    """One effect of the table.
+
+    Attributes
+    ----------
+    name : str
+        Name of the effect.
+    place : {"shaft", "coupling", "actuator", "controller", "sensor", "plant", "record"}
+        Where it acts.
+    parameters : tuple of Parameter
+        Its parameters with units and bounds.
+    meaning : str
+        What it does, one line.
+    simulated : bool
+        False: found in records, but not part of a model.
+    needs_two_masses : bool
+        Whether it acts between two masses, p = 1 and q = 2.
+    relation : str
+        What the parameters have to meet among themselves; empty if nothing.
+    own : bool
+        Whether it is user-defined, registered from Python.
+    says : Text
+        The meaning without what the table says after it, for sentences.
+    turns : bool
+        Whether it depends on the shaft's angle; False for a user-defined effect, of which it is not known.
+    sides : tuple of {"motor", "load"}
+        The sides at which it may act; () where it has none. See `Model.with_effect`.
+    at_load : bool
+        Whether it is the row of a shaft effect at the load; False for all rows of the table.
+
+    See Also
+    --------
+    table : All rows, with an example.
+    """
+
+    name: str
+    place: str  # shaft, coupling, actuator, controller, sensor, plant or record
+    parameters: tuple[Parameter, ...]
+    meaning: str
+    simulated: bool  # False: found in records, but not part of a model
+    needs_two_masses: bool
+    relation: str  # what the parameters have to meet among themselves, empty if nothing
+    own: bool = False  # registered from Python
+    says: Text = Text("")  # the meaning without what the table says after it, for sentences
+    turns: bool = False  # depends on the shaft's angle
+    at_load: bool = False  # the row of a shaft effect at the load, which is none of the table
+
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """The sides at which the effect may act; () where it has none."""
+        return () if self.place != SHAFT else ("motor",) if self.own else SIDES
+
+    @property
+    def key(self) -> str:
+        """What tells it from all others: its name, at the load with that behind it."""
+        return f"{self.name}{AT_LOAD}" if self.at_load else self.name
+
+    def there(self) -> Row:
+        """The row of the same effect at the load."""
+        return self._replace(at_load=True, needs_two_masses=True)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the row for JSON."""
+        parameters = [p.to_dict() for p in self.parameters]
+        return {"name": self.name, "place": self.place, "parameters": parameters, "meaning": self.meaning}
+
+
+class Table(tuple[Row, ...]):
+    """All effects, in the order of the documentation; prints as a table.
+
+    See Also
+    --------
+    table : Makes it, with an example.
+    """
+
+    __slots__ = ()
+
+    def __str__(self) -> str:
+        rows = [("effect", "place", "parameters", "meaning")]
+        for row in self:
+            units = ", ".join(f"{p.name} [{p.unit}]" for p in row.parameters)
+            rows.append((row.name, row.place, units, row.meaning))
+        widths = [max(len(row[i]) for row in rows) for i in range(3)]
+        lines = ["  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[3]]) for row in rows]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        rows = [(r.name, r.place, ", ".join(f"{p.name} [{p.unit}]" for p in r.parameters), r.meaning) for r in self]
+        left = 'style="text-align:left"'
+        head = "".join(f"<th {left}>{title}</th>" for title in ("effect", "place", "parameters", "meaning"))
+        body = "".join("<tr>" + "".join(f"<td {left}>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+        return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
