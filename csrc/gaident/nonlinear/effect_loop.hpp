@@ -86,7 +86,7 @@ private:
         const bool open = run_.loop.kind == LoopKind::open;
         const double share = 1.0 / run_.substeps;
         for (std::size_t n = 0; n < run_.input.size(); ++n) {
-            const double here = position_at(n), next = position_after(n);
+            const double here = run_.position_at(n), next = run_.position_after(n);
             theta_ = run_.position.empty() ? angle_ : R(here);
             time_ = static_cast<double>(n) * run_.sample_time;
             const R y = sensor_over_sample();
@@ -123,10 +123,10 @@ private:
         const double share = 1.0 / run_.substeps;
         double r_before = run_.moving && !run_.input.empty() ? run_.input[0] : 0.0;
         R u_before = c_.before, u_long_before = c_.before;
-        theta_ = run_.position.empty() ? angle_ : R(position_at(0));
+        theta_ = run_.position.empty() ? angle_ : R(run_.position_at(0));
         R y = sensor(), u = control(R(r_before), y);
         for (std::size_t n = 0; n < run_.input.size(); ++n) {
-            const double r = run_.input[n], here = position_at(n > 0 ? n - 1 : 0), next = position_at(n);
+            const double r = run_.input[n], here = run_.position_at(n > 0 ? n - 1 : 0), next = run_.position_at(n);
             const int steps = n == 0 && run_.moving ? 0 : run_.substeps;
             for (int j = 0; j < steps; ++j) {
                 // Adams and Bashforth's mean over the substep to come.
@@ -144,14 +144,6 @@ private:
             r_before = r;
             write(n, y, u);
         }
-    }
-
-    [[gnu::always_inline]] double position_at(std::size_t n) const { return run_.position.empty() ? 0.0 : run_.position[n]; }
-    [[gnu::always_inline]] double position_after(std::size_t n) const {
-        if (run_.position.empty()) return 0.0;
-        const std::size_t last = run_.position.size() - 1;
-        if (n < last) return run_.position[n + 1];
-        return last == 0 ? run_.position[0] : 2.0 * run_.position[last] - run_.position[last - 1];
     }
 
     void begin_at_load() {

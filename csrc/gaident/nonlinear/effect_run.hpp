@@ -35,6 +35,15 @@ struct EffectRun {
     OwnEffects* own = nullptr;           // asked through these
     OwnSignals own_signals{};            // width numbers each,
     const double* own_answer = nullptr;  // and answering there
+
+    // The measured angle at a sample, and at the one after it [rad]; 0 where none was measured.
+    [[gnu::always_inline]] double position_at(std::size_t n) const { return position.empty() ? 0.0 : position[n]; }
+    [[gnu::always_inline]] double position_after(std::size_t n) const {
+        if (position.empty()) return 0.0;
+        const std::size_t last = position.size() - 1;
+        if (n < last) return position[n + 1];
+        return last == 0 ? position[0] : 2.0 * position[last] - position[last - 1];
+    }
 };
 
 // The torques issued so far, as an effect of the actuator looks back on them.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,7 @@ class Work:
     note: Note
     axis: str
     pitch: float | None
+    form_refused: bool = field(init=False, default=False)  # whether a search under another form did not confirm it
 
     def __post_init__(self) -> None:
         self.controller = self.driving.controller
@@ -134,7 +135,7 @@ class Work:
     def _doubt_controller(self) -> None:
         again = self.driving.regained_from is not None
         self.gain_doubt = gain_doubt(self.found.space, self.final, again)
-        self.form = None if again else unlogged_form(self.found.space, self.final)
+        self.form = None if again or self.form_refused else unlogged_form(self.found.space, self.final)
 
     def other_form(self) -> UnloggedForm | None:
         """A form of controller with which these records are explained better, also than with other gains; no torque shows it."""
@@ -151,7 +152,7 @@ class Work:
 
     def refused(self, form: UnloggedForm) -> None:
         """Another form comes closer, but a search under it does not end in noise: what is known is said."""
-        self.form = None
+        self.form, self.form_refused = None, True
         self.notes.append(or_other_form(form.finding.effect))
 
     def other_gains(self, first: Work | None = None) -> OtherGains | None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.models.simulation_input import kind_of_held, sampled_between
+from gaident.models.held_torque import kind_of_held, sampled_between
 
 __all__ = ["means", "with_middles"]
 

@@ -17,6 +17,7 @@ from gaident.errors import RecordError
 from gaident.identification.logged_torque import corrected, not_followed
 from gaident.identification.space import derive_space
 from gaident.models.drive_torque import as_old_as_its_velocity, straight_driven, torque_driven
+from gaident.models.held_torque import held_torque
 from gaident.models.search_space import SearchSpace
 from gaident.models.starts import starts_moving
 from gaident.results.estimate import Estimate
@@ -99,6 +100,8 @@ def space_of(records: Sequence[Record], controller: Controller | None) -> Search
 
 def input_of(rec: Record, controller: Controller | None) -> Vector:
     """What drives the loop, shape (n,): command [rad/s], position command [rad], or without a controller torque [N m]."""
-    source = rec.torque if controller is None else controller.command_of(rec)
+    if controller is None:
+        return held_torque(rec)
+    source = controller.command_of(rec)
     assert source is not None  # checked on entry
     return source

@@ -30,6 +30,7 @@ from gaident.errors import RecordError, SettingsError
 from gaident.identification.plant_of_discrete import plant_of_discrete
 from gaident.models.discrete import Discrete
 from gaident.models.factors import FactorCounts, factor_parameters
+from gaident.models.held_torque import held_torque
 from gaident.models.mechanics import Mechanics, mechanics_from_model
 from gaident.models.model import Model
 
@@ -264,7 +265,8 @@ def _model_covariance(model: Model, theta: Vector, covariance: Vector, dt: float
 
 
 def _source(rec: Record, controller: PI | None) -> Vector:
-    source, name = (rec.torque, "torque") if controller is None else (rec.command, "command")
+    torque = None if rec.torque is None else held_torque(rec)
+    source, name = (torque, "torque") if controller is None else (rec.command, "command")
     if source is None:
         other = f"{A_CONTROLLER} to use the command" if controller is None else f"{NO_CONTROLLER} to use the torque"
         raise RecordError(f"the record has no {name}, the input of the regression: give Record({name}=...), or {other}")

@@ -10,12 +10,11 @@ from gaident.arguments import A_CONTROLLER, COMMAND, NO_CONTROLLER, TORQUE
 from gaident.control import core
 from gaident.control.controller import Controller, checked_controller
 from gaident.data.record import Record
-from gaident.data.torque_kind import COMMANDED, MEASURED
 from gaident.errors import ModelError, RecordError
 from gaident.models.discrete import require_strictly_proper
+from gaident.models.held_torque import held_torque
 from gaident.models.mechanics import OneMass, TwoMass
 from gaident.models.model import Model
-from gaident.policy.table import POLICY
 
 Signal = NDArray[np.float64]
 AnyModel = Model | OneMass | TwoMass
@@ -60,28 +59,6 @@ def input_for(p: int, rec: Record, controller: Controller | None) -> tuple[Signa
             f"{TORQUE}, or {A_CONTROLLER} to drive the loop with the command"
         )
     return held_torque(rec), "torque"
-
-
-def sampled_between(rec: Record) -> bool:
-    """Whether the torque is a sample, at each line, of one that changes between the lines: no drive holds it that long."""
-    return rec.torque_is == MEASURED and rec.dt > POLICY.longest_hold
-
-
-def kind_of_held(rec: Record, dt: float) -> str:
-    """`torque_is` of a record with lines of dt [s], made of `rec`, whose torque is held over each: none is drawn straight."""
-    return COMMANDED if dt > POLICY.longest_hold else rec.torque_is
-
-
-def held_torque(rec: Record) -> Signal:
-    """What a simulation holds over each line of the log [N m] (n,): the logged torque or, of a sampled one, its mean there.
-
-        u_h(n) = (u(n) + u(n+1))/2        a torque that goes straight from line to line; the last line is held
-
-    Held from its line on, a sampled torque would be half a line late.
-    """
-    assert rec.torque is not None
-    u = np.ascontiguousarray(rec.torque, dtype=np.float64)
-    return np.append(0.5 * (u[1:] + u[:-1]), u[-1]) if sampled_between(rec) else u  # no decision: a mean of two
 
 
 def check_start(plant: Model, controller: Controller | None, start: Signal, what: str) -> None:

@@ -64,7 +64,7 @@ def constant_beside(off: NDArray[np.float64], size: float) -> float:
 
     That is what an integrator held before the record, for a load, where `off` is the logged torque minus that made from rest.
     """
-    if not len(off):
+    if len(off) < POLICY.least_rows:
         return 0.0
     held = float(np.mean(off))
     return held if abs(held) > max(POLICY.above_noise * float(np.std(off)), POLICY.negligible * size) else 0.0

@@ -3,9 +3,10 @@
 From rest, the controller makes u_0 of command and velocity. Its integral before the record adds a constant, behind filters too:
 they stood in it. So it is the mean of u - u_0, where that stands out of what else the two are off by:
 
-    I(-1) = mean(u - u_0)   where   |I(-1)| > 6 std(u - u_0)
+    I(-1) = mean(u - u_0)   where   |I(-1)| > 6 std(u - u_0) and is not to be neglected beside the largest torque
 
-On the lines from the first one at a limit on, u_0 is not that of the drive, and they are left out.
+From the first line at a limit on, u_0 of a controller other than a bare PI is not that of the drive: these lines are left out.
+Of too few lines nothing is said.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from gaident.estimation import least_squares as ls
 from gaident.estimation import prediction
 from gaident.estimation.criterion import effective_samples
 from gaident.estimation.dataset import DataSet
-from gaident.estimation.noise_model import WHITE, NoiseFilter
+from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prefilter import Prefilter
@@ -686,9 +686,9 @@ def followed_up(monkeypatch: pytest.MonkeyPatch, times: int, plain: bool) -> tup
     seen: list[tuple[str, ...]] = []
     completed = moves.Moves.completed
 
-    def noted(space: moves.Moves, fit: Fit, noise: NoiseFilter) -> Fit:
+    def noted(space: moves.Moves, fit: Fit) -> Fit:
         seen.append(fit.effects)
-        return completed(space, fit, noise)
+        return completed(space, fit)
 
     with monkeypatch.context() as patch:
         patch.setattr(moves.Moves, "completed", noted)

@@ -10,7 +10,7 @@ import numpy as np
 import gaident as ga
 from gaident.diagnosis.selection.decimated import decimated_record
 from gaident.estimation.mean_velocity import with_middles
-from gaident.models.simulation_input import held_torque
+from gaident.models.held_torque import held_torque
 from gaident.policy.table import POLICY
 
 J, B, C = 5.5, 22.0, 13.0
@@ -57,3 +57,15 @@ def test_the_cause_and_the_inertia_behind_a_sampled_torque() -> None:
     dia = ga.diagnose(logged("measured"))
     assert [f.effect for f in dia.findings if not f.is_noise] == ["coulomb_friction"]
     assert abs(1.0 / dia.model.gain / J - 1.0) < 0.01
+
+
+def test_identify_draws_a_sampled_torque_straight_too() -> None:
+    """The truth is rigid without dry friction; held, its inertia would be B dt/2 too small."""
+    t = FINE * np.arange(40_000)
+    u = 25.0 * np.sin(1.9 * t) + 14.0 * np.sin(5.3 * t + 1.0)
+    rigid = ga.OneMass(J=J, D=B).model()
+    noise = 0.02 * np.random.default_rng(1).standard_normal(len(u))
+    w = ga.simulate(rigid, ga.Record(FINE, torque=u, velocity=0.0 * noise)) + noise
+    rec = ga.Record(EVERY * FINE, torque=u[::EVERY], velocity=w[::EVERY], torque_is="measured")
+    found = ga.identify(rec, seed=1).model
+    assert (found.p, found.q) == (1, 0) and abs(1.0 / found.gain / J - 1.0) < 0.005

@@ -120,6 +120,12 @@ class _Bench:
         return cost / self.variance
 
 
+def _keys_of(finding: Finding, keys: Sequence[str]) -> list[str]:
+    """The effects of a model that a finding names; of one at both ends of the shaft that at its own."""
+    named = [k for k in keys if name_of(k) == finding.effect]
+    return named if len(named) < 2 else [k for k in named if (k != finding.effect) == (finding.sides == SIDES[1:])]
+
+
 def propose(
     findings: Sequence[Finding],
     rivals: Mapping[str, tuple[float, Sequence[Replacement]]],
@@ -137,9 +143,8 @@ def propose(
     pairs = [
         (effect, rival)
         for f in findings
-        for effect, (_, others) in rivals.items()
-        if name_of(effect) == f.effect and (effect != f.effect) == (f.sides == SIDES[1:])
-        for rival in others
+        for effect in _keys_of(f, list(rivals))
+        for rival in rivals[effect][1]
         if name_of(rival.effect) not in (f.effect, *equivalents(f.effect))
     ]
     pairs = sorted(pairs, key=lambda p: p[1].behind)[: POLICY.starts]

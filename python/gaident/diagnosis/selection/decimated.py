@@ -25,7 +25,7 @@ from gaident.estimation.parameterisation import Parameterisation, parameter_name
 from gaident.estimation.prediction import OpenLoop
 from gaident.estimation.projection import WORST
 from gaident.estimation.term import Scales
-from gaident.models.simulation_input import held_torque, kind_of_held
+from gaident.models.held_torque import held_torque, kind_of_held
 from gaident.policy.table import POLICY
 
 __all__ = ["blocks_of", "decimated", "decimated_record", "moved"]

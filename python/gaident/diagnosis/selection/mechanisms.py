@@ -17,6 +17,7 @@ from gaident.estimation.objective import LOST, Fit, Hypothesis, Objective
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.projection import project_out
 from gaident.estimation.term import Term
+from gaident.models.held_torque import held_torque
 from gaident.models.model import Model
 from gaident.models.roots import quadratic_roots
 from gaident.policy.table import POLICY
@@ -53,8 +54,7 @@ def one_mass(data: DataSet, identified: Model) -> Model:
         return identified
     gram, right = np.zeros((2, 2)), np.zeros(2)
     for r in data.driven:
-        assert r.torque is not None
-        columns = np.vstack([np.cumsum(r.torque), -np.cumsum(r.velocity)]) * r.dt
+        columns = np.vstack([np.cumsum(held_torque(r)), -np.cumsum(r.velocity)]) * r.dt
         columns = columns - columns.mean(axis=1, keepdims=True)
         gram += columns @ columns.T
         right += columns @ (r.velocity - r.velocity.mean())
@@ -72,8 +72,8 @@ def held(data: DataSet) -> Model | None:
     """
     gram, right = np.zeros((3, 3)), np.zeros(3)
     for r in data.driven:
-        assert r.torque is not None and r.position is not None
-        columns = np.vstack([np.cumsum(r.torque), -np.cumsum(r.velocity), -np.cumsum(r.position - r.position[0])]) * r.dt
+        assert r.position is not None
+        columns = np.vstack([np.cumsum(held_torque(r)), -np.cumsum(r.velocity), -np.cumsum(r.position - r.position[0])]) * r.dt
         line = np.vstack([np.ones(len(r)), np.linspace(-1.0, 1.0, len(r))])
         beyond = np.linalg.qr(line.T)[0]
         columns, w = (rows - (rows @ beyond) @ beyond.T for rows in (columns, r.velocity))

@@ -22,7 +22,7 @@ from gaident.diagnosis.selection.mechanisms import as_two_masses, resonance, swi
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, effective_samples
 from gaident.estimation.dataset import DataSet
-from gaident.estimation.noise_model import WHITE, NoiseFilter
+from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
 from gaident.estimation.term import Term
@@ -260,13 +260,9 @@ class ModelSpace:
         """A short fit taken to the end, under the predictors that may say more."""
         return self.under_best_predictor(self.completed(fit))
 
-    def completed(self, fit: Fit, noise: NoiseFilter | None = None) -> Fit:
-        """A short fit taken to the end under a noise filter or its own, then under its own.
-
-        What a short fit still leaves may pass for noise under its own.
-        """
-        if not fit.converged:
-            fit = ls.fit(self.objective, fit.hypothesis, fit.x, fit.noise if noise is None else noise, self.policy.usual)
+    def completed(self, fit: Fit) -> Fit:
+        """A short fit taken to the end under its own noise model."""
+        fit = fit if fit.converged else ls.fit(self.objective, fit.hypothesis, fit.x, fit.noise, self.policy.usual)
         return ls.reestimated(self.objective, fit)
 
     def under_best_predictor(self, fit: Fit) -> Fit:

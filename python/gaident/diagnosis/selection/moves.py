@@ -42,7 +42,7 @@ from gaident.diagnosis.selection.score_test import ScoreTest
 from gaident.diagnosis.selection.side_moves import SideMoves, better_sides
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import gained
-from gaident.estimation.noise_model import WHITE, NoiseFilter
+from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis
 from gaident.estimation.prediction import OpenLoop
 from gaident.estimation.projection import WORST, orthonormal_rows
@@ -121,15 +121,15 @@ class Moves(SideMoves):
             if not any(rankings):
                 return self._best(now, fits)
         done = {f.parameters.terms[-1] for f in fits}
-        short: dict[Term, tuple[Fit, NoiseFilter]] = {}
+        short: dict[Term, Fit] = {}
         for ranking in rankings:
             for s in better_sides([s for s in ranking if s.term not in done])[: self.policy.screened]:
                 for x in s.starts[: len(s.starts) if s.term.resonates else 2]:  # a valley at every frequency
                     fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, self.policy.glance))
-                    if s.term not in short or fit.bic < short[s.term][0].bic:
-                        short[s.term] = fit, s.noise
-        promising = sorted((f for f in short.values() if f[0].cost < WORST), key=lambda f: f[0].bic)[: self.policy.finished]
-        best = sorted((self.completed(f, noise) for f, noise in promising), key=self.score)
+                    if s.term not in short or fit.bic < short[s.term].bic:
+                        short[s.term] = fit
+        best = sorted((f for f in short.values() if f.cost < WORST), key=lambda f: f.bic)[: self.policy.finished]
+        best = sorted((self.completed(f) for f in best), key=self.score)
         reach = self.policy.beam_reach * self.penalty
         fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
         if fits:

@@ -55,7 +55,7 @@ class SideMoves(ModelSpace):
         best = sorted((f for f in fits if f.cost < WORST), key=self.score)
         if now.parameters.masses == 1 or not best or self.quiet(best[0]):
             return []
-        last = [f for f in best if f.parameters.masses == 2 and f.parameters.terms[-1].other_side]
+        last = [f for f in best if f.parameters.masses == 2 and f.effects and f.parameters.terms[-1].other_side]
         found = [self.at_other_side(f, f.parameters.terms[-1]) for f in last[: self.policy.starts]]
         rests = [t for t in now.parameters.terms if t.levels]
         simplest = next((t for t in self.allowed if t.simplest and t.levels), None)

@@ -270,9 +270,9 @@ def _fitted(space: Moves, objective: Objective, variant: _Variant, under: UnderC
     if space.whitens:
         z, found = under.closest(objective, found, objective.own_noise(found), z)
     found = ls.reestimated(objective, found)
-    none = 0.0 if variant.finding == "command_weight" else -np.inf  # a weight of 0 is one that drives have
-    at_end = (z > under.high - STEP) | ((z < under.low + STEP) & (z != none))
-    if found.cost >= WORST or bool(at_end[[at for at, _, logarithm in variant.parameters.values() if logarithm]].any()):
+    zero = (under.low == 0.0) & (z == 0.0)  # a weight of 0, or zeros without damping, are what drives have
+    at_end = (z > under.high - STEP) | ((z < under.low + STEP) & ~zero)
+    if found.cost >= WORST or bool(at_end.any()):
         return None
     score = space.score(found) + cost_of(len(z), objective.information) + space.penalty
     return found, score, variant, z, under.deviations(objective, found, z)

@@ -1,0 +1,36 @@
+"""What is held over a line of the log: a commanded torque as it stands, a sampled one as its mean there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.data.record import Record
+from gaident.data.torque_kind import COMMANDED, MEASURED
+from gaident.policy.table import POLICY
+
+__all__ = ["held_torque", "kind_of_held", "sampled_between"]
+
+Signal = NDArray[np.float64]
+
+
+def sampled_between(rec: Record) -> bool:
+    """Whether the torque is a sample, at each line, of one that changes between the lines: no drive holds it that long."""
+    return rec.torque_is == MEASURED and rec.dt > POLICY.longest_hold
+
+
+def kind_of_held(rec: Record, dt: float) -> str:
+    """`torque_is` of a record with lines of dt [s], made of `rec`, whose torque is held over each: none is drawn straight."""
+    return COMMANDED if dt > POLICY.longest_hold else rec.torque_is
+
+
+def held_torque(rec: Record) -> Signal:
+    """What a simulation holds over each line of the log [N m] (n,): the logged torque or, of a sampled one, its mean there.
+
+        u_h(n) = (u(n) + u(n+1))/2        a torque that goes straight from line to line; the last line is held
+
+    Held from its line on, a sampled torque would be half a line late.
+    """
+    assert rec.torque is not None
+    u = np.ascontiguousarray(rec.torque, dtype=np.float64)
+    return np.append(0.5 * (u[1:] + u[:-1]), u[-1]) if sampled_between(rec) else u  # no decision: a mean of two
