@@ -129,6 +129,15 @@ constexpr EffectSet effects_that_turn() {
     return set;
 }
 
+// Those at the load that depend on the angle there.
+constexpr EffectSet load_effects_that_turn() {
+    EffectSet set;
+    LoadEffects::each([&]<class E>() {
+        if (E::info.turns) set.add(effect<E>);
+    });
+    return set;
+}
+
 // A candidate: the linear drive and its effects.
 struct EffectModel {
     Factors<double> linear;

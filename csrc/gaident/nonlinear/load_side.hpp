@@ -70,7 +70,7 @@ struct LoadSide {
 
     [[gnu::always_inline]] LoadSide(const EffectRun& run, R twist)
         : dry(run.effects.meets(load_effects_with(Hooks::law | Hooks::level | Hooks::loaded | Hooks::friction))),
-          turning(run.effects.any([](const EffectInfo& info) { return info.at_load && info.turns; })),
+          turning(run.effects.meets(load_effects_that_turn())),
           twist_at_start(twist) {}
 };
 struct NoLoadSide {
