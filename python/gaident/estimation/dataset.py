@@ -179,8 +179,10 @@ class DataSet:
 
     @cached_property
     def loopable(self) -> bool:
-        """Whether command and controller can drive a model too, from standstill: of a log at the controller's rate, whose torque
-        is as good, only where the integrator was empty."""
+        """Whether command and controller can drive a model too, from standstill.
+
+        Under a bare PI at the log's rate only where its integrator was empty before the records: the logged torque serves there.
+        """
         if self.loop is None or any(self.moving) or (self.slower and not self.loop_follows):
             return False
         if self.pi is not None and any(self.stored):

@@ -141,8 +141,9 @@ class Model:
         """
         rest = tuple(effect for effect in self.effects if effect.name != name or side not in (None, effect.side))
         if len(rest) == len(self.effects):
-            names = ", ".join(effect.name for effect in self.effects) or "none"
-            raise ModelError(f"the model has no effect {name!r}: its effects are {names}")
+            names = ", ".join(e.name + " at the load" * (e.side == "load") for e in self.effects) or "none"
+            there = "" if side is None else f" with side={side!r}"
+            raise ModelError(f"the model has no effect {name!r}{there}: its effects are {names}")
         return self._with(rest)
 
     @property
