@@ -87,6 +87,27 @@ def test_each_form_is_named_with_its_numbers(name: str, digits: int) -> None:
     assert shown is not None and (digits or named == {"integration_rule": {}} or shown.rms < 1e-9 * shown.before)
 
 
+@pytest.mark.parametrize("reads", ["counts", "more"])
+@pytest.mark.parametrize("name", ["notch", "velocity filter"])
+def test_a_lattice_of_speeds_is_the_encoders_or_the_logs(name: str, reads: str) -> None:
+    """Speeds of an encoder's counts, that the controller reads too, written with five decimals; or 16 bits of what it reads."""
+    given, named = CASES[name]
+    step = 2.0 * np.pi / 2**20 / T if reads == "counts" else 100.0 / 2**15
+    filters = given()
+    if reads == "counts":
+        filters["velocity_filters"] = [lambda w: np.round(w / step) * step, *filters.get("velocity_filters", [])]
+    rec = log(**filters)
+    assert rec.velocity is not None and rec.torque is not None
+    counts = np.round(rec.velocity / step) * step
+    shown = shown_by(
+        ga.Record(
+            T, command=rec.command, velocity=np.round(counts, 5) if reads == "counts" else counts, torque=np.round(rec.torque, 5)
+        )
+    )
+    hold(shown, named)
+    assert shown is not None and (shown.rms < 1e-5 or reads == "more")
+
+
 @pytest.mark.parametrize("name", ["IP", "low pass", "notch", "gains off with a low pass"])
 def test_noise_on_a_measured_torque_does_not_break_it(name: str) -> None:
     given, named = CASES[name]

@@ -11,7 +11,7 @@ import pytest
 from scipy import signal
 
 import gaident as ga
-from gaident.data.signals.lattice import lattice_step, rounding_step
+from gaident.data.signals.lattice import digits_step, lattice_step, rounding_step
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.alternatives import alternatives_of, impossible_here
@@ -129,6 +129,10 @@ def test_the_digits_of_a_text_log_are_found_and_not_invented() -> None:
         assert rounding_step(np.array([float(f"{v:.{digits}g}") for v in x])) == pytest.approx(10.0 ** (3 - digits))
     assert rounding_step(x) == 0.0 and rounding_step(np.zeros(10)) == 0.0
     assert rounding_step(np.round(x / 0.3) * 0.3) == pytest.approx(0.3)
+    counts = np.round(x * 83.44) / 83.44  # an encoder's speeds, written with digits of their own
+    for decimals, unit in ((5, 1.0), (2, np.pi / 30.0), (3, np.pi / 180.0)):
+        assert digits_step(np.round(counts / unit, decimals) * unit) == pytest.approx(unit * 10.0**-decimals)
+    assert digits_step(counts) == 0.0
 
 
 def test_a_load_above_the_dry_friction_is_no_friction_of_two_levels() -> None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gaident.policy.table import POLICY
 
-__all__ = ["encoder_lines", "encoder_step", "lattice_step", "rounding_step"]
+__all__ = ["digits_step", "encoder_lines", "encoder_step", "lattice_step", "rounding_step"]
 
 Vector = NDArray[np.float64]
 
@@ -17,7 +17,7 @@ FEWEST_LINES = 100  # no decision: of a turn; no encoder of a drive has fewer
 SPEEDS = (1.0, np.pi / 30.0, np.pi / 180.0, 2.0 * np.pi)  # no decision: units of a speed; rad/s in each: rad/s, rpm, deg/s, 1/s
 EXACT = 1e-4  # no decision: steps, what a decimal number is exact to in binary and scaled by ten
 
-DIGITS = range(4, 10)  # no decision: significant digits that text logs are written with; more round off nothing that matters
+DIGITS = range(1, 10)  # no decision: significant digits that text logs are written with; more round off nothing that matters
 
 
 def lattice_step(values: Vector, rounded: bool = False) -> float:
@@ -87,9 +87,19 @@ def rounding_step(values: Vector) -> float:
     """The step that all `values` are rounded to, in their unit: their lattice's, or, where a text log keeps so many significant
     digits, the last digit of the largest; 0.0 where they are not rounded.
     """
-    step = lattice_step(values)
-    if step > 0.0:
-        return step
+    return lattice_step(values) or _last_digit(values)
+
+
+def digits_step(velocities: Vector) -> float:
+    """The last digit of the largest velocity in a text log [rad/s], in the unit that needs the fewest; 0.0: binary numbers.
+
+    A log of fixed decimals has as many significant digits in its largest value.
+    """
+    return max(unit * _last_digit(velocities / unit) for unit in SPEEDS)
+
+
+def _last_digit(values: Vector) -> float:
+    """Of the largest value, where all are written with the same number of significant digits; 0.0 where they are not."""
     size = np.abs(values[values != 0.0])
     if len(size) < FEWEST:
         return 0.0

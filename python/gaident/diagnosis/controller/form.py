@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.filters import LowPass
 from gaident.control.pi import PI, RULES
 from gaident.diagnosis.controller.form_regression import Shape
 
-__all__ = ["FEEDS", "FILTER_NAMES", "FIRST_FEED", "GAINS", "KI", "KP_R", "KP_W", "WEIGHTS", "Candidate", "Form"]
+__all__ = ["FEEDS", "FILTER_NAMES", "FIRST_FEED", "GAINS", "KI", "KP_R", "KP_W", "WEIGHTS", "Candidate", "Form", "named"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -90,3 +91,36 @@ class Candidate:
     @property
     def names(self) -> tuple[str, ...]:
         return self.form.names(self.shape)
+
+
+def named(
+    best: Candidate, numbers: Vector, filters: Vector, cov: Matrix, period: float
+) -> dict[str, dict[str, tuple[float, float]]]:
+    """Name of what differs -> parameter -> (value, standard deviation), in the units of `Cascade`."""
+    std = np.sqrt(np.maximum(np.diag(cov), 0.0))
+    kp, kp_b = float(numbers[KP_W]), float(numbers[KP_R])
+    named: dict[str, dict[str, tuple[float, float]]] = {name: {} for name in best.names}
+    if "other_gains" in named:
+        gains = {"kp": (kp, float(std[KP_W])), "ki": (float(numbers[KI]), float(std[KI]))}
+        named["other_gains"] = {name: gains[name] for name in best.form.free if name not in best.form.unknown}
+    if "command_weight" in named and kp > 0.0:
+        slope = np.array([-kp_b / kp**2, 1.0 / kp])
+        named["command_weight"] = {"weight": (kp_b / kp, float(np.sqrt(max(slope @ cov[:2, :2] @ slope, 0.0))))}
+    for name in best.form.feeds:
+        at = FIRST_FEED + FEEDS.index(name)
+        named[name] = {"inertia" if name == FEEDS[0] else "torque": (float(numbers[at]), float(std[at]))}
+    at = 0
+    for place, kind in best.shape.places:
+        into, known = named[FILTER_NAMES[place]], std[len(numbers) + at :]
+        if kind is LowPass:
+            into["time_constant"] = _of_logarithm(filters[at], known[0], period)
+        else:
+            into["frequency"] = _of_logarithm(filters[at], known[0], 1.0 / period)
+            into["numerator_damping"] = (float(filters[at + 1]), float(known[1]))
+            into["denominator_damping"] = _of_logarithm(filters[at + 2], known[2], 1.0)
+        at += 1 if kind is LowPass else 3
+    return named
+
+
+def _of_logarithm(logarithm: float, std: float, unit: float) -> tuple[float, float]:
+    return (value := float(np.exp(logarithm)) * unit), value * float(std)

@@ -81,6 +81,7 @@ class Law:
     fitted is x(k) - rho x(k-1) of each signal without its mean in each stretch between two limits, see `logged_stretches`.
     courses: other velocities that have the same lines [rad/s] (n r,) each; () where the log has all samples.
     straight: the velocity straight between its lines [rad/s] (n r,).
+    steps: that the velocities of each record are rounded to [rad/s], where r = 1.
     """
 
     command: Vector
@@ -94,6 +95,7 @@ class Law:
     rho: float = 0.0
     courses: tuple[Vector, ...] = ()
     straight: Vector | None = None
+    steps: tuple[float, ...] = ()
 
     @property
     def others(self) -> tuple[Law, ...]:
@@ -167,10 +169,11 @@ class Shape:
         return float(np.sqrt(np.mean(self.left**2)))
 
 
-def law_of(records: Sequence[Record], given: PI, every: int = 1) -> tuple[Law, float] | None:
+def law_of(records: Sequence[Record], given: PI, every: int = 1, steps: tuple[float, ...] = ()) -> tuple[Law, float] | None:
     """(the regression's data, root mean square that the log's rounding, or a course between its lines, makes of a replay [N m]).
 
-    given: its torque limit and gains. None where a signal or too much is missing.
+    given: its torque limit and gains. steps: that the velocities of each record are rounded to [rad/s], where every is 1, or
+    nothing. None where a signal or too much is missing.
     """
     share = max(LONGEST // len(records), 1)
     parts = [rec[:share] for rec in records]
@@ -183,8 +186,11 @@ def law_of(records: Sequence[Record], given: PI, every: int = 1) -> tuple[Law, f
     if every == 1:
         command, velocity = (np.concatenate([getattr(r, name) for r in parts]) for name in ("command", "velocity"))
         used = np.abs(torque) < POLICY.at_limit * limit
-        law = Law(command, velocity, torque, used, lengths, period)
-        floor = max(rounding_of(r, r.command, given, r.torque) for r in records if r.command is not None and r.torque is not None)
+        steps = steps or (0.0,) * len(records)
+        law = Law(command, velocity, torque, used, lengths, period, steps=steps)
+        logged = [(r, r.command, r.torque) for r in records]
+        rounded = zip(logged, steps, strict=True)
+        floor = max(rounding_of(r, c, given, u, q) for (r, c, u), q in rounded if c is not None and u is not None)
     else:
         cascade = Cascade(given, period)
         logs = [log_of(r, share, cascade, False) for r in records]

@@ -20,12 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.cascade import Cascade
-from gaident.control.filters import LowPass
 from gaident.control.pi import PI, RULES
 from gaident.data.record import Record
 from gaident.diagnosis.controller.form import (
     FEEDS,
-    FILTER_NAMES,
     FIRST_FEED,
     GAINS,
     KI,
@@ -34,6 +32,7 @@ from gaident.diagnosis.controller.form import (
     WEIGHTS,
     Candidate,
     Form,
+    named,
 )
 from gaident.diagnosis.controller.form_regression import (
     FILTER_SETS,
@@ -48,7 +47,7 @@ from gaident.diagnosis.controller.form_regression import (
     quiet_law,
     slope,
 )
-from gaident.diagnosis.controller.replay import tolerance_of
+from gaident.diagnosis.controller.replay import tolerance_of, velocity_steps
 from gaident.diagnosis.controller.replay_causes import white_noise
 from gaident.diagnosis.controller.slow_forms import limited, run_error, too_fast
 from gaident.diagnosis.library.settings import OF_SETTING
@@ -76,6 +75,7 @@ class Shown:
     before, rms of logged minus replayed torque, bare PI and this one [N m]
     starts      the highest integral before a record's begin [N m]; 0: none
     estimated   gains that were not given -> (value, standard deviation)
+    exact       the torques follow to the rounding, at every sample
     """
 
     controller: Cascade
@@ -86,6 +86,7 @@ class Shown:
     rms: float
     starts: float
     estimated: dict[str, tuple[float, float]]
+    exact: bool = False
 
 
 def form_shown(records: Sequence[Record], given: PI, unknown: tuple[str, ...] = (), every: int = 1) -> Shown | None:
@@ -93,14 +94,25 @@ def form_shown(records: Sequence[Record], given: PI, unknown: tuple[str, ...] = 
 
     unknown: gains of `given` that were not given but estimated. every: controller samples to a line of the log.
     """
-    regression = law_of(records, given, every)
-    if regression is None or given.loop != "sampled" or any(r.dt != records[0].dt for r in records):
+    if given.loop != "sampled" or any(r.dt != records[0].dt for r in records):
         return None
-    law, floor = regression
+    shown = []
+    for steps in velocity_steps(records) if every == 1 else ((),):
+        regression = law_of(records, given, every, steps)
+        found = None if regression is None else _form_of(records, given, unknown, *regression)
+        if found is not None and found.exact:
+            return found
+        shown.append(found)
+    # What leaves noise under the finest rounding may fit a coarser one, which is not white, with numbers that are not there.
+    return next((found for found in reversed(shown) if found is not None), None)
+
+
+def _form_of(records: Sequence[Record], given: PI, unknown: tuple[str, ...], law: Law, floor: float) -> Shown | None:
+    """The same for one assumption on the log's rounding."""
     candidates = _compared(law, given, floor, unknown)
     if not candidates:
         return None
-    if every > 1:
+    if law.every > 1:
         return _shown_slowly(records, law, given, candidates, floor)
     shown = _shown(records, law, given, candidates) if candidates[0].names else None
     return shown or _shown_quietly(records, law, given, floor, unknown)
@@ -121,9 +133,14 @@ def _compared(law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> li
     return sorted(candidates, key=lambda c: c.criterion)
 
 
-def _allowed(rec: Record, controller: PI) -> float:
-    assert rec.command is not None and rec.torque is not None
-    return tolerance_of(rec, rec.command, controller, rec.torque)
+def _allowed(records: Sequence[Record], law: Law, controller: PI) -> list[float]:
+    """By how much each logged torque may be off [N m]."""
+    logged = [(r, r.command, r.torque) for r in records]
+    return [
+        tolerance_of(r, c, controller, u, q)
+        for (r, c, u), q in zip(logged, law.steps, strict=True)
+        if c is not None and u is not None
+    ]
 
 
 def _forms(given: PI, unknown: tuple[str, ...]) -> Iterator[Form]:
@@ -184,23 +201,26 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
     numbers, filters, cov = _fitted(law, best, given)
     controller = _controller(best, numbers, filters, given, law.period)
     starts = numbers[FIRST_FEED + len(FEEDS) :]
-    off = []
-    for rec, start in zip(records, starts, strict=True):
+    off, exact = [], True
+    for rec, start, allowed in zip(records, starts, _allowed(records, law, controller.velocity), strict=True):
         assert rec.torque is not None
         left = rec.torque - made_by(rec.with_channels(torque=None), controller) - start
-        if float(np.abs(left).max()) > _allowed(rec, controller.velocity) and not white_noise(left, rec.torque):
-            return None
+        if float(np.abs(left).max()) > allowed:
+            exact = False
+            if not white_noise(left, rec.torque):
+                return None
         off.append(left)
     before = [r.torque - made_by(r.with_channels(torque=None), Cascade(given)) for r in records if r.torque is not None]
     return Shown(
         controller=controller,
-        numbers=_named(best, numbers, filters, cov, law.period),
+        numbers=named(best, numbers, filters, cov, law.period),
         gains=_gains(candidates),
         rivals=_rivals(candidates),
         before=_rms(before),
         rms=_rms(off),
         starts=float(np.abs(starts).max()),
         estimated=_estimated(best, numbers, cov),
+        exact=exact,
     )
 
 
@@ -238,9 +258,11 @@ def _shown_quietly(records: Sequence[Record], law: Law, given: PI, floor: float,
         numbers, filters, cov = _fitted(quiet, best, given)
         made = quiet.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
         left = quiet.logged - made
-        allowed = max(_allowed(r, given) for r in records)
-        if float(np.abs(left).max()) <= allowed or white_noise(left, quiet.logged):
-            return _with_limit(records, quiet, given, candidates, (numbers, filters, cov))
+        allowed = max(_allowed(records, law, given))
+        exact = float(np.abs(left).max()) <= allowed
+        if exact or white_noise(left, quiet.logged):
+            shown = _with_limit(records, quiet, given, candidates, (numbers, filters, cov))
+            return None if shown is None else replace(shown, exact=exact)
     return None
 
 
@@ -265,13 +287,13 @@ def _with_limit(
     size = float(np.std(np.concatenate([r.torque for r in records if r.torque is not None])))
     if not after < part * before or (law.every > 1 and after > POLICY.replay_noise * size):
         return None
-    named, gains = _named(best, numbers, filters, cov, law.period), _gains(candidates)
+    differs, gains = named(best, numbers, filters, cov, law.period), _gains(candidates)
     if at_limit.limit is not None:
-        named[OF_SETTING["torque_limit"]] = {"limit": (at_limit.limit, at_limit.std)}
+        differs[OF_SETTING["torque_limit"]] = {"limit": (at_limit.limit, at_limit.std)}
         gains[OF_SETTING["torque_limit"]] = at_limit.gain
     return Shown(
         controller=at_limit.controller,
-        numbers=named,
+        numbers=differs,
         gains=gains,
         rivals=_rivals(candidates),
         before=before,
@@ -365,36 +387,3 @@ def _controller(best: Candidate, numbers: Vector, filters: Vector, given: PI, pe
     )
     feeds = {name: float(numbers[FIRST_FEED + FEEDS.index(name)]) for name in best.form.feeds}
     return Cascade(pi, **feeds, **at_places(best.shape.places, filters, period))  # type: ignore[arg-type]
-
-
-def _named(
-    best: Candidate, numbers: Vector, filters: Vector, cov: Matrix, period: float
-) -> dict[str, dict[str, tuple[float, float]]]:
-    """Name -> parameter -> (value, deviation)."""
-    std = np.sqrt(np.maximum(np.diag(cov), 0.0))
-    kp, kp_b = float(numbers[KP_W]), float(numbers[KP_R])
-    named: dict[str, dict[str, tuple[float, float]]] = {name: {} for name in best.names}
-    if "other_gains" in named:
-        gains = {"kp": (kp, float(std[KP_W])), "ki": (float(numbers[KI]), float(std[KI]))}
-        named["other_gains"] = {name: gains[name] for name in best.form.free if name not in best.form.unknown}
-    if "command_weight" in named and kp > 0.0:
-        slope = np.array([-kp_b / kp**2, 1.0 / kp])
-        named["command_weight"] = {"weight": (kp_b / kp, float(np.sqrt(max(slope @ cov[:2, :2] @ slope, 0.0))))}
-    for name in best.form.feeds:
-        at = FIRST_FEED + FEEDS.index(name)
-        named[name] = {"inertia" if name == FEEDS[0] else "torque": (float(numbers[at]), float(std[at]))}
-    at = 0
-    for place, kind in best.shape.places:
-        into, known = named[FILTER_NAMES[place]], std[len(numbers) + at :]
-        if kind is LowPass:
-            into["time_constant"] = _of_logarithm(filters[at], known[0], period)
-        else:
-            into["frequency"] = _of_logarithm(filters[at], known[0], 1.0 / period)
-            into["numerator_damping"] = (float(filters[at + 1]), float(known[1]))
-            into["denominator_damping"] = _of_logarithm(filters[at + 2], known[2], 1.0)
-        at += 1 if kind is LowPass else 3
-    return named
-
-
-def _of_logarithm(logarithm: float, std: float, unit: float) -> tuple[float, float]:
-    return (value := float(np.exp(logarithm)) * unit), value * float(std)

@@ -6,6 +6,7 @@ logged torque does not follow from a bare PI, `replay_causes` looks for the simp
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,12 +17,12 @@ from gaident.axis import Text, say
 from gaident.control.controller import Controller, Gains
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
-from gaident.data.signals.lattice import lattice_step, rounding_step
+from gaident.data.signals.lattice import digits_step, lattice_step, rounding_step
 from gaident.diagnosis.controller.replay_causes import explain, rounded_command, white_noise
 from gaident.errors import RecordError
 from gaident.policy.table import POLICY
 
-__all__ = ["Replay", "replay", "rounding_of", "tolerance_of"]
+__all__ = ["Replay", "replay", "rounding_of", "tolerance_of", "velocity_steps"]
 
 Vector = NDArray[np.float64]
 
@@ -89,23 +90,27 @@ def _unchecked(torque: Vector, replayed: Vector | None, sentence: Text) -> Repla
 
 def _compared(rec: Record, command: Vector, controller: Controller, logged: Vector, replayed: Vector) -> Replay:
     resolution = lattice_step(logged)
-    tolerance = tolerance_of(rec, command, controller.gains, logged)
     off = (logged - replayed)[: len(rec) - controller.ahead(rec.dt)]
     pi = bare_pi(controller)
     rms, maximum = float(np.sqrt(np.mean(off**2))), float(np.abs(off).max())
     figures = (logged, replayed, rms, maximum, resolution)
     head = say("The logged {torque} follows from command and velocity through this controller")
-    if maximum <= tolerance:
-        known = say(" (its resolution is {:.2g} {N m})", resolution) if resolution > 0.0 else ""
-        return Replay(*figures, True, "", np.nan, None, say("{}, to {:.1g} {N m}{}.", head, maximum, known))
-    if pi is not None and rounded_command(off, command, rec.dt, pi):
-        text = say("{}, to {:.1g} {N m}, which is the rounding of the log.", head, maximum)
-        return Replay(*figures, True, "", np.nan, None, text)
-    if noise := white_noise(off, logged[: len(off)]):
-        measured = "{} up to white noise of {:.2g} {N m} rms: it is a measured {torque}, or a coarsely rounded one."
-        text = say(measured, head, noise)
-        return Replay(*figures, True, "", np.nan, None, text)
-    found = None if pi is None else explain(command, rec.velocity, rec.dt, pi, logged, tolerance)
+    found = None
+    for (step,) in velocity_steps([rec]):
+        tolerance = tolerance_of(rec, command, controller.gains, logged, step)
+        if maximum <= tolerance:
+            known = say(" (its resolution is {:.2g} {N m})", resolution) if resolution > 0.0 else ""
+            return Replay(*figures, True, "", np.nan, None, say("{}, to {:.1g} {N m}{}.", head, maximum, known))
+        if pi is not None and rounded_command(off, command, rec.dt, pi):
+            text = say("{}, to {:.1g} {N m}, which is the rounding of the log.", head, maximum)
+            return Replay(*figures, True, "", np.nan, None, text)
+        if noise := white_noise(off, logged[: len(off)]):
+            measured = "{} up to white noise of {:.2g} {N m} rms: it is a measured {torque}, or a coarsely rounded one."
+            text = say(measured, head, noise)
+            return Replay(*figures, True, "", np.nan, None, text)
+        found = None if pi is None else explain(command, rec.velocity, rec.dt, pi, logged, tolerance)
+        if found is not None:
+            break
     if found is not None and found.cause == "initial_integral":
         return Replay(*figures, True, found.cause, found.value, None, say("{}, {}", head, found.sentence))
     departs = int(np.argmax(np.abs(off) > tolerance))
@@ -130,38 +135,49 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
     return Replay(*figures, False, "", np.nan, departs, text)
 
 
-def tolerance_of(rec: Record, command: Vector, controller: Gains, logged: Vector) -> float:
+def velocity_steps(records: Sequence[Record]) -> tuple[tuple[float, ...], ...]:
+    """Steps [rad/s] that the velocities of each record may be rounded to by the log, one tuple an assumption, the finest first.
+
+    The digits of a text log are its rounding. A lattice beside them is the log's too (16 bits of a reference speed), or it is
+    the encoder's, and then the controller read the same numbers. A torque that follows to the digits shows which.
+    """
+    ranges = [POLICY.negligible * float(np.ptp(r.velocity)) for r in records]
+    fine, coarse = (
+        tuple(q if q < most else 0.0 for q, most in zip((step(r.velocity) for r in records), ranges, strict=True))
+        for step in (digits_step, rounding_step)
+    )
+    return (fine,) if fine == coarse else (fine, coarse)
+
+
+def tolerance_of(rec: Record, command: Vector, controller: Gains, logged: Vector, step: float) -> float:
     """Steps of the torque's rounding, and what rounded decimals of velocity and command do to P part and integral [N m].
 
-    A coarse lattice of the velocity is the encoder's, and the controller read the same numbers; a fine one is the text log's,
-    and then the command's decimals are no finer. Each of N velocities is rounded by itself, a command once for all the samples
-    that it is held; the integrator adds up what is off, evenly within +-q/2:
+    step: that the log rounds velocities to [rad/s]; it does not round a command more coarsely.
+    Each of N velocities is rounded by itself, a command once for all the samples that it is held; the integrator adds up what is
+    off, evenly within +-q/2:
 
         sum of the squares = ki^2 dt^2 (N q_w^2 + sum L_i^2 q_r^2)/12        L_i: samples for which a command is held
     """
     own = POLICY.replay_steps * rounding_step(logged) + ROUNDING * float(np.abs(logged).max())
-    at_once, drift = _of_signals(rec, command, controller)
+    at_once, drift = _of_signals(rec, command, controller, step)
     return own + at_once + DEVIATIONS * drift
 
 
-def _of_signals(rec: Record, command: Vector, controller: Gains) -> tuple[float, float]:
+def _of_signals(rec: Record, command: Vector, controller: Gains, q_w: float) -> tuple[float, float]:
     """What rounded decimals make of P part, at most, and integral, as deviation [N m]."""
-    q = rounding_step(rec.velocity)
-    q_w = q if q < POLICY.negligible * float(np.ptp(rec.velocity)) else 0.0
     q_r = min(q_w, rounding_step(command))
     held = np.diff(np.flatnonzero(np.concatenate([[True], np.diff(command) != 0.0, [True]])))
     drift = controller.ki * rec.dt * np.sqrt((len(rec) * q_w**2 + float(held @ held) * q_r**2) / 12.0)
     return controller.kp * (q_w + q_r), float(drift)
 
 
-def rounding_of(rec: Record, command: Vector, controller: PI, logged: Vector) -> float:
+def rounding_of(rec: Record, command: Vector, controller: PI, logged: Vector, step: float) -> float:
     """Root mean square of what rounding makes of a replay [N m]: a torque of d digits is off by its own last one."""
-    step = rounding_step(logged)
-    steps = np.full(len(logged), step)
-    if step > 0.0 and lattice_step(logged) == 0.0:
-        size = np.abs(logged)
+    size, own = np.abs(logged), rounding_step(logged)
+    steps = np.full(len(logged), own)
+    if own > 0.0 and lattice_step(logged) == 0.0:
         highest = np.floor(np.log10(size.max()))
         steps *= 10.0 ** (np.floor(np.log10(np.where(size > 0.0, size, size.max()))) - highest)
-    at_once, drift = _of_signals(rec, command, controller)
-    own = float(np.mean(steps**2)) / 12.0 + ROUNDING**2 * float(np.mean(logged**2))
-    return float(np.sqrt(own + at_once**2 / 12.0 + drift**2))
+    at_once, drift = _of_signals(rec, command, controller, step)
+    rounded = float(np.mean(steps**2)) / 12.0 + ROUNDING**2 * float(np.mean(logged**2))
+    return float(np.sqrt(rounded + at_once**2 / 12.0 + drift**2))
