@@ -44,7 +44,8 @@ from json_lines import read, work
 from rows.tables import MEASURED, merged, report, summary
 from rows.watch import Watch, neighbours, watched
 
-from gaident.policy.table import SHOWN_BY, Policy, Row, rows
+from gaident.policy.declared import SHOWN_BY
+from gaident.policy.table import Policy, Row, rows
 from gaident.policy.trial import decide_by
 
 WATCH = Watch()

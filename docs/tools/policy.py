@@ -10,7 +10,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from gaident.policy.table import CALIBRATED, EFFORT, SHOWN_BY, Row, rows
+from gaident.policy.declared import CALIBRATED, EFFORT, SHOWN_BY
+from gaident.policy.table import Row, rows
 
 DOCS = Path(__file__).resolve().parents[1]
 PAGE = DOCS / "theory" / "policy.md"

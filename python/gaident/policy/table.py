@@ -13,88 +13,36 @@ was found.
 
 from __future__ import annotations
 
-import json
 import math
-from dataclasses import dataclass, field, fields
-from pathlib import Path
-from typing import Any, NamedTuple
+from dataclasses import dataclass, fields
+from typing import NamedTuple
 
-__all__ = ["CALIBRATED", "EFFORT", "POLICY", "Policy", "Row", "rows"]
+from gaident.policy.declared import (
+    DRIVES,
+    FORMS,
+    GAIN,
+    LOOP,
+    NOISE,
+    REAL,
+    REGRESSION,
+    SHIFTED,
+    SHORT,
+    SLOWER,
+    SUCCESS,
+    WINDING,
+    calibrated,
+    cause,
+    check,
+    effort,
+    gain,
+    linear,
+    loop,
+    noise,
+    reading,
+    record,
+)
 
-CALIBRATED: dict[str, Any] = json.loads(Path(__file__).with_name("calibrated.json").read_text(encoding="utf-8"))
-"""What the blind bench wrote: its command, count of records, seed, level; by number the value and the largest one measured."""
-
-# The cases that show a row: what `python bench/policy.py ROW` runs (bench/rows/cases.py says which records each of them has).
-DRIVES = "drives"
-SHORT = "short"
-LOOP = "loop"
-SLOWER = "slower"
-SHIFTED = "shifted"
-REAL = "real"
-REGRESSION = "regression"
-SUCCESS = "success"
-WINDING = "winding"
-FORMS = "forms"
-LOGS = "logs"
-SHOWN_BY = (DRIVES, SHORT, LOOP, SLOWER, SHIFTED, REAL, REGRESSION, SUCCESS, WINDING, FORMS, LOGS)
-
-GAIN = "Is the gain enough?"
-NOISE = "Is this noise?"
-CAUSE = "Is a finding a cause?"
-SECOND = "Does a second method agree?"
-CONTROLLER = "Does the logged torque follow from the controller?"
-READING = "How is a log read?"
-RECORD = "What does a record show?"
-LINEAR = "Which linear model?"
-EFFORT = "Effort"
-
-
-def _row(group: str, value: float, unit: str, source: str, cases: str = "", command: str = "") -> Any:
-    told = {"group": group, "unit": unit, "source": source, "cases": cases, "command": command}
-    return field(default=value, metadata=told)
-
-
-def calibrated(group: str, name: str, unit: str, source: str) -> Any:
-    """A row with the value that the blind bench wrote."""
-    measured = CALIBRATED["numbers"][name]
-    source = f"{source}; extrapolated to `noise_level`, the largest of {measured['records']} records is {measured['largest']:.3g}"
-    return _row(group, measured["value"], unit, source, DRIVES, CALIBRATED["command"])
-
-
-def gain(value: float, unit: str, source: str, cases: str) -> Any:
-    return _row(GAIN, value, unit, source, cases)
-
-
-def noise(value: float, unit: str, source: str, cases: str) -> Any:
-    return _row(NOISE, value, unit, source, cases)
-
-
-def cause(value: float, unit: str, source: str, cases: str) -> Any:
-    return _row(CAUSE, value, unit, source, cases)
-
-
-def check(value: float, unit: str, source: str, cases: str) -> Any:
-    return _row(SECOND, value, unit, source, cases)
-
-
-def loop(value: float, unit: str, source: str, cases: str = LOOP) -> Any:
-    return _row(CONTROLLER, value, unit, source, cases)
-
-
-def reading(value: float, unit: str, source: str) -> Any:
-    return _row(READING, value, unit, source, LOGS)
-
-
-def record(value: float, unit: str, source: str, cases: str) -> Any:
-    return _row(RECORD, value, unit, source, cases)
-
-
-def linear(value: float, unit: str, source: str, cases: str) -> Any:
-    return _row(LINEAR, value, unit, source, cases)
-
-
-def effort(value: float, unit: str, source: str) -> Any:
-    return _row(EFFORT, value, unit, source)
+__all__ = ["POLICY", "Policy", "Row", "rows"]
 
 
 @dataclass(frozen=True)
@@ -297,6 +245,7 @@ class Policy:
     sensor_step: float = record(1e-4, "1", "of the velocity's range: a finer quantisation is that of a text log", DRIVES)
     on_lattice: float = record(0.1, "steps", "from the places of a lattice, within which all values lie on it", DRIVES)
     whole_lines: float = record(0.01, "1", "lines of a turn, within which an encoder's number of lines is whole", DRIVES)
+    binary_lines: float = record(1e-4, "1", "share of a power of two, within which an encoder's lines are that", DRIVES)
     folded_steep: float = record(0.15, "1", "of the 95 % quantile of slopes: a turning point with less is a rest", REAL)
     folded_smoother: float = record(
         0.8, "1", "of the curvature at a turning point: below, the signal is smoother with its sign turned there", REAL

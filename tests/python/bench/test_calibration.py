@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from drive_rig import skip_without_library
-from gaident.policy.table import CALIBRATED, POLICY, rows
+from gaident.policy.declared import CALIBRATED
+from gaident.policy.table import POLICY, rows
 from places import ROOT
 
 

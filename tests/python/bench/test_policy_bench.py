@@ -14,7 +14,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from gaident.policy.table import POLICY, SHOWN_BY, Policy, rows
+from gaident.policy.declared import SHOWN_BY
+from gaident.policy.table import POLICY, Policy, rows
 from places import ROOT
 
 BY_NAME = {r.name: r for r in rows()}

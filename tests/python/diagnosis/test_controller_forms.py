@@ -220,6 +220,7 @@ def test_a_controller_that_is_not_the_drives_is_a_rival_of_mechanics() -> None:
     assert alternatives_of("extra_resonance", [], [], False, None, True) == []
     assert "torque_filter" in alternatives_of("extra_resonance", [], [], False, None, False)
     assert alternatives_of("coulomb_friction", [], [], True, None, False) == []  # the records show its jump
+    assert not {"other_gains", "torque_filter"} & {*alternatives_of("load_torque", [], [], False, None, False)}
 
 
 def test_a_wrong_filter_that_was_given_is_not_taken_for_mechanics() -> None:

@@ -46,6 +46,8 @@ def test_lines_of_an_encoder_are_whole() -> None:
     assert encoder_lines(w, T, 2.0 * np.pi) == LINES
     assert encoder_lines(1.0003 * w, T, 2.0 * np.pi) == 0
     assert encoder_lines(angle, T, 2.0 * np.pi) == 0
+    for decimals, seen in ((4, LINES), (3, LINES), (1, 0)):  # of rpm: a line is not known from them, a power of two is
+        assert encoder_lines(np.round(w * 30.0 / np.pi, decimals) * np.pi / 30.0, T, 2.0 * np.pi) == seen
     rpm = np.pi / 30.0 * np.round(angle / angle.max() * 900.0)
     assert encoder_lines(rpm, 1e-3, 2.0 * np.pi) == 0  # not 60000 lines
 
@@ -67,6 +69,27 @@ def test_a_differenced_angle_in_a_log_of_few_decimals_is_no_finding() -> None:
     dia = ga.diagnose(rec.with_channels(velocity=rpm * np.pi / 30.0), DRIVE.controller)
     assert any("half a sample old" in note for note in dia.notes), dia.summary()
     assert dia.causes == (), dia.summary()
+
+
+@pytest.mark.parametrize("lines", [2**20, 1031703])
+def test_half_a_period_of_a_controller_faster_than_the_log_is_no_delay(lines: int) -> None:
+    """Four things differ from the given controller, so that the logged torque drives the model; it is straight between lines.
+
+    How many output errors are independent, the search with the age and the one without say differently: the scores of the two
+    are compared under the errors of one.
+    """
+    skip_without_library()
+    pi, dt, every = ga.PI(0.06, 3.0, command_weight=0.5), 1e-3, 4
+    filters = (ga.LowPass(0.5e-3), ga.Notch(150.0, 0.1, 0.7))
+    loop = ga.Cascade(pi, period=dt / every, torque_filters=filters, command_filters=(ga.LowPass(3e-3),))
+    drive = Plant(J=3e-4, D=1.5e-3, kp=0.06, ki=3.0, dt=dt, cascade=loop)
+    noise = Noise(white=0.0, encoder=2.0 * np.pi / lines, differenced=True)
+    rec = rig(drive, command(1), {"coulomb_friction": {"torque": 0.05}}, noise, 1)
+    rec = rec.with_channels(velocity=np.round(rec.velocity * 30.0 / np.pi, 3) * np.pi / 30.0)
+    given = ga.Cascade(ga.PI(0.06, 3.0), period=dt / every, torque_filters=(ga.LowPass(1e-3),))
+    dia = ga.diagnose(rec, given)
+    assert any("half a sample old (0.125 ms)" in note for note in dia.notes), dia.summary()
+    assert {f.effect: f.alternatives for f in dia.causes} == {"coulomb_friction": ()}, dia.summary()
 
 
 def test_the_mean_over_a_sample_is_exact_behind_a_current_loop() -> None:

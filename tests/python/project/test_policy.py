@@ -11,7 +11,8 @@ from dataclasses import FrozenInstanceError, fields
 
 import pytest
 
-from gaident.policy.table import EFFORT, POLICY, SHOWN_BY, Policy, rows
+from gaident.policy.declared import EFFORT, SHOWN_BY
+from gaident.policy.table import POLICY, Policy, rows
 from places import PACKAGE, ROOT
 
 # Every room is walked. A number that decides is a row of the policy; another says on its line (or on a line of its own above)

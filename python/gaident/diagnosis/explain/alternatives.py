@@ -16,6 +16,8 @@ __all__ = ["alternatives_of", "impossible_here"]
 
 OF_THE_CONTROLLER = (OTHER_GAINS, "torque_filter")
 """What a controller that is not the drive's may lack, in words of the findings."""
+ON_THE_SHAFT = "shaft"
+"""The place of effects that add a torque."""
 
 
 def alternatives_of(
@@ -31,14 +33,16 @@ def alternatives_of(
 
     here: what they cannot tell from it for lack of reversals or of sizes of steps. shown: whether the records show the torque's
     jump by themselves; then nothing without such a jump stands for it, nor does a controller. offset: what an effect is not the
-    same as. follows: whether the logged torque is what the controller makes, where the whole loop is simulated; what a wrong loop
-    leaves looks like mechanics. never: equivalents that cannot be in its place with the sizes that were found.
+    same as. follows: whether the logged torque is what the controller makes, where a log is slower than it. Where it is not, the
+    logged torque drives the model, and is not known between the lines: what that leaves looks like a delay, a filter or a
+    resonance. It does not look like a torque on the shaft that is there from line to line, such as a constant load.
+    never: equivalents that cannot be in its place with the sizes that were found.
     """
     names = [r.effect for r in rivals if not shown or LIBRARY[r.effect].levels]
     names += here
     if offset is None or effect != offset.effect:
         names += [name for name in equivalents(name_of(effect)) if name not in never]
-    if not follows and not shown:
+    if not follows and not shown and LIBRARY[effect].place != ON_THE_SHAFT:
         names += OF_THE_CONTROLLER
     return list(dict.fromkeys(names))
 

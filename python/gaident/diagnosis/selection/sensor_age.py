@@ -6,18 +6,19 @@ is the mean over that sample, to second order in T the velocity in its middle. T
 encoder has it. Left out, it is fitted as a delay or, beside a current loop, as a resonance.
 
 - Where the angle is logged and the velocity is its difference, nothing is left to ask.
-- The lattice of the velocities says how many lines the encoder had. Where they are a whole number, the velocity is taken for a
-  difference. Not every velocity on such a lattice is one: an observer or the drive's firmware may round to it. So both ages are
-  fitted, with the linear mechanism alone and with the lag of a current loop, and it is none where the age of 0 scores better
-  beyond the margin of two rivals.
+- The lattice of the velocities says how many lines the encoder had. Where they are a whole number, or a power of two as far as
+  the decimals of a log show, the velocity is taken for a difference. Not every velocity on such a lattice is one: an observer or
+  the drive's firmware may round to it. So both ages are fitted, with the linear mechanism alone and with the lag of a current
+  loop, and it is none where the age of 0 scores better beyond the margin of two rivals.
 - On another lattice (a gear, a scale, a unit between) the velocity may be a difference. Where the search finds something linear
   in series with the mechanism, a delay, a lag or a resonance, it is made again with the age of half a sample, which is no effect
-  and costs nothing; it is there where fewer effects score better with it.
+  and costs nothing; it is there where fewer effects score better with it, both under the errors of the first search.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -72,14 +73,25 @@ def searched(
     if not step > 0.0:
         return found, []
     again = search(older)
-    fewer = again.space.whitens == found.space.whitens and len(again.final.effects) < len(found.final.effects)
-    if not fewer or not again.space.score(again.final) < found.space.score(found.final):
+    fewer = len(again.final.effects) < len(found.final.effects)
+    if not fewer or not _score_beside(again, found) < found.space.score(found.final):
         return found, []
     text = (
         "The velocities lie on a lattice of {:.4g} {rad/s} and are half a sample old ({:.3g} ms), as those are that are the "
         "difference of an encoder's {angle} over one sample. The simulation has it; it is no finding."
     )
     return again, [say(text, step, age)]
+
+
+def _score_beside(again: Selection, found: Selection) -> float:
+    """Score of the model of one search under the errors of another one.
+
+    How many of the output errors are independent is of each search its own: two scores tell nothing of each other.
+    """
+    data = again.space.data
+    space = replace(found.space, objective=replace(found.space.objective, data=data), grown={})
+    final = again.final
+    return space.score(space.refitted(final.hypothesis.driven_by(replace(final.predictor, data=data)), final.x))  # type: ignore[type-var]
 
 
 def _score(objective: Objective, scales: Scales, model: Model) -> float:
