@@ -112,7 +112,7 @@ class DataSet:
 
     def older(self, loop: Controller | None) -> Controller | None:
         """A loop in which the velocity has its age: it is the difference of the angle over a sample of the controller."""
-        return loop if loop is None or not self.age else differencing(loop)
+        return loop if loop is None or not self.age > 0.0 else differencing(loop)
 
     def as_old(self, rec: Record) -> Record:
         """A record whose torque is as late as the velocity is old: a linear model that it drives gives the velocity that is seen.

@@ -156,7 +156,10 @@ def late(torque: Vector, delay: float, before: float) -> Vector:
     """The mean over each line of a torque (n,) that is held over each line and acts `delay` lines later; `before` the record.
 
     With delay = m + f, m whole: f u(n - m - 1) + (1 - f) u(n - m), exact in its mean and, for f = 0, everywhere.
+    A delay below 0, down to -1/2, is of a torque that the log has now and then: it is on its way to that of the next line.
     """
+    if delay < 0.0:
+        return np.append((1.0 + delay) * torque[:-1] - delay * torque[1:], torque[-1])
     m = int(delay)
     f = delay - m
     padded = np.concatenate([np.full(m + 1, before), torque])

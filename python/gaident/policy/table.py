@@ -190,6 +190,12 @@ class Policy:
         "of the rms: each number of a form leaves less in a slow log, whose errors are no noise, as a BIC would suppose",
         SLOWER,
     )
+    ahead_seen: float = loop(
+        0.125,
+        "lines",
+        "of a torque that drives a model ahead of its line, from which it is seen: half of what two samples make",
+        SLOWER,
+    )
     lag_said: float = loop(0.75, "samples", "from which a lag of an open loop's log is said; a sampled torque's is 0.5", SHIFTED)
     slope_reach: float = loop(
         0.3,
@@ -282,11 +288,8 @@ class Policy:
     lag_left: float = linear(
         0.05, "1", "most of the squared torque, or velocity, that the regression behind a lag leaves: more tells no lag", SHIFTED
     )
-    lag_curvature: float = linear(
-        1e-3,
-        "1",
-        "of the squared torque per squared sample, by which a wrong lag is worse: below, the motion shows no lag",
-        SHIFTED,
+    lag_std: float = linear(
+        0.2, "samples", "standard deviation of a lag that the motion shows, at most; above, it shows none", SHIFTED
     )
     winding_sure: float = linear(5.0, "1", "standard deviations from 0, from which a resistance or inductance is shown", WINDING)
     least_rows: int = linear(20, "1", "rows of a regression at least, half of them each way for dry friction", REGRESSION)

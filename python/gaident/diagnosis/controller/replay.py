@@ -97,8 +97,8 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
     head = say("The logged {torque} follows from command and velocity through this controller")
     found = None
     for (step,) in velocity_steps([rec]):
-        tolerance = tolerance_of(rec, command, controller.gains, logged, step)
-        if maximum <= tolerance:
+        allowed = Allowed.of(rec, command, controller.gains, logged, step)
+        if allowed(off, pi):
             known = say(" (its resolution is {:.2g} {N m})", resolution) if resolution > 0.0 else ""
             return Replay(*figures, True, "", np.nan, None, say("{}, to {:.1g} {N m}{}.", head, maximum, known))
         if pi is not None and rounded_command(off, command, rec.dt, pi):
@@ -108,12 +108,12 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
             measured = "{} up to white noise of {:.2g} {N m} rms: it is a measured {torque}, or a coarsely rounded one."
             text = say(measured, head, noise)
             return Replay(*figures, True, "", np.nan, None, text)
-        found = None if pi is None else explain(command, rec.velocity, rec.dt, pi, logged, tolerance)
+        found = None if pi is None else explain(command, rec.velocity, rec.dt, pi, logged, allowed)
         if found is not None:
             break
     if found is not None and found.cause == "initial_integral":
         return Replay(*figures, True, found.cause, found.value, None, say("{}, {}", head, found.sentence))
-    departs = int(np.argmax(np.abs(off) > tolerance))
+    departs = int(np.argmax(np.abs(off) > min(allowed.torque, maximum / 2)))  # no decision: half of the highest
     head = say(
         "The logged {torque} does not follow from command and velocity through this controller: it departs first at sample "
         "{} ({:.4g} s), by {:.2g} {N m} rms and {:.2g} {N m} at most",
@@ -150,22 +150,58 @@ def velocity_steps(records: Sequence[Record]) -> tuple[tuple[float, ...], ...]:
 
 
 def tolerance_of(rec: Record, command: Vector, controller: Gains, logged: Vector, step: float) -> float:
-    """Steps of the torque's rounding, and what rounded decimals of velocity and command do to P part and integral [N m].
+    """By how much a torque that follows may be off [N m]: see `Allowed`."""
+    return Allowed.of(rec, command, controller, logged, step).torque
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """What a log's rounding makes of a replay, at most.
 
     step: that the log rounds velocities to [rad/s]; it does not round a command more coarsely.
-    Each of N velocities is rounded by itself, a command once for all the samples that it is held; the integrator adds up what is
-    off, evenly within +-q/2:
+    torque: steps of the torque's rounding, and what rounded velocity and command do to P part and integral [N m]. Each of N
+    velocities is rounded by itself, a command once for all the samples that it is held; the integrator adds up what is off,
+    evenly within +-q/2:
 
         sum of the squares = ki^2 dt^2 (N q_w^2 + sum L_i^2 q_r^2)/12        L_i: samples for which a command is held
+
+    jump: by how much what is off may change from one sample to the next [N m], where no limit acts: P part and integral of one
+    sample, and the torque's own rounding twice. A drift is slow; what another controller makes is not.
     """
-    own = POLICY.replay_steps * rounding_step(logged) + ROUNDING * float(np.abs(logged).max())
-    at_once, drift = _of_signals(rec, command, controller, step)
-    return own + at_once + DEVIATIONS * drift
+
+    logged: Vector
+    at_once: Vector
+    torque: float
+    jump: float
+
+    @classmethod
+    def of(cls, rec: Record, command: Vector, controller: Gains, logged: Vector, step: float) -> Allowed:
+        own = POLICY.replay_steps * rounding_step(logged) + ROUNDING * float(np.abs(logged).max())
+        at_once, drift = _of_signals(rec, command, controller, step)
+        sample = controller.ki * rec.dt * (step + _of_command(command, step))
+        error = controller.kp * (command - rec.velocity)
+        return cls(logged, error, own + at_once + DEVIATIONS * drift, 2.0 * own + at_once + sample)
+
+    def __call__(self, off: Vector, controller: PI | None, edge: int = 0) -> bool:
+        """Whether a replay that is off by so much [N m] (n,), from sample `edge` on, is the logged torque, rounded."""
+        if not float(np.abs(off).max()) <= self.torque:
+            return False
+        torque, integral = (np.inf, np.inf) if controller is None else controller.limits
+        here = slice(edge, edge + len(off))
+        logged, stored = self.logged[here], self.logged[here] - self.at_once[here]
+        limited = (np.abs(logged) >= POLICY.at_limit * torque) | (np.abs(stored) >= POLICY.at_limit * integral)
+        free = ~(limited[1:] | limited[:-1])
+        return float(np.abs(np.diff(off))[free].max(initial=0.0)) <= self.jump
+
+
+def _of_command(command: Vector, step: float) -> float:
+    """Step of the command's rounding [rad/s], where velocities are rounded to `step`."""
+    return min(step, rounding_step(command))
 
 
 def _of_signals(rec: Record, command: Vector, controller: Gains, q_w: float) -> tuple[float, float]:
     """What rounded decimals make of P part, at most, and integral, as deviation [N m]."""
-    q_r = min(q_w, rounding_step(command))
+    q_r = _of_command(command, q_w)
     held = np.diff(np.flatnonzero(np.concatenate([[True], np.diff(command) != 0.0, [True]])))
     drift = controller.ki * rec.dt * np.sqrt((len(rec) * q_w**2 + float(held @ held) * q_r**2) / 12.0)
     return controller.kp * (q_w + q_r), float(drift)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,11 @@ from gaident.identification.adequacy import white_lags
 from gaident.identification.noise import chi2_tail, ljung_box
 from gaident.policy.table import POLICY
 
-__all__ = ["Explanation", "explain", "rounded_command", "white_noise"]
+__all__ = ["Explanation", "control_error", "explain", "rounded_command", "white_noise"]
 
 Vector = NDArray[np.float64]
+Allows: TypeAlias = Callable[[Vector, PI, int], bool]
+"""Whether what is off [N m] of a controller, from a sample on, is no more than rounding."""
 
 SHIFTS = (0, 1, -1, 2, -2)  # no decision: samples by which what the controller saw may be older (+) than the log's
 # By how much of ki dt the newest error counts more than half, and the one before less: the rule of integration in words.
@@ -68,14 +70,15 @@ class _Case(NamedTuple):
         return pi_torque(self.command, self.velocity, self.dt, controller, start)
 
 
-def explain(command: Vector, velocity: Vector, dt: float, controller: PI, logged: Vector, tolerance: float) -> Explanation | None:
-    """The first reason that leaves at most `tolerance` [N m] at every sample; else the best, if it leaves white noise."""
+def explain(command: Vector, velocity: Vector, dt: float, controller: PI, logged: Vector, allowed: Allows) -> Explanation | None:
+    """The first reason that leaves what `allowed` takes for rounding; else the best, if it leaves white noise."""
     case = _Case(command, velocity, dt, controller, logged)
     best, least = None, np.inf
     for reason in (_start, _limits, _held, _rate, _linear):
         for found in reason(case):
             off = found.off(logged)
-            if float(np.abs(off).max()) <= tolerance or rounded_command(off, command, dt, found.controller or controller):
+            used = found.controller or controller
+            if allowed(off, used, found.edge) or rounded_command(off, command, dt, used):
                 return found
             rms = float(np.sqrt(np.mean(off**2)))
             if rms < POLICY.better_reason * least:  # a later, more complicated reason must be better
@@ -91,21 +94,20 @@ def rounded_command(off: Vector, command: Vector, dt: float, controller: PI) -> 
 
         off(n) - off(n-1) = (kp + h) d(n) - (kp - h) d(n-1)
     """
-    h = 0.5 * controller.ki * dt  # no decision: the trapezoidal rule
-    if controller.kp <= h or controller.limited:
-        return False
-    d = _error_of(off, controller, dt)
-    return float(np.abs(d).max()) <= POLICY.rounded_command * float(np.abs(command).max())
+    d = control_error(off, controller, dt)
+    return d is not None and float(np.abs(d).max()) <= POLICY.rounded_command * float(np.abs(command).max())
 
 
-def _error_of(torque: Vector, controller: PI, dt: float) -> Vector:
+def control_error(torque: Vector, controller: PI, dt: float) -> Vector | None:
     """The control error e [rad/s] that makes this torque u [N m], h = ki dt/2:
 
         (kp + h) e(n) = (kp - h) e(n-1) + u(n) - u(n-1)
 
-    Both are 0 before the record.
+    Both are 0 before the record. None where a limit hides it, or where it would grow without end.
     """
-    kp, h = controller.kp, 0.5 * controller.ki * dt
+    kp, h = controller.kp, 0.5 * controller.ki * dt  # no decision: the trapezoidal rule
+    if kp <= h or controller.limited:
+        return None
     rise = np.array([1.0, -1.0]) / (kp + h)
     decay = np.array([1.0, (h - kp) / (kp + h)])
     error: Vector = filtered(rise, decay, torque[None, :], [len(torque)])[0]
@@ -153,6 +155,8 @@ def _limits(case: _Case) -> Iterator[Explanation]:
         torque = case.torque(limited)
         more = "" if torque_limit == controller.torque_limit else say(" and a {torque} limit of {:.4g} {N m}", torque_limit)
         acting = int(np.sum(np.abs(torque - proportional) >= POLICY.at_limit * clamp))
+        if not acting:
+            continue
         sentence = say("It does with the integral clamped to {:.4g} {N m}{}; the clamp acts at {} samples.", clamp, more, acting)
         yield Explanation(torque, OF_SETTING["integrator_limit"], clamp, sentence, controller=limited)
 
@@ -208,10 +212,10 @@ def _rate(case: _Case) -> Iterator[Explanation]:
 
     moves with the slope of the limit where it is not the logged one.
     """
-    h = 0.5 * case.controller.ki * case.dt  # no decision: the trapezoidal rule
-    if case.controller.kp <= h or case.controller.limited:
+    error = control_error(case.logged, case.controller, case.dt)
+    if error is None:
         return
-    seen = _error_of(case.logged, case.controller, case.dt) + case.velocity
+    seen = error + case.velocity
     behind = np.abs(seen - case.command)[1:] > POLICY.negligible * float(np.abs(case.command).max())
     slopes = np.abs(np.diff(seen))[behind] / case.dt
     if len(slopes) == 0:

@@ -1,4 +1,4 @@
-"""How old the measured velocity is: half a sample where it is the difference of an encoder's angle.
+"""How old the measured velocity is against the torque: half a sample where it is the difference of an encoder's angle.
 
     w_m(n) = (theta(n) - theta(n-1))/T = 1/T int w dt over the last sample of the controller
 
@@ -13,6 +13,11 @@ encoder has it. Left out, it is fitted as a delay or, beside a current loop, as 
 - On another lattice (a gear, a scale, a unit between) the velocity may be a difference. Where the search finds something linear
   in series with the mechanism, a delay, a lag or a resonance, it is made again with the age of half a sample, which is no effect
   and costs nothing; it is there where fewer effects score better with it, both under the errors of the first search.
+
+A torque that drives the model is held over each line of the log. That of a controller which is faster than the log goes on
+between the lines: its mean over a line of r samples is (r - 1)/(2r) lines ahead, less the age of the velocity. A motion before
+its torque is nothing that an axis can do, so where the inverse-dynamics regression shows one, it is this, and the age is below 0
+(estimation/regression/torque_lag.py). What is late by less than half a line is not seen in such a log.
 """
 
 from __future__ import annotations
@@ -30,9 +35,12 @@ from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.mechanisms import is_mechanism, on_a_shaft, one_mass, reduced, resonance, swings
 from gaident.diagnosis.selection.select import Selection
 from gaident.estimation import least_squares as ls
+from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Innovations, Objective
+from gaident.estimation.regression.torque_lag import torque_lag
 from gaident.estimation.term import Scales, Term
+from gaident.models.held_torque import sampled_between
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
@@ -50,6 +58,15 @@ def searched(
     if controller is not None and (controller.loop == "continuous" or (data.loop is not None and any(data.moving))):
         return search(objective), []
     every = 1 if controller is None else controller.log_every(data.dt)
+    if every == 1 and (ahead := _ahead(data)) is not None:
+        text = (
+            "The motion comes {:.2g} ms before a {torque} that is held over each line of the log, which no axis does: between "
+            "the lines the {torque} goes on, as that of a controller does that is faster than the log. The simulation has it; "
+            "what is late by less than half a line ({:.2g} ms) is not seen in this log. Give the controller's period, or log "
+            "every sample."
+        )
+        earlier = Objective(data.aged(-ahead), objective.weight, counter=objective.counter)
+        return search(earlier), [say(text, 1e3 * ahead * data.dt, 1e3 * HALF * data.dt)]
     if every == 1 and all(is_backward_difference(r.velocity, r.position, data.dt) for r in data.records):
         text = (
             "The velocity is the difference of the last two {angles}: half a sample old ({:.3g} ms). The simulation has it; "
@@ -81,6 +98,23 @@ def searched(
         "difference of an encoder's {angle} over one sample. The simulation has it; it is no finding."
     )
     return again, [say(text, step, age)]
+
+
+def _ahead(data: DataSet) -> float | None:
+    """By how many lines the mean of the torque over a line is ahead of it; None where it is not, or no held torque drives."""
+    drives = data.torque_logged and (data.open_runs or not data.loop_follows)
+    if not drives or any(sampled_between(r) for r in data.driven):
+        return None
+    # Seen from the velocity that is fitted, not from the position, which may be younger.
+    lags = [torque_lag(r.with_channels(position=None)) for r in data.driven]
+    shown = [lag for lag in lags if lag is not None]
+    if not shown:
+        return None
+    weights = np.array([lag.std**-2 for lag in shown])
+    ahead = float(weights @ np.array([lag.lag for lag in shown]) / weights.sum())
+    std = float(weights.sum() ** -0.5)
+    seen = ahead > max(POLICY.ahead_seen, POLICY.contradiction * std)
+    return min(ahead, HALF) if seen and ahead < HALF + POLICY.contradiction * std else None
 
 
 def _score_beside(again: Selection, found: Selection) -> float:

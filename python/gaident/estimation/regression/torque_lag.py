@@ -72,7 +72,7 @@ def torque_lag(rec: Record) -> TorqueLag | None:
     residuals: list[Vector] = []
     for k in steps:
         moved = np.concatenate([torque[k:], np.full(k, torque[-1])] if k >= 0 else [np.full(-k, torque[0]), torque[:k]])[kept]
-        power = float(moved @ moved)
+        power = float(np.sum((moved - np.mean(moved)) ** 2))
         if not power > 0.0:
             return None
         theta, rank = solve(columns, moved)
@@ -85,9 +85,9 @@ def torque_lag(rec: Record) -> TorqueLag | None:
         return None
     before, least, after = left[best - 1 : best + 2]
     curvature = 0.5 * (before + after) - least  # no decision: a parabola through three values
-    if not curvature > POLICY.lag_curvature:
+    if not curvature > 0.0:
         return None
     within = 0.25 * (before - after) / curvature  # no decision: a parabola through three values
     lowest = max(least - curvature * within**2, 0.0)
     std = float(np.sqrt(lowest / (effective_samples(residuals[best][::factor]) * curvature)))
-    return TorqueLag(steps[best] + within, std, lowest)
+    return TorqueLag(steps[best] + within, std, lowest) if std < POLICY.lag_std else None
