@@ -16,7 +16,7 @@ from gaident.models.model import Model
 from gaident.providers import provided
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
-from gaident.results.finding import Finding, finding_of
+from gaident.results.finding import Finding, finding_of, where
 from gaident.results.fitness import Comparison, Fitness
 from gaident.results.identification import Identification
 from gaident.results.inverse_dynamics import InverseDynamics
@@ -163,7 +163,7 @@ class Diagnosis(SavedResult):
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
     def __repr__(self) -> str:
-        named = ", ".join(f.effect + ("" if f.named else "?") for f in self.findings if not f.is_noise)
+        named = ", ".join(f"{f.effect}{'' if f.named else '?'} {where(f, self.model)}".rstrip() for f in self.causes)
         return f"<Diagnosis {self.verdict}{': ' + named if named else ''}; see summary()>"
 
     @property

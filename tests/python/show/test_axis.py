@@ -182,7 +182,7 @@ def sentences() -> list[Text]:
     limits = ga.Limits(50.0, 1.0, np.inf, 2.0)
     evidence = [evidence_of(row.name, 23.0, ()) for row in ga.effects.table()]
     evidence += [
-        evidence_of(TWO_LEVELS.whole, 23.0, (), Offset(TWO_LEVELS, 0.5, 31.0, 0.04)),
+        evidence_of(TWO_LEVELS.whole, 23.0, (), Offset(TWO_LEVELS, TWO_LEVELS.whole, 0.5, 31.0, 0.04)),
         evidence_of("backlash", 412.0, ("cogging",)),
     ]
     asked = [first_experiment(DT, limits, inertia, kp).reason for inertia in (None, 1e-4) for kp in (None, 0.02)]
