@@ -136,10 +136,14 @@ def or_other_gains(effect: str) -> Text:
     return say(text, called_of(effect))
 
 
-def or_other_form(form: str) -> Text:
-    """What is said where another form of controller comes closer, but does not explain the records either."""
+def or_other_form(words: Text) -> Text:
+    """What is said where another form of controller comes closer, but does not explain the records either.
+
+    words: what that controller has.
+    """
     text = (
-        "No {torque} is logged; a controller with another {} than the given one would come closer to these records, but does not "
-        "explain them by itself: {inertia} and causes are not to be trusted. Log the {torque}, it shows what the controller does."
+        "No {torque} is logged; a controller with {}, which the given one has not, would come closer to these records, but does "
+        "not explain them by itself: {inertia} and causes are not to be trusted. Log the {torque}, it shows what the controller "
+        "does."
     )
-    return say(text, called(form))
+    return say(text, words)
