@@ -12,9 +12,12 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["provide", "provided"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["picture", "provide", "provided"]
 
 _PLACES: dict[str, str] = {}
 
@@ -31,3 +34,9 @@ def provided(name: str) -> Callable[..., Any]:
     module, function = _PLACES[name].split(":")
     found: Callable[..., Any] = getattr(importlib.import_module(module), function)
     return found
+
+
+def picture(name: str, *values: object, **named: object) -> Figure:
+    """What a function that draws makes of these values."""
+    figure: Figure = provided(name)(*values, **named)
+    return figure

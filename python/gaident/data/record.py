@@ -29,7 +29,7 @@ from gaident.data.signals.decimation import decimated, factor_of
 from gaident.data.torque_kind import COMMANDED, MEASURED
 from gaident.errors import RecordError, check_schema
 from gaident.files import write_whole
-from gaident.providers import provided
+from gaident.providers import picture, provided
 from gaident.version import version
 
 if TYPE_CHECKING:
@@ -320,7 +320,7 @@ class Record:
         SettingsError, ReadError
             For another axis, or a unit that it does not have.
         """
-        return provided("plot_record")(self, axis, units)  # type: ignore[no-any-return]
+        return picture("plot_record", self, axis, units)
 
     def _sample_at(self, time: float) -> int:
         """First sample not before `time` [s], within 0..n."""

@@ -153,7 +153,7 @@ class Work:
     def refused(self, form: UnloggedForm) -> None:
         """Another form comes closer, but a search under it does not end in noise: what is known is said."""
         self.form, self.form_refused = None, True
-        self.notes.append(or_other_form(form.finding.effect))
+        self.notes.append(or_other_form(form.words))
 
     def other_gains(self, first: Work | None = None) -> OtherGains | None:
         """Gains with which these records are explained better, where no torque shows which they are.

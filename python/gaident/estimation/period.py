@@ -35,9 +35,7 @@ Matrix = NDArray[np.float64]
 TERMS = ("inertia", "viscous_by_direction", "coulomb_by_direction")
 ORDER = 4  # no decision: of the filter
 FINER = 4.0  # no decision: lengths that are tried for each that the travel tells apart
-MULTIPLES = 6  # no decision: work; parts of a pitch that the strongest wave may be
 AT_ONCE = 1 << 21  # no decision: work; numbers of a block of waves
-MOST = 1 << 14  # no decision: work; lengths that are tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,10 +89,11 @@ def period_of_place(records: Sequence[Record]) -> float | None:
     travel = max(float(np.ptp(x)) for x in places)
     speed = float(np.median(np.abs(np.concatenate([r.of(("viscous_by_direction",)).sum(axis=1) for r in rows]))))
     band = 0.5 * POLICY.seen_band / (factor * dt)  # no decision: half the sampling frequency
-    waves = np.linspace(POLICY.seen_path / travel, band / speed, MOST)
-    waves = waves[:: max(int(MOST / (FINER * travel * (waves[-1] - waves[0]))), 1)] if waves[-1] > waves[0] else waves[:0]
-    if len(waves) == 0 or not left.power > 0.0:
+    low, high = POLICY.seen_path / travel, band / speed
+    if not low < high or not left.power > 0.0:
         return None
+    waves = np.linspace(low, high, POLICY.lengths)
+    waves = waves[:: max(int(POLICY.lengths / (FINER * travel * (high - low))), 1)]
     at = float(waves[int(np.argmax(left.worth(places, waves)))])
     beside = left.beside(places, at)
     if not _counts(left, beside, len(waves)):
@@ -102,8 +101,8 @@ def period_of_place(records: Sequence[Record]) -> float | None:
     samples = effective_samples(*beside.errors)
     times = [r.time for r in rows]
     longest = max(float(np.ptp(t)) for t in times)
-    pitches = np.arange(1.0, FINER * band * longest) / (FINER * longest)  # Hz
-    hum = left.power - float(left.worth(times, pitches).max(initial=0.0))
+    frequencies = np.arange(1.0, FINER * band * longest) / (FINER * longest)  # Hz
+    hum = left.power - float(left.worth(times, frequencies).max(initial=0.0))
     if gained(hum, beside.power, samples) < POLICY.rival_margin:
         return None
     wave, std = _refined(left, places, at, 1.0 / (FINER * travel), samples)
@@ -134,13 +133,13 @@ def _refined(left: _Left, places: Sequence[Vector], wave: float, reach: float, s
 
 def _whole(left: _Left, places: Sequence[Vector], wave: float, travel: float) -> int:
     """How many of the waves that were found make a pitch: other parts of it stand beside them. left: beside the wave."""
-    for parts in range(MULTIPLES, 1, -1):
+    for parts in range(POLICY.pitch_parts, 1, -1):
         others = [j for j in range(1, 2 * parts) if j % parts and math.gcd(j, parts) == 1]
         if wave * travel < POLICY.seen_path * parts:
             continue
         worth = left.worth(places, wave * np.array(others) / parts)
         best = wave * others[int(np.argmax(worth))] / parts
-        if _counts(left, left.beside(places, best), MULTIPLES**2):
+        if _counts(left, left.beside(places, best), POLICY.pitch_parts**2):
             return parts
     return 1
 

@@ -55,9 +55,10 @@ def diagnosis_table(dia: Any) -> Any:
                     "p_value": finding.p_value,
                     "is_noise": finding.is_noise,
                     "place": finding.place,
+                    "sides": ", ".join(finding.sides),
                     "evidence": finding.evidence,
                 }
             )
     columns = [*("order", "effect", "parameter", "value", "std", "unit", "at_bound", "identifiable", "named", "alternatives"),
-               *("gain", "delta_bic", "p_value", "is_noise", "place", "evidence")]  # fmt: skip
+               *("gain", "delta_bic", "p_value", "is_noise", "place", "sides", "evidence")]  # fmt: skip
     return _pandas().DataFrame(rows, columns=columns).set_index(["effect", "parameter"])

@@ -7,13 +7,14 @@ tell effects apart by.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 from typing import Any, NamedTuple
 
 from gaident.axis import Text
 from gaident.models.own_effects import Parameter
 
-__all__ = ["AT_LOAD", "SIDES", "Row", "Table", "effect_and_side"]
+__all__ = ["AT_LOAD", "SIDES", "Row", "Table", "effect_and_side", "end_words", "key_of"]
 
 SHAFT = "shaft"
 SIDES = ("motor", "load")
@@ -24,6 +25,18 @@ def effect_and_side(key: str) -> tuple[str, str]:
     """(name, side) of a key; the side is "motor" for effects that have none, too."""
     name, at, _ = key.partition(AT_LOAD)
     return name, SIDES[1] if at else SIDES[0]
+
+
+def key_of(name: str, side: str) -> str:
+    """The key of an effect at a side."""
+    return f"{name}{AT_LOAD}" if side == SIDES[1] else name
+
+
+def end_words(sides: Sequence[str]) -> str:
+    """Where on an elastic shaft an effect acts, for behind its name: at the load; "" where it has no side."""
+    if len(sides) > 1:
+        return f"at the {' or at the '.join(sides)} (these data do not say which)"
+    return f"at the {sides[0]}" if sides else ""
 
 
 class Row(NamedTuple):
@@ -81,7 +94,7 @@ class Row(NamedTuple):
     @property
     def key(self) -> str:
         """What tells it from all others: its name, at the load with that behind it."""
-        return f"{self.name}{AT_LOAD}" if self.at_load else self.name
+        return key_of(self.name, SIDES[self.at_load])
 
     def there(self) -> Row:
         """The row of the same effect at the load."""

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Any
 
 from gaident import _core
-from gaident.axis import Text, say
+from gaident.axis import TURN, Text, say, unit
 from gaident.checks import known_keys, one_of, real_number
 from gaident.errors import ModelError
 from gaident.models.effect_rows import SIDES, Row, Table
@@ -296,14 +296,19 @@ class Effect:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Effect:
-        """Return the effect of what `to_dict` gave; raise ModelError for a user-defined effect that is not registered."""
+        """Return the effect of what `to_dict` gave; raise ModelError for a user-defined effect that is not registered.
+
+        "units", which results of a linear axis have beside: an order in 1/m is one of periods to a metre.
+        """
         keys = ("name", "parameters")
-        values: dict[str, Any] = known_keys(data, "an effect", (*keys, "own", "side"), keys, ModelError)
+        values: dict[str, Any] = known_keys(data, "an effect", (*keys, "own", "side", "units"), keys, ModelError)
         if values.get("own") and values["name"] not in OWN:
             raise ModelError(_unknown(values["name"]))
         if not isinstance(values["parameters"], Mapping):
             raise ModelError(f"the parameters of an effect are {values['parameters']!r}: give a dictionary, name -> value")
         parameters = {k: math.inf if v is None else v for k, v in values["parameters"].items()}
+        per_metre = [k for k, u in values.get("units", {}).items() if u == unit("1/turn", "linear")]
+        parameters |= {k: TURN * parameters[k] for k in per_metre if k in parameters}
         return cls(values["name"], parameters, values.get("side", SIDES[0]))
 
     def __eq__(self, other: object) -> bool:

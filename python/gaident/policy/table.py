@@ -322,6 +322,8 @@ class Policy:
     proposed_samples: int = effort(4000, "samples", "of a proposed record at least, where the diagnosed one is shorter")
     commands: int = effort(4, "1", "of the menu of experiments, on which rivals are fitted, not only linearised")
     head: int = effort(200, "samples", "from whose velocity the start of a model in motion is fitted")
+    lengths: int = effort(1 << 14, "1", "tried, with which a force of a linear axis may return, where no pitch is given")
+    pitch_parts: int = effort(6, "1", "of a pitch at most, of which the strongest wave of a force may be one")
     draws: int = effort(200, "1", "of the bootstrap of an interval")
 
 

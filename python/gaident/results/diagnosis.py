@@ -13,10 +13,10 @@ from gaident.data.record import Record
 from gaident.errors import check_schema
 from gaident.models.drive_torque import driven_by
 from gaident.models.model import Model
-from gaident.providers import provided
+from gaident.providers import picture, provided
 from gaident.results.estimate import Estimate
 from gaident.results.experiment import Proposal
-from gaident.results.finding import Finding, finding_of
+from gaident.results.finding import Finding, finding_of, where
 from gaident.results.fitness import Comparison, Fitness
 from gaident.results.identification import Identification
 from gaident.results.inverse_dynamics import InverseDynamics
@@ -163,7 +163,7 @@ class Diagnosis(SavedResult):
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
     def __repr__(self) -> str:
-        named = ", ".join(f.effect + ("" if f.named else "?") for f in self.findings if not f.is_noise)
+        named = ", ".join(f"{f.effect}{'' if f.named else '?'} {where(f, self.model)}".rstrip() for f in self.causes)
         return f"<Diagnosis {self.verdict}{': ' + named if named else ''}; see summary()>"
 
     @property
@@ -237,8 +237,7 @@ class Diagnosis(SavedResult):
             For another axis.
         """
         given = self._drawn(records, "plot")
-        figure: Figure = provided("plot_diagnosis")(self, given, axis or self.axis)
-        return figure
+        return picture("plot_diagnosis", self, given, axis or self.axis)
 
     def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str | None = None) -> Figure:
         """Draw the extended model against the frequency response of the longest record, with coherence.
@@ -267,10 +266,7 @@ class Diagnosis(SavedResult):
             Where they show no frequency response.
         """
         given = self._drawn(records, "plot_bode")
-        figure: Figure = provided("plot_bode")(
-            self.model, self.controller, tuple(map(self.as_used, given)), hz, axis or self.axis
-        )
-        return figure
+        return picture("plot_bode", self.model, self.controller, tuple(map(self.as_used, given)), hz, axis or self.axis)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""

@@ -7,10 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gaident.axis import restored
+from gaident.models.effect_rows import end_words
 from gaident.models.effects import table
+from gaident.models.model import Model
 from gaident.results.estimate import Estimate
 
-__all__ = ["Finding", "finding_of"]
+__all__ = ["Finding", "finding_of", "where"]
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Finding:
         It is "controller" for all that the logged torque shows to differ from the given controller.
     sides : tuple of {"motor", "load"}
         Where on the shaft the data allow it, one or both; () where an effect has no side.
-        In a model of one mass both ends are the same place.
+        In a model of one mass both ends are the same place, and no output says either.
 
     Examples
     --------
@@ -66,6 +68,11 @@ class Finding:
     def named(self) -> bool:
         """Whether the cause is named, without an alternative."""
         return not self.alternatives
+
+
+def where(finding: Finding, model: Model) -> str:
+    """At which end of the shaft of the model a finding is, for behind its name; "" without a side, and in a model of one mass."""
+    return end_words(finding.sides) if (model.p, model.q) == (1, 2) else ""
 
 
 def finding_of(data: Mapping[str, Any], linear: Mapping[str, str]) -> Finding:

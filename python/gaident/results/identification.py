@@ -19,7 +19,7 @@ from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
 from gaident.models.simulate import initial_state, simulate
 from gaident.models.starts import starts_moving
-from gaident.providers import provided
+from gaident.providers import picture, provided
 from gaident.results.adequacy import Adequacy
 from gaident.results.estimate import Estimate
 from gaident.results.saved import SavedResult, undamaged
@@ -206,8 +206,7 @@ class Identification(SavedResult):
         GaidentError
             Where a loaded identification is given no records, or `records` holds something else.
         """
-        figure: Figure = provided("plot_identification")(self, self._drawn(records, "plot"), axis=axis)
-        return figure
+        return picture("plot_identification", self, self._drawn(records, "plot"), axis=axis)
 
     def plot_bode(self, records: Record | Sequence[Record] | None = None, hz: bool = False, axis: str = "rotary") -> Figure:
         """Draw the model against the frequency response of the longest record, with coherence.
@@ -236,23 +235,19 @@ class Identification(SavedResult):
         RecordError
             Where the record shows no frequency response.
         """
-        figure: Figure = provided("plot_bode")(self.model, self.controller, self._chosen(records), hz, axis)
-        return figure
+        return picture("plot_bode", self.model, self.controller, self._chosen(records), hz, axis)
 
     def plot_poles(self, hz: bool = False) -> Figure:
         """Draw poles and zeros in the s-plane with bars of 2 standard deviations [rad/s]; hz: divided by 2 pi [Hz]."""
-        figure: Figure = provided("plot_poles_zeros")(self, hz)
-        return figure
+        return picture("plot_poles_zeros", self, hz)
 
     def plot_convergence(self) -> Figure:
         """Draw the best fitness per generation of every trial, equation (6)."""
-        figure: Figure = provided("plot_convergence")(self)
-        return figure
+        return picture("plot_convergence", self)
 
     def plot_structures(self) -> Figure:
         """Draw the BIC of every structure (p, q) above the lowest."""
-        figure: Figure = provided("plot_structures")(self)
-        return figure
+        return picture("plot_structures", self)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""

@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from gaident.models.effects import row_of
 from gaident.results.estimate import Estimate, of_axis
 
 __all__ = ["decoded", "json_text", "on_axis"]
@@ -64,5 +65,15 @@ def _on_linear(x: Any, sentences: Mapping[str, str], name: str, of_model: bool) 
         e = of_axis(name, Estimate(x["value"], x["std"], x["unit"]), "linear")
         return {**x, "value": e.value, "std": e.std, "unit": e.unit}
     known = {**sentences, **x.get("linear_axis", {})}
+    if name == "effects" and {"name", "parameters"} <= x.keys():
+        return {**x, **_effect_on_linear(x["name"], x["parameters"])}
     numbers = "fitness" in x and "model" in x  # of an identification
     return {k: _on_linear(v, known, k, of_model or (numbers and k == "parameters")) for k, v in x.items() if k != "linear_axis"}
+
+
+def _effect_on_linear(name: str, parameters: Mapping[str, float | None]) -> dict[str, Any]:
+    """The parameters of an effect of a model, each with its unit, which `Effect.from_dict` reads; None: an infinite limit."""
+    units = {p.name: p.unit for p in row_of(name).parameters}
+    shown = {k: of_axis(k, Estimate(math.inf if v is None else v, 0.0, units[k]), "linear") for k, v in parameters.items()}
+    values = {k: e.value if math.isfinite(e.value) else None for k, e in shown.items()}
+    return {"parameters": values, "units": {k: e.unit for k, e in shown.items()}}

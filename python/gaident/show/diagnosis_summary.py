@@ -14,7 +14,17 @@ from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
 from gaident.show.units import Scales, beside, scales_of
-from gaident.show.wording import certainty, controller_lines, either, missing_words, number, table, with_std, words
+from gaident.show.wording import (
+    cause_words,
+    certainty,
+    controller_lines,
+    either,
+    missing_words,
+    number,
+    table,
+    with_std,
+    words,
+)
 
 __all__ = [
     "TESTED_UP_TO",
@@ -106,9 +116,9 @@ def verdict_words(dia: Diagnosis, axis: str) -> str:
     if dia.verdict == "unexplained":
         return "The model is wrong, and no effect of the library fits what is left."
     causes = [f for f in dia.findings if not f.is_noise]
-    named = list(dict.fromkeys(words(f.effect, axis) for f in causes if not f.alternatives))
-    kinds = dict.fromkeys(filter(None, (missing_words(f, axis) for f in causes if f.alternatives)))
-    open_ = dict.fromkeys(either(f, axis) for f in causes if f.alternatives and not missing_words(f, axis))
+    named = list(dict.fromkeys(cause_words(f, dia, axis) for f in causes if not f.alternatives))
+    kinds = dict.fromkeys(filter(None, (missing_words(f, dia, axis) for f in causes if f.alternatives)))
+    open_ = dict.fromkeys(either(f, dia, axis) for f in causes if f.alternatives and not missing_words(f, dia, axis))
     parts = [f"{'Cause' if len(named) == 1 else 'Causes'}: {', '.join(named)}."] if named else []
     parts += [f"{text[0].upper()}{text[1:]}." for text in kinds]
     parts += [
@@ -127,8 +137,8 @@ def _causes(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
     for f in dia.findings:
         if f.is_noise:
             continue
-        place = ", in the controller" if f.place == "controller" else ", at the load" if f.sides == ("load",) else ""
-        lines.append(words(f.effect, axis) + place + "".join(f", or {words(a, axis)}" for a in f.alternatives))
+        place = ", in the controller" if f.place == "controller" else ""
+        lines.append(cause_words(f, dia, axis) + place + "".join(f", or {words(a, axis)}" for a in f.alternatives))
         lines += table([parameter_row(n, e, axis, scales) for n, e in f.parameters.items()], "    ")
         lines += _wrapped(said(f.evidence, axis), "    ")
         if f.p_value is not None:
@@ -174,7 +184,7 @@ def _gain(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
         lines += _wrapped(said(not_the_loop_words(dia), axis), "  ")
     if extended and dia.before.rmse > 0.0:
         lines += _wrapped(said(fall_words(dia), axis), "  ")
-        steps = [f"{words(f.effect, axis)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
+        steps = [f"{cause_words(f, dia, axis)} {100.0 * f.gain:.0f} %" for f in dia.findings if not f.is_noise]
         if len(steps) > 1:
             lines += _wrapped(f"One after the other, each of what was left before it: {', '.join(steps)}.", "  ")
     return lines

@@ -84,7 +84,11 @@ def shown_in(result: Diagnosis | Identification, scales: Scales, axis: str) -> d
         return {**data, "rmse": {"value": size * result.rmse, "unit": name}}
     data |= {when: {"rmse": size * fit.rmse, "unit": name} for when, fit in (("before", result.before), ("after", result.after))}
     data["findings"] = [
-        {"effect": f.effect, "parameters": {key: _estimate(key, e, scales, axis) for key, e in f.parameters.items()}}
+        {
+            "effect": f.effect,
+            "sides": list(f.sides),
+            "parameters": {key: _estimate(key, e, scales, axis) for key, e in f.parameters.items()},
+        }
         for f in result.findings
     ]
     return data

@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 
 from gaident.axis import identifier_words, unit, word
+from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
-from gaident.results.finding import Finding
+from gaident.results.finding import Finding, where
 
 __all__ = [
-    *("certainty", "controller_lines", "either", "missing_words", "number", "size_words", "structure_words", "table"),
-    *("with_std", "words"),
+    *("cause_words", "certainty", "controller_lines", "either", "missing_words", "number", "size_words", "structure_words"),
+    *("table", "with_std", "words"),
 ]
 
 _ANGULAR = ("frequency", "zero_frequency")  # angular frequencies in rad/s, which are read in Hz
@@ -72,9 +73,18 @@ def words(effect: str, axis: str = "rotary") -> str:
     return identifier_words(effect, axis)
 
 
-def either(finding: Finding, axis: str = "rotary") -> str:
+def cause_words(finding: Finding, dia: Diagnosis, axis: str, sized: bool = False) -> str:
+    """What a finding found, and at which end of the shaft: coulomb friction at the load.
+
+    sized: with its size behind the name where it is determined: coulomb friction (0.05 N m) at the load.
+    """
+    size = size_words(finding, axis) if sized else ""
+    return " ".join(filter(None, (words(finding.effect, axis), size and f"({size})", where(finding, dia.model))))
+
+
+def either(finding: Finding, dia: Diagnosis, axis: str) -> str:
     """ "a, b or c" of a finding and what these data cannot tell from it."""
-    names = [words(name, axis) for name in (finding.effect, *finding.alternatives)]
+    names = [cause_words(finding, dia, axis), *(words(name, axis) for name in finding.alternatives)]
     return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
@@ -89,14 +99,15 @@ def size_words(finding: Finding, axis: str) -> str:
     return f"{number(value, 3)} {u}"
 
 
-def missing_words(finding: Finding, axis: str) -> str:
+def missing_words(finding: Finding, dia: Diagnosis, axis: str) -> str:
     """One of several explanations; where all are kinds of one thing, that with its size: friction, 0.119 N m; its kind is open.
 
-    Kinds of one thing share the last word of their names.
+    Kinds of one thing share the last word of their names. The end of the shaft is that of the first.
     """
     names = [words(name, axis).split() for name in (finding.effect, *finding.alternatives)]
     size = size_words(finding, axis)
     if not size or len({name[-1] for name in names}) > 1 or min(map(len, names)) == 1:
         return ""
     kinds = [" ".join(name[:-1]) for name in names]
-    return f"{names[0][-1]}, {size}; its kind is open ({', '.join(kinds[:-1])} or {kinds[-1]})"
+    first = f"{kinds[0]} {where(finding, dia.model)}".rstrip()
+    return f"{names[0][-1]}, {size}; its kind is open ({', '.join((first, *kinds[1:-1]))} or {kinds[-1]})"

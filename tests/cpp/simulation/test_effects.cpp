@@ -1,93 +1,21 @@
 // The loop with effects: elementary functions, registry, neutral parameters, lanes against scalar, standstill.
 // Accuracy against an independent integrator is tested in tests/python/models/test_effects.py.
-#include "../../csrc/gaident/nonlinear/effect_batch.hpp"
-#include "../../csrc/gaident/plant/roots.hpp"
+#include "effect_cases.hpp"
 
-#include "check.hpp"
-
-#include <algorithm>
-#include <cmath>
 #include <set>
-#include <string>
-#include <vector>
 
 using namespace gaident;
+using namespace gaident::cases;
 
 namespace {
 
-constexpr double Ts = 1e-3;
-
-Factors<double> one_mass(double J = 5e-4, double D = 0.005) {
-    const std::complex<double> pole = -D / J;
-    return factors_from_roots(1.0 / J, {&pole, 1}, {});
-}
-
-Factors<double> table_three(double f = 1.0) {
-    const std::complex<double> poles[] = {-16.11, {-13.53, 172.14 * f}, {-13.53, -172.14 * f}};
-    const std::complex<double> zeros[] = {{-6.88, 66.38}, {-6.88, -66.38}};
-    return factors_from_roots(9803.92, poles, zeros);
-}
-
-// Typical parameters, and ones so small (or large) that the effect does next to nothing without being taken out.
-struct Sizes {
-    Effect effect;
-    double typical[5], slight[5];
-};
-
-const Sizes sizes[] = {
-    {effect<CoulombFriction>, {0.05}, {1e-14}},
-    {effect<StribeckFriction>, {0.04, 0.07, 2.0}, {1e-14, 2e-14, 2.0}},
-    {effect<AsymmetricFriction>, {0.05, 0.035, 1e-4, 4e-4}, {1e-14, 1e-14, 1e-16, 1e-16}},
-    {effect<PreslidingFriction>, {0.05, 3.0}, {1e-14, 3.0}},
-    {effect<LugreFriction>, {0.04, 0.07, 2.0, 10.0, 0.005}, {1e-14, 2e-14, 2.0, 10.0, 1e-16}},
-    {effect<QuadraticDrag>, {1.5e-5}, {1e-18}},
-    {effect<LoadTorque>, {0.03}, {1e-14}},
-    {effect<Unbalance>, {0.05, 0.3}, {1e-14, 0.3}},
-    {effect<Cogging>, {0.03, 12.0, 0.4}, {1e-14, 12.0, 0.4}},
-    {effect<FrictionDrift>, {0.05, -0.2}, {1e-14, -0.2}},
-    {effect<LoadDependentFriction>, {0.04, 0.2}, {1e-14, 1e-14}},
-    {effect<Backlash>, {0.01}, {1e-15}},
-    {effect<HardeningStiffness>, {1e3}, {1e-10}},
-    {effect<TorqueSaturation>, {0.5}, {1e14}},
-    {effect<TorqueDeadBand>, {0.03}, {1e-14}},
-    {effect<TransportDelay>, {0.73e-3}, {1e-16}},
-    {effect<TorqueLag>, {1e-3}, {1e-16}},
-    {effect<IntegratorClamp>, {0.05}, {1e14}},
-    {effect<CommandRateLimit>, {3000.0}, {1e14}},
-    {effect<VelocityFilter>, {1e-3}, {1e-16}},
-    {effect<VelocityRipple>, {0.005, 2.0, 0.2}, {1e-14, 2.0, 0.2}},
-    {effect<VelocityQuantisation>, {0.6}, {1e-13}},
-    {effect<ExtraResonance>, {900.0, 0.02, 800.0, 0.02}, {900.0, 0.02, 900.0 + 1e-10, 0.02}},
-};
-
-std::vector<double> staircase(std::size_t n) {
-    const double level[] = {3.0, -5.0, 20.0, 1.0, -40.0, 10.0, 0.0, -2.0, 60.0, -60.0};
-    std::vector<double> r(n);
-    for (std::size_t k = 0; k < n; ++k) r[k] = level[k * 10 / n];
-    return r;
-}
-
-EffectJob job_of(std::span<const double> input, LoopKind kind) {
-    EffectJob job;
-    job.record.input = input;
-    job.record.sample_time = Ts;
-    job.record.top_speed = 60.0;
-    job.loop.kind = kind;
-    job.loop.controller.kp = 0.08;
-    job.loop.controller.ki = 1.5;
-    return job;
-}
-
-std::vector<double> velocity_of(const EffectJob& job, const EffectModel& model) {
-    std::vector<double> w(job.record.input.size());
-    simulate_effects(job, {&model, 1}, {}, {w.data()});
-    return w;
-}
-
 EffectModel model_with(const Factors<double>& g, Effect e, std::initializer_list<double> values) {
-    EffectModel m{g, {}};
-    m.add(e, values.begin());
-    return m;
+    return with({g, {}}, e, values);
+}
+
+// Whether an effect acts in the coupling of two masses, or is a resonance of its own.
+bool of_a_shaft(const Sizes& s) {
+    return s.effect == effect<Backlash> || s.effect == effect<HardeningStiffness> || s.effect == effect<ExtraResonance>;
 }
 
 }  // namespace
@@ -118,85 +46,38 @@ TEST_CASE("the registry: names are unique, the enumeration has the table's order
     for (const EffectInfo& info : Effects::table) simulated += info.simulated;
     CHECK(simulated == std::size(sizes));
     for (const Sizes& s : sizes) {
-        const EffectInfo& info = effect_table[static_cast<std::size_t>(s.effect)];
-        CHECK(!info.neutral(s.typical));
-        double neutral[5];
-        for (int i = 0; i < info.count(); ++i) {
-            const double value = info.parameters[static_cast<std::size_t>(i)].neutral;
-            neutral[i] = value == value ? value : 1.0;
-        }
-        CHECK(info.neutral(neutral));
+        CHECK(!s.info().neutral(s.typical.data()));
+        CHECK(s.info().neutral(neutral_of(s, {1.0, 1.0, 1.0, 1.0, 1.0}).data()));
     }
 }
 
 TEST_CASE("neutral parameters are the identity, and their neighbourhood is next to it") {
-    const std::vector<double> r = staircase(300);
-    for (const LoopKind kind : {LoopKind::sampled, LoopKind::open, LoopKind::continuous}) {
-        std::vector<double> in = r;
-        if (kind == LoopKind::open)
-            for (double& v : in) v *= 0.01;
-        const EffectJob job = job_of(in, kind);
-        const std::vector<double> linear = velocity_of(job, {table_three(), {}});
-        for (const Sizes& s : sizes) {
-            const EffectInfo& info = effect_table[static_cast<std::size_t>(s.effect)];
-            EffectModel neutral{table_three(), {}}, slight = neutral;
-            double values[5];
-            for (int i = 0; i < info.count(); ++i) {
-                const double value = info.parameters[static_cast<std::size_t>(i)].neutral;
-                values[i] = value == value ? value : s.slight[i];
-            }
-            if (s.effect == effect<ExtraResonance>) values[2] = values[0];
-            neutral.add(s.effect, values);
-            slight.add(s.effect, s.slight);
-            CHECK(velocity_of(job, neutral) == linear);
-            const std::vector<double> w = velocity_of(job, slight);
-            double most = 0.0;
-            for (std::size_t k = 0; k < w.size(); ++k) most = std::max(most, std::abs(w[k] - linear[k]));
-            if (!(most < 1e-8)) check::fail(__FILE__, __LINE__, std::string(info.name) + ": " + std::to_string(most));
-        }
-    }
+    for (const Sizes& s : sizes) check_neutral(s);
 }
 
 TEST_CASE("lanes equal the scalar loop bit for bit, with every effect, loop and instruction set") {
-    const std::vector<double> r = staircase(200);
     std::vector<EffectModel> models;
     for (const Sizes& s : sizes)
-        for (int i = 0; i < 3; ++i) {
-            double values[5];
-            for (int k = 0; k < 4; ++k) values[k] = s.typical[k] * (1.0 + 0.03 * i);
-            EffectModel m{table_three(1.0 + 0.01 * i), {}};
-            m.add(s.effect, values);
-            models.push_back(m);
-        }
+        for (int i = 0; i < 3; ++i)
+            models.push_back(with({table_three(1.0 + 0.01 * i), {}}, s.effect, scaled(s.typical, 1.0 + 0.03 * i)));
     for (int i = 0; i < 11; ++i) {  // several at once, more than one group of lanes
         EffectModel m{one_mass(5e-4 * (1.0 + 0.02 * i)), {}};
         for (const Sizes& s : sizes)
-            if (s.effect != effect<Backlash> && s.effect != effect<HardeningStiffness> && s.effect != effect<ExtraResonance>)
-                m.add(s.effect, s.typical);
+            if (!of_a_shaft(s)) m.add(s.effect, s.typical.data());
         models.push_back(m);
     }
-    for (const LoopKind kind : {LoopKind::sampled, LoopKind::open, LoopKind::continuous})
-        for (const bool position : {false, true}) {
-            EffectJob job = job_of(r, kind);
-            if (position) job.record.position = r;
-            const std::size_t n = models.size() * r.size();
-            std::vector<double> w(n), u(n), a(n), lanes_w(n), lanes_u(n), lanes_a(n);
-            job.lanes = false;
-            simulate_effects(job, models, {}, {w.data(), u.data(), a.data()});
-            job.lanes = true;
-            for (const char* name : {"baseline", "avx2", "avx512"}) {
-                job.kernel = effects_named(name);
-                if (job.kernel == nullptr) continue;
-                job.workers = 2;
-                simulate_effects(job, models, {}, {lanes_w.data(), lanes_u.data(), lanes_a.data()});
-                CHECK(lanes_w == w);
-                CHECK(lanes_u == u);
-                CHECK(lanes_a == a);
-            }
-            const std::atomic<bool> stop{true};
-            job.stop = &stop;
-            CHECK_THROWS(simulate_effects(job, models, {}, {w.data()}), Stopped);
-        }
+    check_lanes(models, {LoopKind::sampled, LoopKind::open, LoopKind::continuous});
+}
+
+TEST_CASE("a simulation that is stopped says so") {
+    const std::vector<double> r = staircase(200);
+    const EffectModel model = model_with(table_three(), effect<CoulombFriction>, {0.05});
+    const std::atomic<bool> stop{true};
+    for (const LoopKind kind : {LoopKind::sampled, LoopKind::open, LoopKind::continuous}) {
+        EffectJob job = job_of(r, kind);
+        job.stop = &stop;
+        CHECK_THROWS(velocity_of(job, model), Stopped);
+    }
 }
 
 TEST_CASE("friction holds exactly: no creep, no ringing, and lets go above its level") {
@@ -302,11 +183,8 @@ TEST_CASE("what is no drive gives undefined numbers and no crash") {
     CHECK(undefined(model_with(one_mass(), effect<LoadTorque>, {std::nan("")})));
     EffectModel all = model_with(one_mass(), effect<PreslidingFriction>, {-1.0, -2.0});
     for (const Sizes& s : sizes)
-        if (s.effect != effect<Backlash> && s.effect != effect<HardeningStiffness>) {
-            double wild[5];
-            for (int i = 0; i < 5; ++i) wild[i] = -1e3 * s.typical[i];
-            all.add(s.effect, wild);
-        }
+        if (s.effect != effect<Backlash> && s.effect != effect<HardeningStiffness>)
+            all = with(all, s.effect, scaled(s.typical, -1e3));
     velocity_of(job, all);
     const EffectModel p0{factors_from_roots(1.0, {}, {}), {}};
     EffectModel with_load = p0;
@@ -316,21 +194,9 @@ TEST_CASE("what is no drive gives undefined numbers and no crash") {
 }
 
 TEST_CASE("a record that starts in motion continues the linear loop's own state") {
-    const std::vector<double> r = staircase(200);
-    const double state[] = {20.0, 0.3, -0.02, 0.2};
-    const double* const start = state;
-    for (const LoopKind kind : {LoopKind::sampled, LoopKind::open, LoopKind::continuous}) {
-        const EffectJob job = job_of(r, kind);
-        std::vector<double> linear(r.size()), w(r.size());
-        const EffectModel plain{table_three(), {}};
-        simulate_effects(job, {&plain, 1}, {&start, 1}, {linear.data()});
-        for (const EffectModel& m :
-             {model_with(table_three(), effect<LoadTorque>, {1e-14}), model_with(table_three(), effect<Backlash>, {1e-15})}) {
-            simulate_effects(job, {&m, 1}, {&start, 1}, {w.data()});
-            const double scale = kind == LoopKind::open ? 1e3 : 1e2;  // the torque of the open loop is the staircase itself
-            for (std::size_t k = 0; k < w.size(); ++k) CHECK_NEAR(w[k], linear[k], 1e-10 * scale);
-        }
-    }
+    const EffectModel nothing[] = {model_with(table_three(), effect<LoadTorque>, {1e-14}),
+                                   model_with(table_three(), effect<Backlash>, {1e-15})};
+    check_motion(nothing, 1e-8, 1e-7);
 }
 
 namespace {
@@ -361,12 +227,9 @@ private:
 }  // namespace
 
 TEST_CASE("effects that the core does not know: as its own, in lanes as alone") {
-    const std::vector<double> r = staircase(400);
     const std::size_t count = 11;  // more than the lanes
     for (const LoopKind kind : {LoopKind::open, LoopKind::sampled, LoopKind::continuous}) {
-        std::vector<double> input = r;
-        if (kind == LoopKind::open)
-            for (double& u : input) u *= 0.01;
+        const std::vector<double> input = input_of(400, kind);
         EffectJob job = job_of(input, kind);
         job.substeps = 16;
         Outside own;

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import gaident as ga
+from gaident.diagnosis.explain.wording import or_other_form
+from gaident.diagnosis.selection.unlogged_form import VARIANTS
 
 DT = 1e-3
 KP, KI = 0.05, 1.5
@@ -54,3 +56,29 @@ def test_a_filter_is_found_beside_friction() -> None:
     dia = ga.diagnose(record(ga.Cascade(PI, velocity_filters=(ga.LowPass(2e-3),)), friction=0.05), PI)
     assert {f.effect for f in dia.causes} == {"velocity_feedback_filter", "coulomb_friction"}, dia.summary()
     assert dia.mechanics["inertia"].value == pytest.approx(J, rel=5e-3)
+
+
+def test_what_comes_closer_is_no_other_part_of_a_controller_that_has_none() -> None:
+    """The given PI has no filter."""
+    notch = next(variant for variant in VARIANTS if len(variant.numbers) == 3)
+    text = or_other_form(notch.words)
+    assert "a controller with a notch in the torque, which the given one has not, would come closer" in text
+    assert "with a notch in the force, which" in text.linear and "another" not in text
+
+
+def test_the_numbers_of_a_form_are_searched_as_they_are_given() -> None:
+    """From a start to the controller and back; ends of a notch: a tenth of the duration, and 0.95 of half the sampling rate."""
+    pi = ga.PI(0.05, 0.4)
+    dt, duration = 1e-3, 2.0
+    for variant in VARIANTS:
+        low, high = variant.ends(dt, duration)
+        for z in variant.starts(dt, duration):
+            assert np.all(low <= z) and np.all(z <= high) and len(z) == len(variant.numbers)
+            assert variant.of(pi, z).velocity.kp == pi.kp
+    notch = next(variant for variant in VARIANTS if len(variant.numbers) == 3)
+    ends = [[n.value(x) for n, x in zip(notch.numbers, z, strict=True)] for z in notch.ends(dt, duration)]
+    np.testing.assert_allclose(ends, [(5.0, 0.0, 0.05), (475.0, 1.0, 2.0)])
+    (found,) = notch.of(pi, notch.starts(dt, duration)[0]).torque_filters
+    assert (found.numerator_damping, found.denominator_damping) == (pytest.approx(0.1), pytest.approx(0.7))
+    frequency = notch.numbers[0].estimate(np.log(80.0), 0.01)
+    assert (frequency.value, frequency.std, frequency.unit) == (pytest.approx(80.0), pytest.approx(0.8), "Hz")

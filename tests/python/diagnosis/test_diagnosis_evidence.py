@@ -226,7 +226,7 @@ def test_dry_friction_and_load_show_with_their_sign_and_size() -> None:
 
 def test_an_offset_is_told_in_the_units_of_the_axis() -> None:
     (two_levels,) = (e.of for e in EQUIVALENT if e.of is not None)
-    text = Offset(two_levels, 0.512, 31.0, 0.0421).sentence
+    text = Offset(two_levels, two_levels.whole, 0.512, 31.0, 0.0421).sentence
     assert "load of 0.512 N m in" in text and "0.042 N m of it is left" in text
     assert "load of 0.512 N in" in text.linear and "0.042 N of it is left" in text.linear
 

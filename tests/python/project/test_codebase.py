@@ -279,7 +279,8 @@ def test_folders_give_out_names_lazily() -> None:
 def test_names_that_are_provided_are_there() -> None:
     for name in providers._PLACES:
         assert callable(providers.provided(name)), name
-    used = re.findall(r'\bprovided\("(\w+)"\)', "".join(f.read_text() for f in sources(PACKAGE, ".py") if f.stem != "providers"))
+    asked = re.compile(r'\b(?:provided|picture)\("(\w+)"')
+    used = asked.findall("".join(f.read_text() for f in sources(PACKAGE, ".py") if f.stem != "providers"))
     assert set(used) == set(providers._PLACES)
     with pytest.raises(LookupError, match="no such name"):
         providers.provided("no such name")

@@ -38,10 +38,11 @@ from gaident.data.listing import columns
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.experiments.first_experiment import candidate_commands, first_experiment
-from gaident.diagnosis.explain.wording import evidence_of
+from gaident.diagnosis.explain.wording import evidence_of, or_other_form
 from gaident.diagnosis.library.equivalences import EQUIVALENT
 from gaident.diagnosis.records.folded import ADVICE
 from gaident.diagnosis.selection.offset import Offset
+from gaident.diagnosis.selection.unlogged_form import VARIANTS
 from gaident.drive.draft import draft
 from gaident.errors import GaidentError, RecordError, SettingsError
 from gaident.identification.notes import open_loop_notes
@@ -182,8 +183,9 @@ def sentences() -> list[Text]:
     limits = ga.Limits(50.0, 1.0, np.inf, 2.0)
     evidence = [evidence_of(row.name, 23.0, ()) for row in ga.effects.table()]
     evidence += [
-        evidence_of(TWO_LEVELS.whole, 23.0, (), Offset(TWO_LEVELS, 0.5, 31.0, 0.04)),
+        evidence_of(TWO_LEVELS.whole, 23.0, (), Offset(TWO_LEVELS, TWO_LEVELS.whole, 0.5, 31.0, 0.04)),
         evidence_of("backlash", 412.0, ("cogging",)),
+        *(or_other_form(variant.words) for variant in VARIANTS),
     ]
     asked = [first_experiment(DT, limits, inertia, kp).reason for inertia in (None, 1e-4) for kp in (None, 0.02)]
     asked += [item.proposal(("cogging",), 1.0).reason for item in candidate_commands(DT, limits)]

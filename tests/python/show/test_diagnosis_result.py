@@ -77,7 +77,7 @@ def fake() -> Any:
             "torque_saturation": say("a limit above {} {N m} would not have shown: no more {torque} was asked for", 1.25),
             "command_rate_limit": say("a limit above {} {rad/s^2} would not have shown: no command rises faster", "2e+04"),
         },
-        model=SimpleNamespace(effects=("coulomb_friction", "cogging"), poles=(-1.0, -1.0 + 2.0j, -1.0 - 2.0j)),
+        model=SimpleNamespace(effects=("coulomb_friction", "cogging"), poles=(-1.0, -1.0 + 2.0j, -1.0 - 2.0j), p=1, q=2),
         before=Fitness(0.5, 97.1, 0.1, 0.0511, 0.184, 0.0021),
         after=Fitness(0.2, 98.84, 0.1, 0.0123, 0.184, 0.0021),
         regression=SimpleNamespace(terms=("inertia", "viscous", "coulomb"), cutoff_hz=12.34, order=4, samples=812),

@@ -89,7 +89,8 @@ def test_numbers_of_a_linear_axis_bear_its_units(diagnosis: ga.Diagnosis) -> Non
     assert of_axis("frequency", ga.Estimate(9.0, 1.0, "rad/s"), "linear").unit == "rad/s"  # turns no axis
     assert parameter_row("order", order, "linear", {})[1:] == ("100.000 +- 0.010", "1/m", "", "every 10 mm, at a bound")
     cogging = ga.Finding("cogging", {"order": order}, evidence=say("{Torque} ripple, {:g} {N m}", 0.3))
-    dia = replace(diagnosis, axis="linear", findings=(cogging,), notes=(say("a {torque}"),))
+    model = diagnosis.model.with_effect("cogging", amplitude=0.3, order=200.0 * math.pi, phase=0.1)
+    dia = replace(diagnosis, axis="linear", findings=(cogging,), notes=(say("a {torque}"),), model=model)
     data = on_axis(dia.to_dict(), "linear")
     assert data["findings"][0]["parameters"]["order"]["unit"] == "1/m"
     assert data["findings"][0]["parameters"]["order"]["value"] == pytest.approx(100.0)
@@ -97,7 +98,12 @@ def test_numbers_of_a_linear_axis_bear_its_units(diagnosis: ga.Diagnosis) -> Non
     assert data["mechanics"]["inertia"]["unit"] == "kg" and "N m" not in json.dumps(data)
     numbers = data["identification"]["parameters"]
     assert numbers["gain"]["unit"] == "m/s^2/N" and {e["unit"] for n, e in numbers.items() if n != "gain"} == {"rad/s"}
-    assert ga.Diagnosis.from_dict(data).findings[0].evidence == "Force ripple, 0.3 N"
+    effect = data["model"]["effects"][-1]
+    assert effect["units"] == {"amplitude": "N", "order": "1/m", "phase": "rad"}
+    assert effect["parameters"]["order"] == pytest.approx(100.0)
+    again = ga.Diagnosis.from_dict(data)
+    assert again.findings[0].evidence == "Force ripple, 0.3 N"
+    assert [e.values for e in again.model.effects] == [pytest.approx(e.values) for e in model.effects]
     assert on_axis(diagnosis.to_dict(), "rotary") == diagnosis.to_dict()
     assert shown_in(dia, {"N": ("kN", 1e-3)}, "linear")["findings"][0]["parameters"]["order"]["unit"] == "1/m"  # type: ignore[index]
     assert list(dia.to_pandas()["unit"]) == ["1/m"] and "Force ripple, 0.3 N" in dia._repr_html_()

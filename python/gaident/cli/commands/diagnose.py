@@ -25,7 +25,7 @@ from gaident.results.identification import Identification
 from gaident.results.json_text import on_axis
 from gaident.results.store import load
 from gaident.show.progress_bar import Progress
-from gaident.show.wording import either, number, table, words
+from gaident.show.wording import cause_words, either, number, table
 
 __all__ = ["diagnose_command"]
 
@@ -87,7 +87,8 @@ def _row(name: str, result: tuple[Drive, Diagnosis] | GaidentError) -> tuple[str
     if isinstance(result, GaidentError):
         return name, "not diagnosed", in_options(result), "", "", ""
     drive, dia = result
-    causes = ", ".join(either(f, drive.axis) if f.alternatives else words(f.effect, drive.axis) for f in dia.causes) or "none"
+    found = (either(f, dia, drive.axis) if f.alternatives else cause_words(f, dia, drive.axis) for f in dia.causes)
+    causes = ", ".join(found) or "none"
     return name, dia.verdict, causes, number(dia.before.rmse), number(dia.after.rmse), velocity_unit(drive.axis)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.results.diagnosis import Diagnosis
 
@@ -22,5 +23,5 @@ def velocity_curve(dia: Diagnosis, low: float, high: float) -> Curve | None:
         curve = LIBRARY[effect.name].curve if effect.name in LIBRARY else None
         if curve is not None:
             torque += curve(w, effect.parameters)
-            names.append(effect.name.replace("_", " "))
+            names.append(called_of(effect.key))
     return (w, torque, " + ".join(names)) if names else None

@@ -9,6 +9,7 @@ from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
 from gaident.estimation.dataset import DataSet
+from gaident.models.effect_rows import end_words
 from gaident.models.effects import row_of
 from gaident.results.estimate import Estimate
 
@@ -31,15 +32,13 @@ def evidence_of(
 ) -> Text:
     """What speaks for a finding: what it does, how sure that is, what these data cannot tell from it.
 
-    sides: where on an elastic shaft it may be; the motor goes without saying.
+    sides: where on an elastic shaft it may be.
     """
     from gaident.show.wording import certainty
 
     what = row_of(effect).says.begun()
-    if len(sides) > 1:
-        what = say("{} (at the {}: these data do not say at which end of the shaft)", what, " or the ".join(sides))
-    elif row_of(effect).at_load:
-        what = say("{}, at the load", what)
+    if sides:
+        what = say("{}, {}", what, end_words(sides))
     sure, worse = certainty(gain), f"(the model without it is {gain:.0f} BIC units worse)"
     if alternatives:
         others = joined(" or ", map(called, alternatives))
@@ -137,10 +136,14 @@ def or_other_gains(effect: str) -> Text:
     return say(text, called_of(effect))
 
 
-def or_other_form(form: str) -> Text:
-    """What is said where another form of controller comes closer, but does not explain the records either."""
+def or_other_form(words: Text) -> Text:
+    """What is said where another form of controller comes closer, but does not explain the records either.
+
+    words: what that controller has.
+    """
     text = (
-        "No {torque} is logged; a controller with another {} than the given one would come closer to these records, but does not "
-        "explain them by itself: {inertia} and causes are not to be trusted. Log the {torque}, it shows what the controller does."
+        "No {torque} is logged; a controller with {}, which the given one has not, would come closer to these records, but does "
+        "not explain them by itself: {inertia} and causes are not to be trusted. Log the {torque}, it shows what the controller "
+        "does."
     )
-    return say(text, called(form))
+    return say(text, words)

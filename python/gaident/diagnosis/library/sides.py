@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from gaident.axis import Text, called, say
 from gaident.diagnosis.library.cause import Cause
-from gaident.models.effect_rows import AT_LOAD, SIDES, effect_and_side
+from gaident.models.effect_rows import SIDES, effect_and_side, end_words, key_of
 from gaident.models.effects import row_of
 
 __all__ = ["at_load", "at_motor", "called_of", "name_of", "sides_of"]
@@ -17,7 +17,7 @@ def at_load(cause: Cause, excludes: frozenset[str]) -> Cause:
     """The same effect at the load; excludes: what changes the mechanism linearly, which does not go together with it."""
 
     def there(name: str) -> str:
-        return f"{name}{AT_LOAD}"
+        return key_of(name, SIDES[1])
 
     return replace(
         cause,
@@ -41,12 +41,12 @@ def name_of(key: str) -> str:
 def called_of(key: str) -> Text:
     """An effect in words for a field of `say`, at the load with its side."""
     name, side = effect_and_side(key)
-    return say("{} at the load", called(name)) if side == SIDES[1] else called(name)
+    return say("{} {}", called(name), end_words((side,))) if side == SIDES[1] else called(name)
 
 
 def at_motor(cause: Cause) -> Cause:
     """The row with the name of the same effect at the load, where there is one."""
-    return replace(cause, other_side=f"{cause.name}{AT_LOAD}") if SIDES[1] in row_of(cause.name).sides else cause
+    return replace(cause, other_side=key_of(cause.name, SIDES[1])) if SIDES[1] in row_of(cause.name).sides else cause
 
 
 def sides_of(key: str, rivals: Sequence[str], masses: int) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.library.equivalences import equivalents
+from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.mechanisms import as_two_masses, resonance, swings
 from gaident.estimation import least_squares as ls
@@ -26,7 +27,6 @@ from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
 from gaident.estimation.term import Term
-from gaident.models.effect_rows import AT_LOAD
 from gaident.policy.table import POLICY, Policy
 
 __all__ = ["ModelSpace", "words"]
@@ -36,7 +36,7 @@ Vector = NDArray[np.float64]
 
 def words(effects: Iterable[str]) -> str:
     """Effects as people write them."""
-    return ", ".join(e.replace("_", " ").replace(AT_LOAD, " at the load") for e in effects)
+    return ", ".join(map(called_of, effects))
 
 
 def _representative(term: Term) -> str:

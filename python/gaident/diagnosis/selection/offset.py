@@ -4,6 +4,7 @@
     two levels, one viscous part:   -(Tp or Tn) sign(w)     the same torque: Tc = (Tp + Tn)/2, T = (Tp - Tn)/2
     two levels, two viscous parts:  -(Tp + bp w) or (Tn + bn |w|)     not the same
 
+At either end of an elastic shaft; a constant torque is the same at both.
 A load that is fitted to the last of these stands for the mean of (bp - bn) |w| / 2 over the motion. Where it leaves the model
 worse, there is no choice between the two, and the offset is mostly what it stood for.
 """
@@ -14,9 +15,11 @@ from dataclasses import dataclass
 
 from gaident.axis import Text, say
 from gaident.diagnosis.library.equivalences import EQUIVALENT, Composition
+from gaident.diagnosis.library.sides import name_of
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.moves import Moves
 from gaident.estimation.objective import Fit
+from gaident.models.effect_rows import effect_and_side, key_of
 
 __all__ = ["Offset", "offset_of"]
 
@@ -30,14 +33,10 @@ class Offset:
     """
 
     of: Composition
+    effect: str  # key of the effect that is not the same as the others here
     load: float
     behind: float
     left: float
-
-    @property
-    def effect(self) -> str:
-        """The effect that is not the same as the others here."""
-        return self.of.whole
 
     @property
     def sentence(self) -> Text:
@@ -47,25 +46,26 @@ class Offset:
 
 def offset_of(space: Moves, fit: Fit) -> Offset | None:
     """The offset that an effect of the model stands for; None where there is none, or where a load is as good."""
-    compositions = (e.of for e in EQUIVALENT if e.of is not None and e.of.whole in fit.effects)
-    found = (_of(composition, space, fit) for composition in compositions)
+    compositions = {e.of.whole: e.of for e in EQUIVALENT if e.of is not None}
+    found = (_of(compositions[name_of(key)], key, space, fit) for key in fit.effects if name_of(key) in compositions)
     return next((offset for offset in found if offset is not None), None)
 
 
-def _of(composition: Composition, space: Moves, fit: Fit) -> Offset | None:
-    whole = composition.whole
-    parts = composition.parts(next(e for e in fit.parameters.model(fit.x).effects if e.name == whole).parameters)
-    constant = next(name for name in parts if LIBRARY[name].constant)
-    if constant in fit.effects:
+def _of(composition: Composition, whole: str, space: Moves, fit: Fit) -> Offset | None:
+    """whole: the key of the effect in the model; the others are put where it is."""
+    own = composition.parts(next(e for e in fit.parameters.model(fit.x).effects if e.key == whole).parameters)
+    parts = {key_of(name, effect_and_side(whole)[1]): values for name, values in own.items()}
+    constant = next(key for key in parts if LIBRARY[key].constant)
+    if any(LIBRARY[key].constant for key in fit.effects):
         return None
     x, hypothesis = fit.parameters.removed(fit.x, whole), fit.hypothesis.without(whole)
-    for name, own in parts.items():
-        x = hypothesis.parameters.inserted(x, LIBRARY[name].coordinates(own))
-        hypothesis = hypothesis.extended(LIBRARY[name])
+    for key, values in parts.items():
+        x = hypothesis.parameters.inserted(x, LIBRARY[key].coordinates(values))
+        hypothesis = hypothesis.extended(LIBRARY[key])
     other = space.refitted(hypothesis, x)
     behind = other.bic - fit.bic
     if not behind > space.penalty:
         return None
     load = float(other.parameters.effect_values(other.x[None, :], constant)[0, 0])
     left = float(LIBRARY[constant].coordinates(parts[constant])[0])
-    return Offset(composition, load, behind, left)
+    return Offset(composition, whole, load, behind, left)

@@ -14,8 +14,10 @@ the torque is. What it is worth is judged by the criterion that selected the mod
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,97 +50,103 @@ DAMPING = (0.05, 2.0)  # no decision: denominators of notches that drives have
 
 
 @dataclass(frozen=True, eq=False)
-class _Variant:
-    """A form with numbers z: their ends and starts for (sample time, duration) [s], the controller, and z as parameters.
+class _Number:
+    """A number of a form: its name and unit as a finding has them; its ends and starts for (sample time, duration) [s].
 
-    parameters: name -> (place in z, unit, whether z is its logarithm).
+    logarithm: whether it is searched by its logarithm.
     """
+
+    name: str
+    unit: str
+    ends: Callable[[float, float], tuple[float, float]]
+    starts: Callable[[float, float], Sequence[float] | Vector]
+    logarithm: bool = True
+
+    def moved(self, value: float) -> float:
+        """The value as the search moves it."""
+        return float(np.log(value)) if self.logarithm else float(value)
+
+    def value(self, z: float) -> float:
+        """The value of what the search moves."""
+        return float(np.exp(z)) if self.logarithm else float(z)
+
+    def estimate(self, z: float, std: float) -> Estimate:
+        """The value with its deviation; std: of z."""
+        value = self.value(z)
+        return Estimate(value, std * value if self.logarithm else std, self.unit)
+
+
+@dataclass(frozen=True, eq=False)
+class _Variant:
+    """A form with its numbers; controller: of the given PI and their values. words: what it has, for a sentence."""
 
     finding: str
     words: Text
-    ends: Callable[[float, float], list[tuple[float, float]]]
-    starts: Callable[[float, float], list[tuple[float, ...]]]
-    controller: Callable[[PI, Vector], Cascade]
-    parameters: Mapping[str, tuple[int, str, bool]]
+    numbers: tuple[_Number, ...]
+    controller: Callable[..., Cascade]
+
+    def of(self, pi: PI, z: Vector) -> Cascade:
+        """The controller with the numbers z as the search moves them."""
+        return self.controller(pi, *(number.value(x) for number, x in zip(self.numbers, z, strict=True)))
+
+    def ends(self, dt: float, duration: float) -> tuple[Vector, Vector]:
+        """(lowest, highest) z."""
+        low, high = np.array([[n.moved(end) for end in n.ends(dt, duration)] for n in self.numbers]).T
+        return low, high
+
+    def starts(self, dt: float, duration: float) -> list[Vector]:
+        """Every z that a search begins at."""
+        grids = ([n.moved(start) for start in n.starts(dt, duration)] for n in self.numbers)
+        return [np.array(z) for z in itertools.product(*grids)]
 
 
-def _time_ends(dt: float, duration: float) -> list[tuple[float, float]]:
-    return [(float(np.log(0.1 * dt)), float(np.log(SLOWEST * duration)))]
+def _band(dt: float, duration: float) -> tuple[float, float]:
+    return 1.0 / (SLOWEST * duration), NYQUIST * 0.5 / dt
 
 
-def _time_starts(dt: float, duration: float) -> list[tuple[float, ...]]:
-    return [(float(np.log(tau)),) for tau in np.geomspace(0.5 * dt, 0.1 * SLOWEST * duration, GRID)]
+REACH = (1.0 + POLICY.gain_doubt) / (1.0 - POLICY.gain_doubt)
+"""Largest ratio of ki/kp to the given one."""
 
-
-def _notch_ends(dt: float, duration: float) -> list[tuple[float, float]]:
-    low, high = 1.0 / (SLOWEST * duration), NYQUIST * 0.5 / dt
-    return [(float(np.log(low)), float(np.log(high))), (0.0, 1.0), (float(np.log(DAMPING[0])), float(np.log(DAMPING[1])))]
-
-
-def _notch_starts(dt: float, duration: float) -> list[tuple[float, ...]]:
-    (low, high), *_ = _notch_ends(dt, duration)
-    return [(float(f), 0.1, float(np.log(0.7))) for f in np.linspace(low, high, 2 * GRID + 1)[1:-1]]
-
-
-def _notch(z: Vector) -> Notch:
-    return Notch(frequency=float(np.exp(z[0])), numerator_damping=float(z[1]), denominator_damping=float(np.exp(z[2])))
-
-
-def _low_pass(z: Vector) -> LowPass:
-    return LowPass(time_constant=float(np.exp(z[0])))
-
-
-REACH = float(np.log((1.0 + POLICY.gain_doubt) / (1.0 - POLICY.gain_doubt)))
-"""Largest logarithm of the ratio ki/kp over the given one."""
+RATIO = _Number("integral_gain", "1", lambda dt, duration: (1.0 / REACH, REACH), lambda dt, duration: (1.0,))
+WEIGHT = _Number("weight", "1", lambda dt, duration: (0.0, 2.0), lambda dt, duration: (0.0, 0.5), logarithm=False)
+TIME_CONSTANT = _Number(
+    "time_constant",
+    "s",
+    lambda dt, duration: (0.1 * dt, SLOWEST * duration),
+    lambda dt, duration: np.geomspace(0.5 * dt, 0.1 * SLOWEST * duration, GRID),
+)
+FREQUENCY = _Number("frequency", "Hz", _band, lambda dt, duration: np.geomspace(*_band(dt, duration), 2 * GRID + 1)[1:-1])
+OF_ZEROS = _Number("numerator_damping", "1", lambda dt, duration: (0.0, 1.0), lambda dt, duration: (0.1,), logarithm=False)
+OF_POLES = _Number("denominator_damping", "1", lambda dt, duration: DAMPING, lambda dt, duration: (0.7,))
 
 VARIANTS: tuple[_Variant, ...] = (
+    _Variant(OTHER_GAINS, Text("other gains"), (RATIO,), lambda pi, ratio: Cascade(replace(pi, ki=pi.ki * ratio))),
     _Variant(
-        OTHER_GAINS,
-        Text("other gains"),
-        lambda dt, duration: [(-REACH, REACH)],
-        lambda dt, duration: [(0.0,)],
-        lambda pi, z: Cascade(replace(pi, ki=pi.ki * float(np.exp(z[0])))),
-        {"ki": (0, "N m/rad", True)},
-    ),
-    _Variant(
-        "command_weight",
-        Text("a command weight"),
-        lambda dt, duration: [(0.0, 2.0)],
-        lambda dt, duration: [(0.0,), (0.5,)],
-        lambda pi, z: Cascade(replace(pi, command_weight=float(z[0]))),
-        {"weight": (0, "1", False)},
+        "command_weight", Text("a command weight"), (WEIGHT,), lambda pi, weight: Cascade(replace(pi, command_weight=weight))
     ),
     _Variant(
         "torque_filter",
-        Text("a low pass of the torque"),
-        _time_ends,
-        _time_starts,
-        lambda pi, z: Cascade(pi, torque_filters=(_low_pass(z),)),
-        {"time_constant": (0, "s", True)},
+        say("a low pass of the {torque}"),
+        (TIME_CONSTANT,),
+        lambda pi, tau: Cascade(pi, torque_filters=(LowPass(time_constant=tau),)),
     ),
     _Variant(
         "torque_filter",
-        Text("a notch in the torque"),
-        _notch_ends,
-        _notch_starts,
-        lambda pi, z: Cascade(pi, torque_filters=(_notch(z),)),
-        {"frequency": (0, "Hz", True), "numerator_damping": (1, "1", False), "denominator_damping": (2, "1", True)},
+        say("a notch in the {torque}"),
+        (FREQUENCY, OF_ZEROS, OF_POLES),
+        lambda pi, *notch: Cascade(pi, torque_filters=(Notch(*notch),)),
     ),
     _Variant(
         "velocity_feedback_filter",
         Text("a low pass of the velocity that it reads"),
-        _time_ends,
-        _time_starts,
-        lambda pi, z: Cascade(pi, velocity_filters=(_low_pass(z),)),
-        {"time_constant": (0, "s", True)},
+        (TIME_CONSTANT,),
+        lambda pi, tau: Cascade(pi, velocity_filters=(LowPass(time_constant=tau),)),
     ),
     _Variant(
         "command_filter",
         Text("a low pass of the command"),
-        _time_ends,
-        _time_starts,
-        lambda pi, z: Cascade(pi, command_filters=(_low_pass(z),)),
-        {"time_constant": (0, "s", True)},
+        (TIME_CONSTANT,),
+        lambda pi, tau: Cascade(pi, command_filters=(LowPass(time_constant=tau),)),
     ),
 )
 """Forms that a drive's controller often has, and other gains, which come first where they explain as much.
@@ -151,11 +159,13 @@ A rule of integration moves kp by less than a thousandth at a drive's clock.
 class UnloggedForm:
     """A model under another form of controller.
 
-    Its fit, the controller, its finding; its score, and that of the selected model under the given controller.
+    Its fit, the controller, what that has in words, its finding; its score, and that of the selected model under the given
+    controller.
     """
 
     fit: Fit
     controller: Cascade
+    words: Text
     finding: Finding
     score: float
     selected: float
@@ -201,7 +211,7 @@ def unlogged_form(space: Moves, final: Fit) -> UnloggedForm | None:
     selected = min(space.score(final), space.score(_opened(space, final)))
     close = {f[2]: f[2].words for f in known if f[1] < score + space.margin and f[2].finding != variant.finding}
     finding = _finding(variant, z, stds, selected - score, list(close.values()))
-    return UnloggedForm(fit, variant.controller(data.pi, z), finding, score, selected)
+    return UnloggedForm(fit, variant.of(data.pi, z), variant.words, finding, score, selected)
 
 
 def leaves_noise(space: Moves, fit: Fit) -> bool:
@@ -255,10 +265,10 @@ def _starts(space: Moves, objective: Objective, pi: PI, bases: list[Fit]) -> Ite
     dt, duration = space.data.dt, max(len(r) * r.dt for r in space.data.records)
     for base in bases:
         for variant in VARIANTS:
-            low, high = np.array(variant.ends(dt, duration)).T
-            under = UnderController(space.data, lambda z, made=variant.controller: made(pi, z), low, high)  # type: ignore[misc]
+            low, high = variant.ends(dt, duration)
+            under = UnderController(space.data, partial(variant.of, pi), low, high)
             for row in variant.starts(dt, duration):
-                z = np.clip(np.array(row), low, high)
+                z = np.clip(row, low, high)
                 v, J = objective.linearised(under.of(base.hypothesis, z), base.x, WHITE)
                 left = project_out(J, v[None, :])[0]
                 yield float(left @ left), (variant, under, base, z)
@@ -280,10 +290,7 @@ def _fitted(space: Moves, objective: Objective, variant: _Variant, under: UnderC
 
 def _finding(variant: _Variant, z: Vector, stds: Vector, gain: float, others: list[Text]) -> Finding:
     """What is reported of a form that takes the place of the given controller; others: forms that come as close."""
-    estimates = {}
-    for name, (at, unit, logarithm) in variant.parameters.items():
-        value = float(np.exp(z[at])) if logarithm else float(z[at])
-        estimates[name] = Estimate(value, float(stds[at]) * (value if logarithm else 1.0), unit)
+    estimates = {n.name: n.estimate(x, float(std)) for n, x, std in zip(variant.numbers, z, stds, strict=True)}
     text = (
         "No {torque} is logged; under a controller with {} ({}) command and velocity agree with the axis, and the best model "
         "under the given one is {:.0f} BIC units worse{}. Log the {torque}, which shows what the controller does."

@@ -45,7 +45,7 @@ from gaident.show.report.parts import (
 )
 from gaident.show.report.views import View
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
-from gaident.show.wording import either, missing_words, size_words, words
+from gaident.show.wording import cause_words, either, missing_words, words
 
 __all__ = ["chapters", "headline", "mark", "tiles"]
 
@@ -71,23 +71,18 @@ def headline(dia: Diagnosis, axis: str) -> str:
     causes = [f for f in dia.findings if not f.is_noise]
     if not causes:
         return "The model is wrong, and no effect of the library fits what is left."
-    named = list(dict.fromkeys(_sized(f, axis) for f in causes if not f.alternatives))
+    named = list(dict.fromkeys(cause_words(f, dia, axis, sized=True) for f in causes if not f.alternatives))
     listed = " and ".join(filter(None, (", ".join(named[:-1]), *named[-1:])))
     lacks = [listed] if named else []
-    lacks += list(dict.fromkeys(_open(f, axis) for f in causes if f.alternatives))
+    lacks += list(dict.fromkeys(_open(f, dia, axis) for f in causes if f.alternatives))
     text = f"The model lacks {'; and '.join(lacks)}"
     if dia.verdict == "partly explained":
         return f"{text}; this explains a part of what it gets wrong, and something significant is left."
     return f"{text}; with {'it' if len(causes) == 1 else 'them'} nothing significant is left."
 
 
-def _sized(f: Finding, axis: str) -> str:
-    size = size_words(f, axis)
-    return f"{words(f.effect, axis)} ({size})" if size else words(f.effect, axis)
-
-
-def _open(f: Finding, axis: str) -> str:
-    return missing_words(f, axis) or f"one of {either(f, axis)}, which these data do not tell apart"
+def _open(f: Finding, dia: Diagnosis, axis: str) -> str:
+    return missing_words(f, dia, axis) or f"one of {either(f, dia, axis)}, which these data do not tell apart"
 
 
 def mark(dia: Diagnosis) -> tuple[str, str, str]:
@@ -158,7 +153,8 @@ def _causes(dia: Diagnosis, view: View) -> Section:
         )
         parts.append(tag("p", text))
     for f in causes:
-        name = joined((tag("b", words(f.effect, axis)), *(joined((" or ", tag("b", words(a, axis)))) for a in f.alternatives)))
+        others = (words(a, axis) for a in f.alternatives)
+        name = joined((tag("b", cause_words(f, dia, axis)), *(joined((" or ", tag("b", other))) for other in others)))
         rows: list[Row] = [(n, *map(typeset, cells), remark) for n, *cells, remark in map(_row(view), f.parameters.items())]
         held = "in-sample" if dia.held_out == "in-sample" else "held-out"
         place = f"Place: {f.place}. " if f.place else ""

@@ -10,7 +10,7 @@ from gaident.show.html import Html, Row, joined, number, table, tag, typeset
 from gaident.show.report import diagnosis, identification
 from gaident.show.report.parts import Head, estimate
 from gaident.show.summary import meaning_of
-from gaident.show.wording import structure_words, words
+from gaident.show.wording import cause_words, structure_words, words
 
 __all__ = ["diagnosis_html", "identification_html"]
 
@@ -22,13 +22,13 @@ def diagnosis_html(dia: Diagnosis) -> Html:
     """Verdict, causes with their parameters and evidence, error before and after."""
     rows: list[Row] = []
     for f in (f for f in dia.findings if not f.is_noise):
-        name = " or ".join(words(effect, dia.axis) for effect in (f.effect, *f.alternatives))
+        name = " or ".join((cause_words(f, dia, dia.axis), *(words(effect, dia.axis) for effect in f.alternatives)))
         for i, parameter in enumerate(f.parameters):
             e = of_axis(parameter, f.parameters[parameter], dia.axis)
             cells = (words(parameter, dia.axis), estimate(e.value, e.std), typeset("" if e.unit == "1" else e.unit))
             rows.append((name if i == 0 else "", *cells))
     evidence = [
-        tag("li", tag("b", words(f.effect, dia.axis)), ": ", typeset(said(f.evidence, dia.axis)))
+        tag("li", tag("b", cause_words(f, dia, dia.axis)), ": ", typeset(said(f.evidence, dia.axis)))
         for f in dia.findings
         if f.evidence
     ]
