@@ -179,11 +179,11 @@ class DataSet:
 
     @cached_property
     def loopable(self) -> bool:
-        """Whether command and controller can drive a model too, from standstill.
+        """Whether command and controller can drive a model too, from standstill; never where they do not make the logged torque.
 
         Under a bare PI at the log's rate only where its integrator was empty before the records: the logged torque serves there.
         """
-        if self.loop is None or any(self.moving) or (self.slower and not self.loop_follows):
+        if self.loop is None or any(self.moving) or not self.loop_follows:
             return False
         if self.pi is not None and any(self.stored):
             return False

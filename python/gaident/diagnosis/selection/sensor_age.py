@@ -33,12 +33,14 @@ from gaident.data.signals.lattice import encoder_lines, encoder_step
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.mechanisms import is_mechanism, on_a_shaft, one_mass, reduced, resonance, swings
+from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.select import Selection
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Innovations, Objective
-from gaident.estimation.regression.torque_lag import torque_lag
+from gaident.estimation.regression.force_error import band_of
+from gaident.estimation.regression.torque_lag import TorqueLag, torque_lag
 from gaident.estimation.term import Scales, Term
 from gaident.models.held_torque import sampled_between
 from gaident.models.model import Model
@@ -47,6 +49,7 @@ from gaident.policy.table import POLICY
 __all__ = ["searched"]
 
 HALF = 0.5  # no decision: of a sample, the age of a mean over it
+SURE = 0.02  # no decision: lines, to which a search finds by how much the torque is ahead
 
 
 def searched(
@@ -58,15 +61,22 @@ def searched(
     if controller is not None and (controller.loop == "continuous" or (data.loop is not None and any(data.moving))):
         return search(objective), []
     every = 1 if controller is None else controller.log_every(data.dt)
-    if every == 1 and (ahead := _ahead(data)) is not None:
+    if every == 1 and (ahead := _ahead(data, model)) is not None:
         text = (
             "The motion comes {:.2g} ms before a {torque} that is held over each line of the log, which no axis does: between "
             "the lines the {torque} goes on, as that of a controller does that is faster than the log. The simulation has it; "
             "what is late by less than half a line ({:.2g} ms) is not seen in this log. Give the controller's period, or log "
             "every sample."
         )
-        earlier = Objective(data.aged(-ahead), objective.weight, counter=objective.counter)
-        return search(earlier), [say(text, 1e3 * ahead * data.dt, 1e3 * HALF * data.dt)]
+
+        def under(lines: float) -> Selection:
+            return search(Objective(data.aged(-lines), objective.weight, counter=objective.counter))
+
+        found = under(ahead.lag)
+        closer = _refined(found, ahead)
+        found = found if closer is None else under(closer)
+        used = ahead.lag if closer is None else closer
+        return found, [say(text, 1e3 * used * data.dt, 1e3 * HALF * data.dt)]
     if every == 1 and all(is_backward_difference(r.velocity, r.position, data.dt) for r in data.records):
         text = (
             "The velocity is the difference of the last two {angles}: half a sample old ({:.3g} ms). The simulation has it; "
@@ -100,21 +110,45 @@ def searched(
     return again, [say(text, step, age)]
 
 
-def _ahead(data: DataSet) -> float | None:
+def _ahead(data: DataSet, model: Model) -> TorqueLag | None:
     """By how many lines the mean of the torque over a line is ahead of it; None where it is not, or no held torque drives."""
     drives = data.torque_logged and (data.open_runs or not data.loop_follows)
     if not drives or any(sampled_between(r) for r in data.driven):
         return None
     # Seen from the velocity that is fitted, not from the position, which may be younger.
-    lags = [torque_lag(r.with_channels(position=None)) for r in data.driven]
-    shown = [lag for lag in lags if lag is not None]
+    moving = [r.with_channels(position=None) for r in data.driven]
+    band = band_of(model, moving, below=POLICY.rigid_band)
+    shown = [lag for r in moving if (lag := torque_lag(r, band)) is not None]
     if not shown:
         return None
     weights = np.array([lag.std**-2 for lag in shown])
     ahead = float(weights @ np.array([lag.lag for lag in shown]) / weights.sum())
     std = float(weights.sum() ** -0.5)
-    seen = ahead > max(POLICY.ahead_seen, POLICY.contradiction * std)
-    return min(ahead, HALF) if seen and ahead < HALF + POLICY.contradiction * std else None
+    if not ahead > max(POLICY.ahead_seen, POLICY.contradiction * std) or ahead > HALF + POLICY.contradiction * std:
+        return None
+    return TorqueLag(min(ahead, HALF), std, max(lag.left for lag in shown))
+
+
+def _refined(found: Selection, ahead: TorqueLag) -> float | None:
+    """With how many lines the model that was found comes closest, without what is late itself; None: no others than it had.
+
+    The regression of a rigid axis shows it less closely where the load swings.
+    """
+    from scipy.optimize import minimize_scalar
+
+    if ahead.std < SURE:
+        return None
+    space, final = found.space, found.final
+    for term in final.parameters.terms:
+        if term.in_series:
+            final = space.without(final, term.name)
+
+    def score(lines: float) -> float:
+        return _score_under(space.objective.data.aged(-float(lines)), final, space)
+
+    best = minimize_scalar(score, bounds=(0.0, HALF), method="bounded", options={"xatol": SURE})
+    closer = float(best.x)
+    return closer if abs(closer - ahead.lag) > SURE and best.fun < score(ahead.lag) else None
 
 
 def _score_beside(again: Selection, found: Selection) -> float:
@@ -122,9 +156,12 @@ def _score_beside(again: Selection, found: Selection) -> float:
 
     How many of the output errors are independent is of each search its own: two scores tell nothing of each other.
     """
-    data = again.space.data
-    space = replace(found.space, objective=replace(found.space.objective, data=data), grown={})
-    final = again.final
+    return _score_under(again.space.data, again.final, found.space)
+
+
+def _score_under(data: DataSet, final: Fit, space: Moves) -> float:
+    """Score of a model over these data, fitted again, under the errors of a search."""
+    space = replace(space, objective=replace(space.objective, data=data), grown={})
     return space.score(space.refitted(final.hypothesis.driven_by(replace(final.predictor, data=data)), final.x))  # type: ignore[type-var]
 
 

@@ -47,13 +47,15 @@ class TorqueLag:
     left: float
 
 
-def torque_lag(rec: Record) -> TorqueLag | None:
-    """The lag of the record's torque; None without one, or where the motion does not tell."""
+def torque_lag(rec: Record, cutoff_hz: float | None = None) -> TorqueLag | None:
+    """The lag of the record's torque; None without one, or where the motion does not tell.
+
+    cutoff_hz: of the filter, at most; None: that of the regression. What swings above it is no rigid axis."""
     if rec.torque is None:
         return None
     rec = rec[:LONGEST]
     assert rec.torque is not None
-    cutoff = cutoff_of(rec, ORDER)
+    cutoff = min(cutoff_of(rec, ORDER), np.inf if cutoff_hz is None else cutoff_hz)
     factor = decimation_of(None, cutoff, rec.dt)
     held = 0.5 * (rec.torque + np.concatenate([rec.torque[:1], rec.torque[:-1]]))
     both = bool(np.any(rec.velocity > 0.0) and np.any(rec.velocity < 0.0))

@@ -1,0 +1,67 @@
+"""A torque that goes on between the lines of a log slower than its controller, whose period nobody gave."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from drive_rig import Noise, Plant, rig, skip_without_library
+from gaident.estimation.regression.torque_lag import torque_lag
+from gaident.models.drive_torque import late
+
+DT, EVERY, KP, KI, SLOPE = 1e-3, 4, 0.08, 4.0, 1500.0
+NOTCHED = ga.Cascade(ga.PI(KP, KI), DT / EVERY, position=ga.P(20.0), torque_filters=(ga.Notch(200.0, 0.1, 0.7),))
+GIVEN = ga.Cascade(ga.PI(KP, KI), position=ga.P(20.0))
+ONE = Plant(J=1e-3, D=2e-3, kp=KP, ki=KI, dt=DT, cascade=NOTCHED)
+
+
+def command() -> np.ndarray:
+    """Angles of moves at levels of both signs, 0.3 s each, with ramps between them [rad]."""
+    levels = np.random.default_rng(3).permutation([5.0, -10.0, 20.0, -40.0, 60.0, -60.0, 30.0, -3.0, 0.0, 15.0])
+    ramp = np.arange(300) * SLOPE * DT
+    before = np.append(0.0, levels[:-1])
+    speed = np.concatenate([a + np.sign(b - a) * np.minimum(ramp, abs(b - a)) for a, b in zip(before, levels, strict=True)])
+    return np.asarray(np.cumsum(speed) * DT)
+
+
+def record(plant: Plant, differenced: bool) -> ga.Record:
+    """Read by an encoder of 2^20 lines, with dry friction."""
+    skip_without_library()
+    noise = Noise(white=0.0, encoder=2.0 * np.pi / 2**20, differenced=differenced)
+    return rig(plant, command(), {"coulomb_friction": {"torque": 0.15}}, noise, 1)
+
+
+@pytest.mark.parametrize("differenced", [False, True])
+def test_the_mean_of_a_torque_over_a_line_is_ahead_of_it(differenced: bool) -> None:
+    """(r - 1)/(2r) lines, less the age of the velocity, half a sample of the controller."""
+    seen = torque_lag(record(ONE, differenced))
+    assert seen is not None
+    expected = (EVERY - 1 - differenced) / (2.0 * EVERY)
+    assert abs(seen.lag - expected) < max(3.0 * seen.std, 0.03)
+
+
+def test_a_torque_ahead_is_on_its_way_to_that_of_the_next_line() -> None:
+    u = np.array([0.0, 1.0, 3.0, 2.0])
+    assert late(u, -0.25, 0.0) == pytest.approx([0.25, 1.5, 2.75, 2.0])
+    assert late(u, 0.0, 0.0) is u
+
+
+@pytest.mark.parametrize("differenced", [False, True])
+def test_a_forgotten_period_is_no_second_mass(differenced: bool) -> None:
+    dia = ga.diagnose(record(ONE, differenced), GIVEN)
+    assert any("goes on, as that of a controller does that is faster" in note for note in dia.notes), dia.summary()
+    assert {f.effect: f.alternatives for f in dia.causes} == {"coulomb_friction": ()}, dia.summary()
+    assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=1e-3) and "stiffness" not in dia.mechanics
+    assert dia.causes[0].parameters["torque"].value == pytest.approx(0.15, rel=0.01)
+
+
+def test_a_torque_that_is_held_is_not_moved() -> None:
+    at_its_rate = replace(ONE, cascade=replace(NOTCHED, period=DT))
+    rec = record(at_its_rate, differenced=False)
+    seen = torque_lag(rec)
+    assert seen is not None and abs(seen.lag) < max(3.0 * seen.std, 0.03)
+    dia = ga.diagnose(rec.with_channels(position_command=None))
+    assert not any("goes on, as that of a controller" in note for note in dia.notes), dia.summary()
