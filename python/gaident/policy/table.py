@@ -160,7 +160,9 @@ class Policy:
     replay_left: float = loop(1e-3, "1", "most that an effect leaves of the replay's squared error where it explains it")
     replay_noise: float = loop(0.1, "1", "part of the torque's standard deviation: more is no noise of a measured torque")
     same_gains: float = loop(1e-2, "1", "relative difference of the gains of several logs, up to which they are the same")
-    gain_doubt: float = loop(0.2, "1", "of a given gain, by which it may be off where no torque is logged that would show it")
+    gain_doubt: float = loop(
+        0.2, "1", "of a given gain, by which it may be off where no torque is logged that would show it", DRIVES
+    )
     same_value: float = loop(2e-3, "1", "relative difference up to which two limits are one, or a gain is the configured one")
     at_limit: float = loop(0.999, "1", "of a limit, from which a torque or an integral is at it")
     plateau: int = loop(5, "samples", "at a limit, from which a torque or an integral is held there")
