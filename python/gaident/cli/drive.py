@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from gaident.axis import Text, say
@@ -62,9 +62,21 @@ def _selected(args: argparse.Namespace) -> str | None:
     return names[0] if names else None
 
 
-def read_all(drive: Drive, logs: Sequence[str], controller: Controller | None, measured: bool = True) -> list[Record]:
-    """The logs, each with what drives its simulation; raises SettingsError where that is missing."""
-    named = [(log, rec) for log in logs for rec in drive.records(log, measured)]
+def read_all(
+    drive: Drive,
+    logs: Sequence[str],
+    controller: Controller | None,
+    measured: bool = True,
+    doing: Callable[[str], None] = lambda message: None,
+) -> list[Record]:
+    """The logs, each with what drives its simulation; raises SettingsError where that is missing.
+
+    doing: told which log is being read.
+    """
+    named = []
+    for log in logs:
+        doing(f"reading {log}")
+        named += [(log, rec) for rec in drive.records(log, measured)]
     for log, rec in named:
         if controller is not None and controller.driven_by == "position_command":
             if rec.position_command is None:

@@ -50,16 +50,19 @@ class ResultFiles:
         validation: Sequence[Record],
         drive: Drive,
         figure: Callable[[], Figure],
+        doing: Callable[[str], None],
     ) -> list[Path]:
-        """Write those that were asked for and return them; figure: draws the picture."""
+        """Write those that were asked for and return them; figure: draws the picture; doing: told what is under way."""
         if self.result is not None:
             with naming(self.result):
                 result.save(self.result)
         if self.picture is not None:
+            doing(f"drawing {self.picture}")
             from gaident.show.units import figure_in_units, scales_of
 
             save_figure(figure_in_units(figure(), scales_of(drive.units_shown, drive.axis)), self.picture)
         if self.page is not None:
+            doing(f"writing {self.page}")
             write_report(result, self.page, records, validation, drive, self.live)
         return [path for path in (self.result, self.picture, self.page) if path is not None]
 

@@ -253,8 +253,8 @@ def _parsed(path: str) -> dict[str, Any]:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        comma = _decimal_comma(text, str(error))
-        raise ReadError(f"{path}: {comma or f'this is not TOML ({error}); see gaident identify --help'}") from None
+        otherwise = _as_toml_has_it(text, str(error))
+        raise ReadError(f"{path}: {otherwise or f'this is not TOML ({error}); see gaident identify --help'}") from None
     if not data:
         raise ReadError(
             f"{path}: this drive file is empty: it holds {_SECTIONS} and {', '.join(KEYS[''])}; leave it out otherwise"
@@ -291,21 +291,36 @@ def unfilled_of(path: str, axis: str | None = None) -> dict[tuple[str, str], str
     return found
 
 
-def _decimal_comma(text: str, error: str) -> str:
-    """What to write where TOML stumbled over 0,5; "" where it was something else."""
+def _as_toml_has_it(text: str, error: str) -> str:
+    """What to write where TOML stumbled over 0,5 or .5 or 5. or 05, or a text without quotes; "" where it was something else."""
     at = re.search(r"at line (\d+)", error)
     lines = text.splitlines()
     number = int(at[1]) if at is not None else len(lines)
-    found = _WITH_COMMA.match(lines[number - 1]) if 0 < number <= len(lines) else None
-    if found is None:
-        return ""
-    key, value = found.groups()
-    return f"line {number}: {key} is {value}, with a decimal comma: write {value.replace(',', '.')}"
+    line = lines[number - 1] if 0 < number <= len(lines) else ""
+    if (comma := _WITH_COMMA.match(line)) is not None:
+        key, value = comma.groups()
+        return f"line {number}: {key} is {value}, with a decimal comma: write {value.replace(',', '.')}"
+    key, _, rest = line.partition("=")
+    value = _TEXT.sub('""', rest).partition("#")[0].strip()
+    if _WORD.fullmatch(value):
+        meant = value.lower() if value.lower() in ("true", "false") else f'"{value}"'
+        return f"line {number}: {key.strip()} is {value}, which is no value in TOML: write {meant}"
+    for found in _NUMBER.finditer(value):
+        sign, whole, part, power = found[1], found[2], found[3], found[4] or ""
+        if not (whole or part):
+            continue
+        written = sign + (whole.lstrip("0") or "0") + ("" if part is None else f".{part or 0}") + power
+        if written != found[0]:
+            return f"line {number}: {key.strip()} holds {found[0]}, which is no number in TOML: write {written}"
+    return ""
 
 
 _SECTION = re.compile(r"\s*\[([\w.]+)\]")
 _MARK = re.compile(r"\s*#\s*(\w+)\s*=.*#\s*FILL IN\b")
 _WITH_COMMA = re.compile(r"\s*([\w.-]+)\s*=\s*([-+]?\d+,\d+(?:[eE][-+]?\d+)?)\s*(?:#|$)")
+_TEXT = re.compile(r""" "[^"]*" | '[^']*' """, re.VERBOSE)
+_WORD = re.compile(r"[^\W\d][^={}\"'\\]*")
+_NUMBER = re.compile(r"(?<![\w.+-])([-+]?)(\d*)(?:\.(\d*))?([eE][-+]?\d+)?(?![\w.])")
 _SECTIONS = ", ".join(f"[{name}]" for name in KEYS if name)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+import threading
 import time
 from collections.abc import Callable
 from html import escape
@@ -22,6 +23,7 @@ class Progress:
     """Draws `(fraction, message)`; as a context it gives the function that takes them.
 
     Nothing is drawn, and None is given instead of a function, where `stream` is neither a terminal nor a notebook.
+    On a terminal it appears after a moment whether or not something was told since, so that no long step looks like a standstill.
     NO_COLOR is respected. What was drawn is gone when the context ends.
     """
 
@@ -29,26 +31,52 @@ class Progress:
         self.stream = stream if stream is not None and (stream.isatty() or _in_notebook()) else None
         self.began = time.monotonic()
         self.bar: _TerminalBar | _NotebookBar | None = None
+        self._told = 0.0, "starting"
+        self._lock = threading.Lock()
+        self._alarm: threading.Timer | None = None
 
     def __enter__(self) -> Callable[[float, str], None] | None:
-        return None if self.stream is None else self.show
+        if self.stream is None:
+            return None
+        if not _in_notebook():  # a kernel shows what a thread draws in another cell
+            self._alarm = threading.Timer(_QUIET, self._late)
+            self._alarm.daemon = True
+            self._alarm.start()
+        return self.show
 
     def show(self, fraction: float, message: str) -> None:
         """fraction of the work that is done, 0 to 1; message: generation, best fitness, species, or what else is under way."""
-        passed = time.monotonic() - self.began
+        with self._lock:
+            self._told = min(max(fraction, 0.0), 1.0), message
+            if self.bar is not None or time.monotonic() - self.began >= _QUIET:
+                self._draw()
+
+    def doing(self, message: str) -> None:
+        """What is under way now, as far as before."""
+        if self.stream is not None:
+            self.show(self._told[0], message)
+
+    def _late(self) -> None:
+        with self._lock:
+            if self._alarm is not None and self.bar is None:
+                self._draw()
+
+    def _draw(self) -> None:
         if self.bar is None:
-            if passed < _QUIET:
-                return
             self.bar = _NotebookBar() if _in_notebook() else _TerminalBar(self.stream)
-        done = min(max(fraction, 0.0), 1.0)
-        left = passed * (1.0 - done) / done if done > _FRACTION else None
+        done, message = self._told
+        left = (time.monotonic() - self.began) * (1.0 - done) / done if _FRACTION < done < 1.0 else None
         remains = "" if left is None else Message(f"about {_clock(left)} left", f"{_clock(left)} left")
         self.bar.update(done, message, remains)
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None) -> None:
-        if self.bar is not None:
-            self.bar.stop()
-            self.bar = None
+        with self._lock:
+            if self._alarm is not None:
+                self._alarm.cancel()
+                self._alarm = None
+            if self.bar is not None:
+                self.bar.stop()
+                self.bar = None
 
 
 class _TerminalBar:

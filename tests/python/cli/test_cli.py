@@ -173,13 +173,13 @@ def test_demo_without_measured_data(here: Path, capsys: pytest.CaptureFixture[st
     assert "(p,q) = (1,2), two masses on a shaft; the linear model stands" in out
     assert "Compared with the truth" in out
     assert "\nThe measured EMPS axis is left out: GAIDENT_DATA" in out
-    assert "\nVerdict: explained\n" in out and "Cause: coulomb\nfriction." in out
+    assert "\nVerdict: explained\n" in out and "Cause: coulomb\nfriction at the motor." in out
     assert "\nThe truth: a dry friction of 0.04 N m" in out
     made = [f"demo_{name}.{suffix}" for name in ("friction", "two_mass") for suffix in ("csv", "png")]
     assert sorted(p.name for p in here.iterdir()) == [*made, "step.csv"]
     # The commands that it proposes, the first with the drive file of the examples.
     assert main(out.splitlines()[-1].split()[1:]) == 0
-    assert "Cause: coulomb\nfriction." in capsys.readouterr().out
+    assert "Cause: coulomb\nfriction at the motor." in capsys.readouterr().out
     drive = ROOT / "examples" / "drive.toml"
     assert main(["identify", "demo_two_mass.csv", "--drive", str(drive)]) == 0
     assert capsys.readouterr().out.startswith("(p,q) = (1,2)")

@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 import types
 from pathlib import Path
 
@@ -400,6 +401,30 @@ def test_progress_is_drawn_on_a_terminal_and_nowhere_else(monkeypatch: pytest.Mo
         assert show is None
     with Progress(None) as show:
         assert show is None
+
+
+def test_a_long_step_is_named_although_nothing_is_told_in_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("rich")
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.setattr("gaident.show.progress_bar._QUIET", 0.05)
+    stream = Terminal()
+    with (bar := Progress(stream)) as show:
+        assert show is not None
+        bar.doing("reading run1.csv")
+        deadline = time.monotonic() + 20.0
+        while "reading run1.csv" not in stream.getvalue() and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert "reading run1.csv" in stream.getvalue()
+        show(0.5, "looking beyond the linear model")
+        bar.doing("writing run1.html")
+    assert "50%" in stream.getvalue() and "writing run1.html" in stream.getvalue()
+    stream = Terminal()
+    monkeypatch.setattr("gaident.show.progress_bar._QUIET", 60.0)
+    with (bar := Progress(stream)):
+        bar.doing("reading run1.csv")
+    assert stream.getvalue() == ""
+    Progress(None).doing("nothing is drawn")
 
 
 def test_progress_in_a_notebook(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -157,6 +157,18 @@ def test_init_keeps_a_german_position_and_its_command(tmp_path: Path, monkeypatc
         ("speed_rpm", "rpm"),
         ("torque_Nm", "Nm"),
         ("Speed rad/s", "rad/s"),
+        ("pos_cmd_deg", "deg"),
+        ("theta-rad", "rad"),
+        ("x_act_mm", "mm"),
+        ("vel_rad_s", "rad/s"),
+        ("vel_deg_per_s", "deg/s"),
+        ("v_m_s", "m/s"),
+        ("feed mm_min", "mm/min"),
+        ("omega_radps", "rad/s"),
+        ("torque_pct", "%"),
+        ("enc_counts", "counts"),
+        ("i_a", None),
+        ("deg", None),
         ("Torque [% of rated torque]", "% of rated torque"),
         ("M [‰]", "‰"),
         ("turn count", None),
@@ -168,6 +180,19 @@ def test_a_unit_in_the_name(name: str, unit: str | None, tmp_path: Path) -> None
     rows = "".join(f"{k};{np.sin(k):.4f}\n" for k in range(30))
     (tmp_path / "log.csv").write_text(f"t;{name}\n{rows}", encoding="utf-8")
     assert ga.columns(tmp_path / "log.csv").columns[1].unit == unit
+
+
+def test_a_unit_in_the_name_of_an_array_and_what_init_makes_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No unit is asked for that the name says; it is read in that unit."""
+    monkeypatch.chdir(tmp_path)
+    t = 1e-3 * np.arange(400)
+    angle = 90.0 * np.sin(6.0 * t)
+    np.savez("log.npz", time=t, pos_cmd_deg=np.roll(angle, -2), pos_deg=angle)
+    assert main(["init", "log.npz"]) == 0
+    text = Path("drive.toml").read_text()
+    assert 'position_command = "deg"' in text and 'position = "deg"' in text
+    rec = ga.read("log.npz", columns={"position": "pos_deg", "position_command": "pos_cmd_deg"})
+    assert rec.position is not None and rec.position == pytest.approx(np.radians(angle))
 
 
 def test_per_mille_of_the_rated_torque(tmp_path: Path) -> None:

@@ -99,18 +99,19 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
     following = target_of(args.next_command, sources)
     files = ResultFiles.of(args, sources, **{"--next-command": following})
     controller = drive.controller()
-    records = read_all(drive, args.logs, controller)
-    validation = read_all(drive, args.validation, controller) if args.validation else None
-    idn = None
-    if args.model is not None:
-        loaded = load(args.model)
-        if not isinstance(loaded, Identification):
-            raise SettingsError(f"--model {args.model} holds no identification: give what gaident identify --out saved")
-        idn = loaded
-    if idn is None:
-        driven = torque_driven(records, controller)
-        derive_space(driven.records, driven.loop)  # wrong signs and units are found before anything is searched for
-    with Progress(None if args.quiet else sys.stderr) as progress:
+    with (bar := Progress(None if args.quiet else sys.stderr)) as progress:
+        records = read_all(drive, args.logs, controller, doing=bar.doing)
+        validation = read_all(drive, args.validation, controller, doing=bar.doing) if args.validation else None
+        idn = None
+        if args.model is not None:
+            loaded = load(args.model)
+            if not isinstance(loaded, Identification):
+                raise SettingsError(f"--model {args.model} holds no identification: give what gaident identify --out saved")
+            idn = loaded
+        bar.doing("looking at the records")
+        if idn is None:
+            driven = torque_driven(records, controller)
+            derive_space(driven.records, driven.loop)  # wrong signs and units are found before anything is searched for
         dia = diagnose(
             records,
             controller,
@@ -123,8 +124,8 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
             axis=drive.axis,
             pitch=drive.pitch,
         )
-    dia = replace(dia, notes=(*reading_notes(drive, [*records, *(validation or ())]), *dia.notes))
-    written = files.write(dia, records, validation or (), drive, lambda: dia.plot(axis=drive.axis))
+        dia = replace(dia, notes=(*reading_notes(drive, [*records, *(validation or ())]), *dia.notes))
+        written = files.write(dia, records, validation or (), drive, lambda: dia.plot(axis=drive.axis), bar.doing)
     if following is not None and dia.next_experiment is not None:
         write(following, proposal_csv(dia.next_experiment, drive.axis).encode())
         written.append(following)

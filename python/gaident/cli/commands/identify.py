@@ -29,10 +29,11 @@ def identify_command(args: argparse.Namespace) -> None:
     drive = drive_of(args)
     files = ResultFiles.of(args, args.logs)
     controller = drive.controller()
-    records = read_all(drive, args.logs, controller)
     settings = Settings.paper() if args.paper else Settings()
     settings = replace(settings, initial_state=args.initial_state)
-    with Progress(None if args.quiet else sys.stderr) as progress:
+    with (bar := Progress(None if args.quiet else sys.stderr)) as progress:
+        records = read_all(drive, args.logs, controller, doing=bar.doing)
+        bar.doing("deriving where to look from the data")
         idn = identify(
             records,
             controller,
@@ -43,13 +44,13 @@ def identify_command(args: argparse.Namespace) -> None:
             workers=args.workers,
             progress=progress,
         )
-    # What the logs say of the controller, which the search takes as given.
-    off = [
-        say("{}{}{}", f"{name}: " if len(records) > 1 else "", said.sentence, _instead(said, controller))
-        for name, said in _replayed(records, controller)
-    ]
-    idn = replace(idn, warnings=(*reading_notes(drive, records), *off, *idn.warnings))
-    written = files.write(idn, records, (), drive, lambda: idn.plot(records, drive.axis))
+        # What the logs say of the controller, which the search takes as given.
+        off = [
+            say("{}{}{}", f"{name}: " if len(records) > 1 else "", said.sentence, _instead(said, controller))
+            for name, said in _replayed(records, controller)
+        ]
+        idn = replace(idn, warnings=(*reading_notes(drive, records), *off, *idn.warnings))
+        written = files.write(idn, records, (), drive, lambda: idn.plot(records, drive.axis), bar.doing)
     if args.json:
         print_json({**on_axis(idn.to_dict(), drive.axis), **shown_block(idn, drive)})
         return

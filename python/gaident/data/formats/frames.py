@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gaident.data.formats.stored import library, midnight, seconds_since, unique_keys
 from gaident.data.formats.table import BLOCK, Column, Table, first_line
+from gaident.data.formats.unit_names import unit_of
 from gaident.errors import ReadError
 
 __all__ = ["frame_table", "is_frame", "open_parquet"]
@@ -40,8 +41,8 @@ def open_parquet(path: str, file: Path, stack: ExitStack) -> Table:
             others.append(f"{field.name!r} ({field.type})")
             continue
         metadata = field.metadata or {}
-        unit = next((metadata[key].decode("utf-8", "replace") for key in (b"units", b"unit") if key in metadata), None)
-        columns.append(Column(field.name, np.zeros(0), (), "s" if kind in "Mm" else unit))
+        stated = next((metadata[key].decode("utf-8", "replace") for key in (b"units", b"unit") if key in metadata), None)
+        columns.append(Column(field.name, np.zeros(0), (), "s" if kind in "Mm" else stated or unit_of(field.name)))
     if not columns:
         raise ReadError(f"{path}: the file holds no columns of numbers (only {', '.join(others)})")
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from gaident.data.formats.dialect import Dialect, parse_number, split
 from gaident.data.formats.text import Line
 from gaident.data.formats.time_names import NO_NAME
+from gaident.data.formats.unit_names import name_and_unit
 from gaident.data.formats.units import is_any_unit, is_unit
 
 __all__ = ["COMMENT", "Header", "Heading", "find_header"]
@@ -20,8 +21,6 @@ COMMENT = re.compile(r"\s*(#|//|%)")
 _BRACKETS = re.compile(r"(.*\S)\s*[\[(<{]([^\])>}]+)[\])>}]")
 _NOTED = re.compile(r"(.*\S)\s*\[([^\]]+)\]\s*\S.*")  # n_ist [1/min] (smoothed)
 _AFTER = re.compile(r"(.*\S)\s+(?:/|in)\s+(\S.*)")
-_PLAIN = re.compile(r"(.*[^\s_-])[\s_-]+(rpm|nm|rad/s|deg/s|1/min|r/min|u/min|min-1|m/s|mm/s|m/min|mm/min)", re.IGNORECASE)
-"""A unit behind a blank or underline, of those that are no word beside: speed_rpm, torque_Nm."""
 _ENCLOSED = re.compile(r"[\[(<{](.*)[\])>}]")
 
 
@@ -192,9 +191,9 @@ def _split_unit(cell: str) -> tuple[str, str | None]:
     """`w [rpm]`, `w (rpm)`, `w / rpm`, `n in rpm` -> (w, rpm).
 
     Square brackets always hold a unit, unless a number (`w[0]`); what else is enclosed counts if it is a
-    known unit.
+    known unit. Of the others `name_and_unit` knows those that end a name: speed_rpm.
     """
-    for pattern in (_BRACKETS, _NOTED, _AFTER, _PLAIN):
+    for pattern in (_BRACKETS, _NOTED, _AFTER):
         match = pattern.fullmatch(cell)
         if match is None:
             continue
@@ -202,4 +201,4 @@ def _split_unit(cell: str) -> tuple[str, str | None]:
         square = pattern is _BRACKETS and cell.endswith("]") and not unit.lstrip("+-").isdigit()
         if is_any_unit(unit) or square:
             return name, _bare_unit(unit)
-    return cell, None
+    return name_and_unit(cell) or (cell, None)

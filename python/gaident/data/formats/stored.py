@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.formats.table import Column, Stored, Table
+from gaident.data.formats.unit_names import unit_of
 from gaident.errors import ReadError
 
 __all__ = ["Matrix", "array_table", "library", "midnight", "seconds_since", "unique_keys"]
@@ -46,7 +47,7 @@ def array_table(
         raise ReadError(f"{path}: the file holds no arrays of numbers{rest}; save the log's columns as plain vectors")
     columns: list[Column] = []
     matrices: dict[str, Any] = {}
-    units = {} if units is None else units
+    units = {name: unit for name in arrays if (unit := (units or {}).get(name) or unit_of(name)) is not None}
     for name, array in arrays.items():
         if isinstance(array, Stored) or (isinstance(array, np.ndarray) and array.ndim == 1):
             columns.append(Column(name, array, _last_part(name), units.get(name)))
