@@ -107,7 +107,8 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
             raise SettingsError(f"--model {args.model} holds no identification: give what gaident identify --out saved")
         idn = loaded
     if idn is None:
-        driven = torque_driven(records, controller)
+        # Numbers that are not known are estimated from a logged torque, which drives the model here.
+        driven = torque_driven(records, controller if controller is None or not controller.unknown else None)
         derive_space(driven.records, driven.loop)  # wrong signs and units are found before anything is searched for
     with Progress(None if args.quiet else sys.stderr) as progress:
         dia = diagnose(
