@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,9 @@ from gaident.control import core
 from gaident.control.controller import Controller, Limiting, Signals
 from gaident.control.drive_parameters import position_gain
 from gaident.control.filtering import filtered, rate_limited
-from gaident.control.filters import LowPass, Notch, filter_of
+from gaident.control.filters import Filter, filter_of, filters_of
 from gaident.control.pi import PI
-from gaident.control.ticks import Feedforward, Ticks, ticks_of
+from gaident.control.ticks import INTERPOLATIONS, Feedforward, Ticks, multiple_of, ticks_of
 from gaident.control.unknown import known, with_own
 from gaident.control.words import UNKNOWN
 from gaident.errors import ControllerError
@@ -25,12 +25,9 @@ from gaident.errors import ControllerError
 __all__ = ["Cascade", "Filter", "P", "cascade_of", "controller_of"]
 
 Vector = NDArray[np.float64]
-Filter: TypeAlias = LowPass | Notch
 
-WHOLE = 1e-6  # no decision: rounding of two decimal numbers that divide; more is no whole multiple
 FEEDFORWARDS = ("velocity_feedforward", "acceleration_feedforward", "friction_feedforward")
 FILTERS = ("torque_filters", "velocity_filters", "command_filters")
-MOST_FILTERS = 8  # no decision: what an argument may be
 LONGEST_DELAY = 1.0  # no decision: s, as of the effect transport_delay; what an argument may be
 
 
@@ -132,12 +129,14 @@ class Cascade(Controller):
     delay : float
         [s], from 0 to 1: the torque acts at the motor so long after its sample, and is held for T then. Any part of T.
         The logged torque is the one before it.
+    interpolation : {"straight", "smooth"}
+        How a position command goes between the lines of a log that is slower than the controller.
 
     Raises
     ------
     ControllerError
-        For a velocity controller of another kind, times that are not above 0 or no whole multiples, a delay beyond its range, and
-        a feedforward of the position loop without one.
+        For a velocity controller of another kind, times that are not above 0 or no whole multiples, a delay beyond its range, an
+        interpolation of another name, and a feedforward of the position loop without one.
 
     Examples
     --------
@@ -160,6 +159,7 @@ class Cascade(Controller):
     velocity_filters: Sequence[Filter] = ()
     command_filters: Sequence[Filter] = ()
     delay: float = 0.0
+    interpolation: str = "straight"
 
     if TYPE_CHECKING:  # None is what is not known; whoever simulates has asked for numbers before (`gaident.control.unknown`)
 
@@ -176,6 +176,7 @@ class Cascade(Controller):
             velocity_filters: Sequence[Filter] = ...,
             command_filters: Sequence[Filter] = ...,
             delay: float = ...,
+            interpolation: str = ...,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -199,15 +200,17 @@ class Cascade(Controller):
         if not 0.0 <= delay <= LONGEST_DELAY:
             raise ControllerError(f"delay is {delay:g}: give seconds, from 0 to {LONGEST_DELAY:g}")
         object.__setattr__(self, "delay", delay)
+        if self.interpolation not in INTERPOLATIONS:
+            raise ControllerError(f"interpolation is {self.interpolation!r}: give {' or '.join(map(repr, INTERPOLATIONS))}")
         if self.position is None and (self.velocity_feedforward != 0.0 or self.position_period is not None):
             given = "velocity_feedforward" if self.velocity_feedforward != 0.0 else "position_period"
             raise ControllerError(
                 f"{given} belongs to a position controller, and there is none: give position=P(gain) or leave it out"
             )
         if self.period is not None and self.position_period is not None:
-            _multiple(self.position_period, self.period, "position_period", "period")
+            multiple_of(self.position_period, self.period, "position_period", "period")
         for name in FILTERS:
-            object.__setattr__(self, name, _filters(getattr(self, name), name))
+            object.__setattr__(self, name, filters_of(getattr(self, name), name))
 
     @property
     def loop(self) -> str:
@@ -256,13 +259,19 @@ class Cascade(Controller):
 
     def log_every(self, dt: float) -> int:
         """Controller samples for each line of a log with the sample time dt [s]; ControllerError where it is no whole number."""
-        return 1 if self.period is None else _multiple(dt, self.period, "the record's dt", "period")
+        return 1 if self.period is None else multiple_of(dt, self.period, "the record's dt", "period")
+
+    def courses(self, dt: float) -> tuple[Cascade, ...]:
+        """See `Controller`: each interpolation of a position command."""
+        if self.position is None or self.log_every(dt) == 1:
+            return (self,)
+        return self, *(replace(self, interpolation=name) for name in INTERPOLATIONS if name != self.interpolation)
 
     def position_every(self, dt: float) -> int:
         """Velocity controller's samples for each of the position controller's, in a log with the sample time dt [s]."""
         if self.position_period is None:
             return 1
-        return _multiple(self.position_period, dt if self.period is None else self.period, "position_period", "period")
+        return multiple_of(self.position_period, dt if self.period is None else self.period, "position_period", "period")
 
     def line_equation(self, log: Signals, poles: int) -> bool:
         """See `Controller`: with a position controller that samples at each line, and without acceleration feedforward there."""
@@ -270,7 +279,8 @@ class Cascade(Controller):
         if every == 1 or source is None or self.limited or self.friction_feedforward != 0.0:
             return False
         if self.position is not None:
-            fits = self.acceleration_feedforward == 0.0 and every % self.position_every(log.dt) == 0
+            at_lines = self.interpolation == "straight" and every % self.position_every(log.dt) == 0
+            fits = at_lines and self.acceleration_feedforward == 0.0
         else:
             # What stood before a record is not known: a jump at its first line would be one of the command's slope.
             fits = self.acceleration_feedforward == 0.0 or float(source[0]) == 0.0
@@ -331,7 +341,7 @@ class Cascade(Controller):
         known(self)
         placed = 0 if self.position is None else self.position_every(dt)
         feed = Feedforward(self.velocity_feedforward, self.acceleration_feedforward, self.friction_feedforward)
-        return ticks_of(command, position, dt, self.log_every(dt), placed, feed)
+        return ticks_of(command, position, dt, self.log_every(dt), placed, feed, self.interpolation)
 
     def core_loop(self, dt: float) -> _core.Loop:
         """See `Controller`; ControllerError where a number is None."""
@@ -351,12 +361,13 @@ class Cascade(Controller):
         filters = {name: [f.to_dict() for f in getattr(self, name)] for name in FILTERS}
         numbers = {name: getattr(self, name) for name in ("period", "position_period", *FEEDFORWARDS, "delay")}
         position = None if self.position is None else UNKNOWN if self.position.gain is None else self.position.gain
-        return {"velocity": self.velocity.to_dict(), "position_gain": position, **numbers, **filters}
+        between = {} if self.interpolation == "straight" else {"interpolation": self.interpolation}
+        return {"velocity": self.velocity.to_dict(), "position_gain": position, **numbers, **between, **filters}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Cascade:
         """Return the controller of what `to_dict` gave; raises ControllerError."""
-        allowed = ("velocity", "position_gain", "period", "position_period", *FEEDFORWARDS, *FILTERS, "delay")
+        allowed = ("velocity", "position_gain", "period", "position_period", *FEEDFORWARDS, *FILTERS, "delay", "interpolation")
         values: dict[str, Any] = known_keys(data, "the cascade", allowed, ("velocity",), ControllerError)
         gain = values.pop("position_gain", None)
         position = None if gain is None else P(None if gain == UNKNOWN else gain)
@@ -377,24 +388,3 @@ def cascade_of(controller: Controller) -> Cascade:
 def controller_of(data: Mapping[str, Any]) -> Controller:
     """The controller of what `to_dict` of a PI or a Cascade gave; raises ControllerError."""
     return Cascade.from_dict(data) if "velocity" in data else PI.from_dict(data)
-
-
-def _filters(given: object, name: str) -> tuple[Filter, ...]:
-    if isinstance(given, LowPass | Notch):
-        given = (given,)
-    if not isinstance(given, Sequence) or not all(isinstance(f, LowPass | Notch) for f in given):
-        raise ControllerError(f"{name} is {given!r}: give a sequence of LowPass and Notch")
-    if len(given) > MOST_FILTERS:
-        raise ControllerError(f"{name} has {len(given)} filters: give at most {MOST_FILTERS}")
-    return tuple(given)
-
-
-def _multiple(long: float, short: float, name: str, of: str) -> int:
-    ratio = long / short
-    whole = max(round(ratio), 1)
-    if abs(ratio - whole) > WHOLE * ratio:
-        raise ControllerError(
-            f"{name} is {long:g} s and {of} {short:g} s, {ratio:.4g} times as long: it must be a whole multiple, such as "
-            f"{whole * short:g} s; or give the {of} {long / whole:g} s"
-        )
-    return whole

@@ -126,6 +126,10 @@ class Controller(ABC):
     def log_every(self, dt: float) -> int:
         """Controller samples for each line of a log with the sample time dt [s]; ControllerError where it is no whole number."""
 
+    def courses(self, dt: float) -> tuple[Controller, ...]:
+        """This controller, and the same with its command on other ways between the lines of a log with the sample time dt [s]."""
+        return (self,)
+
     def command_of(self, log: Signals) -> Vector | None:
         """The signal that drives it (n,): velocity command [rad/s] or position command [rad]; None where it is not logged."""
         signal: Vector | None = getattr(log, self.driven_by)

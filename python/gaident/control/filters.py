@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from gaident import _core
 from gaident.checks import known_keys, real_number
 from gaident.errors import ControllerError
 
-__all__ = ["LowPass", "Notch", "filter_of"]
+__all__ = ["Filter", "LowPass", "Notch", "filter_of", "filters_of"]
+
+MOST_FILTERS = 8  # no decision: what an argument may be
 
 
 def _above_zero(value: object, name: str) -> float | None:
@@ -132,6 +134,9 @@ class Notch:
         return {"kind": "notch", **asdict(self)}
 
 
+Filter: TypeAlias = LowPass | Notch
+
+
 def filter_of(data: Mapping[str, Any]) -> LowPass | Notch:
     """The filter of what `to_dict` gave; raises ControllerError."""
     numbers: dict[str, Any] = {key: value for key, value in data.items() if key != "kind"}
@@ -143,3 +148,14 @@ def filter_of(data: Mapping[str, Any]) -> LowPass | Notch:
         known_keys(numbers, "the notch", names, names, ControllerError)
         return Notch(**numbers)
     raise ControllerError(f'kind is {data.get("kind")!r}: a filter is a "low pass" or a "notch"')
+
+
+def filters_of(given: object, name: str) -> tuple[Filter, ...]:
+    """The filters of an argument; ControllerError where it is no sequence of them, or too long."""
+    if isinstance(given, LowPass | Notch):
+        given = (given,)
+    if not isinstance(given, Sequence) or not all(isinstance(f, LowPass | Notch) for f in given):
+        raise ControllerError(f"{name} is {given!r}: give a sequence of LowPass and Notch")
+    if len(given) > MOST_FILTERS:
+        raise ControllerError(f"{name} has {len(given)} filters: give at most {MOST_FILTERS}")
+    return tuple(given)

@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.profile import profile_between
+from gaident.errors import ControllerError
 from gaident.policy.table import POLICY
 
-__all__ = ["Feedforward", "Ticks", "at_the_clock", "between_lines", "of_lines", "smooth_between", "straight_part", "ticks_of"]
+__all__ = [
+    "INTERPOLATIONS",
+    "Feedforward",
+    "Ticks",
+    "at_the_clock",
+    "between_lines",
+    "multiple_of",
+    "of_lines",
+    "smooth_between",
+    "straight_part",
+    "ticks_of",
+]
 
 Vector = NDArray[np.float64]
+
+WHOLE = 1e-6  # no decision: rounding of two decimal numbers that divide; more is no whole multiple
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,18 +56,21 @@ def of_lines(command: Vector, position: Vector | None) -> Ticks:
     return Ticks(1, command, none, none, none if position is None else position)
 
 
-def ticks_of(command: Vector, position: Vector | None, dt: float, every: int, placed: int, feed: Feedforward) -> Ticks:
+def ticks_of(
+    command: Vector, position: Vector | None, dt: float, every: int, placed: int, feed: Feedforward, between: str = "straight"
+) -> Ticks:
     """dt: sample time of the log [s], which has a line for every `every`-th sample of the controller.
 
     command: velocity command [rad/s], or with a position controller position command [rad], shape (n,).
     placed: samples from one of the position controller's to the next; 0: there is none.
+    between: of INTERPOLATIONS, how a position command goes from line to line.
     """
     period = dt / every
     if not placed:
         source = between_lines(command, every)
         velocity, step = source, 1
     else:
-        source, step = at_the_clock(command, every), placed
+        source, step = INTERPOLATIONS[between](command, every), placed
         velocity = _slope(source, step, period)
     fed = np.zeros(0)
     if feed.acceleration != 0.0 or feed.friction != 0.0:
@@ -61,7 +80,7 @@ def ticks_of(command: Vector, position: Vector | None, dt: float, every: int, pl
         source,
         feed.velocity * velocity if feed.velocity != 0.0 else np.zeros(0),
         fed,
-        np.zeros(0) if position is None else at_the_clock(position, every),
+        np.zeros(0) if position is None else smooth_between(position, every),
     )
 
 
@@ -125,3 +144,19 @@ def smooth_between(line: Vector, every: int) -> Vector:
     spline = make_interp_spline(np.arange(n), line, k=3)
     at = np.minimum(np.arange(n * every) / every, n - 1.0)
     return np.asarray(spline(at), dtype=np.float64)
+
+
+def multiple_of(long: float, short: float, name: str, of: str) -> int:
+    """How many times the short time [s] goes into the long one; ControllerError where it is no whole number."""
+    ratio = long / short
+    whole = max(round(ratio), 1)
+    if abs(ratio - whole) > WHOLE * ratio:
+        raise ControllerError(
+            f"{name} is {long:g} s and {of} {short:g} s, {ratio:.4g} times as long: it must be a whole multiple, such as "
+            f"{whole * short:g} s; or give the {of} {long / whole:g} s"
+        )
+    return whole
+
+
+INTERPOLATIONS: Mapping[str, Callable[[Vector, int], Vector]] = {"straight": at_the_clock, "smooth": profile_between}
+"""How a position command may go between the lines of its log -> positions at the controller's samples."""

@@ -47,6 +47,7 @@ PI_KEYS: dict[str, Check] = {
 AROUND: dict[str, Check] = {
     **dict.fromkeys(("period", "position_gain", "position_period", *FEEDFORWARDS, "delay"), number_or_unit),
     **dict.fromkeys(FILTERS, _filters),
+    "interpolation": text,
 }
 # What the motor has stands above the first section, where the units of the log need it too.
 OF_DRIVES = tuple(

@@ -58,7 +58,11 @@ def looped_over(records: Sequence[Record], controller: Controller | None, space:
             return Looped(list(records), controller, doubts)
         assert controller is not None  # else there were no doubt
         if (other := corrected(records, controller)) is not None:
-            return Looped(list(records), other.controller, (*doubts, other.note), other.estimates)
+            if line_equation(records, other.controller, space if isinstance(space, SearchSpace) else None):
+                return Looped(list(records), other.controller, (*doubts, other.note), other.estimates)
+            driven = torque_driven(records, other.controller)
+            given = [r.with_channels(command=None) for r in driven.records]
+            return Looped(given, None, (*driven.notes, *doubts, other.note), other.estimates)
         straight = [straight_driven(r, controller).with_channels(command=None) for r in records]
         return Looped(straight, None, (*torque_driven(records, controller).notes, *doubts, NOT_THE_LOOP))
     driven = torque_driven(records, controller)

@@ -31,7 +31,7 @@ from gaident.data.record import Record
 from gaident.errors import ControllerError, RecordError
 from gaident.identification import number_words
 from gaident.identification.logged_stretches import centred, correlation, log_of, numbered, unlimited, whitened
-from gaident.identification.number_ranges import grid_of, range_of
+from gaident.identification.number_ranges import grid_of, inverse, off_bound, range_of
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
@@ -58,13 +58,14 @@ SMALLEST = 1e-300  # no decision: no division by 0
 class Numbers:
     """A controller with all its numbers, those that were estimated by their names (`Controller.unknown`), and a note on them.
 
-    doubt: why these are no numbers of it, as an error; empty where they are.
+    doubt: why these are no numbers of it, as an error; empty where they are. rms: of what they leave of the torque [N m].
     """
 
     controller: Controller | None
     estimates: Mapping[str, Estimate]
     notes: tuple[Text, ...] = ()
     doubt: str = ""
+    rms: float = 0.0
 
     def trusted(self) -> Numbers:
         """These; raises ControllerError where they are not to be trusted."""
@@ -76,13 +77,19 @@ class Numbers:
 def with_estimates(records: Sequence[Record], controller: Controller | None) -> Numbers:
     """The controller with numbers for what is None, estimated from the records.
 
+    Where its command may go in several ways between the lines, that with which the torque follows best.
     Raises RecordError where a record lacks the torque or what the controller reads.
     """
     if controller is None or not controller.unknown:
         return Numbers(controller, {})
-    unknown = controller.unknown
     for rec in records:
-        _check(rec, controller, unknown[0])
+        _check(rec, controller, controller.unknown[0])
+    return min((_estimated(records, one) for one in controller.courses(records[0].dt)), key=lambda numbers: numbers.rms)
+
+
+def _estimated(records: Sequence[Record], controller: Controller) -> Numbers:
+    """The same of one of these controllers."""
+    unknown = controller.unknown
     records = sorted(records, key=lambda r: (r.digest, r.name))  # no sum depends on the order in which they were given
     numbers, shift = _shifted(controller, unknown, records, _solved(controller, unknown, records))
     values = {name: float(x) for name, x in zip(unknown, numbers.values, strict=True)}
@@ -99,7 +106,7 @@ def with_estimates(records: Sequence[Record], controller: Controller | None) -> 
     elif hidden:
         doubt = number_words.not_shown(hidden[0], estimates[hidden[0]])
     notes = (number_words.found(estimates, numbers.rms, numbers.size), *((number_words.moved(shift),) if shift else ()))
-    return Numbers(controller.with_numbers(values), estimates, notes, doubt)
+    return Numbers(controller.with_numbers(values), estimates, notes, doubt, numbers.rms)
 
 
 def _check(rec: Record, controller: Controller, name: str) -> None:
@@ -238,7 +245,7 @@ class _Fit:
         """(sum of squares, x) of a local search."""
         from scipy.optimize import least_squares
 
-        inside = _off_bound(start, low, high)
+        inside = off_bound(start, low, high)
         size = max(float(np.sqrt(np.mean(off(inside) ** 2))), ROUNDING * float(np.std(self.logged)), SMALLEST)
         found = least_squares(
             lambda x: off(x) / size, inside, bounds=(low, high), x_scale="jac", xtol=1e-12, ftol=1e-10, gtol=1e-14,
@@ -354,10 +361,10 @@ class _Fit:
         free_left = self.free(0.0)(x)
         size = float(np.std(self.logged[self.used]))
         sigma = max(float(np.sqrt(np.sum(at**2) / max(count, 1))), ROUNDING * size)
-        spread, back = _inverse(J)
+        spread, back = inverse(J)
         # Where another course between the lines, or another correlation, would have put the numbers.
         course = back @ (self.free(rho, straight=True)(x) - at)
-        uncorrelated = _inverse(self.slopes(self.free(0.0), x, low))[1] @ free_left
+        uncorrelated = inverse(self.slopes(self.free(0.0), x, low))[1] @ free_left
         stds = np.sqrt(sigma**2 * np.diag(spread) + course**2 + uncorrelated**2)
         values = self.values(x)
         natural = [
@@ -380,21 +387,3 @@ class _Fit:
             for b, f, v, s in zip(beyond, self.fields, values, own_std, strict=True)
         ]
         return _Solved(x, values, natural, bound, seen, free, float(np.sqrt(np.mean(free_left**2))), size)
-
-
-def _inverse(J: Matrix) -> tuple[Matrix, Matrix]:
-    """((J'J)^-1, (J'J)^-1 J'); infinite where a column is 0, very large where it is made of the others."""
-    sizes = np.linalg.norm(J, axis=0)
-    used = np.where(sizes > 0.0, sizes, 1.0)
-    u, s, vt = np.linalg.svd(J / used, full_matrices=False)
-    s = np.maximum(s, 1e-9)  # no decision: rounding
-    back = ((vt.T / s) @ u.T) / used[:, None]
-    spread = ((vt.T / s**2) @ vt) / np.outer(used, used)
-    spread[np.diag_indices_from(spread)] += np.where(sizes > 0.0, 0.0, np.inf)
-    return spread, back
-
-
-def _off_bound(x: Vector, low: Vector, high: Vector) -> Vector:
-    """A start strictly inside of its bounds."""
-    margin = np.maximum(np.abs(x), 1.0) * 1e-12  # no decision: rounding
-    return np.clip(x, np.where(np.isfinite(low), low + margin, low), np.where(np.isfinite(high), high - margin, high))

@@ -142,9 +142,15 @@ class Corrected(NamedTuple):
 
 
 def corrected(records: Sequence[Record], controller: Controller) -> Corrected | None:
-    """The one number with which the torque of all records follows; None where there is none, or several are as good."""
-    cascade, found = cascade_of(controller), []
-    for given, one in _with_one_open(cascade):
+    """The other way of its command between the lines, or the one number, with which the torque of all records follows.
+
+    None where there is none, or several numbers are as good.
+    """
+    for course in controller.courses(records[0].dt)[1:]:
+        if not _doubts(records, course):
+            return Corrected(course, {}, say("With {} it does: all simulations use this.", _course(course)))
+    found = []
+    for given, one in _with_one_open(cascade_of(controller)):
         try:
             numbers = with_estimates(records, one)
         except GaidentError:  # the records lack what shows it
@@ -152,9 +158,17 @@ def corrected(records: Sequence[Record], controller: Controller) -> Corrected | 
         if numbers.controller is None or numbers.doubt or _doubts(records, numbers.controller):
             continue
         values = [_value(name, e) for name, e in numbers.estimates.items()]
-        text = "With {} (given: {}) it does: all simulations use this."
-        found.append(Corrected(numbers.controller, numbers.estimates, say(text, joined(" and ", values), given)))
+        moved = cascade_of(numbers.controller).interpolation != cascade_of(controller).interpolation
+        also = say(", and {},", _course(numbers.controller)) if moved else ""
+        text = "With {} (given: {}){} it does: all simulations use this."
+        found.append(Corrected(numbers.controller, numbers.estimates, say(text, joined(" and ", values), given, also)))
     return found[0] if len(found) == 1 else None
+
+
+def _course(controller: Controller) -> str:
+    """How its position command goes between the lines, in words."""
+    way = cascade_of(controller).interpolation
+    return f"a position command that goes {way} between the lines of the log (interpolation {way!r})"
 
 
 def _value(name: str, e: Estimate) -> Text:

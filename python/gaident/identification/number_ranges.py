@@ -1,10 +1,14 @@
-"""Where the numbers of a controller are searched: as the search moves them, logarithms of what is above 0."""
+"""Where the numbers of a controller are searched, as the search moves them: logarithms of what is above 0; and its algebra."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["grid_of", "range_of"]
+__all__ = ["grid_of", "inverse", "off_bound", "range_of"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 
 SMALLEST = 1e-300  # no decision: a controller of two gains of 0 is none
 
@@ -34,3 +38,21 @@ def range_of(field: str, period: float) -> tuple[float, float]:
         "ki": (0.0, np.inf),
         "command_weight": (0.0, np.inf),
     }.get(field, (-np.inf, np.inf))
+
+
+def inverse(J: Matrix) -> tuple[Matrix, Matrix]:
+    """((J'J)^-1, (J'J)^-1 J'); infinite where a column is 0, very large where it is made of the others."""
+    sizes = np.linalg.norm(J, axis=0)
+    used = np.where(sizes > 0.0, sizes, 1.0)
+    u, s, vt = np.linalg.svd(J / used, full_matrices=False)
+    s = np.maximum(s, 1e-9)  # no decision: rounding
+    back = ((vt.T / s) @ u.T) / used[:, None]
+    spread = ((vt.T / s**2) @ vt) / np.outer(used, used)
+    spread[np.diag_indices_from(spread)] += np.where(sizes > 0.0, 0.0, np.inf)
+    return spread, back
+
+
+def off_bound(x: Vector, low: Vector, high: Vector) -> Vector:
+    """A start strictly inside of its bounds."""
+    margin = np.maximum(np.abs(x), 1.0) * 1e-12  # no decision: rounding
+    return np.clip(x, np.where(np.isfinite(low), low + margin, low), np.where(np.isfinite(high), high - margin, high))

@@ -5,6 +5,14 @@ they stood in it. So it is the mean of u - u_0, where that stands out of what el
 
     I(-1) = mean(u - u_0)   where   |I(-1)| > 6 std(u - u_0) and is not to be neglected beside the largest torque
 
+What the velocity did between the lines of a slower log, and the steps of an encoder, add up in the integral of u_0. So
+d = u - u_0 is a level, that before the record, plus a random walk from 0, of steps with the variance q, plus white noise of the
+variance r (local level model; Muth 1960). The mean that knows the level at the first line best has weights that fall from there:
+
+    weight of line k ~ (1 - K)^k,   K = (sqrt(s^2 + 4 s) - s)/2,   s = q/r
+
+    mean((d(k+m) - d(k))^2) = m q + 2 r   for m = 1 and for a twentieth of the lines
+
 From the first line at a limit on, u_0 of a controller other than a bare PI is not that of the drive: these lines are left out.
 Of too few lines nothing is said.
 """
@@ -26,6 +34,8 @@ __all__ = ["stored_torque"]
 
 Vector = NDArray[np.float64]
 
+PARTS = 20  # no decision: of a record, over which a random walk shows beside white noise
+
 
 def stored_torque(rec: Record, controller: Controller) -> float:
     """What the integrator held before a record [N m], for a load; 0 where nothing shows it.
@@ -38,7 +48,21 @@ def stored_torque(rec: Record, controller: Controller) -> float:
     limit = controller.limits[0]
     at_limit = np.flatnonzero(np.abs(rec.torque) >= POLICY.at_limit * limit)
     free = len(rec) if bare_pi(controller) is not None or not len(at_limit) else int(at_limit[0])
-    return constant_beside(rec.torque[:free] - made[:free], float(np.abs(rec.torque).max()))
+    off = rec.torque[:free] - made[:free]
+    return _first_level(off) if constant_beside(off, float(np.abs(rec.torque).max())) else 0.0
+
+
+def _first_level(off: Vector) -> float:
+    """The level of (n,) before a random walk begins, beside white noise."""
+    far = max(len(off) // PARTS, 2)
+    near, wide = (float(np.mean((off[m:] - off[:-m]) ** 2)) for m in (1, far))
+    walk = max((wide - near) / (far - 1), 0.0)
+    white = max((near - walk) / 2.0, 0.0)  # no decision: a difference of two
+    if walk == 0.0:
+        return float(np.mean(off))
+    ratio = walk / white if white > 0.0 else np.inf
+    kept = 0.0 if not np.isfinite(ratio) else 1.0 - 0.5 * (np.sqrt(ratio**2 + 4.0 * ratio) - ratio)
+    return float(np.average(off, weights=kept ** np.arange(len(off))))
 
 
 def _from_rest(rec: Record, controller: Controller) -> Vector | None:

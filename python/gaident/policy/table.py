@@ -183,6 +183,13 @@ class Policy:
         "times the change to the line before or after: a command that changes more between two lines jumps there",
         SLOWER,
     )
+    corner_square: float = loop(
+        0.1,
+        "1",
+        "of its curvature, by which a change of a position command may miss a square: a corner to 0.06, a cubic 0.42",
+        SLOWER,
+    )
+    corner_seen: float = loop(20.0, "1", "times the other third differences of it: less is no corner of its slope", SLOWER)
     course: float = loop(
         4.0, "1", "times what the path of the velocity between a slow log's lines changes in the torque: less is not seen", SLOWER
     )

@@ -47,6 +47,10 @@ CASES: dict[str, tuple[str, ga.PI | ga.Cascade]] = {
         "acceleration_feedforward = 3e-4\n",
         ga.Cascade(SINAMICS, position=ga.P(40.0), position_period=1e-3, velocity_feedforward=1.0, acceleration_feedforward=3e-4),
     ),
+    "a profile that the controller makes": (
+        '[controller]\nkp = 0.02\nki = 2\nperiod = 250e-6\nposition_gain = 40\ninterpolation = "smooth"\n',
+        ga.Cascade(SINAMICS, period=250e-6, position=ga.P(40.0), interpolation="smooth"),
+    ),
     "position gain of a drive": (
         '[controller]\ndrive = "ax5000"\ns_0_0100 = 0.02\ns_0_0101 = 10\ns_0_0104 = 1.5\n',
         ga.Cascade(SINAMICS, position=ga.P(25.0)),

@@ -110,7 +110,8 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
             idn = loaded
         bar.doing("looking at the records")
         if idn is None:
-            driven = torque_driven(records, controller)
+            # Numbers that are not known are estimated from a logged torque, which drives the model here.
+            driven = torque_driven(records, controller if controller is None or not controller.unknown else None)
             derive_space(driven.records, driven.loop)  # wrong signs and units are found before anything is searched for
         dia = diagnose(
             records,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from gaident.axis import Text
 from gaident.control.controller import Controller
@@ -104,6 +105,8 @@ def driving_of(
             limited = other is None and by_a_limit(whole, controller)
             if other is not None:
                 controller, numbers, notes, doubts = other.controller, other.estimates, (*notes, *doubts, other.note), ()
+                records, held, origin = _again(records, held, origin, partial(driven_by, controller=controller))
+                moved = aligned(records, held, None)
             elif not limited and not asked.findings:  # a form that a bare PI lacked was found already
                 form = other_form(whole, [origin.get(r.digest, r) for r in held], controller)
     if form is not None:
@@ -114,7 +117,8 @@ def driving_of(
         moved = aligned(form.records, form.held, None)
     elif doubts and driven.slower and not limited:
         # What this controller would make between the lines is not what the drive's made there.
-        records, held, origin = _straight((*records,), (*held,), origin, driven.controller)
+        assert driven.controller is not None
+        records, held, origin = _again(records, held, origin, partial(straight_driven, controller=driven.controller))
         moved = aligned(records, held, None)
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
@@ -124,12 +128,11 @@ def driving_of(
     return Driving(moved, used, logged, findings, notes, doubts, numbers, limited)
 
 
-def _straight(
-    records: Sequence[Record], held: Sequence[Record], origin: Mapping[str, Record], controller: Controller | None
+def _again(
+    records: Sequence[Record], held: Sequence[Record], origin: Mapping[str, Record], drive: Callable[[Record], Record]
 ) -> tuple[tuple[Record, ...], tuple[Record, ...], dict[str, Record]]:
-    """Records, held ones and origin with the logged torque straight between the lines."""
-    assert controller is not None
+    """Records, held ones and origin with another torque; drive: makes it of a record as given."""
     given = [[origin.get(r.digest, r) for r in part] for part in (records, held)]
-    changed = [tuple(straight_driven(r, controller) for r in part) for part in given]
+    changed = [tuple(map(drive, part)) for part in given]
     pairs = zip((*changed[0], *changed[1]), (*given[0], *given[1]), strict=True)
     return changed[0], changed[1], {now.digest: whole for now, whole in pairs}

@@ -1,0 +1,116 @@
+"""A position command between the lines of a log that is slower than the controller: straight, or as a profile goes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from drive_rig import Plant, rig, run_drive, skip_without_library
+from gaident.control.profile import profile_between
+from gaident.control.ticks import at_the_clock
+from gaident.errors import ControllerError
+from gaident.identification.closed_loop import line_equation
+from gaident.identification.controller_numbers import with_estimates
+from gaident.identification.logged_torque import corrected, not_followed
+from gaident.models.stored_torque import _first_level
+
+T, EVERY = 250e-6, 4
+DRIVE = ga.Cascade(ga.PI(0.3, 15.0), T, position=ga.P(30.0), velocity_feedforward=1.0)
+AXIS = Plant(J=1.5e-3, D=2e-3, kp=0.3, ki=15.0, dt=EVERY * T, cascade=DRIVE, name="axis")
+
+
+def profile(seconds: float, period: float, rise: float = 1500.0) -> np.ndarray:
+    """Positions at a controller's samples [rad] of moves with trapezoidal velocities, whose corners lie anywhere."""
+    speeds = np.repeat([0.0, 60.0, 120.0, 25.0, -50.0, -120.0, -35.0, 0.0, 40.0, 0.0], int(np.ceil(seconds / period / 10.0)) + 1)
+    speed, slope = np.zeros(round(seconds / period)), rise * period
+    for n in range(1, len(speed)):
+        speed[n] = speed[n - 1] + np.clip(speeds[n] - speed[n - 1], -slope, slope)
+    return np.concatenate([[0.0], np.cumsum(speed[:-1])]) * period
+
+
+def record(effects: dict[str, dict[str, float]], decimals: int = 9) -> ga.Record:
+    """The log of a drive whose profile is made at the controller's samples; one line for four of them."""
+    skip_without_library()
+    whole = profile(2.0, T)
+    noise = 0.002 * np.random.default_rng(1).standard_normal(len(whole))
+    log = run_drive(AXIS, np.ascontiguousarray(whole), effects, velocity_noise=noise)
+    lines = {"velocity": log.velocity, "torque": log.torque, "position": log.position, "position_command": whole}
+    return ga.Record(EVERY * T, **{name: np.round(x[::EVERY], decimals) for name, x in lines.items()})
+
+
+@pytest.mark.parametrize("every", [2, 4, 8])
+@pytest.mark.parametrize("decimals", [7, 12])
+def test_a_profile_is_found_again_between_its_lines(every: int, decimals: int) -> None:
+    whole = profile(2.0, T)
+    found, straight = (
+        course(np.round(whole[::every], decimals), every)[: len(whole)] for course in (profile_between, at_the_clock)
+    )
+    off, plain = (np.abs(np.diff(x - whole)[: -2 * every]) / T for x in (found, straight))
+    assert np.sqrt(np.mean(off**2)) < 0.05 * np.sqrt(np.mean(plain**2))  # rad/s
+    assert np.max(off) < 1.1 * 1500.0 * T  # one sample of the acceleration, where a speed is reached within a sample
+
+
+def test_a_smooth_profile_has_no_corners() -> None:
+    t = np.arange(0.0, 1.0, T)
+    whole = 3.0 * np.sin(20.0 * t) + np.sin(90.0 * t)
+    found, straight = (course(whole[::EVERY], EVERY)[: len(t)] for course in (profile_between, at_the_clock))
+    inside = slice(EVERY, -2 * EVERY)  # before the first line and behind the last nothing is known
+    assert np.abs(found - whole)[inside].max() < 0.02 * np.abs(straight - whole)[inside].max()
+    assert np.array_equal(found[::EVERY], whole[::EVERY])
+
+
+def test_where_the_torque_shows_a_profile_the_position_command_is_no_staircase() -> None:
+    rec = record({"coulomb_friction": {"torque": 0.3}})
+    smooth = ga.Cascade(ga.PI(0.3, 15.0), T, position=ga.P(30.0), velocity_feedforward=1.0, interpolation="smooth")
+    assert not_followed([rec], DRIVE) and not not_followed([rec], smooth)
+    found = corrected([rec], DRIVE)
+    assert found is not None and found.controller == smooth and found.estimates == {}
+    dia = ga.diagnose(rec, DRIVE)
+    assert dia.verdict == "explained" and {f.effect: f.alternatives for f in dia.causes} == {"coulomb_friction": ()}, (
+        dia.summary()
+    )
+    assert dia.controller == smooth and any("interpolation" in note for note in dia.notes)
+    assert dia.causes[0].parameters["torque"].value == pytest.approx(0.3, rel=2e-3)
+    assert dia.mechanics["inertia"].value == pytest.approx(AXIS.J, rel=1e-3)
+
+
+def test_a_feedforward_that_was_not_given_is_found_beside_the_way_of_the_command() -> None:
+    rec = record({})
+    bare = ga.Cascade(ga.PI(0.3, 15.0), T, position=ga.P(30.0))
+    found = corrected([rec], bare)
+    assert found is not None and isinstance(found.controller, ga.Cascade) and found.controller.interpolation == "smooth"
+    assert found.estimates["velocity_feedforward"].value == pytest.approx(1.0, abs=1e-3)
+    open_one = ga.Cascade(ga.PI(0.3, 15.0), T, position=ga.P(30.0), velocity_feedforward=None)
+    assert with_estimates([rec], open_one).controller == found.controller
+    idn = ga.identify(rec, controller=DRIVE, settings=ga.Settings(generations=3, population=20))
+    assert any("interpolation" in note for note in idn.warnings)
+
+
+def test_a_command_that_goes_straight_stays_straight() -> None:
+    skip_without_library()
+    rec = rig(AXIS, profile(2.0, T)[::EVERY], {}, "none", 1, position_logged=True)
+    assert not not_followed([rec], DRIVE)
+    assert (
+        with_estimates([rec], ga.Cascade(ga.PI(0.3, 15.0), T, position=ga.P(None), velocity_feedforward=1.0)).controller
+        is not None
+    )
+
+
+def test_the_way_of_a_command_is_a_setting() -> None:
+    smooth = ga.Cascade(ga.PI(0.3, 15.0), T, position=ga.P(30.0), interpolation="smooth")
+    assert ga.Cascade.from_dict(smooth.to_dict()) == smooth
+    assert "interpolation" not in DRIVE.to_dict()
+    assert [c.interpolation for c in smooth.courses(1e-3)] == ["smooth", "straight"] and len(smooth.courses(T)) == 1
+    rec = record({})
+    assert line_equation([rec], DRIVE, None) and not line_equation([rec], smooth, None)
+    with pytest.raises(ControllerError, match="interpolation is 'cubic'"):
+        ga.Cascade(ga.PI(0.3, 15.0), T, interpolation="cubic")
+
+
+def test_what_the_integrator_held_is_known_best_where_its_error_has_not_added_up() -> None:
+    rng = np.random.default_rng(3)
+    walk, noise = np.cumsum(1e-3 * rng.standard_normal(5000)), 0.01 * rng.standard_normal(5000)
+    assert _first_level(1.2 + walk + noise) == pytest.approx(1.2, abs=0.01)
+    assert _first_level(1.2 + noise) == pytest.approx(1.2, abs=1e-3)
+    assert abs(np.mean(1.2 + walk + noise) - 1.2) > 0.01
