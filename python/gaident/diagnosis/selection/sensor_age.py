@@ -50,13 +50,17 @@ HALF = 0.5  # no decision: of a sample, the age of a mean over it
 
 
 def searched(
-    objective: Objective, scales: Scales, model: Model, search: Callable[[Objective], Selection]
+    objective: Objective, scales: Scales, model: Model, search: Callable[[Objective, int], Selection]
 ) -> tuple[Selection, list[Text]]:
-    """What a search selects over records whose velocity is as old as they show, with a note on that."""
+    """What a search selects over records whose velocity is as old as they show, with a note on that.
+
+    search: of these records, with at most so many effects.
+    """
+    most = POLICY.most_effects
     data = objective.data
     controller = data.controller
     if controller is not None and (controller.loop == "continuous" or (data.loop is not None and any(data.moving))):
-        return search(objective), []
+        return search(objective, most), []
     every = 1 if controller is None else controller.log_every(data.dt)
     if every == 1 and (ahead := _ahead(data)) is not None:
         text = (
@@ -66,13 +70,14 @@ def searched(
             "every sample."
         )
         earlier = Objective(data.aged(-ahead), objective.weight, counter=objective.counter)
-        return search(earlier), [say(text, 1e3 * ahead * data.dt, 1e3 * HALF * data.dt)]
+        return search(earlier, most), [say(text, 1e3 * ahead * data.dt, 1e3 * HALF * data.dt)]
     if every == 1 and all(is_backward_difference(r.velocity, r.position, data.dt) for r in data.records):
         text = (
             "The velocity is the difference of the last two {angles}: half a sample old ({:.3g} ms). The simulation has it; "
             "it is no finding."
         )
-        return search(Objective(data.aged(HALF), objective.weight, counter=objective.counter)), [say(text, 1e3 * HALF * data.dt)]
+        older = Objective(data.aged(HALF), objective.weight, counter=objective.counter)
+        return search(older, most), [say(text, 1e3 * HALF * data.dt)]
     lines = encoder_lines(data.velocity, data.dt / every, TURN if data.axis == "rotary" else 1.0)
     older = Objective(data.aged(HALF / every), objective.weight, counter=objective.counter)
     age = 1e3 * HALF * data.dt / every
@@ -83,16 +88,18 @@ def searched(
             "and nothing speaks against it: they are taken for half a sample old ({:.3g} ms). The simulation has it; it is no "
             "finding."
         )
-        return search(older), [say(text, lines, each, age)]
-    found = search(objective)
+        return search(older, most), [say(text, lines, each, age)]
+    found = search(objective, most)
     in_series = any(t.in_series for t in found.final.parameters.terms)
     step = encoder_step(data.velocity, data.axis == "linear") if in_series else 0.0
     if not step > 0.0:
         return found, []
-    again = search(older)
-    fewer = len(again.final.effects) < len(found.final.effects)
-    if not fewer or not _score_beside(again, found) < found.space.score(found.final):
-        return found, []
+    # Only a model with fewer effects takes the place: first whether there is one, then what the whole search ends with.
+    for allowed in (len(found.final.effects) - 1, most):
+        again = search(older, allowed)
+        fewer = len(again.final.effects) < len(found.final.effects)
+        if not fewer or not _score_beside(again, found) < found.space.score(found.final):
+            return found, []
     text = (
         "The velocities lie on a lattice of {:.4g} {rad/s} and are half a sample old ({:.3g} ms), as those are that are the "
         "difference of an encoder's {angle} over one sample. The simulation has it; it is no finding."
