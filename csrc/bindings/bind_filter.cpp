@@ -57,6 +57,18 @@ RealArray powers_of(const RealArray& b, const RealArray& a, const RealArray& e, 
     return out;
 }
 
+// measured (n) - rows (r, n), which are written over.
+RealArray errors_of(const RealArray& measured, py::array_t<double, py::array::c_style> rows, double lost) {
+    if (rows.ndim() != 2 || measured.size() != rows.shape(1))
+        throw std::invalid_argument("rows: a matrix with as many columns as were measured");
+    double* const out = rows.mutable_data();
+    {
+        const py::gil_scoped_release release;
+        subtracted(measured.data(), out, static_cast<std::size_t>(rows.shape(0)), static_cast<std::size_t>(rows.shape(1)), lost);
+    }
+    return rows;
+}
+
 // A (m, m), drive (n, m), start (m): all x(0..n-1), with `newest` x(1..n), (n, m).
 ComplexArray states(const ComplexArray& A, const ComplexArray& drive, const ComplexArray& start, bool newest) {
     const py::ssize_t m = start.size();
@@ -108,6 +120,7 @@ RealArray held(const RealArray& error, const Controller& controller, double newe
 void bind_filter(py::module_& m) {
     m.def("filtered", &filtered_rows, py::arg("b"), py::arg("a"), py::arg("rows"), py::arg("lengths"));
     m.def("filtered_powers", &powers_of, py::arg("b"), py::arg("a"), py::arg("e"), py::arg("weight"), py::arg("lengths"));
+    m.def("errors_of", &errors_of, py::arg("measured"), py::arg("rows"), py::arg("lost"));
     m.def("state_recursion", &states, py::arg("A"), py::arg("drive"), py::arg("start"), py::arg("newest"));
     m.def("lagged_products", &products, py::arg("e"), py::arg("lags"));
     m.def("held_torque", &held, py::arg("error"), py::arg("controller"), py::arg("newest"), py::arg("before"), py::arg("rule"),

@@ -337,6 +337,9 @@ def filtered(
 ) -> NDArray[np.float64]:
     """v(n) = sum_i b_i e(n-i) - sum_{i>=1} a_i v(n-i) of rows of e, each cut into records of these lengths, from rest."""
 
+def errors_of(measured: NDArray[np.float64], rows: NDArray[np.float64], lost: float) -> NDArray[np.float64]:
+    """measured - rows, written over the rows; `lost` everywhere in a row that comes to it or holds what is no number."""
+
 def filtered_powers(
     b: NDArray[np.float64],
     a: NDArray[np.float64],

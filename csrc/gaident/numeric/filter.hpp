@@ -21,12 +21,36 @@ namespace gaident {
 
 constexpr int max_recursion = 16;  // numbers a_1, a_2, ... of a filter
 
+// The sum over as many samples at a time as stay in registers.
 inline void moving_sum(std::span<const double> b, const double* e, double* v, std::size_t n) {
-    for (std::size_t k = 0; k < n; ++k) v[k] = b[0] * e[k];
-    for (std::size_t i = 1; i < std::min(b.size(), n); ++i) {
-        const double bi = b[i];
-        double* const late = v + i;
-        for (std::size_t k = 0; k < n - i; ++k) late[k] += bi * e[k];
+    constexpr std::size_t block = 16;
+    const std::size_t order = b.size() - 1;
+    const auto one = [&](std::size_t k) {
+        double sum = b[0] * e[k];
+        for (std::size_t i = 1; i <= std::min(order, k); ++i) sum += b[i] * e[k - i];
+        v[k] = sum;
+    };
+    std::size_t k = 0;
+    for (; k < std::min(order, n); ++k) one(k);
+    for (; k + block <= n; k += block) {
+        double sum[block];
+        for (std::size_t j = 0; j < block; ++j) sum[j] = b[0] * e[k + j];
+        for (std::size_t i = 1; i <= order; ++i)
+            for (std::size_t j = 0; j < block; ++j) sum[j] += b[i] * e[k + j - i];
+        std::copy_n(sum, block, v + k);
+    }
+    for (; k < n; ++k) one(k);
+}
+
+// From what was measured (n): measured - row, in place. A row that comes to `lost`, or is no number, is `lost` everywhere.
+inline void subtracted(const double* measured, double* rows, std::size_t count, std::size_t n, double lost) {
+    for (std::size_t r = 0; r < count; ++r, rows += n) {
+        bool kept = true;
+        for (std::size_t k = 0; k < n; ++k) {
+            rows[k] = measured[k] - rows[k];
+            kept &= rows[k] < lost && rows[k] > -lost;
+        }
+        if (!kept) std::fill_n(rows, n, lost);
     }
 }
 

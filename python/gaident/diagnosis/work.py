@@ -118,7 +118,9 @@ class Work:
         self.notes += [ADVICE] * any(folded(r) for r in self.records)
         self.notes += loop_notes(self.data)
         rest = self.scales, self.idn.model, allowed, self._equivalent_here, self._say
-        found, older = searched(self.objective, self.scales, self.idn.model, lambda objective: selected(objective, *rest))
+        found, older = searched(
+            self.objective, self.scales, self.idn.model, lambda objective, most: selected(objective, *rest, most=most)
+        )
         self.notes += older
         self.note(0.85, "looking for what is left")
         self.take(found)

@@ -179,13 +179,17 @@ class DataSet:
 
     @cached_property
     def loopable(self) -> bool:
-        """Whether command and controller can drive a model too, from standstill; never where they do not make the logged torque.
+        """Whether command and controller drive a model in fits too, from standstill.
 
         Under a bare PI at the log's rate only where its integrator was empty before the records: the logged torque serves there.
         """
+        return self.closable and not (self.pi is not None and any(self.stored))
+
+    @cached_property
+    def closable(self) -> bool:
+        """Whether command and controller can drive a model from standstill, with what the integrator held; never where they do not
+        make the logged torque."""
         if self.loop is None or any(self.moving) or not self.loop_follows:
-            return False
-        if self.pi is not None and any(self.stored):
             return False
         loop = self.loop
         return all(loop.command_of(r) is not None for r in self.records)

@@ -10,7 +10,7 @@ from gaident.estimation.objective import Fit, Hypothesis, Objective
 from gaident.estimation.projection import WORST
 from gaident.policy.table import POLICY
 
-__all__ = ["evolved", "fit", "reestimated", "scored"]
+__all__ = ["evolved", "fit", "negligible", "reestimated", "scored"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -32,7 +32,6 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
     damping, converged = 1e-2, False  # no decision: a start
     v, J = objective.linearised(hypothesis, x, noise, objective.known_error(hypothesis, x))
     cost = min(float(v @ v), WORST) if np.all(np.isfinite(v)) else WORST
-    count = max(objective.count, 1.0)
     last: Vector | None = None  # the raw error at x
     moved = False  # since the model was linearised
     for _ in range(iterations):
@@ -65,12 +64,17 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
         fall = cost - float(costs[best])
         x, cost, last, moved = X[best], float(costs[best]), errors[best], True
         damping = min(max(damping * 10.0 ** (best - 3.0), 1e-9), 1e9)  # no decision: the grid of a solver
-        if fall < SETTLED * cost / count:
+        if negligible(objective, fall, cost):
             converged = True
             break
     if last is not None:
         objective.remember_error(hypothesis, x, last)
     return objective.fitted(hypothesis, x, noise, cost, converged)
+
+
+def negligible(objective: Objective, fall: float, cost: float) -> bool:
+    """Whether a fall of the cost changes no decision."""
+    return fall < SETTLED * cost / max(objective.count, 1.0)
 
 
 def damped_steps(A: Matrix, g: Vector, damping: Matrix) -> Matrix:

@@ -26,6 +26,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident import _core
 from gaident.control.filtering import filtered_powers
 from gaident.estimation.criterion import bic
 from gaident.estimation.dataset import DataSet
@@ -192,13 +193,7 @@ class Objective:
     def errors(self, hypothesis: Hypothesis, X: Matrix) -> Matrix:
         """Rows of raw errors: measured minus simulated velocity [rad/s]."""
         self.counter.simulations += len(X)
-        E = hypothesis.predictor.velocities(hypothesis.parameters, X)
-        with np.errstate(invalid="ignore", over="ignore"):
-            np.subtract(self.measured, E, out=E)
-            kept = (E.max(axis=1) < LOST) & (E.min(axis=1) > -LOST)
-        if not kept.all():
-            E[~kept] = LOST
-        return E
+        return _core.errors_of(self.measured, hypothesis.predictor.velocities(hypothesis.parameters, X), LOST)
 
     def error(self, fit: Fit) -> Vector:
         """The raw error of a fit."""

@@ -165,11 +165,12 @@ class LoadedRecord:
         starts = np.zeros((0, 0)) if initial_states is None else np.ascontiguousarray(initial_states, dtype=np.float64)
         built_in, own = _parted(structure, effects, table)
         names = [e for e in effects if e not in OWN]
+        asked = tuple(structure), names, starts, checked_substeps(substeps), workers, own
         try:
-            with np.errstate(all="ignore"):
-                return self.core.simulate_values(
-                    built_in, tuple(structure), names, starts, checked_substeps(substeps), workers, own
-                )
+            if not own:
+                return self.core.simulate_values(built_in, *asked)
+            with np.errstate(all="ignore"):  # of the user's functions
+                return self.core.simulate_values(built_in, *asked)
         except GaidentError:
             raise
         except ValueError as reason:

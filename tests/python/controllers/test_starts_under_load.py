@@ -87,3 +87,18 @@ def test_the_load_is_named(loop: str) -> None:
     assert "load_torque" in (found.effect, *found.alternatives)
     assert dia.verdict == "explained"
     assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=0.01)
+
+
+def test_under_a_bare_pi_the_loop_is_no_start_of_a_fit_but_shows_what_a_model_misses() -> None:
+    """The torque that drives a model without noise of the load integrates it; in the loop, begun under the load, it is held."""
+    rng = np.random.default_rng(5)
+    levels = np.repeat([0.0, 20.0, -30.0, 10.0, 40.0, -10.0], 200)
+    model = ga.OneMass(J=1e-3, D=0.01).model().with_effect("load_torque", torque=LOAD)
+    pi = ga.PI(KP, KI)
+    still = ga.Record(1e-3, command=levels, velocity=np.zeros(len(levels)))
+    done = ga.run(model, still, pi, np.append(np.zeros(model.linear.order), LOAD))
+    rec = ga.Record(1e-3, command=levels, velocity=done.velocity + 1e-3 * rng.standard_normal(len(levels)), torque=done.torque)
+    data = DataSet.of([rec], pi)
+    assert data.stored[0] == pytest.approx(LOAD, rel=0.01)
+    assert data.closable and not data.loopable
+    assert DataSet.of([rec.with_channels(command=None)], pi).closable is False

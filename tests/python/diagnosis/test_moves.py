@@ -340,6 +340,22 @@ def test_models_are_compared_in_the_same_view() -> None:
     assert bench.space.under_predictor_of(less, bench.fit(A)) is less
 
 
+def test_beside_coloured_noise_only_what_promises_something_is_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before whitening every effect explains some of coloured noise; under a filter of its own error it does not."""
+    coloured = lfilter([1.0], [1.0, -0.97], NOISE * np.random.default_rng(3).standard_normal(N))
+    ended: list[tuple[str, ...]] = []
+    whole = moves.Moves.completed
+    monkeypatch.setattr(moves.Moves, "completed", lambda space, fit: ended.append(fit.effects) or whole(space, fit))
+    for effects, found in (({}, []), ({"a": (0.8,)}, [("a",)])):
+        bench = Bench(effects, allowed=(A, B, C, PLACED), extra=coloured, noise=NOISE)
+        fit = bench.fit()
+        monkeypatch.setattr(moves.Moves, "quiet", lambda space, fit: True)
+        ended.clear()
+        grown = bench.space.add(fit)
+        assert set(ended) == set(found)
+        assert names([f for f in grown if bench.space.worth(f, fit)]) == found
+
+
 def test_quiet_and_noise_are_ratios_to_the_noise_of_the_velocity() -> None:
     quiet, loud = Bench(), Bench({"a": (0.3,)}, plain=True)
     assert quiet.space.quiet(quiet.fit()) and quiet.space.is_noise(quiet.fit())

@@ -41,8 +41,8 @@ __all__ = ["ByOutputErrors", "Task", "linear_bases", "noise_floor", "output_erro
 class Task:
     """One selection on its grid of time.
 
-    shown: families of effects that the records show by themselves; rigid_below: the records show one rigid body there [rad/s],
-    and two masses that swing more slowly are none.
+    most: effects in a model at most; shown: families of effects that the records show by themselves; rigid_below: the records
+    show one rigid body there [rad/s], and two masses that swing more slowly are none.
     """
 
     objective: Objective
@@ -50,6 +50,7 @@ class Task:
     model: Model
     allowed: tuple[Term, ...]
     note: Callable[[str], None]
+    most: int = POLICY.most_effects
     shown: frozenset[str] = frozenset()
     rigid_below: float = 0.0
 
@@ -58,7 +59,8 @@ class Task:
         return self.objective.data
 
     def space(self) -> Moves:
-        return Moves(self.objective, self.allowed, self.note, shown=self.shown, rigid_below=self.rigid_below)
+        policy = replace(POLICY, most_effects=self.most)
+        return Moves(self.objective, self.allowed, self.note, policy, self.shown, self.rigid_below)
 
     def under(self, family: Innovations | OutputErrors) -> Task:
         return replace(self, objective=self.objective.under(family))

@@ -123,7 +123,7 @@ class ModelSpace:
 
     def small_unwhitened(self, fit: Fit) -> bool:
         """Whether the errors before whitening, in the loop where there is one, are little more than the noise."""
-        inside = fit.hypothesis.driven_by(self.closed(fit.predictor)) if self.data.loopable else fit.hypothesis
+        inside = fit.hypothesis.driven_by(self.closed(fit.predictor)) if self.data.closable else fit.hypothesis
         cost = float(self.objective.costs(inside, fit.x[None, :], WHITE)[0])
         return bool(np.sqrt(cost / self.objective.count) < self.policy.free_run_ratio * self.noise_beside(fit))
 

@@ -18,7 +18,7 @@ Whether an effect is added is one decision, `ModelSpace.worth`; a search of the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -128,7 +128,8 @@ class Moves(SideMoves):
                     fit = ls.scored(self.objective, ls.fit(self.objective, s.hypothesis, x, s.noise, self.policy.glance))
                     if s.term not in short or fit.bic < short[s.term].bic:
                         short[s.term] = fit
-        best = sorted((f for f in short.values() if f.cost < WORST), key=lambda f: f.bic)[: self.policy.finished]
+        glanced = self._promising(now, test, short.values()) if self.whitens and self.quiet(now) else short.values()
+        best = sorted((f for f in glanced if f.cost < WORST), key=lambda f: f.bic)[: self.policy.finished]
         best = sorted((self.completed(f) for f in best), key=self.score)
         reach = self.policy.beam_reach * self.penalty
         fits += [self.under_best_predictor(f) if self.score(f) < self.score(best[0]) + reach else f for f in best]
@@ -136,6 +137,21 @@ class Moves(SideMoves):
             fits += self.resettled(min(fits, key=self.score))
             fits += self.at_the_load(now, fits)
         return self._best(now, fits)
+
+    def _promising(self, now: Fit, test: ScoreTest, short: Collection[Fit]) -> list[Fit]:
+        """Of short fits beside a model that leaves noise those that are worth a whole one.
+
+        Before whitening anything fits coloured noise. So they are held against this model itself, fitted before whitening too,
+        each under the filter of what it leaves. A fit may not have come near; what promises something under the noise of this
+        model, or of what nothing explains, goes on as well.
+        """
+        plain = ls.scored(self.objective, ls.fit(self.objective, now.hypothesis, now.x, WHITE, self.policy.usual))
+        found, others = [f for f in short if f.bic < plain.bic], [f for f in short if not f.bic < plain.bic]
+        if not others:
+            return found
+        rankings = test.ranked(now.noise), test.ranked(None)
+        hopeful = {s.term for ranking in rankings for s in ranking if s.hope > self.policy.hope * self.penalty}
+        return found + [f for f in others if f.parameters.terms[-1] in hopeful]
 
     def _best(self, now: Fit, fits: Sequence[Fit]) -> list[Fit]:
         """Those that are mechanisms, best first, in the loop where the best one is.

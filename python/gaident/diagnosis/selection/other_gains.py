@@ -18,6 +18,7 @@ effect costs. What comes out is compared with the selected model by the criterio
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from gaident.axis import Text, joined, say, unit_text
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.select import Selection
-from gaident.diagnosis.selection.under_controller import STEP, UnderController
+from gaident.diagnosis.selection.under_controller import STEP, UnderController, out_of_reach
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, gained
 from gaident.estimation.noise_model import WHITE
@@ -119,7 +120,7 @@ def _bare(space: Moves, fit: Fit) -> Fit:
     return fit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Search:
     """Fits under other gains, held against one selected model."""
 
@@ -148,6 +149,11 @@ class _Search:
         """Models under the PI of these logarithms."""
         ends = np.full(self.freedom, self.reach)
         return UnderController(self.space.data, self.controller, -ends, ends)
+
+    @cached_property
+    def beyond(self) -> float:
+        """Score from which on a model is not followed."""
+        return out_of_reach(self.space, self.final)
 
     def inside(self, g: OtherGains) -> bool:
         """Whether the gains are not at the end of what is taken to be possible."""
@@ -185,17 +191,14 @@ class _Search:
         return ls.fit(objective, fit.hypothesis, fit.x, WHITE, POLICY.usual).cost
 
     def beside(self, fit: Fit) -> OtherGains | None:
-        """The model under the gains that come closest; None where it diverges."""
+        """The model under the gains that come closest; None where it diverges, or stays far behind the selected one."""
         if fit.cost >= WORST:
             return None
-        objective = replace(self.space.objective)  # with a memory of its own: every gain tried makes a data set
-        z, found = np.zeros(self.freedom), fit
-        z, found = self.under.closest(objective, found, WHITE, z)
-        if self.space.whitens:
-            z, found = self.under.closest(objective, found, objective.own_noise(found), z)
-        found = ls.reestimated(objective, found)
-        if found.cost >= WORST:
+        objective = replace(self.space.objective)
+        end = self.under.fitted(self.space, objective, fit, np.zeros(self.freedom), self.beyond)
+        if end is None:
             return None
+        z, found = end
         stds = self.under.deviations(objective, found, z)
         pi = self.controller(z)
         at_end = np.abs(z) > (1.0 - STEP) * self.reach

@@ -88,12 +88,14 @@ def selected(
     allowed: Sequence[Term],
     classes: Classes,
     note: Callable[[str], None],
+    most: int = POLICY.most_effects,
 ) -> Selection:
     """The model of the records, with the rivals of its effects.
 
-    objective: over all samples; model: the identified linear one; classes: effect -> what these records cannot tell from it.
+    objective: over all samples; model: the identified linear one; classes: effect -> what these records cannot tell from it;
+    most: effects at most.
     """
-    task = Task(objective, scales, model, tuple(allowed), note)
+    task = Task(objective, scales, model, tuple(allowed), note, most)
     one = task.one_mass()
     error = objective.error(one)
     task = task.under(Innovations(floor=noise_floor(task, one)))
@@ -104,7 +106,7 @@ def selected(
     grid = decimated_objective(task.objective, blocks)
     coarse_scales = replace(scales, dt=task.data.dt * blocks, blocks=blocks)
     outside = tuple(t for t in task.allowed if not t.in_controller)
-    outline = _decided(Task(grid, coarse_scales, model, outside, note), note)
+    outline = _decided(Task(grid, coarse_scales, model, outside, note, most), note)
     return _compared(_on_all_samples(task, outline, note), classes, note)
 
 

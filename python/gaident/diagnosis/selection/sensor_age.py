@@ -53,13 +53,17 @@ SURE = 0.02  # no decision: lines, to which a search finds by how much the torqu
 
 
 def searched(
-    objective: Objective, scales: Scales, model: Model, search: Callable[[Objective], Selection]
+    objective: Objective, scales: Scales, model: Model, search: Callable[[Objective, int], Selection]
 ) -> tuple[Selection, list[Text]]:
-    """What a search selects over records whose velocity is as old as they show, with a note on that."""
+    """What a search selects over records whose velocity is as old as they show, with a note on that.
+
+    search: of these records, with at most so many effects.
+    """
+    most = POLICY.most_effects
     data = objective.data
     controller = data.controller
     if controller is not None and (controller.loop == "continuous" or (data.loop is not None and any(data.moving))):
-        return search(objective), []
+        return search(objective, most), []
     every = 1 if controller is None else controller.log_every(data.dt)
     if every == 1 and (ahead := _ahead(data, model)) is not None:
         text = (
@@ -70,7 +74,7 @@ def searched(
         )
 
         def under(lines: float) -> Selection:
-            return search(Objective(data.aged(-lines), objective.weight, counter=objective.counter))
+            return search(Objective(data.aged(-lines), objective.weight, counter=objective.counter), most)
 
         found = under(ahead.lag)
         closer = _refined(found, ahead)
@@ -82,7 +86,8 @@ def searched(
             "The velocity is the difference of the last two {angles}: half a sample old ({:.3g} ms). The simulation has it; "
             "it is no finding."
         )
-        return search(Objective(data.aged(HALF), objective.weight, counter=objective.counter)), [say(text, 1e3 * HALF * data.dt)]
+        older = Objective(data.aged(HALF), objective.weight, counter=objective.counter)
+        return search(older, most), [say(text, 1e3 * HALF * data.dt)]
     lines = encoder_lines(data.velocity, data.dt / every, TURN if data.axis == "rotary" else 1.0)
     older = Objective(data.aged(HALF / every), objective.weight, counter=objective.counter)
     age = 1e3 * HALF * data.dt / every
@@ -93,16 +98,18 @@ def searched(
             "and nothing speaks against it: they are taken for half a sample old ({:.3g} ms). The simulation has it; it is no "
             "finding."
         )
-        return search(older), [say(text, lines, each, age)]
-    found = search(objective)
+        return search(older, most), [say(text, lines, each, age)]
+    found = search(objective, most)
     in_series = any(t.in_series for t in found.final.parameters.terms)
     step = encoder_step(data.velocity, data.axis == "linear") if in_series else 0.0
     if not step > 0.0:
         return found, []
-    again = search(older)
-    fewer = len(again.final.effects) < len(found.final.effects)
-    if not fewer or not _score_beside(again, found) < found.space.score(found.final):
-        return found, []
+    # Only a model with fewer effects takes the place: first whether there is one, then what the whole search ends with.
+    for allowed in (len(found.final.effects) - 1, most):
+        again = search(older, allowed)
+        fewer = len(again.final.effects) < len(found.final.effects)
+        if not fewer or not _score_beside(again, found) < found.space.score(found.final):
+            return found, []
     text = (
         "The velocities lie on a lattice of {:.4g} {rad/s} and are half a sample old ({:.3g} ms), as those are that are the "
         "difference of an encoder's {angle} over one sample. The simulation has it; it is no finding."

@@ -4,6 +4,8 @@
 
 x, numbers of the model, and z, numbers of the controller, are fitted in turn: x by least squares for one z, z by a step of Gauss
 and Newton from which what x can explain is projected out (variable projection, Golub and Pereyra 1973).
+
+What comes out is held against a selected model. One that is fitted before whitening and stays far behind it is not followed.
 """
 
 from __future__ import annotations
@@ -15,21 +17,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.controller import Controller
+from gaident.diagnosis.selection.model_space import ModelSpace
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
-from gaident.estimation.noise_model import NoiseFilter
+from gaident.estimation.noise_model import WHITE, NoiseFilter
 from gaident.estimation.objective import Fit, Hypothesis, Objective
-from gaident.estimation.projection import project_out
+from gaident.estimation.projection import WORST, project_out
 from gaident.policy.table import POLICY
 
-__all__ = ["STEP", "UnderController"]
+__all__ = ["STEP", "UnderController", "out_of_reach"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 STEP = 1e-3  # no decision: of a number of the controller, for a difference
 STEPS = 12  # no decision: work, of Gauss and Newton
-SETTLED = 1e-6  # no decision: of a number of the controller, a step that ends them
+SLOW = 0.1  # no decision: of the cost: a step with less of a fall does not lead out of a place far behind
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +49,27 @@ class UnderController:
         data = self.data.under(self.controller(z))
         return hypothesis.driven_by(replace(hypothesis.predictor, data=data))  # type: ignore[type-var]
 
-    def closest(self, objective: Objective, fit: Fit, noise: NoiseFilter, z: Vector) -> tuple[Vector, Fit]:
-        """(z, model) of the least cost under one noise filter."""
+    def fitted(self, space: ModelSpace, objective: Objective, fit: Fit, z: Vector, beyond: float) -> tuple[Vector, Fit] | None:
+        """(z, model) of the least cost, under a noise model of its own; None where it diverges or its score stays beyond.
+
+        objective: that of the space, with a memory of its own: every controller tried makes a data set.
+        """
+
+        def hopeless(found: Fit) -> bool:
+            return space.score(ls.scored(objective, found)) > beyond
+
+        z, found = self.closest(objective, fit, WHITE, z, hopeless)
+        if hopeless(found):
+            return None
+        if space.whitens:
+            z, found = self.closest(objective, found, objective.own_noise(found), z, hopeless)
+        found = ls.reestimated(objective, found)
+        return None if found.cost >= WORST else (z, found)
+
+    def closest(
+        self, objective: Objective, fit: Fit, noise: NoiseFilter, z: Vector, hopeless: Callable[[Fit], bool]
+    ) -> tuple[Vector, Fit]:
+        """(z, model) of the least cost under one noise filter, or on the way there, where that is hopeless."""
         found = ls.fit(objective, self.of(fit.hypothesis, z), fit.x, noise, POLICY.usual)
         for _ in range(STEPS):
             v, C = self.slopes(objective, found.hypothesis, found.x, noise, z)
@@ -59,8 +81,8 @@ class UnderController:
                     break
             else:
                 break
-            moved, z, found = float(np.abs(to - z).max()), to, trial
-            if moved < SETTLED:
+            fall, z, found = found.cost - trial.cost, to, trial
+            if ls.negligible(objective, fall, found.cost) or (fall < SLOW * found.cost and hopeless(found)):
                 break
         return z, found
 
@@ -83,3 +105,13 @@ class UnderController:
         variance = float(v @ v) / objective.information
         spread = np.linalg.pinv(C @ C.T * objective.information / max(objective.count, 1.0)) * variance
         return np.sqrt(np.maximum(np.diag(spread), 0.0))
+
+
+def out_of_reach(space: ModelSpace, selected: Fit) -> float:
+    """Score from which on a model that is fitted before whitening is not followed beside a selected one.
+
+    The selected model itself, fitted before whitening too, scores worse than it does, and a beam follows what is behind by less
+    than its reach.
+    """
+    plain = ls.scored(space.objective, ls.fit(space.objective, selected.hypothesis, selected.x, WHITE, POLICY.usual))
+    return max(space.score(plain), space.score(selected)) + POLICY.beam_reach * space.penalty

@@ -28,13 +28,13 @@ from gaident.control.filters import LowPass, Notch
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS
-from gaident.diagnosis.selection.under_controller import STEP, UnderController
+from gaident.diagnosis.selection.under_controller import STEP, UnderController, out_of_reach
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.prediction import OpenLoop
-from gaident.estimation.projection import WORST, project_out
+from gaident.estimation.projection import project_out
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
@@ -202,7 +202,8 @@ def unlogged_form(space: Moves, final: Fit) -> UnloggedForm | None:
     starts = _promising(space, objective, data.pi, [_opened(space, base) for base in bases])
     if not leaves_noise(space, final):
         starts += [(v, under, _with_friction(space, base), z) for v, under, base, z in starts if not _rubs(base)]
-    found = [_fitted(space, objective, *one) for one in starts]
+    beyond = max(out_of_reach(space, f) for f in (final, _opened(space, final)))
+    found = [_fitted(space, objective, beyond, *one) for one in starts]
     known = [f for f in found if f is not None]
     best = min(known, key=lambda f: f[1], default=None)
     if best is None or any(f[2].finding == OTHER_GAINS and f[1] < best[1] + space.margin for f in known):
@@ -274,15 +275,20 @@ def _starts(space: Moves, objective: Objective, pi: PI, bases: list[Fit]) -> Ite
                 yield float(left @ left), (variant, under, base, z)
 
 
-def _fitted(space: Moves, objective: Objective, variant: _Variant, under: UnderController, base: Fit, z: Vector) -> _End | None:
-    """(model, score, form, its numbers, their deviations) from one start; None where it diverges or ends at a bound."""
-    z, found = under.closest(objective, base, WHITE, z)
-    if space.whitens:
-        z, found = under.closest(objective, found, objective.own_noise(found), z)
-    found = ls.reestimated(objective, found)
+def _fitted(
+    space: Moves, objective: Objective, beyond: float, variant: _Variant, under: UnderController, base: Fit, z: Vector
+) -> _End | None:
+    """(model, score, form, its numbers, their deviations) from one start; None where it diverges or ends at a bound.
+
+    Nor where its score stays beyond what is followed.
+    """
+    end = under.fitted(space, objective, base, z, beyond)
+    if end is None:
+        return None
+    z, found = end
     zero = (under.low == 0.0) & (z == 0.0)  # a weight of 0, or zeros without damping, are what drives have
     at_end = (z > under.high - STEP) | ((z < under.low + STEP) & ~zero)
-    if found.cost >= WORST or bool(at_end.any()):
+    if bool(at_end.any()):
         return None
     score = space.score(found) + cost_of(len(z), objective.information) + space.penalty
     return found, score, variant, z, under.deviations(objective, found, z)
