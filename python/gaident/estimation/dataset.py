@@ -187,8 +187,10 @@ class DataSet:
 
     @cached_property
     def closable(self) -> bool:
-        """Whether command and controller can drive a model from standstill, with what the integrator held; never where they do not
-        make the logged torque."""
+        """Whether command and controller can drive a model from standstill, with what the integrator held.
+
+        Never where they do not make the logged torque.
+        """
         if self.loop is None or any(self.moving) or not self.loop_follows:
             return False
         loop = self.loop
