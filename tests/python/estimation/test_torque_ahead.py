@@ -65,3 +65,13 @@ def test_a_torque_that_is_held_is_not_moved() -> None:
     assert seen is not None and abs(seen.lag) < max(3.0 * seen.std, 0.03)
     dia = ga.diagnose(rec.with_channels(position_command=None))
     assert not any("goes on, as that of a controller" in note for note in dia.notes), dia.summary()
+
+
+def test_a_torque_that_follows_exactly_is_not_ahead() -> None:
+    """The deviation of its lag is 0."""
+    t = DT * np.arange(4000)
+    held = 0.2 * np.sin(5.0 * t)
+    drive = ga.OneMass(J=1e-3, D=2e-3)
+    rec = ga.Record(DT, torque=held, velocity=ga.simulate(drive, ga.Record(DT, torque=held, velocity=np.zeros(len(t)))))
+    dia = ga.diagnose(rec)
+    assert dia.causes == () and not any("goes on, as that of a controller" in note for note in dia.notes), dia.summary()

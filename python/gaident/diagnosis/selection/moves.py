@@ -7,6 +7,7 @@ A model is a mechanism (one mass or two) with effects. The moves are
     simplify    a generalisation to what it contains
     exchange    an effect for one of its equivalence class, where only others tell them apart
     other side  a shaft effect of two masses at the other end of the shaft
+    a load      one mass with effects of its shaft as two masses, these at the load
     resettle    the mechanism's resonance at the place of an extra one
     hold        one mass by a spring to the ground
     demote      two masses to one, or the spring away
@@ -88,7 +89,7 @@ class Moves(SideMoves):
             return []
         key = "add", now.key, self.allowed
         self.grown.setdefault((now.parameters.kind, frozenset(now.effects)), []).append(now)
-        return self.objective.once(key, lambda: self._best(now, [*self.hold(now), *self._add(now)]))
+        return self.objective.once(key, lambda: self._best(now, [*self.hold(now), *self.with_a_load(now), *self._add(now)]))
 
     def known(self, fit: Fit) -> Fit:
         """A fit of the same model that was grown already, where it is no worse by what swaps a place: its growth is known."""

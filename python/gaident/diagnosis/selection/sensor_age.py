@@ -49,6 +49,7 @@ from gaident.policy.table import POLICY
 __all__ = ["searched"]
 
 HALF = 0.5  # no decision: of a sample, the age of a mean over it
+EXACT = 1e-3  # no decision: lines, what the parabola of a lag is exact to
 SURE = 0.02  # no decision: lines, to which a search finds by how much the torque is ahead
 
 
@@ -128,7 +129,7 @@ def _ahead(data: DataSet, model: Model) -> TorqueLag | None:
     shown = [lag for r in moving if (lag := torque_lag(r, band)) is not None]
     if not shown:
         return None
-    weights = np.array([lag.std**-2 for lag in shown])
+    weights = np.array([max(lag.std, EXACT) ** -2 for lag in shown])
     ahead = float(weights @ np.array([lag.lag for lag in shown]) / weights.sum())
     std = float(weights.sum() ** -0.5)
     if not ahead > max(POLICY.ahead_seen, POLICY.contradiction * std) or ahead > HALF + POLICY.contradiction * std:

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaident.diagnosis.library.terms import LIBRARY
+from gaident.diagnosis.selection.mechanisms import on_a_shaft
 from gaident.diagnosis.selection.model_space import ModelSpace
 from gaident.diagnosis.selection.score_test import Screened
+from gaident.estimation import least_squares as ls
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis
 from gaident.estimation.projection import WORST
@@ -65,6 +67,28 @@ class SideMoves(ModelSpace):
             start = X[int(np.argmin(self.objective.costs(longer, X, WHITE)))]
             found.append(self.refitted(longer, start))
         return [f for f in found if f is not None]
+
+    def with_a_load(self, fit: Fit) -> list[Fit]:
+        """One mass with effects of its shaft as two masses that have these at the load; not where little is left to explain.
+
+        Friction at the load damps what swings there: a second mass beside friction at the motor may explain nothing, and friction
+        at the load has no place without one.
+        """
+        moved = [t for t in fit.parameters.terms if t.other_side]
+        if fit.parameters.kind != "one mass" or not moved or self.quiet(fit):
+            return []
+        short = []
+        for hypothesis, x in on_a_shaft(self.objective, fit):
+            for term in moved:
+                values = x[hypothesis.parameters.slot(term.name)]
+                bare, y = hypothesis.without(term.name), hypothesis.parameters.removed(x, term.name)
+                other = self._beside(bare, term)
+                if other is None:
+                    return []
+                hypothesis, x = bare.extended(other), bare.parameters.inserted(y, values)
+            short.append(ls.fit(self.objective, hypothesis, x, WHITE, self.policy.short))
+        best = min(short, key=lambda f: f.cost, default=None)
+        return [] if best is None or best.cost >= WORST else [self.refitted(best.hypothesis, best.x, self.policy.long)]
 
     def screened_at_load(self, now: Fit) -> list[Term]:
         """What is screened at the load, beside what is screened at the motor: harmonic torques and the simplest dry friction.
