@@ -122,8 +122,13 @@ class ModelSpace:
         return self.ratio(fit) < self.policy.noise_ratio
 
     def small_unwhitened(self, fit: Fit) -> bool:
-        """Whether the errors before whitening, in the loop where there is one, are little more than the noise."""
-        inside = fit.hypothesis.driven_by(self.closed(fit.predictor)) if self.data.closable else fit.hypothesis
+        """Whether the errors before whitening, in the loop where there is one, are little more than the noise.
+
+        A loop that begins under a load hides it from a model that has none: the torque drives that one.
+        """
+        loaded = self.data.closable and any(t.constant for t in fit.parameters.terms)
+        in_loop = self.data.loopable or loaded
+        inside = fit.hypothesis.driven_by(self.closed(fit.predictor)) if in_loop else fit.hypothesis
         cost = float(self.objective.costs(inside, fit.x[None, :], WHITE)[0])
         return bool(np.sqrt(cost / self.objective.count) < self.policy.free_run_ratio * self.noise_beside(fit))
 
