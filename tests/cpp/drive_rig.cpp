@@ -2,13 +2,13 @@
 // library.
 //
 //   motor   J1 dw/dt = M - D1 w - Tc        M  = g (s^2 + 2 zz wz s + wz^2)/(s^2 + 2 zp wp s + wp^2) {T + q - f},  g = (wp/wz)^2
-//   load    J2 dw2/dt = Tc - D2 w2          Tc = K x + DG dx/dt + k3 x^3 beyond the gap, 0 inside; x = theta - theta2
+//   load    J2 dw2/dt = Tc - D2 w2 + q2 - f2    Tc = K x + DG dx/dt + k3 x^3 beyond the gap, 0 inside; x = theta - theta2
 //
-// T: torque behind saturation, dead band, delay and lag; q: smooth shaft torques; f: dry friction.
-// Both act at the motor, or with `at_load` as q - f on the load, with its velocity and angle.
+// T: torque behind saturation, dead band, delay and lag; q: smooth shaft torques; f: dry friction; q2, f2: the same at the load,
+// with its velocity and angle. Effects at the load and a further resonance do not go together.
 // Every sample is cut at the instant where the delayed torque changes and into substeps of a Runge-Kutta step of fourth order.
-// Dry friction has three regimes (sliding +, sliding -, at rest); the instant of a zero crossing is found by a secant iteration,
-// and at rest w is exactly 0 until the torque that holds the shaft exceeds the friction's level.
+// Dry friction has three regimes at each end (sliding +, sliding -, at rest); the instant of the first zero crossing is found by a
+// secant iteration, and at rest w is exactly 0 until the torque that holds that end exceeds its friction's level.
 // The controller is digital, as a drive has it: drive_rig_controller.hpp.
 //
 // Compiled and called by tests/python/support/drive_rig.py, which reads the list of fields below.
@@ -17,6 +17,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -85,24 +86,71 @@ struct Drive {  // SI units, rad; neutral values
     double root = 0;        // drag root sqrt|w| sign(w),
     double hysteretic = 0;  // share of a Bouc-Wen spring in K,
     double yield = 1;       // and its yield twist, rad
-    double at_load = 0;     // not 0: the shaft's effects act at the load, without a further resonance
     // end of fields
 };
 
-enum Index { w1, angle, w2, twist, lagged, bristle, bent, filtered, e1, e2, hysteresis, states };
+enum Index { w1, angle, w2, twist, lagged, bristle, bent, bristle2, bent2, filtered, e1, e2, hysteresis, states };
 using State = std::array<double, states>;
 
 double sign(double value) { return static_cast<double>((value > 0) - (value < 0)); }
 
+// The effects of the shaft at one end of it: their sizes, and the states that they have.
+struct End {
+    const Drive& d;
+    const Index speed, bristle, bent;
+    const bool load;
+    const bool dry = d.friction_positive != 0 || d.friction_negative != 0 || d.viscous_positive != 0 || d.viscous_negative != 0 ||
+                     d.stribeck != 0 || d.drifting != 0 || d.uneven != 0 || d.loaded != 0;
+
+    double turned(const State& x) const { return load ? x[angle] - x[twist] : x[angle]; }
+
+    // Magnitude of dry friction when this end turns, or is about to turn, in the direction `way`.
+    double level(const State& x, double t, int way) const {
+        const double fast = std::abs(x[speed]);
+        double f = way > 0 ? d.friction_positive + d.viscous_positive * fast : d.friction_negative + d.viscous_negative * fast;
+        if (d.stribeck != 0) f += d.stribeck * std::exp(-(fast / d.stribeck_velocity) * (fast / d.stribeck_velocity));
+        if (d.drifting != 0) f += d.drifting * (1 + d.drift_rate * t);
+        if (d.uneven != 0) f += d.uneven * (1 + d.uneven_depth * std::sin(d.uneven_order * turned(x) + d.uneven_phase));
+        if (d.loaded != 0) f += d.loaded * std::abs(d.load + d.unbalance * std::sin(turned(x) + d.unbalance_phase));
+        return f;
+    }
+
+    // dz/dt of the LuGre bristle
+    double bending(const State& x) const {
+        const double ratio = x[speed] / d.lugre_velocity;
+        const double g = d.lugre + (d.lugre_static - d.lugre) * std::exp(-ratio * ratio);
+        return x[speed] - d.lugre_stiffness * std::abs(x[speed]) * x[bent] / g;
+    }
+
+    // The smooth torques here, added to what else acts.
+    double smooth(const State& x, double t, double q) const {
+        q -= d.load;
+        if (d.drag != 0) q -= d.drag * x[speed] * std::abs(x[speed]);
+        if (d.dahl != 0) q -= d.dahl_stiffness * x[bristle];
+        if (d.lugre != 0) q -= d.lugre_stiffness * x[bent] + d.lugre_damping * bending(x);
+        if (!load) q -= d.ground * (x[angle] - d.rest);
+        if (d.unbalance != 0) q -= d.unbalance * std::sin(turned(x) + d.unbalance_phase);
+        if (d.cogging != 0) q -= d.cogging * std::sin(d.cogging_order * turned(x) + d.cogging_phase);
+        if (d.hum != 0) q += d.hum * std::sin(d.hum_frequency * t + d.hum_phase);
+        if (d.root != 0) q -= d.root * std::sqrt(std::abs(x[speed])) * sign(x[speed]);
+        return q;
+    }
+
+    void bristles(const State& x, State& dx) const {
+        if (d.dahl != 0) dx[bristle] = x[speed] - d.dahl_stiffness * std::abs(x[speed]) * x[bristle] / d.dahl;
+        if (d.lugre != 0) dx[bent] = bending(x);
+    }
+};
+
+using Ways = std::array<int, 2>;  // of motor and load: -1, 0 (at rest), 1
+
 class Rig {
 public:
-    explicit Rig(const Drive& drive)
+    // load: whose shaft effects act at the load; nothing else of it is read
+    Rig(const Drive& drive, const Drive& load)
         : d(drive),
-          dry(d.friction_positive != 0 || d.friction_negative != 0 || d.viscous_positive != 0 || d.viscous_negative != 0 ||
-              d.stribeck != 0 || d.drifting != 0 || d.uneven != 0 || d.loaded != 0),
+          ends{End{drive, w1, ::bristle, ::bent, false}, End{load, w2, bristle2, bent2, true}},
           extra(d.wp > 0),
-          at_load(d.at_load != 0),
-          shaft(at_load ? w2 : w1),
           g(extra ? (d.wp / d.wz) * (d.wp / d.wz) : 1) {}
 
     State s{};
@@ -115,66 +163,31 @@ public:
     void advance(double t, double span, int count) {
         const double h = span / count;
         for (int i = 0; i < count; ++i) {
-            if (dry) {
+            if (ends[0].dry || ends[1].dry) {
                 substep_with_friction(t + i * h, h);
             } else {
-                s = runge_kutta(s, t + i * h, h, 0);
+                s = runge_kutta(s, t + i * h, h, {});
             }
         }
     }
 
 private:
     const Drive& d;
-    const bool dry;
+    const std::array<End, 2> ends;
     const bool extra;
-    const bool at_load;
-    const Index shaft;  // whose velocity the shaft's effects have
     const double g;
-    int regime = 0;  // -1, 0 (at rest), 1
+    Ways regime{};
 
     double rippled(const State& x) const {
         if (d.ripple == 0) return x[w1];
         return x[w1] * (1 + d.ripple * d.ripple_order * std::cos(d.ripple_order * x[angle] + d.ripple_phase));
     }
 
-    double turned(const State& x) const { return at_load ? x[angle] - x[twist] : x[angle]; }
-
-    // Magnitude of dry friction when the shaft turns, or is about to turn, in the direction `way`.
-    double level(const State& x, double t, int way) const {
-        const double speed = std::abs(x[shaft]);
-        double f = way > 0 ? d.friction_positive + d.viscous_positive * speed : d.friction_negative + d.viscous_negative * speed;
-        if (d.stribeck != 0) f += d.stribeck * std::exp(-(speed / d.stribeck_velocity) * (speed / d.stribeck_velocity));
-        if (d.drifting != 0) f += d.drifting * (1 + d.drift_rate * t);
-        if (d.uneven != 0) f += d.uneven * (1 + d.uneven_depth * std::sin(d.uneven_order * turned(x) + d.uneven_phase));
-        if (d.loaded != 0) f += d.loaded * std::abs(d.load + d.unbalance * std::sin(turned(x) + d.unbalance_phase));
-        return f;
-    }
-
-    // dz/dt of the LuGre bristle
-    double bending(const State& x) const {
-        const double ratio = x[shaft] / d.lugre_velocity;
-        const double g = d.lugre + (d.lugre_static - d.lugre) * std::exp(-ratio * ratio);
-        return x[shaft] - d.lugre_stiffness * std::abs(x[shaft]) * x[bent] / g;
-    }
-
-    double grounded(const State& x) const { return d.ground * (x[angle] - d.rest); }
-
     // Torque of the actuator and what disturbs it.
     double driving(const State& x) const { return (d.lag > 0 ? x[lagged] : held) + disturbed; }
 
-    // The smooth torques where the shaft's effects are.
-    double smooth(const State& x, double t) const {
-        double q = (at_load ? 0 : driving(x)) - d.load;
-        if (d.drag != 0) q -= d.drag * x[shaft] * std::abs(x[shaft]);
-        if (d.dahl != 0) q -= d.dahl_stiffness * x[bristle];
-        if (d.lugre != 0) q -= d.lugre_stiffness * x[bent] + d.lugre_damping * bending(x);
-        if (!at_load) q -= grounded(x);
-        if (d.unbalance != 0) q -= d.unbalance * std::sin(turned(x) + d.unbalance_phase);
-        if (d.cogging != 0) q -= d.cogging * std::sin(d.cogging_order * turned(x) + d.cogging_phase);
-        if (d.hum != 0) q += d.hum * std::sin(d.hum_frequency * t + d.hum_phase);
-        if (d.root != 0) q -= d.root * std::sqrt(std::abs(x[shaft])) * sign(x[shaft]);
-        return q;
-    }
+    // What acts on one end without the coupling and without dry friction.
+    double smooth(int end, const State& x, double t) const { return ends[end].smooth(x, t, end == 0 ? driving(x) : 0); }
 
     double coupling(const State& x) const {
         double open = x[twist];
@@ -192,30 +205,27 @@ private:
         return extra ? g * ((d.wz * d.wz - d.wp * d.wp) * x[e1] + 2 * (d.zz * d.wz - d.zp * d.wp) * x[e2]) : 0;
     }
 
-    // The friction torque that keeps the shaft at rest.
-    double holding(const State& x, double t) const {
-        if (at_load) return smooth(x, t) + coupling(x);
-        return smooth(x, t) + (stored(x) - (d.J2 > 0 ? coupling(x) : 0)) / g;
+    // The friction torque that keeps one end at rest.
+    double holding(int end, const State& x, double t) const {
+        if (end == 1) return smooth(1, x, t) + coupling(x);
+        return smooth(0, x, t) + (stored(x) - (d.J2 > 0 ? coupling(x) : 0)) / g;
     }
 
-    State slope(const State& x, double t, int way) const {
+    State slope(const State& x, double t, const Ways& way) const {
         State dx{};
         const double tc = d.J2 > 0 ? coupling(x) : 0;
-        const double q = smooth(x, t);
-        const bool resting = dry && way == 0;
-        double net = q;
-        if (at_load) {
-            net = driving(x) - grounded(x);
-        } else if (resting) {
+        const bool resting = ends[0].dry && way[0] == 0;
+        double net = smooth(0, x, t);
+        if (resting) {
             net = (tc - stored(x)) / g;
-        } else if (dry) {
-            net = q - way * level(x, t, way);
+        } else if (ends[0].dry) {
+            net -= way[0] * ends[0].level(x, t, way[0]);
         }
-        dx[w1] = resting && !at_load ? 0 : (g * net + stored(x) - d.D1 * x[w1] - tc) / d.J1;
+        dx[w1] = resting ? 0 : (g * net + stored(x) - d.D1 * x[w1] - tc) / d.J1;
         dx[angle] = x[w1];
         if (d.J2 > 0) {
-            dx[w2] = (tc - d.D2 * x[w2]) / d.J2;
-            if (at_load) dx[w2] = resting ? 0 : dx[w2] + (q - (dry ? way * level(x, t, way) : 0)) / d.J2;
+            const double own = smooth(1, x, t) - (ends[1].dry ? way[1] * ends[1].level(x, t, way[1]) : 0);
+            dx[w2] = ends[1].dry && way[1] == 0 ? 0 : (tc - d.D2 * x[w2]) / d.J2 + own / d.J2;
             dx[twist] = x[w1] - x[w2];
             if (d.hysteretic != 0) {
                 // z turns at the rate of the twist, less the more it is yielded: Bouc-Wen with n = 2, beta = gamma = 1/2.
@@ -224,8 +234,7 @@ private:
             }
         }
         if (d.lag > 0) dx[lagged] = (held - x[lagged]) / d.lag;
-        if (d.dahl != 0) dx[bristle] = x[shaft] - d.dahl_stiffness * std::abs(x[shaft]) * x[bristle] / d.dahl;
-        if (d.lugre != 0) dx[bent] = bending(x);
+        for (const End& end : ends) end.bristles(x, dx);
         if (d.filter > 0) dx[filtered] = (rippled(x) - x[filtered]) / d.filter;
         if (extra) {
             dx[e1] = x[e2];
@@ -234,7 +243,7 @@ private:
         return dx;
     }
 
-    State runge_kutta(const State& x, double t, double h, int way) const {
+    State runge_kutta(const State& x, double t, double h, const Ways& way) const {
         const auto moved = [&](const State& k, double by) {
             State y = x;
             for (int i = 0; i < states; ++i) y[i] += by * k[i];
@@ -247,48 +256,55 @@ private:
         return y;
     }
 
-    // The regime that follows from rest.
-    int from_rest(double t) const {
-        const double needed = holding(s, t);
-        return needed > level(s, t, 1) ? 1 : needed < -level(s, t, -1) ? -1 : 0;
+    // The regime of an end that follows from rest.
+    int from_rest(int end, double t) const {
+        const double needed = holding(end, s, t);
+        return needed > ends[end].level(s, t, 1) ? 1 : needed < -ends[end].level(s, t, -1) ? -1 : 0;
+    }
+
+    // When an end that slides comes to rest within h from t, with the state there; h and the state at its end where it does not.
+    std::pair<double, State> stop(int end, double t, double h, double substep, const State& whole) const {
+        if (!ends[end].dry || regime[end] == 0 || regime[end] * whole[ends[end].speed] >= 0) return {h, whole};
+        const Index shaft = ends[end].speed;
+        // w(a) >= 0 >= w(b), seen in the direction of motion: regula falsi between the two, Illinois.
+        double a = 0, b = h, wa = s[shaft], wb = whole[shaft];
+        State crossing = s;
+        for (int i = 0; i < 40 && b - a > 1e-9 * substep; ++i) {
+            const double middle = wa == wb ? b : a + (b - a) * wa / (wa - wb);
+            crossing = runge_kutta(s, t, middle, regime);
+            if (std::abs(crossing[shaft]) < 1e-13) {
+                a = b = middle;
+            } else if (regime[end] * crossing[shaft] > 0) {
+                a = middle, wa = crossing[shaft], wb /= 2;
+            } else {
+                b = middle, wb = crossing[shaft], wa /= 2;
+            }
+        }
+        return {b, crossing};
     }
 
     void substep_with_friction(double t, double h) {
-        const double end = t + h;
-        for (int events = 0; events < 20 && end - t > 1e-6 * h; ++events) {
-            const double left = end - t;
-            if (regime == 0) regime = from_rest(t);
-            if (regime == 0) {
-                s = runge_kutta(s, t, left, 0);
-                return;
-            }
+        const double until = t + h;
+        int last = 0;
+        for (int events = 0; events < 20 && until - t > 1e-6 * h; ++events) {
+            const double left = until - t;
+            for (int end = 0; end < 2; ++end)
+                if (ends[end].dry && regime[end] == 0) regime[end] = from_rest(end, t);
             const State whole = runge_kutta(s, t, left, regime);
-            if (regime * whole[shaft] >= 0) {
-                s = whole;
-                return;
-            }
-            // w(a) >= 0 >= w(b), seen in the direction of motion: regula falsi between the two, Illinois.
-            double a = 0, b = left, wa = s[shaft], wb = whole[shaft];
-            State crossing = s;
-            for (int i = 0; i < 40 && b - a > 1e-9 * h; ++i) {
-                const double middle = wa == wb ? b : a + (b - a) * wa / (wa - wb);
-                crossing = runge_kutta(s, t, middle, regime);
-                if (std::abs(crossing[shaft]) < 1e-13) {
-                    a = b = middle;
-                } else if (regime * crossing[shaft] > 0) {
-                    a = middle, wa = crossing[shaft], wb /= 2;
-                } else {
-                    b = middle, wb = crossing[shaft], wa /= 2;
-                }
-            }
-            s = crossing;
+            const auto motor = stop(0, t, left, h, whole), load = stop(1, t, left, h, whole);
+            const bool first = motor.first <= load.first;
+            const auto& [passed, state] = first ? motor : load;
+            last = first ? 0 : 1;
+            s = state;
+            const Index shaft = ends[last].speed;
+            if (!(ends[last].dry && regime[last] != 0 && regime[last] * whole[shaft] < 0)) return;
             s[shaft] = 0;
-            t += b;
-            regime = from_rest(t);
+            t += passed;
+            regime[last] = from_rest(last, t);
         }
-        if (end - t > 1e-6 * h) {  // too many events for one substep: the shaft is at rest
-            regime = 0;
-            s = runge_kutta(s, t, end - t, 0);
+        if (until - t > 1e-6 * h) {  // too many events for one substep: that end is at rest
+            regime[last] = 0;
+            s = runge_kutta(s, t, until - t, regime);
         }
     }
 };
@@ -299,13 +315,13 @@ using rig_controller::clamp;
 
 // One run of n samples of the controller. `command` drives the loop; where it is null, `given` is the torque command of an open
 // loop. `measured`, where given, is what the controller reads instead of the velocity (a replay). Returns 0, or 1 where the drive
-// ran away.
-extern "C" int drive_rig_run(const Drive* drive, const rig_controller::Settings* settings, const double* filters,
-                             int filter_count, int n, double dt, int substeps, const double* command, const double* given,
-                             const double* measured, const double* velocity_noise, const double* torque_noise, double* velocity,
-                             double* torque, double* position, double* truth) {
+// ran away. load: whose effects of the shaft act at the load.
+extern "C" int drive_rig_run(const Drive* drive, const Drive* load, const rig_controller::Settings* settings,
+                             const double* filters, int filter_count, int n, double dt, int substeps, const double* command,
+                             const double* given, const double* measured, const double* velocity_noise,
+                             const double* torque_noise, double* velocity, double* torque, double* position, double* truth) {
     const Drive& d = *drive;
-    Rig rig(d);
+    Rig rig(d, *load);
     rig_controller::Controller controller(*settings, filters, filter_count, command, n, dt, d.integrator_limit, d.command_rate);
     std::vector<double> acted(static_cast<std::size_t>(n));
     const auto at = [&](int i) { return i < 0 ? 0.0 : acted[static_cast<std::size_t>(i)]; };

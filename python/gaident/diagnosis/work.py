@@ -235,8 +235,10 @@ class Work:
             alternatives = self._alternatives(effect, rivals, offset, never)
             if effect in self.gain_doubt.rivals:
                 self.notes.append(or_other_gains(effect))
-            sides = sides_of(effect, [r.effect for r in rivals], masses := self.final.parameters.masses)
-            said_by = evidence_of(effect, gain, alternatives, offset, sides if masses > 1 else ())
+            two = self.final.parameters.masses > 1
+            one_place = not two or any(t.resonates for t in self.final.parameters.terms)  # beside those nothing is at the load
+            sides = sides_of(effect, [r.effect for r in rivals], one_place)
+            said_by = evidence_of(effect, gain, alternatives, offset, sides if two else ())
             what = name_of(effect), estimates[effect], alternatives, gains.of(effect), gain, None, said_by, False
             findings.append(Finding(*what, LIBRARY[effect].place, sides))
         if driver is None and (damping := negative_damping(mechanics)) is not None:

@@ -163,7 +163,7 @@ class Diagnosis(SavedResult):
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
     def __repr__(self) -> str:
-        named = ", ".join(f"{f.effect}{'' if f.named else '?'} {where(f, self.model)}".rstrip() for f in self.causes)
+        named = ", ".join(f"{f.effect} {where(f, self.model)}".rstrip() + ("" if f.named else "?") for f in self.causes)
         return f"<Diagnosis {self.verdict}{': ' + named if named else ''}; see summary()>"
 
     @property

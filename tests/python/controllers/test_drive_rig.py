@@ -310,7 +310,8 @@ def test_wrong_use_is_refused() -> None:
         run_drive(ONE, levels(ONE), {"coulomb_friction": {"level": 0.05}})
     with pytest.raises(RanAwayError):
         run_drive(replace(ONE, kp=50.0), levels(ONE), {"transport_delay": {"delay": 5e-3}})
-    assert drive_values(ONE, {}) | {"J1": 1e-3, "D1": 0} == fields()
+    drive, at_load = drive_values(ONE, {})
+    assert drive | {"J1": 1e-3, "D1": 0} == fields() == at_load
 
 
 @pytest.mark.parametrize("effect", [e for e in EFFECTS if e in SHAFT])
@@ -329,13 +330,45 @@ def test_effects_at_the_load_agree_with_the_fine_integrator(effect: str) -> None
     assert np.sqrt(np.mean((here - motor) ** 2)) > 0.02 * changed, "the end of the shaft shows"
 
 
-def test_the_load_s_end_takes_two_masses_and_all_effects_of_the_shaft() -> None:
-    friction = {"torque": 0.05}
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if e in SHAFT])
+def test_effects_at_both_ends_agree_with_the_fine_integrator(effect: str) -> None:
+    """The levels at the load 15 % larger: neither end stops when the other does."""
+    command = levels(TWO, 30)[:200]
+    values = draw_effect(effect, 1.0, TWO, len(command), np.random.default_rng(1))
+    larger = {name: value * (1.15 if name in ("torque", "torque_positive", "amplitude", "coefficient") else 1.0)
+              for name, value in values.items()}  # fmt: skip
+    masses = (TWO.J, TWO.D), (TWO.JL, TWO.DL), (TWO.KG, TWO.DG)
+    case = FineCase(TWO.dt, "sampled", command, *masses, TWO.kp, TWO.ki, effects={effect: values}, at_load={effect: larger})
+    fine = integrate([case], fine=200).velocity[:, 0]
+    both, motor, without = (
+        run_drive(TWO, command, effects).truth for effects in ({effect: values, effect + AT_LOAD: larger}, {effect: values}, {})
+    )
+    changed = float(np.sqrt(np.mean((both - without) ** 2)))
+    assert np.sqrt(np.mean((both - fine) ** 2)) < 0.01 * changed
+    assert np.sqrt(np.mean((both - motor) ** 2)) > 0.02 * changed, "the second one shows"
+
+
+def test_both_ends_hold_exactly_and_let_go_one_after_the_other() -> None:
+    """A torque that rises slowly: the motor moves when it is above its own level, the load when the shaft carries more."""
+    torque = np.concatenate([np.linspace(0.0, 0.2, 4000), np.zeros(2000)])
+    friction = {"coulomb_friction": {"torque": 0.05}, "coulomb_friction@load": {"torque": 0.08}}
+    log = run_drive(TWO, None, friction, torque=torque)
+    moves = np.flatnonzero(log.truth)
+    assert torque[moves[0]] == pytest.approx(0.05, abs=2e-4) and np.all(log.truth[: moves[0]] == 0.0)
+    # Up to 0.13 N m the load holds, and the motor goes no further than the shaft twists: (T - 0.05)/K.
+    before = np.flatnonzero(torque < 0.125)
+    before = before[before < 4000]
+    assert log.position[before[-1]] == pytest.approx((0.125 - 0.05) / TWO.KG, rel=0.02)
+    assert log.position[3999] > 10.0 * log.position[before[-1]]
+    assert np.all(log.truth[-100:] == 0.0)
+
+
+def test_the_load_s_end_takes_two_masses_and_effects_of_the_shaft() -> None:
     for plant, effects in (
-        (ONE, {"coulomb_friction@load": friction}),
-        (TWO, {"coulomb_friction@load": friction, "load_torque": friction}),
+        (ONE, {"coulomb_friction@load": {"torque": 0.05}}),
+        (TWO, {"transport_delay@load": {"delay": 1e-3}}),
     ):
-        with pytest.raises(ValueError, match="at one side, at the load only of two masses"):
+        with pytest.raises(ValueError, match="effects of the shaft are at the load, and only of two masses"):
             drive_values(plant, effects)
 
 

@@ -279,6 +279,7 @@ def test_the_staircase_triggers_almost_everything() -> None:
     assert found.reversals >= 8 and found.torque_reversals >= 10 and 4 < found.revolutions < 5
     assert len([v for v in found.speeds if v]) >= 6 and found.steps[-1] == 100.0
     assert set(found.one_sided) >= {"torque_saturation", "integrator_clamp", "command_rate_limit"}
+    assert found.one_sided["extra_resonance"].startswith(f"one above {0.4 / DT:.3g} Hz would not have shown")
     assert "reversals" in found.sentence
 
 

@@ -181,7 +181,7 @@ def library() -> ctypes.CDLL:
     loaded = compiled.library(SOURCE)
     pointer = ctypes.POINTER(ctypes.c_double)
     integer = ctypes.c_int
-    loaded.drive_rig_run.argtypes = [*[pointer] * 3, integer, integer, ctypes.c_double, integer, *[pointer] * 9]
+    loaded.drive_rig_run.argtypes = [*[pointer] * 4, integer, integer, ctypes.c_double, integer, *[pointer] * 9]
     return loaded
 
 
@@ -195,45 +195,47 @@ def skip_without_library() -> None:
         pytest.skip(str(missing), allow_module_level=True)
 
 
-def drive_values(plant: Plant, effects: Effects) -> dict[str, float]:
-    """The fields of the simulated drive that has these effects; "name@load": at the load, where then all of the shaft are.
+def drive_values(plant: Plant, effects: Effects) -> tuple[dict[str, float], dict[str, float]]:
+    """The fields of the simulated drive that has these effects, and those of what acts at its load, "name@load".
 
     Raises ValueError for parameters that an effect does not take, and where its place is not in the plant.
     """
-    values = dict(fields())
+    values, at_load = dict(fields()), dict(fields())
     values.update(J1=plant.J, D1=plant.D, J2=plant.JL, D2=plant.DL, K=plant.KG, DG=plant.DG)
     values.update(ground=plant.ground, rest=plant.rest)
     delay = 0.0 if plant.cascade is None else plant.cascade.delay
     if plant.cascade is not None and plant.cascade.velocity.integrator_limit is not None:
         values["integrator_limit"] = plant.cascade.velocity.integrator_limit
-    sides = {key.partition("@")[2] for key in effects if AT_LOAD in key or key in SHAFT}
-    if len(sides) > 1 or (sides == {"load"} and not plant.two_masses):
-        raise ValueError(f"{sorted(effects)}: all effects of the shaft are at one side, at the load only of two masses")
-    values["at_load"] = float(sides == {"load"})
     for key, parameters in effects.items():
         effect = key.removesuffix(AT_LOAD)
-        if effect == "outliers":
-            continue  # they spoil the log, not the drive
-        known = FIELDS.get(effect) or FRICTION[effect]
-        if set(parameters) != set(known):
-            raise ValueError(f"{effect} takes {sorted(known)}, not {sorted(parameters)}")
-        if effect in COUPLING and not plant.two_masses:
-            raise ValueError(f"{effect} acts in the shaft between two masses")
-        if "both" in known.values():
-            values["friction_positive"] += parameters["torque"]
-            values["friction_negative"] += parameters["torque"]
-        if effect == "stribeck_friction":
-            values["stribeck"] = parameters["static_torque"] - parameters["torque"]
-            values["stribeck_velocity"] = parameters["stribeck_velocity"]
-        elif effect == "load_dependent_friction":
-            values["loaded"] = parameters["share"]
-        elif effect == "asymmetric_friction":
-            for name, place in known.items():
-                values[place] += parameters[name]
-        elif effect in FIELDS:
-            values.update({known[name]: value for name, value in parameters.items()})
+        if effect != key and not (plant.two_masses and effect in SHAFT):
+            raise ValueError(f"{key}: effects of the shaft are at the load, and only of two masses")
+        if effect != "outliers":  # they spoil the log, not the drive
+            _add(values if effect == key else at_load, effect, parameters, plant)
     values["delay"] += delay  # of the controller: its torque is logged before it
-    return values
+    return values, at_load
+
+
+def _add(values: dict[str, float], effect: str, parameters: Mapping[str, float], plant: Plant) -> None:
+    """One effect in the fields of a drive."""
+    known = FIELDS.get(effect) or FRICTION[effect]
+    if set(parameters) != set(known):
+        raise ValueError(f"{effect} takes {sorted(known)}, not {sorted(parameters)}")
+    if effect in COUPLING and not plant.two_masses:
+        raise ValueError(f"{effect} acts in the shaft between two masses")
+    if "both" in known.values():
+        values["friction_positive"] += parameters["torque"]
+        values["friction_negative"] += parameters["torque"]
+    if effect == "stribeck_friction":
+        values["stribeck"] = parameters["static_torque"] - parameters["torque"]
+        values["stribeck_velocity"] = parameters["stribeck_velocity"]
+    elif effect == "load_dependent_friction":
+        values["loaded"] = parameters["share"]
+    elif effect == "asymmetric_friction":
+        for name, place in known.items():
+            values[place] += parameters[name]
+    elif effect in FIELDS:
+        values.update({known[name]: value for name, value in parameters.items()})
 
 
 def controller_values(plant: Plant) -> tuple[dict[str, float], Array]:
@@ -291,7 +293,7 @@ def run_drive(
 
     `torque` without a command: open loop; `measured`: the controller reads this (a replay).
     """
-    values = drive_values(plant, effects or {})
+    values, at_load = drive_values(plant, effects or {})
     values.update(encoder=encoder, differenced=float(differenced))
     driving = command if command is not None else torque
     if driving is None:
@@ -312,7 +314,7 @@ def run_drive(
     every = plant.log_every
     period = plant.dt / every
     least = substeps if every == 1 else max(LEAST_SUBSTEPS, -(-substeps // every))
-    drive, control = (np.array(list(v.values()), dtype=np.float64) for v in (values, settings))
+    drive, load, control = (np.array(list(v.values()), dtype=np.float64) for v in (values, at_load, settings))
     out = [np.empty(n) for _ in range(4)]
     given = [
         None if a is None else np.ascontiguousarray(a, dtype=np.float64)
@@ -320,12 +322,13 @@ def run_drive(
     ]
     failed = library().drive_rig_run(
         address(drive),
+        address(load),
         address(control),
         address(filters),
         len(filters),
         n,
         period,
-        substeps_for(values, period, least),
+        max(substeps_for(each, period, least) for each in (values, at_load)),
         *map(pointer, given),
         *map(pointer, out),
     )

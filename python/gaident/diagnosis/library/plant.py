@@ -37,5 +37,6 @@ CAUSES: tuple[Cause, ...] = (
         needs=(t.torque_changes,),
         excited_by=("random signal at speed",),
         alike={ONE_SIZE: ("resonance",)},
+        unseen=t.resonance_beyond,
     ),
 )

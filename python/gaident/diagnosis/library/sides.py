@@ -49,10 +49,10 @@ def at_motor(cause: Cause) -> Cause:
     return replace(cause, other_side=key_of(cause.name, SIDES[1])) if SIDES[1] in row_of(cause.name).sides else cause
 
 
-def sides_of(key: str, rivals: Sequence[str], masses: int) -> tuple[str, ...]:
+def sides_of(key: str, rivals: Sequence[str], one_place: bool) -> tuple[str, ...]:
     """The sides that data allow for an effect; rivals: keys of what they cannot tell from it.
 
-    In a model of one mass both ends are the same place.
+    one_place: whether both ends are the same place in the model, as with one mass, or nothing can be tried at the load of it.
     """
     allowed = {effect_and_side(k)[1] for k in (key, *rivals) if name_of(k) == name_of(key)}
-    return tuple(s for s in row_of(key).sides if masses == 1 or s in allowed)
+    return tuple(s for s in row_of(key).sides if one_place or s in allowed)

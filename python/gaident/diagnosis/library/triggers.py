@@ -275,6 +275,13 @@ def slope_beyond(s: Motions) -> Text | None:
     return say("a limit above {:.3g} {rad/s^2} would not have shown: no command rises faster", slope) if slope > 0.0 else None
 
 
+def resonance_beyond(s: Motions) -> Text:
+    """Resonances that are too fast for the sampling, of a shaft or another one."""
+    dt = max(m.dt for m in s.records)
+    text = "one above {:.3g} Hz would not have shown, of a shaft or another: the log has a line every {:.3g} ms"
+    return say(text, POLICY.seen_band * 0.5 / dt, 1e3 * dt)  # no decision: half the sampling frequency
+
+
 def orders_beyond(s: Motions) -> Text | None:
     """Orders of the angle too low for the travel, or too high for the sampling."""
     one = _per_turn(s)

@@ -126,7 +126,7 @@ class ModelSpace:
 
         A loop that begins under a load hides it from a model that has none: the torque drives that one.
         """
-        loaded = self.data.closable and any(t.constant for t in fit.parameters.terms)
+        loaded = self.data.closable and any(LIBRARY[e].constant for e in fit.effects)
         in_loop = self.data.loopable or loaded
         inside = fit.hypothesis.driven_by(self.closed(fit.predictor)) if in_loop else fit.hypothesis
         cost = float(self.objective.costs(inside, fit.x[None, :], WHITE)[0])
