@@ -92,7 +92,7 @@ def driving_of(
 
     Raises ControllerError where unknown numbers of the controller do not make the torque, and no other form of it does.
     """
-    controller, pi, notes = driven.controller, driven.loop, driven.notes
+    controller, pi, notes = driven.controller, driven.loop, (*asked.clock, *driven.notes)
     whole = [origin.get(r.digest, r) for r in records]
     doubts = (*driven.doubts, *not_followed(whole, controller))
     moved = aligned(records, held, pi)

@@ -17,6 +17,7 @@ from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.identification.controller_numbers import Numbers, with_estimates
+from gaident.identification.logged_torque import faster_clock
 from gaident.models.drive_torque import driven_by
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
@@ -73,18 +74,30 @@ def driver_of(
 
 @dataclass(frozen=True)
 class Loop:
-    """The controller that a diagnosis works with: the given one, with its numbers, or the one that a slower log shows."""
+    """The controller that a diagnosis works with: the given one, with its numbers, or the one that a slower log shows.
+
+    clock: a note on its sample time, where that was not given.
+    """
 
     controller: Controller | None
     numbers: Numbers
     findings: tuple[Finding, ...] = ()
     notes: tuple[Text, ...] = ()
     estimates: Mapping[str, Estimate] = field(default_factory=dict)
+    clock: tuple[Text, ...] = ()
 
 
 def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     """The controller with estimates for what is None and, where a log has fewer lines than a bare PI in a Cascade has samples,
     in the form that the logged torque shows."""
+    faster = _faster(records, given)
+    if faster is not None:
+        text = (
+            "The logged {torque} does not follow from command and velocity through this controller at the log's rate. It does "
+            "where the controller samples {} times for each line of the log, which is taken for true (period = {:.4g} s)."
+        )
+        clock = say(text, faster.log_every(records[0].dt), faster.period)
+        return replace(loop_of(records, faster), clock=(clock,))
     numbers = with_estimates(records, given)
     numbers = replace(numbers, controller=simplest(numbers.controller, (r.dt for r in records)))
     as_given = Loop(numbers.controller, numbers, (), (), numbers.estimates)
@@ -97,6 +110,15 @@ def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
         return replace(as_given, numbers=numbers.trusted())
     estimates = {f"velocity.{name}": e for name, e in _estimates(shown.estimated).items()}
     return Loop(shown.controller, replace(numbers, doubt=""), findings_of(shown), notes_of(shown, records), estimates)
+
+
+def _faster(records: Sequence[Record], given: Controller | None) -> Cascade | None:
+    """The given controller with the sample time that was not given, where only a faster one makes the logged torques."""
+    if given is None or given.unknown or any(r.torque is None or not given.replayable(r) for r in records):
+        return None
+    said = [replay(r, given) for r in records]
+    unsaid = [r for r in said if r.follows is False]
+    return faster_clock(records, given) if unsaid and not any(r.cause for r in unsaid) else None
 
 
 def _alone(controller: Controller | None, records: Sequence[Record]) -> tuple[PI | None, int]:
