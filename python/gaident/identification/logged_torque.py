@@ -33,9 +33,9 @@ from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["Corrected", "corrected", "faster_clock", "noise_between", "not_followed", "period_forgotten"]
+__all__ = ["FASTER", "Corrected", "corrected", "faster_clock", "noise_between", "not_followed", "period_forgotten"]
 
-FASTER = (2, 4, 8, 16)  # no decision: work; samples of a controller to a line of the log, as drives have them
+FASTER = (2, 4, 8)  # no decision: work; samples of a controller to a line of the log, as drives have them
 
 Vector = NDArray[np.float64]
 

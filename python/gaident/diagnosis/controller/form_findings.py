@@ -10,14 +10,14 @@ import numpy as np
 from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller
-from gaident.control.pi import PI
+from gaident.control.pi import PI, bare_pi
 from gaident.control.simplest import simplest
 from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.identification.controller_numbers import Numbers, with_estimates
-from gaident.identification.logged_torque import faster_clock
+from gaident.identification.logged_torque import FASTER, faster_clock
 from gaident.models.drive_torque import driven_by
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
@@ -90,14 +90,14 @@ class Loop:
 def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     """The controller with estimates for what is None and, where a log has fewer lines than a bare PI in a Cascade has samples,
     in the form that the logged torque shows."""
-    faster = _faster(records, given)
-    if faster is not None:
+    if (faster := _faster(records, given)) is not None:
         text = (
-            "The logged {torque} does not follow from command and velocity through this controller at the log's rate. It does "
+            "The logged {torque} does not follow from command and velocity through this controller at the log's rate. It does{} "
             "where the controller samples {} times for each line of the log, which is taken for true (period = {:.4g} s)."
         )
-        clock = say(text, faster.log_every(records[0].dt), faster.period)
-        return replace(loop_of(records, faster), clock=(clock,))
+        loop = loop_of(records, faster)
+        beside = ", in the form below," if loop.findings else ""
+        return replace(loop, clock=(say(text, beside, faster.log_every(records[0].dt), faster.period),))
     numbers = with_estimates(records, given)
     numbers = replace(numbers, controller=simplest(numbers.controller, (r.dt for r in records)))
     as_given = Loop(numbers.controller, numbers, (), (), numbers.estimates)
@@ -113,12 +113,25 @@ def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
 
 
 def _faster(records: Sequence[Record], given: Controller | None) -> Cascade | None:
-    """The given controller with the sample time that was not given, where only a faster one makes the logged torques."""
+    """The given controller with the sample time that was not given, where only a faster one makes the logged torques.
+
+    As given or, for a bare PI, in the form that they show: that of the fewest settings and, of these, the one that comes closest.
+    """
     if given is None or given.unknown or any(r.torque is None or not given.replayable(r) for r in records):
         return None
-    said = [replay(r, given) for r in records]
-    unsaid = [r for r in said if r.follows is False]
-    return faster_clock(records, given) if unsaid and not any(r.cause for r in unsaid) else None
+    unsaid = [said for r in records if (said := replay(r, given)).follows is False]
+    if not unsaid or any(said.cause for said in unsaid):
+        return None
+    pi, dt = bare_pi(given), records[0].dt
+    faster = faster_clock(records, given)
+    if faster is not None or pi is None or pi.loop != "sampled":
+        return faster
+    if form_shown(records, pi) is not None:
+        return None
+    found = {every: shown for every in FASTER if (shown := form_shown(records, pi, (), every)) is not None}
+    close = {every: shown for every, shown in found.items() if shown.rms < POLICY.replay_noise * shown.before}
+    best = min(close, key=lambda every: (len(close[every].numbers), close[every].rms), default=None)
+    return None if best is None else Cascade(pi, period=dt / best)
 
 
 def _alone(controller: Controller | None, records: Sequence[Record]) -> tuple[PI | None, int]:
