@@ -141,7 +141,8 @@ def _forces(
     own, better = of(gains.extended), False
     if own is not None and second is not None and second[0].rms < own[0].rms:
         better = interval_of_fall(own[1], second[1])[0] > 0.0
-    before, after = fitness(gains.before, of(gains.mechanism)), fitness(gains.after, own)
+    linear = own if gains.mechanism == gains.extended else of(gains.mechanism)
+    before, after = fitness(gains.before, linear), fitness(gains.after, own)
     return before, after, None if second is None else second[0].rms, better
 
 

@@ -51,12 +51,14 @@ def _fit(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFi
         sub, gradient, scale = A[index][:, index], g[index], diagonal[index]
         factors = damping * DAMPINGS
         X = np.repeat(x[None, :], len(factors), axis=0)
-        X[:, index] -= damped_steps(sub, gradient, factors[:, None] * scale + 1e-18 * scale.max())
+        moves = damped_steps(sub, gradient, factors[:, None] * scale + 1e-18 * scale.max())
+        X[:, index] -= moves
         np.minimum(np.maximum(X, limits[0], out=X), limits[1], out=X)
         costs, errors = objective.costs_and_errors(hypothesis, X, noise)
         best = int(np.argmin(costs))
         if not costs[best] < cost:
-            if damping > 1e5:  # no decision: nothing is gained by smaller steps
+            # Nothing is gained by smaller steps, nor where the linear model promises nothing of the largest one.
+            if damping > 1e5 or negligible(objective, float(gradient @ moves[0]), cost):  # no decision: a grid
                 converged = True
                 break
             damping *= 1e5

@@ -97,7 +97,19 @@ def autoregression(parts: Sequence[Vector], highest: int = HIGHEST, floor: float
         return np.zeros(0)
     M = sum(_moments(e, r, order) for e, r in zip(parts, products, strict=True))
     M = M + floor * (total - order * len(parts)) * np.eye(order + 1)
-    return np.asarray(np.linalg.lstsq(M[1:, 1:], M[0, 1:], rcond=1e-13)[0], dtype=np.float64)
+    return _solved(M[1:, 1:], M[0, 1:])
+
+
+def _solved(M: Matrix, v: Vector) -> Vector:
+    """M^-1 v of a positive definite M; where it is not definite beyond its rounding, the least x of the least error."""
+    from scipy.linalg.lapack import dposv
+
+    factor, x, reason = dposv(M, v)
+    if reason == 0:
+        pivots = factor.diagonal()
+        if pivots.min() > 1e-6 * pivots.max():  # no decision: rounding; a pivot is the square root of what is left
+            return np.asarray(x, dtype=np.float64)
+    return np.asarray(np.linalg.lstsq(M, v, rcond=1e-13)[0], dtype=np.float64)
 
 
 def stationary_autoregression(parts: Sequence[Vector], highest: int = HIGHEST) -> Vector:

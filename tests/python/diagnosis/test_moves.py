@@ -17,10 +17,10 @@ from scipy.stats import chi2
 
 import gaident as ga
 from gaident.control.controller import Limiting
-from gaident.diagnosis.selection import model_space, moves, score_test, side_moves
+from gaident.diagnosis.selection import model_space, moves, score_test, select, side_moves
 from gaident.diagnosis.selection.bases import Task
 from gaident.diagnosis.selection.bootstrap import largest_gains
-from gaident.diagnosis.selection.rivals import rivals_of
+from gaident.diagnosis.selection.rivals import Replacement, rivals_of
 from gaident.diagnosis.selection.select import specification
 from gaident.estimation import least_squares as ls
 from gaident.estimation import prediction
@@ -338,6 +338,21 @@ def test_models_are_compared_in_the_same_view() -> None:
     seen = bench.space.under_predictor_of(less, more)
     assert seen.predictor.closed and seen.bic < less.bic
     assert bench.space.under_predictor_of(less, bench.fit(A)) is less
+
+
+def test_of_effects_that_are_the_same_to_every_record_the_first_has_the_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench({"lag": (0.5,)})
+    lag, seen = bench.fit(LAG), bench.fit(SEEN)
+
+    def better(final: Fit, other: Fit, behind: float) -> Fit | None:
+        name = other.effects[0]
+        monkeypatch.setattr(select, "rivals_of", lambda *arguments: (90.0, [Replacement(name, behind, other)]))
+        return select._rivals(bench.space, final, True, lambda effect: (), lambda message: None)[1]
+
+    assert better(seen, lag, 0.3) is lag, "rounding decides"
+    assert better(seen, lag, POLICY.swap + 0.1) is None
+    assert better(lag, seen, -0.3) is None
+    assert better(lag, seen, -POLICY.swap - 0.1) is seen
 
 
 def test_beside_coloured_noise_only_what_promises_something_is_fitted_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:

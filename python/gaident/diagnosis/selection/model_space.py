@@ -29,7 +29,7 @@ from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
 from gaident.estimation.term import Term
 from gaident.policy.table import POLICY, Policy
 
-__all__ = ["ModelSpace", "words"]
+__all__ = ["ModelSpace", "representative", "words"]
 
 Vector = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def words(effects: Iterable[str]) -> str:
     return ", ".join(map(called_of, effects))
 
 
-def _representative(term: Term) -> str:
+def representative(term: Term) -> str:
     """Of effects that are the same to every record and have as many parameters, the first."""
     alike = (n for n in equivalents(term.name) if LIBRARY[n].size == term.size)
     return min((*alike, term.name))
@@ -100,7 +100,7 @@ class ModelSpace:
 
     def key(self, fit: Fit) -> Hashable:
         """The same for the same mechanism with the same effects, or with equivalent ones."""
-        return fit.parameters.kind, frozenset(_representative(t) for t in fit.parameters.terms)
+        return fit.parameters.kind, frozenset(representative(t) for t in fit.parameters.terms)
 
     def ratio(self, fit: Fit) -> float:
         """Rms of the whitened errors over the noise of the velocity."""

@@ -26,7 +26,7 @@ from gaident.diagnosis.selection.beam import Beam
 from gaident.diagnosis.selection.beam import reduced as reduced_by
 from gaident.diagnosis.selection.decimated import blocks_of, decimated_objective, moved
 from gaident.diagnosis.selection.mechanisms import resonance, swings
-from gaident.diagnosis.selection.model_space import words
+from gaident.diagnosis.selection.model_space import representative, words
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.rivals import Replacement, rivals_of
 from gaident.estimation import least_squares as ls
@@ -144,7 +144,12 @@ def _decided(task: Task, note: Callable[[str], None]) -> _Found:
         test = specification(space, task, again)
         if test.contradicts and by_output.final.effects:
             return replace(by_output, specification=test)
-    base, final = _explored(task, space, bases)
+    if again is not None and again.effects and space.is_noise(again) and space.small_unwhitened(again):
+        # It leaves noise: no other way to explain the same is followed, and what it may lack is looked for from there.
+        final = _beam(space).run([reduced_by(again, _reductions(space), space.prefers, space.score)])
+        base = _bare(space, final)
+    else:
+        base, final = _explored(task, space, bases)
     test = specification(space, task, final)
     if by_output is None and (test.contradicts or not (space.is_noise(final) and space.small_unwhitened(final))):
         by_output = _by_output_errors(task.by_output_errors, bases, note)
@@ -362,7 +367,8 @@ def _rivals(
     Where a record cannot split a load or a dead band from dry friction, friction stands first: every axis has it.
     """
     found: dict[str, tuple[float, list[Replacement]]] = {}
-    for term in final.parameters.terms:
+    # What gains least is the likeliest to give way; then all are asked again.
+    for term in sorted(final.parameters.terms, key=lambda t: space.without(final, t.name).bic):
         note(f"rivals of {words([term.name])}")
         here = classes(term.name)
         gain, rivals = rivals_of(space, final, term.name, here)
@@ -377,6 +383,9 @@ def _rivals(
             # Of what these records cannot tell apart, the simplest of a family before what belongs to another one, or to none.
             others = (r for r in rivals if r.effect in here and r.behind < space.margin)
             better = next((r for r in others if r.term.simplest and r.term.family != term.family), None)
+        if better is None and (first_of := representative(term)) != term.name:
+            # Rounding decides between effects that are the same to every record: the first of them has the name.
+            better = next((r for r in rivals if r.effect == first_of and r.behind < space.policy.swap), None)
         if better is not None:
             return found, better.fit
     return found, None
