@@ -17,6 +17,7 @@ Every finished case is a line of the file: stop at will, start again and it goes
     loops    loops of servo drives, wholly known, at 125 us with the log every 1, 2, 4, 8 samples: clean, and the effects in turn
              (--loops, --every: only these; --effects none: only clean ones)
     sides    two masses, inertia ratio 0.3 to 10, multi-level, torque logged: clean, and every effect of the shaft at either end
+    ends     the same drives, dry friction of one kind at both ends at once
     measured no controller: a torque that was measured, with white noise of 5 and 10 % of its rms; clean, and effects at the shaft
 """
 
@@ -47,14 +48,15 @@ from blind_tables import limits_of, report
 from json_lines import read, work
 
 import gaident as ga
-from blind_judge import describes_noise, ends_of, judge
+from blind_judge import describes_noise, ends_of, judge, with_ends
 from drive_cases import EFFECTS, KINDS, NOISE_EFFECTS, PAIRS, Truth, nominal_plants, random_case, random_plant, tuned, two_masses
 from drive_rig import AT_LOAD, COUPLING, OUTSIDE, SHAFT
 from loop_cases import EVERY, LOOPS, loop_effects, loop_kind, loop_noise, loop_plant
 
 NOISE_KINDS = ("white", "encoder", "coloured")
-GROUPS = ("clean", "effects", "sizes", "pairs", "outside", "encoder", "settled", "loops", "sides", "measured")
+GROUPS = ("clean", "effects", "sizes", "pairs", "outside", "encoder", "settled", "loops", "sides", "ends", "measured")
 TORQUE_NOISE = (0.05, 0.1)  # of the rms of a measured torque
+LEVELS = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "presliding_friction", "lugre_friction")
 AT_THE_SHAFT = ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "quadratic_drag", "unbalance", "cogging")
 
 
@@ -131,6 +133,10 @@ def cells(group: str, cases: int, seed: int, limits: dict[tuple[str, str], float
                 for key in (effect, effect + AT_LOAD) if effect else ("",):
                     noise = NOISE_KINDS[(number + zlib.crc32(effect.encode())) % len(NOISE_KINDS)]
                     yield Cell(group, (key,) if key else (), "multi", noise, True, number)
+        elif group == "ends":
+            for effect in LEVELS:
+                noise = NOISE_KINDS[(number + zlib.crc32(effect.encode())) % len(NOISE_KINDS)]
+                yield Cell(group, (effect, effect + AT_LOAD), "multi", noise, True, number)
         elif group == "measured":
             for share in TORQUE_NOISE:
                 for effect in ("", *AT_THE_SHAFT):
@@ -156,8 +162,8 @@ def case_of(cell: Cell) -> tuple[ga.Record, ga.Record | None, ga.PI | ga.Cascade
         two = True if {*cell.effects} & {*COUPLING, "extra_resonance"} else None
         plant, noise = loop_plant(cell.loop, cell.every, rng, two), loop_noise(cell.noise, cell.seed)
         return random_case(cell.seed, cell.effects, cell.kind, noise, cell.torque, cell.factor, plant, plant.placed)
-    if cell.group == "sides":  # both ends of one effect on the same drive
-        rng = np.random.default_rng([cell.seed, zlib.crc32("".join(cell.effects).removesuffix(AT_LOAD).encode())])
+    if cell.group in ("sides", "ends"):  # either end of one effect, and both, on the same drive
+        rng = np.random.default_rng([cell.seed, zlib.crc32("".join(cell.effects[:1]).removesuffix(AT_LOAD).encode())])
         return random_case(cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, two_masses(rng))
     plant = next(p for p in iter(lambda: random_plant(rng), None) if p.name == cell.plant) if cell.plant else None
     case = random_case(cell.seed, cell.effects, cell.kind, cell.noise, cell.torque, cell.factor, plant, settle=cell.settle)
@@ -189,14 +195,16 @@ def run(cell: Cell, with_oracle: bool) -> dict[str, Any]:
         dia = ga.diagnose(record, controller=controller, validation=validation)  # type: ignore[attr-defined]
     except Exception as failure:  # a crash is a result, too
         return line | {"crash": f"{type(failure).__name__}: {failure}", "seconds": time.perf_counter() - started}
-    hidden = {key.removesuffix(AT_LOAD): values for key, values in truth.effects.items()}
-    line |= {"seconds": time.perf_counter() - started, "judged": judge(dia, hidden).as_dict()}
+    both = cell.group == "ends"
+    hidden = dict(truth.effects) if both else {key.removesuffix(AT_LOAD): values for key, values in truth.effects.items()}
+    line |= {"seconds": time.perf_counter() - started, "judged": judge(with_ends(dia) if both else dia, hidden).as_dict()}
     line |= {"ends": ends_of(dia, tuple(hidden))} if cell.group == "sides" else {}
     line |= {"processor": time.process_time() - processor, "simulations": dia.simulations}
     line |= {"before": dia.before.rmse, "after": dia.after.rmse}
     if cell.torque_noise:
         line |= inertia_of(dia, truth.plant.J + truth.plant.JL)
-    inside = cell.effects and cell.group != "sides" and not set(cell.effects) & set(OUTSIDE) and not describes_noise(cell.effects)
+    of_library = not set(cell.effects) & set(OUTSIDE) and not describes_noise(cell.effects)
+    inside = cell.effects and cell.group not in ("sides", "ends") and of_library
     if with_oracle and validation is not None and inside and not cell.settle and not cell.loop:
         line["oracle"] = blind_refit.oracle(truth, record.velocity, validation.velocity)
     return line

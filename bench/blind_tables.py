@@ -275,6 +275,21 @@ def sides_table(lines: list[Line]) -> str:
                   "named wrong"], rows)  # fmt: skip
 
 
+def ends_table(lines: list[Line]) -> str:
+    """Dry friction at both ends: both named with their end, both in the sets, one of them, a wrong name; error of the levels."""
+    rows = []
+    for kind in [*dict.fromkeys(x["cell"]["effects"][0] for x in lines), ""]:
+        some = [x for x in lines if x["cell"]["effects"][0] == kind or not kind]
+        missed = [x["judged"] for x in some if not right(x, "in_set")]
+        one = sum(any({*judged["truth"]} & {*each} for each in judged["sets"]) for judged in missed)
+        wrong = Counter(name for x in some for name in x["judged"]["wrong"])
+        off = [e for x in some for name, e in x["judged"]["parameter_errors"].items() if ".torque" in name and right(x, "in_set")]
+        levels = f"{100 * np.median(off):.2g} %" if off else "-"
+        rows.append([kind or "all", len(some), share(right(x, "exact") for x in some), share(right(x, "in_set") for x in some),
+                     one, levels, listing(wrong)])  # fmt: skip
+    return table(["effect", "n", "both named", "both in set", "one of them", "levels, median error", "named wrong"], rows)
+
+
 def _matches(key: str, hidden: str, end: str) -> bool:
     name = key.removesuffix(AT_LOAD)
     return (hidden == name or (hidden == "all" and name != "")) and (not name or (end == "load") == (key != name))
@@ -321,6 +336,7 @@ def report(lines: list[Line]) -> str:
     add("A load settled before the record", groups.get("settled", []), effect_table)
     add("Loops of servo drives, wholly known", groups.get("loops", []), loop_table)
     add("Ends of an elastic shaft", groups.get("sides", []), sides_table)
+    add("Dry friction at both ends of an elastic shaft", groups.get("ends", []), ends_table)
     add("A measured torque that drives the axis", groups.get("measured", []), measured_table)
     add("Time of a diagnosis", done, seconds_table)
     crashed = [x for x in lines if "crash" in x]

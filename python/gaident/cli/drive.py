@@ -7,16 +7,14 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from gaident.axis import Text, say
 from gaident.checks import one_of
 from gaident.control.controller import Controller
 from gaident.control.words import LOOPS
 from gaident.data.record import Record
-from gaident.data.torque_kind import MEASURED
 from gaident.drive.drive_file import COLUMNS, KEYS, Drive, read_drive_file, unfilled_of
 from gaident.errors import ControllerError, SettingsError
 
-__all__ = ["drive_of", "read_all", "reading_notes"]
+__all__ = ["drive_of", "read_all"]
 
 
 def drive_of(args: argparse.Namespace) -> Drive:
@@ -95,19 +93,6 @@ def read_all(
                 "(--columns torque=...), or give the controller (--kp, --ki)"
             )
     return [rec for _, rec in named]
-
-
-def reading_notes(drive: Drive, records: Sequence[Record]) -> list[Text]:
-    """What to keep in mind about how the logs were read, in plain sentences."""
-    notes = []
-    guessed = [rec.name for rec in records if rec.torque_is == MEASURED and "torque_is" not in drive.general]
-    if guessed:
-        text = (
-            "The {torque} of {} is taken as measured, as the name of its column says; where it is the controller's command, say "
-            "so with --torque-is commanded."
-        )
-        notes.append(say(text, ", ".join(guessed)))
-    return notes
 
 
 def _assignments(texts: Sequence[str], option: str) -> dict[str, str]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import NO_TIME, arg
+from gaident.axis import Text, say
 from gaident.data.clock import axis_of, clock_of, common_clock, part_of, second_of
 from gaident.data.column_score import LEAST, spoken_for
 from gaident.data.counters import Counters
@@ -20,7 +21,7 @@ from gaident.data.signals.decimation import Decimator, decimated, factor_of
 from gaident.data.signals.difference import backward_difference
 from gaident.data.signals.resampling import resampled
 from gaident.data.timeaxis import SLOW_STEP, TimeAxis
-from gaident.data.torque_kind import COMMANDED, kind_of_torque
+from gaident.data.torque_kind import COMMANDED, MEASURED, kind_of_torque
 from gaident.data.wanted import Wanted, si_factor
 from gaident.data.winding_torque import ELECTRICAL, torque_of_winding
 from gaident.errors import ReadError, RecordError
@@ -53,7 +54,7 @@ def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
     scales = {channel: _scale(table, wanted, channel, column) for channel, column in named.items()}
     kind = _torque_kind(table, wanted, named.get("torque")) if ELECTRICAL.isdisjoint(named) else ""
     counters = Counters(table, wanted, named)
-    said = _unnamed_torque(table, wanted, named)
+    said: list[str] = [*_unnamed_torque(table, wanted, named), *_known_by_name(kind, wanted)]
     if wanted.resample is not None:
         dt, values = _on_even_axis(table, wanted, named, scales, counters)
     else:
@@ -99,6 +100,17 @@ def _torque_kind(table: Table, wanted: Wanted, column: Column | None) -> str:
             f"with {arg('columns', '...', 'torque')}, or leave torque_is out"
         )
     return wanted.torque_is
+
+
+def _known_by_name(kind: str, wanted: Wanted) -> list[Text]:
+    """What to say of a torque that is measured by its column's name alone; kind: what it is taken for."""
+    if kind != MEASURED or wanted.torque_is is not None:
+        return []
+    text = (
+        "The {torque} is taken as measured, as the name of its column says; where it is the controller's command, give "
+        "torque_is='commanded' (--torque-is commanded)."
+    )
+    return [say(text)]
 
 
 def _unnamed_torque(table: Table, wanted: Wanted, named: dict[str, Column]) -> list[str]:

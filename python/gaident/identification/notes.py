@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gaident.axis import Text, say
+from gaident.axis import Text, joined, say
 from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.models.mechanics import OneMass, TwoMass
@@ -88,6 +88,12 @@ def record_notes(records: Sequence[Record], controller: Controller | None, initi
 
 
 def reading_notes(records: Sequence[Record]) -> list[Text]:
-    """What was noticed when the logs were read, each sentence once, with the name of its record where there are several."""
-    told = ((f"{r.name}: " if len(records) > 1 and r.name else "", note) for r in records for note in r.notes)
-    return [Text(sentence) for sentence in dict.fromkeys(f"{name}{note}" for name, note in told)]
+    """What was noticed when the logs were read, each sentence once, with the names of its records where not all have it."""
+    told: dict[str, list[str]] = {}
+    for rec in records:
+        for note in dict.fromkeys(rec.notes):
+            told.setdefault(note, []).append(rec.name)
+    return [
+        joined("", (f"{', '.join(filter(None, names))}: " if len(names) < len(records) and any(names) else "", note))
+        for note, names in told.items()
+    ]

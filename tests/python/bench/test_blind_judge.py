@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blind_judge import Judgement, judge
+import gaident as ga
+from blind_judge import Judgement, judge, with_ends
 from places import BENCH
 
 sys.path.insert(0, str(BENCH))
@@ -105,6 +106,25 @@ def test_tables_count_what_happened() -> None:
     assert "below the limit, a wrong name: 1/1" in curve and "100 %, 100 %, 0 % of 1" in curve
     assert "no results" in blind_tables.report([])
     assert "### Crashes" in blind_tables.report([{"key": "x", "crash": "ValueError: no"}])
+
+
+def test_friction_at_both_ends_is_two_causes_with_their_ends() -> None:
+    key = "coulomb_friction@load"
+    hidden = {"coulomb_friction": {"torque": 0.05}, key: {"torque": 0.08}}
+
+    def told(*findings: ga.Finding) -> Judgement:
+        return judge(with_ends(SimpleNamespace(findings=findings, verdict="explained", driver=None)), hidden)
+
+    def friction(side: str, torque: float) -> ga.Finding:
+        return ga.Finding("coulomb_friction", {"torque": ga.Estimate(torque, 1e-3, "N m")}, sides=(side,))
+
+    good = told(friction("motor", 0.05), friction("load", 0.084))
+    assert good.exact and good.in_set and not good.wrong
+    assert good.parameter_errors == {"coulomb_friction.torque": pytest.approx(0.0), f"{key}.torque": pytest.approx(0.05)}
+    half = told(friction("motor", 0.13))
+    assert not half.in_set and not half.wrong
+    lines = [{"cell": {"effects": list(hidden)}, "judged": each.as_dict()} for each in (good, half, half)]
+    assert "| coulomb_friction | 3 | 33 % | 33 % | 2 | 2.5 % | - |" in blind_tables.ends_table(lines)
 
 
 def test_cells_repeat_themselves_and_have_their_own_keys() -> None:

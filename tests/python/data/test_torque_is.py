@@ -22,6 +22,7 @@ from gaident.diagnosis.selection.decimated import decimated_record
 from gaident.drive.drive_file import Drive, read_drive_file
 from gaident.errors import ReadError, RecordError
 from gaident.estimation.dataset import DataSet
+from gaident.identification.notes import reading_notes
 
 RPM = 2 * np.pi / 60
 N = 300
@@ -214,6 +215,14 @@ def test_a_torque_that_is_measured_is_said_to_be(here: Path, capsys: pytest.Capt
     assert "taken as measured, as the name of its column says" in " ".join(capsys.readouterr().out.split())
     assert main(["identify", "current.csv", "--drive", "plain.toml", "--torque-is", "measured"]) == 0
     assert "as the name of its column says" not in " ".join(capsys.readouterr().out.split())
+    # From Python the same is said, once for all records that have it, and by name where not all do.
+    columns = {"torque": "Actual current [A]", "velocity": "speed_act"}
+    rec = ga.read("current.csv", columns, torque_constant=1.0)
+    (note,) = [n for n in rec.notes if "taken as measured, as the name of its column says" in n]
+    assert not [n for n in ga.read("current.csv", columns, torque_constant=1.0, torque_is="measured").notes if "taken as" in n]
+    assert note in reading_notes([rec]) and note in reading_notes([rec, rec])
+    assert f"{rec.name}: {note}" in reading_notes([rec, ga.Record(rec.dt, velocity=rec.velocity, torque=rec.torque)])
+    assert "The force is taken as measured" in next(n for n in reading_notes([rec]) if n == note).linear
     # A torque that an option leaves out takes what was said of it along; without one there is nothing to be said.
     Path("said.toml").write_text(
         "torque_is = 'measured'\n[columns]\ncommand = 'speed_ref'\nvelocity = 'speed_act'\ntorque = 'torque'\n"

@@ -7,11 +7,12 @@ record's noise do not count, unless that is what was hidden.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from types import SimpleNamespace
 from typing import Any
 
 from drive_cases import NOISE_EFFECTS
-from drive_rig import OUTSIDE
+from drive_rig import AT_LOAD, OUTSIDE
 
 # Truth -> what no record of command, velocity and torque can tell from it: always reported together.
 EQUIVALENT = {"torque_lag": "velocity_filter", "velocity_filter": "torque_lag"}
@@ -80,6 +81,12 @@ def ends_of(dia: Any, truth: tuple[str, ...]) -> list[str]:
     """At which ends of the shaft the finding with a hidden effect in its set is said to be; empty where there is none."""
     found = (f for f in counted(dia.findings, truth) if set(truth) & {f.effect, *f.alternatives})
     return next((list(f.sides) for f in found), [])
+
+
+def with_ends(dia: Any) -> Any:
+    """The diagnosis with the end in the name of what is at the load alone, "name@load", as hidden effects have it."""
+    findings = tuple(replace(f, effect=f.effect + AT_LOAD) if f.sides == ("load",) else f for f in dia.findings)
+    return SimpleNamespace(findings=findings, verdict=dia.verdict, driver=dia.driver)
 
 
 def parameter_errors(findings: list[Any], effects: dict[str, dict[str, float]]) -> dict[str, float]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import starmap
 from pathlib import Path
 from typing import Any
 
 from gaident.axis import velocity_unit
-from gaident.cli.drive import drive_of, read_all, reading_notes
+from gaident.cli.drive import drive_of, read_all
 from gaident.cli.output import print_json, proposal_csv, target_of, write
 from gaident.cli.remedies import in_options
 from gaident.cli.result_files import ResultFiles, shown_block
@@ -125,7 +124,6 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
             axis=drive.axis,
             pitch=drive.pitch,
         )
-        dia = replace(dia, notes=(*reading_notes(drive, [*records, *(validation or ())]), *dia.notes))
         written = files.write(dia, records, validation or (), drive, lambda: dia.plot(axis=drive.axis), bar.doing)
     if following is not None and dia.next_experiment is not None:
         write(following, proposal_csv(dia.next_experiment, drive.axis).encode())

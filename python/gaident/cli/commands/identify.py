@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from gaident.axis import say
-from gaident.cli.drive import drive_of, read_all, reading_notes
+from gaident.cli.drive import drive_of, read_all
 from gaident.cli.output import print_json, summary_of
 from gaident.cli.result_files import ResultFiles, shown_block
 from gaident.control.controller import Controller
@@ -49,7 +49,7 @@ def identify_command(args: argparse.Namespace) -> None:
             say("{}{}{}", f"{name}: " if len(records) > 1 else "", said.sentence, _instead(said, controller))
             for name, said in _replayed(records, controller)
         ]
-        idn = replace(idn, warnings=(*reading_notes(drive, records), *off, *idn.warnings))
+        idn = replace(idn, warnings=(*off, *idn.warnings))
         written = files.write(idn, records, (), drive, lambda: idn.plot(records, drive.axis), bar.doing)
     if args.json:
         print_json({**on_axis(idn.to_dict(), drive.axis), **shown_block(idn, drive)})
