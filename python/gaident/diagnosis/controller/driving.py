@@ -17,7 +17,7 @@ from gaident.diagnosis.controller.log_shift import Aligned, aligned
 from gaident.diagnosis.controller.other_form import other_form
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains
 from gaident.diagnosis.selection.unlogged_form import UnloggedForm
-from gaident.identification.logged_torque import corrected, not_followed, period_forgotten
+from gaident.identification.logged_torque import corrected, not_followed
 from gaident.models.drive_torque import Driven, driven_by, straight_driven
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
@@ -92,7 +92,7 @@ def driving_of(
 
     Raises ControllerError where unknown numbers of the controller do not make the torque, and no other form of it does.
     """
-    controller, pi, notes = driven.controller, driven.loop, (*asked.clock, *driven.notes)
+    controller, pi, notes = driven.controller, driven.loop, driven.notes
     whole = [origin.get(r.digest, r) for r in records]
     doubts = (*driven.doubts, *not_followed(whole, controller))
     moved = aligned(records, held, pi)
@@ -122,10 +122,8 @@ def driving_of(
         moved = aligned(records, held, None)
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
-    if doubts or form is not None or any(r.follows is False for r in logged.replays.values()):
-        notes = (*notes, *period_forgotten(whole, asked.controller))
     used = controller if bare_pi(controller) is None else logged.controller
-    return Driving(moved, used, logged, findings, notes, doubts, numbers, limited)
+    return Driving(moved, used, logged, findings, (*asked.period_notes, *notes), doubts, numbers, limited)
 
 
 def _again(

@@ -14,10 +14,10 @@ from gaident.control.pi import PI
 from gaident.control.simplest import simplest
 from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
+from gaident.diagnosis.controller.period_shown import period_shown
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.identification.controller_numbers import Numbers, with_estimates
-from gaident.identification.logged_torque import faster_clock
 from gaident.models.drive_torque import driven_by
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
@@ -76,7 +76,7 @@ def driver_of(
 class Loop:
     """The controller that a diagnosis works with: the given one, with its numbers, or the one that a slower log shows.
 
-    clock: a note on its sample time, where that was not given.
+    period_notes: on a sample time of it that was not given.
     """
 
     controller: Controller | None
@@ -84,20 +84,19 @@ class Loop:
     findings: tuple[Finding, ...] = ()
     notes: tuple[Text, ...] = ()
     estimates: Mapping[str, Estimate] = field(default_factory=dict)
-    clock: tuple[Text, ...] = ()
+    period_notes: tuple[Text, ...] = ()
 
 
 def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     """The controller with estimates for what is None and, where a log has fewer lines than a bare PI in a Cascade has samples,
     in the form that the logged torque shows."""
-    faster = _faster(records, given)
-    if faster is not None:
-        text = (
-            "The logged {torque} does not follow from command and velocity through this controller at the log's rate. It does "
-            "where the controller samples {} times for each line of the log, which is taken for true (period = {:.4g} s)."
-        )
-        clock = say(text, faster.log_every(records[0].dt), faster.period)
-        return replace(loop_of(records, faster), clock=(clock,))
+    period = period_shown(records, given)
+    found = _loop_of(records, given if period is None else period.controller)
+    return found if period is None else replace(found, period_notes=(period.note,))
+
+
+def _loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
+    """The same of a controller whose sample time is known."""
     numbers = with_estimates(records, given)
     numbers = replace(numbers, controller=simplest(numbers.controller, (r.dt for r in records)))
     as_given = Loop(numbers.controller, numbers, (), (), numbers.estimates)
@@ -110,15 +109,6 @@ def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
         return replace(as_given, numbers=numbers.trusted())
     estimates = {f"velocity.{name}": e for name, e in _estimates(shown.estimated).items()}
     return Loop(shown.controller, replace(numbers, doubt=""), findings_of(shown), notes_of(shown, records), estimates)
-
-
-def _faster(records: Sequence[Record], given: Controller | None) -> Cascade | None:
-    """The given controller with the sample time that was not given, where only a faster one makes the logged torques."""
-    if given is None or given.unknown or any(r.torque is None or not given.replayable(r) for r in records):
-        return None
-    said = [replay(r, given) for r in records]
-    unsaid = [r for r in said if r.follows is False]
-    return faster_clock(records, given) if unsaid and not any(r.cause for r in unsaid) else None
 
 
 def _alone(controller: Controller | None, records: Sequence[Record]) -> tuple[PI | None, int]:
