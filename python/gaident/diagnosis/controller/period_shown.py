@@ -1,15 +1,18 @@
 """The sample time of a controller, where none was given: by the logged torque, and by how old the velocity is.
 
-A controller that is faster than the log makes another torque of the same lines than one at the log's rate: by its filters, by
-what its integrator adds up between the lines, by what an anti-windup keeps at a limit. Each of r = 2, 4, 8, 16 samples to a line is
-tried, with the plateau of the torque as a limit where it shows one. Such a controller is the drive's where it leaves less than the
-share `each_number` of what one at the log's rate leaves; which of them, where several leave alike, the motion tells. A velocity is
-not old, or T/2 old where it is the difference of an encoder's angle:
+A controller that is faster than the log makes another torque of the same lines than one at the log's rate: by its filters,
+by what its integrator adds up between the lines, by what an anti-windup keeps at a limit.
+Each of r = 2, 4, 8, 16 samples to a line is tried, with the plateau of the torque as a limit where it shows one. Such a controller
+is the drive's where it leaves less than the share `each_number` of what one at the log's rate leaves.
+What the velocity did between the lines is lost, and at a limit it changes what an anti-windup keeps: two that leave alike, up to
+the factor `same_clock`, are told apart by the motion.
+A velocity is not old, or T/2 old where it is the difference of an encoder's angle:
 
     lag = 0,   or, on the lattice of an encoder,   lag = -1/(2 r) lines
 
-with the lag of the inverse-dynamics regression (`estimation/regression/torque_lag.py`) under the torque that each controller makes
-between the lines. The nearest r is taken where it is near; or the only one, where the torque follows from it.
+with the lag of the inverse-dynamics regression (`estimation/regression/torque_lag.py`) under the torque that each controller
+makes between the lines. The nearest r is taken where it is near. Where the torque shows one alone, either lag confirms it, or
+that the torque follows from it.
 """
 
 from __future__ import annotations
@@ -60,13 +63,16 @@ def period_shown(records: Sequence[Record], given: Controller | None) -> Period 
     least = min(left for _, left in found.values())
     if not least < POLICY.each_number * before:
         return None
-    alike = [n for n, (_, left) in found.items() if POLICY.each_number * left <= least]
-    off = {n: _lag_off(records, found[n][0], n) for n in alike}
-    every = min(alike, key=lambda n: off[n])
-    sure = off[every] < POLICY.near_age / every or (len(alike) == 1 and not not_followed(records, found[every][0]))
+    alike = [n for n, (_, left) in found.items() if left <= POLICY.same_clock * least]
+    lags = {n: _lag(records, found[n][0]) for n in alike}
+    old = HALF if encoder_step(np.concatenate([r.velocity for r in records])) > 0.0 else 0.0
+    every = min(alike, key=lambda n: abs(lags[n] + old / n))
+    alone = len(alike) == 1
+    near = min(abs(lags[every] + age / every) for age in ((0.0, old) if alone else (old,)))
+    sure = near < POLICY.near_age / every or (alone and not not_followed(records, found[every][0]))
     text = (
-        "The logged {torque} does not follow from this controller at the log's rate (rms {:.2g} {N m}). It follows better where it "
-        "samples {} times for each line (rms {:.2g} {N m}){}"
+        "The logged {torque} does not follow from this controller at the log's rate (rms {:.2g} {N m}). It follows better where "
+        "it samples {} times for each line (rms {:.2g} {N m}){}"
     )
     used = say(": {:.4g} ms is taken for its sample time. Where that is not it, give period (s).", 1e3 * dt / every)
     asked = say("; if it does, give its sample time, period = {:.4g} (s).", dt / every)
@@ -80,11 +86,7 @@ def _left(records: Sequence[Record], controller: Cascade) -> tuple[Cascade, floa
     return one, run_error(records, one)
 
 
-def _lag_off(records: Sequence[Record], controller: Cascade, every: int) -> float:
-    """By how much the motion's lag is off the one that a controller of so many samples to a line makes [lines]."""
+def _lag(records: Sequence[Record], controller: Cascade) -> float:
+    """Of the torque that the controller makes against the motion, mean of the records [lines]; infinite where none tells."""
     lags = [lag.lag for r in records if (lag := torque_lag(driven_by(r, controller))) is not None]
-    if not lags:
-        return np.inf
-    step = encoder_step(np.concatenate([r.velocity for r in records]))
-    ages = (0.0, HALF / every) if step > 0.0 else (0.0,)
-    return min(abs(float(np.mean(lags)) + age) for age in ages)
+    return float(np.mean(lags)) if lags else np.inf
