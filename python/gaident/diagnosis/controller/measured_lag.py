@@ -58,7 +58,8 @@ class Lag:
             "ms, to white noise of {:.2g} {N m} rms. What the controller makes, without that noise, drives the model; the lag "
             "is between it and the shaft."
         )
-        return say(text, 1e3 * self.time_constant, 1e3 * self.std, self.noise)
+        ms = 1e3  # no decision: in a second
+        return say(text, ms * self.time_constant, ms * self.std, self.noise)
 
 
 def lag_shown(records: Sequence[Record], controller: PI | None) -> Lag | None:

@@ -2,8 +2,8 @@
 
 A controller that is faster than the log makes another torque of the same lines than one at the log's rate: by its filters,
 by what its integrator adds up between the lines, by what an anti-windup keeps at a limit.
-Each of r = 2, 4, 8, 16 samples to a line is tried, with the plateau of the torque as a limit where it shows one. Such a controller
-is the drive's where it leaves less than the share `each_number` of what one at the log's rate leaves.
+Each of r = 2, 4, 8, 16 samples to a line is tried, with the plateau of the torque as a limit where it shows one. Such a
+controller is the drive's where it leaves less than the share `each_number` of what one at the log's rate leaves.
 What the velocity did between the lines is lost, and at a limit it changes what an anti-windup keeps: two that leave alike, up to
 the factor `same_clock`, are told apart by the motion.
 A velocity is not old, or T/2 old where it is the difference of an encoder's angle:
