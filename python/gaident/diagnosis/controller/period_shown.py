@@ -37,6 +37,7 @@ from gaident.policy.table import POLICY
 __all__ = ["Period", "period_shown"]
 
 FASTER = (2, 4, 8, 16)  # no decision: work; samples of a controller to a line of the log, as drives have them
+UNLIKE = ("", "torque_limit", "anti_windup")  # what a replay at the log's rate may say: any other reason explains the torque
 HALF = 0.5  # no decision: of a sample, the age of a mean over it
 
 
@@ -56,8 +57,10 @@ def period_shown(records: Sequence[Record], given: Controller | None) -> Period 
     faster = {every: replace(own, period=dt / every) for every in FASTER}
     if any(r.dt != dt or not comparable(r, faster[FASTER[0]]) for r in records):
         return None
-    if given.one_equation and all(replay(r, given).follows for r in records):
-        return None
+    if given.one_equation:
+        said = [replay(r, given) for r in records]
+        if all(r.follows for r in said) or any(r.cause not in UNLIKE for r in said if r.follows is False):
+            return None
     before = _left(records, replace(own, period=dt))[1]
     found = {every: _left(records, one) for every, one in faster.items()}
     least = min(left for _, left in found.values())
