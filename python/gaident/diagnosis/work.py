@@ -231,7 +231,7 @@ class Work:
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         for effect in causes:
             gain, rivals = self.rivals[effect]
-            never = impossible_here(effect, {e: estimates[e] for e in causes})
+            never = impossible_here(effect, {e: estimates[e] for e in causes}) | self._told_by_the_current
             alternatives = self._alternatives(effect, rivals, offset, never)
             if effect in self.gain_doubt.rivals:
                 self.notes.append(or_other_gains(effect))
@@ -335,6 +335,11 @@ class Work:
         if self.form is not None and self.form.as_good(self.found.space.margin) and effect in in_series(self.final):
             names.append(self.form.finding.effect)
         return tuple(n for n in dict.fromkeys(map(name_of, names)) if n != name_of(effect) and n not in self.not_testable)
+
+    @property
+    def _told_by_the_current(self) -> frozenset[str]:
+        """What is no lag of the torque, where a measured torque shows that lag: what makes the velocity late."""
+        return frozenset(t.name for t in LIBRARY.values() if t.late) if self.driving.lag is not None else frozenset()
 
     def _only_describes(self, effect: str, driver: str | None) -> bool:
         of_class = bool(self._equivalent_here(effect))

@@ -33,9 +33,7 @@ from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["FASTER", "Corrected", "corrected", "faster_clock", "noise_between", "not_followed", "period_forgotten"]
-
-FASTER = (2, 4, 8)  # no decision: work; samples of a controller to a line of the log, as drives have them
+__all__ = ["Corrected", "comparable", "corrected", "noise_between", "not_followed"]
 
 Vector = NDArray[np.float64]
 
@@ -49,7 +47,7 @@ def not_followed(records: Sequence[Record], controller: Controller | None) -> tu
         return ()
     doubts = []
     for rec in records:
-        if not _comparable(rec, controller):
+        if not comparable(rec, controller):
             continue
         assert rec.torque is not None
         off = _off(rec, controller)
@@ -59,45 +57,8 @@ def not_followed(records: Sequence[Record], controller: Controller | None) -> tu
     return tuple(doubts)
 
 
-def faster_clock(records: Sequence[Record], controller: Controller | None) -> Cascade | None:
-    """The same controller where it samples so many times for each line of the log that it makes the logged torques.
-
-    Asked of records whose torque does not follow from it at the log's rate; None where a sample time is given, or no faster one
-    makes the torques.
-    """
-    if controller is None or controller.unknown or cascade_of(controller).period is not None or controller.loop == "continuous":
-        return None
-    dt, own = records[0].dt, cascade_of(controller)
-    faster = {every: replace(own, period=dt / every) for every in FASTER}
-    if not all(_comparable(rec, faster[FASTER[0]]) for rec in records):
-        return None
-    left = {every: sum(_power_left(rec, other) for rec in records) for every, other in ({1: own} | faster).items()}
-    best = min(left, key=lambda every: left[every])
-    if not left[best] < POLICY.each_number**2 * left[1] or _doubts(records, faster[best]):
-        return None
-    return faster[best]
-
-
-def period_forgotten(records: Sequence[Record], controller: Controller | None) -> tuple[Text, ...]:
-    """A sentence where torques that do not follow from a controller at the log's rate do from one with another sample time."""
-    faster = faster_clock(records, controller)
-    if faster is None:
-        return ()
-    text = (
-        "The {torque} follows better from this controller where that samples {} times for each line of the log: if it does, give "
-        "its sample time, period = {:.4g} (s)."
-    )
-    return (say(text, faster.log_every(records[0].dt), faster.period),)
-
-
-def _power_left(rec: Record, controller: Cascade) -> float:
-    """Sum of squares of logged minus made torque [N^2 m^2]."""
-    log = log_of(rec, len(rec), controller, whole=True)
-    left = log.torque - log.made(controller)
-    return float(left @ left)
-
-
-def _comparable(rec: Record, controller: Controller) -> bool:
+def comparable(rec: Record, controller: Controller) -> bool:
+    """Whether a record that is slower than this controller starts at rest and holds torque and all that it reads."""
     needed = (rec.torque, *(getattr(rec, channel) for channel in controller.reads))
     return (
         controller.log_every(rec.dt) > 1

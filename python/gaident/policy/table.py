@@ -183,6 +183,15 @@ class Policy:
         "times the change to the line before or after: a command that changes more between two lines jumps there",
         SLOWER,
     )
+    same_clock: float = loop(
+        3.0, "1", "times the least that a controller faster than the log leaves: not told apart by it", SLOWER
+    )
+    near_age: float = loop(
+        0.25,
+        "samples",
+        "of a controller, by which the motion's lag misses the age of its velocity at most; T/2 is the age",
+        SLOWER,
+    )
     corner_square: float = loop(
         0.1,
         "1",

@@ -13,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 import gaident as ga
+from drive_rig import Plant, run_drive, skip_without_library
 from gaident.cli.main import main
 from gaident.data.signals.difference import backward_difference, is_backward_difference
 
@@ -110,3 +111,29 @@ def test_friction_is_found_without_velocity_and_torque(tmp_path: Path) -> None:
     said = " ".join(dia.summary().split())
     assert "half a sample old" in said and "nothing shows it: log the torque" in said
     assert not dia.torque_logged and "The logged torque" not in said
+
+
+@pytest.mark.parametrize("torque", [False, True])
+def test_a_second_mass_is_found_whose_friction_is_at_the_load(torque: bool) -> None:
+    """With the friction at the motor a shaft explains nothing, so that neither of the two helps alone.
+
+    The position of 2^22 counts a turn is the only measured signal, or the torque is logged beside it.
+    """
+    skip_without_library()
+    loop = ga.Cascade(ga.PI(0.08, 4.0), position=ga.P(20.0))
+    axis = Plant(J=4e-4, D=1e-3, JL=6e-4, DL=1e-3, KG=60.0, DG=0.02, kp=0.08, ki=4.0, dt=1e-3, cascade=loop, name="axis")
+    levels = np.repeat([0.0, 30.0, 60.0, 12.0, -24.0, -60.0, -18.0, 6.0, 42.0, 0.0, -42.0, 21.0, 0.0], 150)
+    speed = np.zeros(len(levels))
+    for n in range(1, len(speed)):
+        speed[n] = speed[n - 1] + np.clip(levels[n] - speed[n - 1], -1.0, 1.0)
+    path = np.cumsum(speed) * 1e-3
+    log = run_drive(axis, path, {"coulomb_friction@load": {"torque": 0.15}}, encoder=2.0 * np.pi / 2**22, differenced=True)
+    position = np.cumsum(log.velocity) * 1e-3
+    shown = {"torque": log.torque} if torque else {}
+    rec = ga.Record(1e-3, position_command=path, position=position, velocity=backward_difference(position, 1e-3), **shown)
+    dia = ga.diagnose(rec, loop)
+    assert [(f.effect, f.sides, f.alternatives) for f in dia.causes] == [("coulomb_friction", ("load",), ())], dia.summary()
+    assert dia.causes[0].parameters["torque"].value == pytest.approx(0.15, rel=1e-3)
+    found = {name: dia.mechanics[name].value for name in ("motor_inertia", "load_inertia", "stiffness")}
+    assert found == pytest.approx({"motor_inertia": 4e-4, "load_inertia": 6e-4, "stiffness": 60.0}, rel=0.01)
+    assert dia.verdict == "explained"

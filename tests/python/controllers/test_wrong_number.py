@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import gaident as ga
-from gaident.identification.logged_torque import period_forgotten
+from drive_rig import Plant, run_drive, skip_without_library
+from gaident.diagnosis.controller.period_shown import period_shown
 
 TRUE = ga.Cascade(
     ga.PI(0.03, 1.0),
@@ -74,15 +75,55 @@ def test_a_loop_that_is_not_the_drives_is_not_simulated() -> None:
     assert dia.after.rmse < 2.0 * dia.after.noise_floor
 
 
-def test_a_forgotten_sample_time_of_the_controller_is_asked_for() -> None:
+def test_a_forgotten_sample_time_of_the_controller_is_found() -> None:
     """The whole cascade, every fourth sample of which was logged, and nobody said so."""
-    (note,) = period_forgotten([log()], replace(TRUE, period=None))
-    assert "samples 4 times for each line of the log" in note and "period = 0.00025 (s)" in note
-    assert period_forgotten([log()], TRUE) == () == period_forgotten([log()], None)
-    assert period_forgotten([log()], replace(TWO_WRONG, period=None)) == ()  # another number is wrong: no clock mends that
-
-
-def test_a_forgotten_sample_time_is_a_note_of_the_diagnosis() -> None:
+    shown = period_shown([log()], replace(TRUE, period=None))
+    assert shown is not None and shown.controller == TRUE
+    assert "samples 4 times for each line" in shown.note
+    assert period_shown([log()], TRUE) is None is period_shown([log()], None)
+    assert period_shown([log()], replace(TWO_WRONG, period=None)) is None  # another number is wrong: no clock mends that
     dia = ga.diagnose(log(), replace(TRUE, period=None))
-    assert any("give its sample time, period = 0.00025 (s)" in note for note in dia.notes)
-    assert not any("give its sample time" in note for note in ga.diagnose(log(), TRUE).notes)
+    assert any("0.25 ms is taken for its sample time" in note for note in dia.notes) and dia.controller == TRUE
+    assert [f.effect for f in dia.causes] == ["coulomb_friction"] and dia.verdict == "explained"
+
+
+AT_LIMIT = ga.Cascade(ga.PI(0.15, 8.0, torque_limit=1.0, anti_windup="hold"), period=0.25e-3)
+RPM = 30.0 / np.pi
+STRIBECK = {"torque": 0.15, "static_torque": 0.25, "stribeck_velocity": 4.0}
+
+
+def at_limit(every: int, differenced: bool = True) -> ga.Record:
+    """One mass behind a limit that is reached, an encoder of 2^20 lines, three decimals of rpm."""
+    skip_without_library()
+    cascade = replace(AT_LIMIT, period=1e-3 / every)
+    axis = Plant(J=1e-3, D=2e-3, kp=0.15, ki=8.0, dt=1e-3, cascade=cascade, name="axis")
+    levels = np.repeat([0.0, 50.0, 100.0, 20.0, -40.0, -100.0, -30.0, 10.0, 70.0, 0.0, 5.0, -5.0], 180 * every)
+    speed, step = np.zeros(len(levels)), 2.5 / every  # a ramp that the controller makes at its own samples
+    for n in range(1, len(speed)):
+        speed[n] = speed[n - 1] + np.clip(levels[n] - speed[n - 1], -step, step)
+    sensor = {"encoder": 2.0 * np.pi / 2**20, "differenced": differenced}
+    whole = run_drive(axis, speed, {"stribeck_friction": STRIBECK}, **sensor)
+    velocity, torque = whole.velocity[::every], whole.torque[::every]
+    return ga.Record(1e-3, command=speed[::every], velocity=np.round(velocity * RPM, 3) / RPM, torque=np.round(torque, 4))
+
+
+@pytest.mark.parametrize("every", [1, 2, 4, 8])
+def test_a_sample_time_is_told_by_the_torque_and_by_the_age_of_the_velocity(every: int) -> None:
+    shown = period_shown([at_limit(every)], ga.PI(0.15, 8.0))
+    if every == 1:
+        assert shown is None
+    else:
+        assert shown is not None and shown.controller == ga.Cascade(ga.PI(0.15, 8.0), 1e-3 / every)
+
+
+def test_behind_a_limit_a_forgotten_sample_time_makes_no_second_mass() -> None:
+    dia = ga.diagnose(at_limit(4), ga.PI(0.15, 8.0))
+    assert any("0.25 ms is taken for its sample time" in note for note in dia.notes), dia.summary()
+    assert "motor_inertia" not in dia.mechanics
+    assert [f.effect for f in dia.causes][:2] == [
+        "torque_saturation",
+        "stribeck_friction",
+    ]
+    found = dia.causes[1].parameters
+    assert {name: found[name].value for name in STRIBECK} == pytest.approx(STRIBECK, rel=0.1), dia.summary()
+    assert dia.mechanics["inertia"].value == pytest.approx(1e-3, rel=2e-3)

@@ -14,10 +14,11 @@ from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
 from gaident.diagnosis.controller.form_findings import Loop, driver_of
 from gaident.diagnosis.controller.limit_not_given import by_a_limit
 from gaident.diagnosis.controller.log_shift import Aligned, aligned
+from gaident.diagnosis.controller.measured_lag import Lag, commanded, lag_shown
 from gaident.diagnosis.controller.other_form import other_form
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS, OtherGains
 from gaident.diagnosis.selection.unlogged_form import UnloggedForm
-from gaident.identification.logged_torque import corrected, not_followed, period_forgotten
+from gaident.identification.logged_torque import corrected, not_followed
 from gaident.models.drive_torque import Driven, driven_by, straight_driven
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
@@ -32,7 +33,8 @@ class Driving:
     logged: the bare PI with the gains that the torques show. findings: of the controller's form. notes: what to keep in mind.
     doubts: notes on torques that do not follow from a controller that is no bare PI. numbers: those that were not given.
     limited: whether a limit of the controller, which was not given either, makes the torques follow.
-    regained_from: the PI that was given, where records without a torque show other gains.
+    regained_from: the PI that was given, where records without a torque show other gains. lag: behind which a measured torque was
+    logged; the records then hold the one before it.
     """
 
     moved: Aligned
@@ -44,6 +46,7 @@ class Driving:
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
     limited: bool = False
     regained_from: PI | None = None
+    lag: Lag | None = None
 
     def regained(self, other: OtherGains) -> Driving:
         """The same under other gains, which command and velocity show where no torque is logged; a finding says so."""
@@ -92,9 +95,13 @@ def driving_of(
 
     Raises ControllerError where unknown numbers of the controller do not make the torque, and no other form of it does.
     """
-    controller, pi, notes = driven.controller, driven.loop, (*asked.clock, *driven.notes)
+    controller, pi, notes = driven.controller, driven.loop, driven.notes
     whole = [origin.get(r.digest, r) for r in records]
     doubts = (*driven.doubts, *not_followed(whole, controller))
+    lag = lag_shown(records, pi)
+    if lag is not None and pi is not None:
+        notes = (*notes, lag.note)
+        records, held, origin = _again(records, held, origin, partial(commanded, controller=pi))
     moved = aligned(records, held, pi)
     form = None if moved.shifts else driver_of(records, held, pi, tuple(n.removeprefix("velocity.") for n in asked.estimates))
     findings, numbers, limited = asked.findings, asked.estimates, False
@@ -122,10 +129,8 @@ def driving_of(
         moved = aligned(records, held, None)
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
-    if doubts or form is not None or any(r.follows is False for r in logged.replays.values()):
-        notes = (*notes, *period_forgotten(whole, asked.controller))
     used = controller if bare_pi(controller) is None else logged.controller
-    return Driving(moved, used, logged, findings, notes, doubts, numbers, limited)
+    return Driving(moved, used, logged, findings, (*asked.period_notes, *notes), doubts, numbers, limited, lag=lag)
 
 
 def _again(

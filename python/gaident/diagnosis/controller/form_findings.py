@@ -14,10 +14,10 @@ from gaident.control.pi import PI, bare_pi
 from gaident.control.simplest import simplest
 from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
+from gaident.diagnosis.controller.period_shown import Period, period_shown
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.identification.controller_numbers import Numbers, with_estimates
-from gaident.identification.logged_torque import FASTER, faster_clock
 from gaident.models.drive_torque import driven_by
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
@@ -35,6 +35,7 @@ UNITS = {
     "limit": "N m",
 }
 """Of the findings' parameters; the others are numbers."""
+FASTER = (2, 4, 8)  # no decision: work; samples of a controller to a line of the log, as drives have them
 RULES = {
     "backward": "a rectangular integral (backward)",
     "forward": "a rectangular integral that lacks the newest error (forward)",
@@ -76,7 +77,7 @@ def driver_of(
 class Loop:
     """The controller that a diagnosis works with: the given one, with its numbers, or the one that a slower log shows.
 
-    clock: a note on its sample time, where that was not given.
+    period_notes: on a sample time of it that was not given.
     """
 
     controller: Controller | None
@@ -84,20 +85,47 @@ class Loop:
     findings: tuple[Finding, ...] = ()
     notes: tuple[Text, ...] = ()
     estimates: Mapping[str, Estimate] = field(default_factory=dict)
-    clock: tuple[Text, ...] = ()
+    period_notes: tuple[Text, ...] = ()
 
 
 def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     """The controller with estimates for what is None and, where a log has fewer lines than a bare PI in a Cascade has samples,
     in the form that the logged torque shows."""
-    if (faster := _faster(records, given)) is not None:
-        text = (
-            "The logged {torque} does not follow from command and velocity through this controller at the log's rate. It does{} "
-            "where the controller samples {} times for each line of the log, which is taken for true (period = {:.4g} s)."
-        )
-        loop = loop_of(records, faster)
-        beside = ", in the form below," if loop.findings else ""
-        return replace(loop, clock=(say(text, beside, faster.log_every(records[0].dt), faster.period),))
+    period = period_shown(records, given) or _formed(records, given)
+    found = _loop_of(records, given if period is None else period.controller)
+    return found if period is None else replace(found, period_notes=(period.note,))
+
+
+def _formed(records: Sequence[Record], given: Controller | None) -> Period | None:
+    """A bare PI with a sample time that was not given, where only another form of it makes the logged torques, and a faster one.
+
+    Of several sample times that of the fewest settings and, of these, the one that comes closest.
+    """
+    pi, dt = bare_pi(given), records[0].dt
+    if (
+        pi is None
+        or pi.unknown
+        or pi.loop != "sampled"
+        or any(r.torque is None or r.command is None or r.dt != dt for r in records)
+    ):
+        return None
+    unsaid = [said for r in records if (said := replay(r, pi)).follows is False]
+    if not unsaid or any(said.cause for said in unsaid) or form_shown(records, pi) is not None:
+        return None
+    found = {every: shown for every in FASTER if (shown := form_shown(records, pi, (), every)) is not None}
+    close = {every: shown for every, shown in found.items() if shown.rms < POLICY.replay_noise * shown.before}
+    if not close:
+        return None
+    every = min(close, key=lambda n: (len(close[n].numbers), close[n].rms))
+    text = (
+        "The logged {torque} follows from no form of this controller at the log's rate. It does from the one below, where that "
+        "samples {} times for each line: {:.4g} ms is taken for its sample time. Where that is not it, give period (s)."
+    )
+    return Period(Cascade(pi, period=dt / every), say(text, every, 1e3 * dt / every))
+
+
+def _loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
+    """The same of a controller whose sample time is known."""
     numbers = with_estimates(records, given)
     numbers = replace(numbers, controller=simplest(numbers.controller, (r.dt for r in records)))
     as_given = Loop(numbers.controller, numbers, (), (), numbers.estimates)
@@ -110,28 +138,6 @@ def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
         return replace(as_given, numbers=numbers.trusted())
     estimates = {f"velocity.{name}": e for name, e in _estimates(shown.estimated).items()}
     return Loop(shown.controller, replace(numbers, doubt=""), findings_of(shown), notes_of(shown, records), estimates)
-
-
-def _faster(records: Sequence[Record], given: Controller | None) -> Cascade | None:
-    """The given controller with the sample time that was not given, where only a faster one makes the logged torques.
-
-    As given or, for a bare PI, in the form that they show: that of the fewest settings and, of these, the one that comes closest.
-    """
-    if given is None or given.unknown or any(r.torque is None or not given.replayable(r) for r in records):
-        return None
-    unsaid = [said for r in records if (said := replay(r, given)).follows is False]
-    if not unsaid or any(said.cause for said in unsaid):
-        return None
-    pi, dt = bare_pi(given), records[0].dt
-    faster = faster_clock(records, given)
-    if faster is not None or pi is None or pi.loop != "sampled":
-        return faster
-    if form_shown(records, pi) is not None:
-        return None
-    found = {every: shown for every in FASTER if (shown := form_shown(records, pi, (), every)) is not None}
-    close = {every: shown for every, shown in found.items() if shown.rms < POLICY.replay_noise * shown.before}
-    best = min(close, key=lambda every: (len(close[every].numbers), close[every].rms), default=None)
-    return None if best is None else Cascade(pi, period=dt / best)
 
 
 def _alone(controller: Controller | None, records: Sequence[Record]) -> tuple[PI | None, int]:

@@ -35,6 +35,7 @@ __all__ = [
     "released",
     "resonant",
     "rigid",
+    "shafts",
     "swings",
 ]
 
@@ -141,15 +142,29 @@ def on_a_shaft(objective: Objective, one: Fit, known: float = 0.0) -> list[tuple
     What delays the torque moves the resonance that fits best, and the cost has a valley at each: with it in the model the
     resonance is looked for where it is. Not within a step of the grid from a known one [rad/s], whose valley has been searched.
     """
-    s = one.parameters.scales
-    highest = HIGHEST_SHAFT * np.pi / s.dt
-    poles = np.geomspace(max(SLOWEST_SHAFT * np.pi / s.duration, SHAFT_SPAN * highest), highest, SHAFTS)
-    z = SHAFT_DAMPING
+    poles, z = _shaft_frequencies(one), SHAFT_DAMPING
     rows = np.array([(np.log(w), z, np.log(w * r), z) for w in poles for r in SHAFT_RATIOS])
     longer, X = _helpful(objective, one, rows)
     starts = [as_two_masses(replace(one, hypothesis=longer, x=x)) for x in X]
     step = float(np.log(poles[1] / poles[0]))
     return [(h, x) for h, x in starts if not known > 0.0 or abs(np.log(_resonance_at(h.parameters, x) / known)) > step]
+
+
+def shafts(one: Fit) -> list[Model]:
+    """Two masses of the inertia and damping of one, with the shafts of that grid."""
+    K, a = one.parameters.base_values(one.x[None, :])[0]
+    z = 2.0 * SHAFT_DAMPING  # no decision: the 2 of 2 zeta w
+    return [
+        Model(float(K) / r**2, [-float(a), *quadratic_roots(z * w, w**2)], quadratic_roots(z * w * r, (w * r) ** 2))
+        for w in _shaft_frequencies(one) for r in SHAFT_RATIOS
+    ]  # fmt: skip
+
+
+def _shaft_frequencies(one: Fit) -> Vector:
+    """Resonances of the grid [rad/s]."""
+    s = one.parameters.scales
+    highest = HIGHEST_SHAFT * np.pi / s.dt
+    return np.geomspace(max(SLOWEST_SHAFT * np.pi / s.duration, SHAFT_SPAN * highest), highest, SHAFTS)
 
 
 def _helpful(objective: Objective, one: Fit, rows: Matrix) -> tuple[Hypothesis, Matrix]:

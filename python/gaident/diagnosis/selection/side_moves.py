@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaident.diagnosis.library.terms import LIBRARY
-from gaident.diagnosis.selection.mechanisms import on_a_shaft
+from gaident.diagnosis.selection.mechanisms import moved_to, shafts
 from gaident.diagnosis.selection.model_space import ModelSpace
 from gaident.diagnosis.selection.score_test import Screened
 from gaident.estimation import least_squares as ls
@@ -77,8 +77,9 @@ class SideMoves(ModelSpace):
         moved = [t for t in fit.parameters.terms if t.other_side]
         if fit.parameters.kind != "one mass" or not moved or self.quiet(fit):
             return []
-        short = []
-        for hypothesis, x in on_a_shaft(self.objective, fit):
+        starts = []
+        for model in shafts(fit):
+            hypothesis, x = moved_to(model, fit)
             for term in moved:
                 values = x[hypothesis.parameters.slot(term.name)]
                 bare, y = hypothesis.without(term.name), hypothesis.parameters.removed(x, term.name)
@@ -86,9 +87,12 @@ class SideMoves(ModelSpace):
                 if other is None:
                     return []
                 hypothesis, x = bare.extended(other), bare.parameters.inserted(y, values)
-            short.append(ls.fit(self.objective, hypothesis, x, WHITE, self.policy.short))
-        best = min(short, key=lambda f: f.cost, default=None)
-        return [] if best is None or best.cost >= WORST else [self.refitted(best.hypothesis, best.x, self.policy.long)]
+            starts.append((float(self.objective.costs(hypothesis, x[None, :], WHITE)[0]), hypothesis, x))
+        # With the effects at the motor the best shaft is another one, from which a fit does not come to this.
+        nearest = sorted(starts, key=lambda start: start[0])[: self.policy.starts]
+        short = [ls.fit(self.objective, h, x, WHITE, self.policy.short) for _, h, x in nearest]
+        best = min(short, key=lambda f: f.cost)
+        return [] if best.cost >= WORST else [self.refitted(best.hypothesis, best.x, self.policy.long)]
 
     def screened_at_load(self, now: Fit) -> list[Term]:
         """What is screened at the load, beside what is screened at the motor: harmonic torques and the simplest dry friction.

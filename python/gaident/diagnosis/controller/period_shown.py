@@ -1,0 +1,95 @@
+"""The sample time of a controller, where none was given: by the logged torque, and by how old the velocity is.
+
+A controller that is faster than the log makes another torque of the same lines than one at the log's rate: by its filters,
+by what its integrator adds up between the lines, by what an anti-windup keeps at a limit.
+Each of r = 2, 4, 8, 16 samples to a line is tried, with the plateau of the torque as a limit where it shows one. Such a
+controller is the drive's where it leaves less than the share `each_number` of what one at the log's rate leaves.
+What the velocity did between the lines is lost, and at a limit it changes what an anti-windup keeps: two that leave alike, up to
+the factor `same_clock`, are told apart by the motion.
+A velocity is not old, or T/2 old where it is the difference of an encoder's angle:
+
+    lag = 0,   or, on the lattice of an encoder,   lag = -1/(2 r) lines
+
+with the lag of the inverse-dynamics regression (`estimation/regression/torque_lag.py`) under the torque that each controller
+makes between the lines. The nearest r is taken where it is near. Where the torque shows one alone, either lag confirms it, or
+that the torque follows from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gaident.axis import Text, say
+from gaident.control.cascade import Cascade, cascade_of
+from gaident.control.controller import Controller
+from gaident.data.record import Record
+from gaident.data.signals.lattice import encoder_step
+from gaident.diagnosis.controller.replay import replay
+from gaident.diagnosis.controller.slow_forms import limited, run_error
+from gaident.estimation.regression.torque_lag import torque_lag
+from gaident.identification.logged_torque import comparable, not_followed
+from gaident.models.drive_torque import driven_by
+from gaident.policy.table import POLICY
+
+__all__ = ["Period", "period_shown"]
+
+FASTER = (2, 4, 8, 16)  # no decision: work; samples of a controller to a line of the log, as drives have them
+UNLIKE = ("", "torque_limit", "anti_windup")  # what a replay at the log's rate may say: any other reason explains the torque
+HALF = 0.5  # no decision: of a sample, the age of a mean over it
+
+
+@dataclass(frozen=True)
+class Period:
+    """The given controller, with the sample time that the log shows where that is sure, and a sentence on it."""
+
+    controller: Controller
+    note: Text
+
+
+def period_shown(records: Sequence[Record], given: Controller | None) -> Period | None:
+    """None where a sample time was given, numbers are not known, or the torque follows no better from a faster controller."""
+    if given is None or given.unknown or given.loop != "sampled" or cascade_of(given).period is not None:
+        return None
+    own, dt = cascade_of(given), records[0].dt
+    faster = {every: replace(own, period=dt / every) for every in FASTER}
+    if any(r.dt != dt or not comparable(r, faster[FASTER[0]]) for r in records):
+        return None
+    if given.one_equation:
+        said = [replay(r, given) for r in records]
+        if all(r.follows for r in said) or any(r.cause not in UNLIKE for r in said if r.follows is False):
+            return None
+    before = _left(records, replace(own, period=dt))[1]
+    found = {every: _left(records, one) for every, one in faster.items()}
+    least = min(left for _, left in found.values())
+    if not least < POLICY.each_number * before:
+        return None
+    alike = [n for n, (_, left) in found.items() if left <= POLICY.same_clock * least]
+    lags = {n: _lag(records, found[n][0]) for n in alike}
+    old = HALF if encoder_step(np.concatenate([r.velocity for r in records])) > 0.0 else 0.0
+    every = min(alike, key=lambda n: abs(lags[n] + old / n))
+    alone = len(alike) == 1
+    near = min(abs(lags[every] + age / every) for age in ((0.0, old) if alone else (old,)))
+    sure = near < POLICY.near_age / every or (alone and not not_followed(records, found[every][0]))
+    text = (
+        "The logged {torque} does not follow from this controller at the log's rate (rms {:.2g} {N m}). It follows better where "
+        "it samples {} times for each line (rms {:.2g} {N m}){}"
+    )
+    used = say(": {:.4g} ms is taken for its sample time. Where that is not it, give period (s).", 1e3 * dt / every)
+    asked = say("; if it does, give its sample time, period = {:.4g} (s).", dt / every)
+    note = say(text, before, every, found[every][1], used if sure else asked)
+    return Period(faster[every] if sure else given, note)
+
+
+def _left(records: Sequence[Record], controller: Cascade) -> tuple[Cascade, float]:
+    """(the controller with the limit that the logs show, root mean square of logged minus made torque [N m])."""
+    one = limited(records, controller).controller
+    return one, run_error(records, one)
+
+
+def _lag(records: Sequence[Record], controller: Cascade) -> float:
+    """Of the torque that the controller makes against the motion, mean of the records [lines]; infinite where none tells."""
+    lags = [lag.lag for r in records if (lag := torque_lag(driven_by(r, controller))) is not None]
+    return float(np.mean(lags)) if lags else np.inf

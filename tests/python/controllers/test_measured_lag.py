@@ -1,0 +1,68 @@
+"""A measured current behind the controller's command: a lag, not other gains."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gaident as ga
+from drive_rig import Plant, run_drive, skip_without_library
+from gaident.diagnosis.controller.measured_lag import commanded, lag_shown
+
+T = 0.5e-3
+PI = ga.PI(0.05, 2.0)
+AXIS = Plant(J=1e-3, D=2e-3, kp=0.05, ki=2.0, dt=T, name="axis")
+LAG = 0.3e-3
+
+
+def record(lag: float, noise: float = 0.01, late: int = 1, effects: dict[str, dict[str, float]] | None = None) -> ga.Record:
+    """A ramped motion with reversals; what is logged is the torque behind the lag, as it stood when the controller sampled."""
+    skip_without_library()
+    levels = np.repeat([0.0, 30.0, 60.0, 12.0, -24.0, -60.0, -18.0, 6.0, 42.0, 0.0, 3.0, -3.0, 0.0], 200)
+    speed = np.zeros(len(levels))
+    for n in range(1, len(speed)):
+        speed[n] = speed[n - 1] + np.clip(levels[n] - speed[n - 1], -0.5, 0.5)
+    hidden = {"coulomb_friction": {"torque": 0.1}} | (effects or {}) | ({"torque_lag": {"time_constant": lag}} if lag else {})
+    rng = np.random.default_rng(2)
+    log = run_drive(AXIS, speed, hidden, velocity_noise=0.01 * rng.standard_normal(len(speed)))
+    behind, a = np.zeros(len(speed)), np.exp(-T / lag) if lag else 0.0
+    for n in range(1, len(speed)):
+        behind[n] = a * behind[n - 1] + (1.0 - a) * log.torque[n - late]
+    torque = behind + noise * rng.standard_normal(len(speed))
+    return ga.Record(T, command=speed, velocity=log.velocity, torque=torque, torque_is="measured")
+
+
+@pytest.mark.parametrize("late", [0, 1])
+def test_a_lag_behind_the_controller_is_found_with_its_deviation(late: int) -> None:
+    lag = lag_shown([record(LAG, late=late)], PI)
+    assert lag is not None and abs(lag.time_constant - LAG) < 3.0 * lag.std < 0.3 * LAG
+    assert lag.noise == pytest.approx(0.01, rel=0.05)
+
+
+def test_the_torque_before_the_lag_is_the_controllers() -> None:
+    rec = record(LAG)
+    made = commanded(rec, PI)
+    assert made.torque_is == "commanded" and made.torque is not None
+    error = rec.command - rec.velocity
+    integral = np.cumsum(error) - 0.5 * error
+    assert np.abs(made.torque - PI.kp * error - PI.ki * T * integral).max() < 1e-9
+
+
+def test_where_other_gains_explain_more_no_lag_is_found() -> None:
+    rec = record(LAG, noise=0.001)
+    assert lag_shown([rec], ga.PI(0.06, 2.0)) is None  # the gains are other
+    assert lag_shown([record(0.0, late=0)], PI) is None  # it follows as it is
+    assert lag_shown([ga.Record(T, command=rec.command, velocity=rec.velocity, torque=rec.torque)], PI) is None  # commanded
+    assert lag_shown([rec], None) is None
+
+
+def test_a_lag_of_the_measured_current_is_not_said_to_be_other_gains() -> None:
+    dia = ga.diagnose(record(LAG), PI)
+    assert [f.effect for f in dia.causes] == ["coulomb_friction", "torque_lag"], dia.summary()
+    assert {*dia.causes[1].alternatives} <= {"transport_delay"}  # no velocity filter: the current shows the lag
+    found = {f.effect: f.parameters for f in dia.causes}
+    assert found["torque_lag"]["time_constant"].value == pytest.approx(LAG, rel=0.05)
+    assert found["coulomb_friction"]["torque"].value == pytest.approx(0.1, rel=0.01)
+    assert dia.mechanics["inertia"].value == pytest.approx(AXIS.J, rel=0.005)
+    assert any("behind a lag of 0.3" in note or "behind a lag of 0.29" in note for note in dia.notes), dia.notes
+    assert "torque_lag" not in dia.not_testable and dia.verdict == "explained"
