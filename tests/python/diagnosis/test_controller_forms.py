@@ -281,3 +281,14 @@ def test_a_form_that_was_found_is_not_looked_for_again() -> None:
         found = driving_of(driven.records, (), asked, driven, {driven.records[0].digest: rec})
     assert {f.effect for f in asked.findings} == {"torque_saturation", "command_weight"}
     assert found.findings == asked.findings and found.controller == asked.controller
+
+
+@pytest.mark.parametrize("every", [2, 4])
+def test_a_form_shows_the_sample_time_that_nobody_gave(every: int) -> None:
+    with threadpool_limits(1, user_api="blas"):
+        loop = loop_of([slower(every, torque_filters=[dip()])], GIVEN)
+        at_its_rate = loop_of([log(torque_filters=[dip()])], GIVEN)
+    assert [f.effect for f in loop.findings] == ["torque_filter"]
+    assert isinstance(loop.controller, ga.Cascade) and loop.controller.period == pytest.approx(T)
+    assert f"samples {every} times for each line" in loop.period_notes[0]
+    assert at_its_rate.period_notes == () and at_its_rate.controller == GIVEN
