@@ -56,8 +56,8 @@ def measure(cell: Any) -> dict[str, Any]:
     diagnosis = importlib.import_module("gaident.diagnosis.work")
     selected = diagnosis.selected
 
-    def kept(*arguments: Any) -> Selection:
-        found.append(selected(*arguments))
+    def kept(*arguments: Any, **named: Any) -> Selection:
+        found.append(selected(*arguments, **named))
         return found[-1]
 
     with mock.patch.object(diagnosis, "selected", kept):

@@ -102,18 +102,19 @@ def diagnose(
     began = time.perf_counter()
     note = Note(progress)
     given = records_of(rec, "rec")
-    asked = loop_of(given, checked_controller(controller))
-    driven = torque_driven(given, asked.controller)
+    import scipy.linalg  # noqa: F401  brings a BLAS of its own, to be limited too
+    from threadpoolctl import threadpool_limits
+
+    # A sum that several threads share is rounded otherwise with each number of them, and a search follows the last digit.
+    with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
+        asked = loop_of(given, checked_controller(controller))
+        driven = torque_driven(given, asked.controller)
     kept = () if validation is None else records_of(validation, "validation")
     records, held = driven.records, torque_driven(kept, asked.controller).records if kept else ()
     checked(records, held, driven.loop, identification, bootstrap, seed, progress, axis, pitch)
     origin = {r.digest: whole for r, whole in zip((*records, *held), (*given, *kept), strict=True)}
     records, held = in_order(records), in_order(held)
     noise_std = noise_std_of(noise)
-    import scipy.linalg  # noqa: F401  brings a BLAS of its own, to be limited too
-    from threadpoolctl import threadpool_limits
-
-    # A sum that several threads share is rounded otherwise with each number of them, and a search follows the last digit.
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.01, "replaying the controller")
         driving = driving_of(records, held, asked, driven, origin)

@@ -304,7 +304,10 @@ class Policy:
         0.05, "1", "of the squared torque, that a spring or friction by direction explains", REGRESSION
     )
     lag_left: float = linear(
-        0.05, "1", "most of the squared torque, or velocity, that the regression behind a lag leaves: more tells no lag", SHIFTED
+        0.05,
+        "1",
+        "most of the torque's variance, or squared velocity, that the regression behind a lag leaves: more tells none",
+        SHIFTED,
     )
     lag_std: float = linear(
         0.2, "samples", "standard deviation of a lag that the motion shows, at most; above, it shows none", SHIFTED

@@ -113,8 +113,8 @@ def test_output_errors_are_weighed_anew_on_all_samples(monkeypatch: pytest.Monke
     torque = rec.torque + 2.0 * np.random.default_rng(2).standard_normal(len(rec))
     found: list[select.Selection] = []
 
-    def kept(*arguments: Any) -> select.Selection:
-        found.append(select.selected(*arguments))
+    def kept(*arguments: Any, **named: Any) -> select.Selection:
+        found.append(select.selected(*arguments, **named))
         return found[-1]
 
     monkeypatch.setattr(importlib.import_module("gaident.diagnosis.work"), "selected", kept)

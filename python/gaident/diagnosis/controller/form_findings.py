@@ -14,7 +14,7 @@ from gaident.control.pi import PI, bare_pi
 from gaident.control.simplest import simplest
 from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
-from gaident.diagnosis.controller.period_shown import Period, period_shown
+from gaident.diagnosis.controller.period_shown import FASTER, Period, period_shown
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.identification.controller_numbers import Numbers, with_estimates
@@ -35,7 +35,6 @@ UNITS = {
     "limit": "N m",
 }
 """Of the findings' parameters; the others are numbers."""
-FASTER = (2, 4, 8)  # no decision: work; samples of a controller to a line of the log, as drives have them
 RULES = {
     "backward": "a rectangular integral (backward)",
     "forward": "a rectangular integral that lacks the newest error (forward)",
@@ -91,7 +90,9 @@ class Loop:
 def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     """The controller with estimates for what is None and, where a log has fewer lines than a bare PI in a Cascade has samples,
     in the form that the logged torque shows."""
-    period = period_shown(records, given) or _formed(records, given)
+    period = period_shown(records, given)
+    if period is None or period.controller is given:  # none, or no sure one
+        period = _formed(records, given) or period
     found = _loop_of(records, given if period is None else period.controller)
     return found if period is None else replace(found, period_notes=(period.note,))
 

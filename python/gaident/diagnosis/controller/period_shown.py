@@ -34,7 +34,7 @@ from gaident.identification.logged_torque import comparable, not_followed
 from gaident.models.drive_torque import driven_by
 from gaident.policy.table import POLICY
 
-__all__ = ["Period", "period_shown"]
+__all__ = ["FASTER", "Period", "period_shown"]
 
 FASTER = (2, 4, 8, 16)  # no decision: work; samples of a controller to a line of the log, as drives have them
 UNLIKE = ("", "torque_limit", "anti_windup")  # what a replay at the log's rate may say: any other reason explains the torque
@@ -72,7 +72,10 @@ def period_shown(records: Sequence[Record], given: Controller | None) -> Period 
     every = min(alike, key=lambda n: abs(lags[n] + old / n))
     alone = len(alike) == 1
     near = min(abs(lags[every] + age / every) for age in ((0.0, old) if alone else (old,)))
-    sure = near < POLICY.near_age / every or (alone and not not_followed(records, found[every][0]))
+    # Two samples to a line, and a velocity half a sample old: the lag is that of a torque held over each line, and shows nothing.
+    follows = not not_followed(records, found[every][0])
+    told = every > 2 or not old or follows or found[every][1] < POLICY.replay_noise * before
+    sure = (told and near < POLICY.near_age / every) or (alone and follows)
     text = (
         "The logged {torque} does not follow from this controller at the log's rate (rms {:.2g} {N m}). It follows better where "
         "it samples {} times for each line (rms {:.2g} {N m}){}"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gaident.arguments import TORQUE
 from gaident.axis import Text, say
+from gaident.control.cascade import cascade_of
 from gaident.control.controller import Controller, Gains
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
@@ -98,7 +99,7 @@ def _compared(rec: Record, command: Vector, controller: Controller, logged: Vect
     found = None
     for (step,) in velocity_steps([rec]):
         allowed = Allowed.of(rec, command, controller.gains, logged, step)
-        if allowed(off, pi):
+        if allowed(off, None if cascade_of(controller).torque_filters else controller.gains.limits):
             known = say(" (its resolution is {:.2g} {N m})", resolution) if resolution > 0.0 else ""
             return Replay(*figures, True, "", np.nan, None, say("{}, to {:.1g} {N m}{}.", head, maximum, known))
         if pi is not None and rounded_command(off, command, rec.dt, pi):
@@ -146,7 +147,7 @@ def velocity_steps(records: Sequence[Record]) -> tuple[tuple[float, ...], ...]:
         tuple(q if q < most else 0.0 for q, most in zip((step(r.velocity) for r in records), ranges, strict=True))
         for step in (digits_step, rounding_step)
     )
-    return (fine,) if fine == coarse else (fine, coarse)
+    return (fine,) if np.allclose(fine, coarse, rtol=ROUNDING, atol=0.0) else (fine, coarse)
 
 
 def tolerance_of(rec: Record, command: Vector, controller: Gains, logged: Vector, step: float) -> float:
@@ -182,11 +183,16 @@ class Allowed:
         error = controller.kp * (command - rec.velocity)
         return cls(logged, error, own + at_once + DEVIATIONS * drift, 2.0 * own + at_once + sample)
 
-    def __call__(self, off: Vector, controller: PI | None, edge: int = 0) -> bool:
-        """Whether a replay that is off by so much [N m] (n,), from sample `edge` on, is the logged torque, rounded."""
+    def __call__(self, off: Vector, limits: tuple[float, float] | None, edge: int = 0) -> bool:
+        """Whether a replay that is off by so much [N m] (n,), from sample `edge` on, is the logged torque, rounded.
+
+        limits: of torque and integrator [N m]; None: behind a filter they do not show.
+        """
         if not float(np.abs(off).max()) <= self.torque:
             return False
-        torque, integral = (np.inf, np.inf) if controller is None else controller.limits
+        if limits is None:
+            return True
+        torque, integral = limits
         here = slice(edge, edge + len(off))
         logged, stored = self.logged[here], self.logged[here] - self.at_once[here]
         limited = (np.abs(logged) >= POLICY.at_limit * torque) | (np.abs(stored) >= POLICY.at_limit * integral)

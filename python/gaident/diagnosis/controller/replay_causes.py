@@ -21,8 +21,8 @@ from gaident.policy.table import POLICY
 __all__ = ["Explanation", "control_error", "explain", "rounded_command", "white_noise"]
 
 Vector = NDArray[np.float64]
-Allows: TypeAlias = Callable[[Vector, PI, int], bool]
-"""Whether what is off [N m] of a controller, from a sample on, is no more than rounding."""
+Allows: TypeAlias = Callable[[Vector, tuple[float, float], int], bool]
+"""Whether what is off [N m] under limits of torque and integrator, from a sample on, is no more than rounding."""
 
 SHIFTS = (0, 1, -1, 2, -2)  # no decision: samples by which what the controller saw may be older (+) than the log's
 # By how much of ki dt the newest error counts more than half, and the one before less: the rule of integration in words.
@@ -78,7 +78,7 @@ def explain(command: Vector, velocity: Vector, dt: float, controller: PI, logged
         for found in reason(case):
             off = found.off(logged)
             used = found.controller or controller
-            if allowed(off, used, found.edge) or rounded_command(off, command, dt, used):
+            if allowed(off, used.limits, found.edge) or rounded_command(off, command, dt, used):
                 return found
             rms = float(np.sqrt(np.mean(off**2)))
             if rms < POLICY.better_reason * least:  # a later, more complicated reason must be better

@@ -71,9 +71,9 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
     filters_unseen = controller.torque_filters and controller.log_every(records[0].dt) > 1
     if controller.velocity.torque_limit is not None or filters_unseen:
         return Limited(controller, None, 0.0)
-    limits = [plateau_of(np.abs(before_filters(r.torque, controller, r.dt))) for r in records if r.torque is not None]
-    limit = min(limits)
-    if not np.isfinite(limit):
+    parts = [np.abs(before_filters(r.torque, controller, r.dt)) for r in records if r.torque is not None]
+    limit = plateau_of(np.concatenate(parts))
+    if not np.isfinite(limit) or not limit > 0.0:
         return Limited(controller, None, 0.0)
     if any(starts_moving(r, None) for r in records):  # no run from rest shows what the integrator does at the limit
         known = replace(controller, velocity=replace(controller.velocity, torque_limit=limit))
@@ -88,13 +88,15 @@ def _spread(records: Sequence[Record], limit: float) -> float:
     torque = np.concatenate([r.torque for r in records if r.torque is not None])
     at_limit = np.abs(torque)[np.abs(torque) >= POLICY.at_limit * limit]
     rounded = rounding_step(torque) / float(np.sqrt(12.0))  # no decision: of an even distribution
-    return max(float(np.std(at_limit)), rounded, ROUNDING * limit)
+    return max(float(np.std(at_limit)) if len(at_limit) else 0.0, rounded, ROUNDING * limit)
 
 
 def _gain(records: Sequence[Record], without: Cascade, controller: Cascade) -> float:
     """BIC units by which a run with a limit is better than one without."""
     n = sum(len(r) for r in records)
-    return float(2 * n * np.log(run_error(records, without) / run_error(records, controller)) - np.log(n))
+    floor = ROUNDING * float(np.concatenate([np.abs(r.torque) for r in records if r.torque is not None]).max())
+    before, after = (max(run_error(records, one), floor) for one in (without, controller))
+    return float(2 * n * np.log(before / after) - np.log(n))
 
 
 def before_filters(torque: Vector, controller: Cascade, period: float) -> Vector:

@@ -69,9 +69,8 @@ def searched(
     if every == 1 and (ahead := _ahead(data, model)) is not None:
         text = (
             "The motion comes {:.2g} ms before a {torque} that is held over each line of the log, which no axis does: between "
-            "the lines the {torque} goes on, as that of a controller does that is faster than the log. The simulation has it; "
-            "what is late by less than half a line ({:.2g} ms) is not seen in this log. Give the controller's period, or log "
-            "every sample."
+            "the lines the {torque} goes on, as that of a controller does that is faster than the log{}. The simulation has it; "
+            "what is late by less than half a line ({:.2g} ms) is not seen in this log. {}og every sample."
         )
 
         def under(lines: float) -> Selection:
@@ -81,7 +80,9 @@ def searched(
         closer = _refined(found, ahead)
         found = found if closer is None else under(closer)
         used = ahead.lag if closer is None else closer
-        return found, [say(text, 1e3 * used * data.dt, 1e3 * HALF * data.dt)]
+        late = ", or it was filtered or written late on its way into the log" if data.torque_measured else ""
+        asked = "L" if controller is None else "Give the controller's period, or l"
+        return found, [say(text, 1e3 * used * data.dt, late, 1e3 * HALF * data.dt, asked)]
     if every == 1 and all(is_backward_difference(r.velocity, r.position, data.dt) for r in data.records):
         text = (
             "The velocity is the difference of the last two {angles}: half a sample old ({:.3g} ms). The simulation has it; "

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gaident.diagnosis.library.terms import LIBRARY
-from gaident.diagnosis.selection.mechanisms import moved_to, shafts
+from gaident.diagnosis.selection.mechanisms import moved_to, resonance, shafts
 from gaident.diagnosis.selection.model_space import ModelSpace
 from gaident.diagnosis.selection.score_test import Screened
 from gaident.estimation import least_squares as ls
@@ -92,7 +92,8 @@ class SideMoves(ModelSpace):
         nearest = sorted(starts, key=lambda start: start[0])[: self.policy.starts]
         short = [ls.fit(self.objective, h, x, WHITE, self.policy.short) for _, h, x in nearest]
         best = min(short, key=lambda f: f.cost)
-        return [] if best.cost >= WORST else [self.refitted(best.hypothesis, best.x, self.policy.long)]
+        shown = resonance(best) < self.policy.seen_band * np.pi / self.data.dt
+        return [] if best.cost >= WORST or not shown else [self.refitted(best.hypothesis, best.x, self.policy.long)]
 
     def screened_at_load(self, now: Fit) -> list[Term]:
         """What is screened at the load, beside what is screened at the motor: harmonic torques and the simplest dry friction.

@@ -1,7 +1,7 @@
 """By how many samples a logged torque stands behind the motion that it makes, from the inverse-dynamics regression.
 
     u_h(n)  = (u(n) + u(n-1))/2                 a torque held over each sample, as it shows in w(n+1) - w(n-1)
-    J(k)    = min |u_h(n + k) - J a - B w - C sign(w) - T|^2 / |u_h|^2,   k = -3 .. 3
+    J(k)    = min |u_h(n + k) - J a - B w - C sign(w) - T|^2 / |u_h - mean(u_h)|^2,   k = -3 .. 3
     lag     = where the parabola through the least of J and its neighbours has its lowest point
     std     = sqrt(J_min/(n_eff c)),   J(k) = J_min + c (k - lag)^2
 
