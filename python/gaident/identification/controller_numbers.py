@@ -29,6 +29,7 @@ from gaident.control.pi import PI
 from gaident.control.unknown import UNITS, field_of
 from gaident.data.record import Record
 from gaident.errors import ControllerError, RecordError
+from gaident.estimation.criterion import effective_samples, gained
 from gaident.identification import number_words
 from gaident.identification.logged_stretches import centred, correlation, log_of, numbered, unlimited, whitened
 from gaident.identification.number_ranges import grid_of, inverse, off_bound, range_of
@@ -58,7 +59,7 @@ SMALLEST = 1e-300  # no decision: no division by 0
 class Numbers:
     """A controller with all its numbers, those that were estimated by their names (`Controller.unknown`), and a note on them.
 
-    doubt: why these are no numbers of it, as an error; empty where they are. rms: of what they leave of the torque [N m].
+    doubt: why these are no numbers of it, as an error; empty where they are. Others: see `_Solved`.
     """
 
     controller: Controller | None
@@ -66,6 +67,8 @@ class Numbers:
     notes: tuple[Text, ...] = ()
     doubt: str = ""
     rms: float = 0.0
+    size: float = 0.0
+    samples: float = 1.0
 
     def trusted(self) -> Numbers:
         """These; raises ControllerError where they are not to be trusted."""
@@ -77,14 +80,21 @@ class Numbers:
 def with_estimates(records: Sequence[Record], controller: Controller | None) -> Numbers:
     """The controller with numbers for what is None, estimated from the records.
 
-    Where its command may go in several ways between the lines, that with which the torque follows best.
+    Where its command may go in several ways between the lines, the given one, but where the torque follows only, or clearly
+    better, with another: a note says so.
     Raises RecordError where a record lacks the torque or what the controller reads.
     """
     if controller is None or not controller.unknown:
         return Numbers(controller, {})
     for rec in records:
         _check(rec, controller, controller.unknown[0])
-    return min((_estimated(records, one) for one in controller.courses(records[0].dt)), key=lambda numbers: numbers.rms)
+    given, *others = [_estimated(records, one) for one in controller.courses(records[0].dt)]
+    best = min((n for n in others if not n.doubt), key=lambda n: n.rms, default=given)
+    gain = gained(given.rms**2, best.rms**2, min(given.samples, best.samples))
+    as_good = given.rms <= POLICY.negligible * given.size or gain <= POLICY.rival_margin
+    if best is given or best.controller is None or (not given.doubt and as_good):
+        return given
+    return replace(best, notes=(*best.notes, number_words.other_course(best.controller, controller)))
 
 
 def _estimated(records: Sequence[Record], controller: Controller) -> Numbers:
@@ -106,7 +116,7 @@ def _estimated(records: Sequence[Record], controller: Controller) -> Numbers:
     elif hidden:
         doubt = number_words.not_shown(hidden[0], estimates[hidden[0]])
     notes = (number_words.found(estimates, numbers.rms, numbers.size), *((number_words.moved(shift),) if shift else ()))
-    return Numbers(controller.with_numbers(values), estimates, notes, doubt, numbers.rms)
+    return Numbers(controller.with_numbers(values), estimates, notes, doubt, numbers.rms, numbers.size, numbers.samples)
 
 
 def _check(rec: Record, controller: Controller, name: str) -> None:
@@ -180,8 +190,7 @@ class _Solved:
     """x, values, stds, at_bound, seen, free: one of each unknown; x as the search moves it.
 
     free: of a gain that stands at 0, what it would be without that bound where it is beyond its deviations; else 0.
-
-    rms, size: of what is left, and of the torque where no limit acts [N m].
+    rms, size: of what is left, and of the torque where no limit acts [N m]. samples: how many independent ones are left.
     """
 
     x: Vector
@@ -192,6 +201,7 @@ class _Solved:
     free: list[float]
     rms: float
     size: float
+    samples: float
 
 
 class _Fit:
@@ -386,4 +396,5 @@ class _Fit:
             float(b) if f in BOUNDED and v <= near * abs(b) and b < -POLICY.check_deviations * s else 0.0
             for b, f, v, s in zip(beyond, self.fields, values, own_std, strict=True)
         ]
-        return _Solved(x, values, natural, bound, seen, free, float(np.sqrt(np.mean(free_left**2))), size)
+        rms = float(np.sqrt(np.mean(free_left**2)))
+        return _Solved(x, values, natural, bound, seen, free, rms, size, effective_samples(free_left))

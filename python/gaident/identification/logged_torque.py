@@ -28,6 +28,7 @@ from gaident.data.signals.lattice import rounding_step
 from gaident.errors import GaidentError
 from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.logged_stretches import Log, centred, correlation, log_of, whitened
+from gaident.identification.number_words import course as way_of
 from gaident.models.drive_torque import follows_not, torque_driven
 from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
@@ -118,7 +119,7 @@ def corrected(records: Sequence[Record], controller: Controller) -> Corrected | 
     """
     for course in controller.courses(records[0].dt)[1:]:
         if not _doubts(records, course):
-            return Corrected(course, {}, say("With {} it does: all simulations use this.", _course(course)))
+            return Corrected(course, {}, say("With {} it does: all simulations use this.", way_of(course)))
     found = []
     for given, one in _with_one_open(cascade_of(controller)):
         try:
@@ -129,16 +130,10 @@ def corrected(records: Sequence[Record], controller: Controller) -> Corrected | 
             continue
         values = [_value(name, e) for name, e in numbers.estimates.items()]
         moved = cascade_of(numbers.controller).interpolation != cascade_of(controller).interpolation
-        also = say(", and {},", _course(numbers.controller)) if moved else ""
+        also = say(", and {},", way_of(numbers.controller)) if moved else ""
         text = "With {} (given: {}){} it does: all simulations use this."
         found.append(Corrected(numbers.controller, numbers.estimates, say(text, joined(" and ", values), given, also)))
     return found[0] if len(found) == 1 else None
-
-
-def _course(controller: Controller) -> str:
-    """How its position command goes between the lines, in words."""
-    way = cascade_of(controller).interpolation
-    return f"a position command that goes {way} between the lines of the log (interpolation {way!r})"
 
 
 def _value(name: str, e: Estimate) -> Text:

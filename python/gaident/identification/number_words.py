@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from gaident.axis import Text, joined, say, unit_text
+from gaident.control.cascade import cascade_of
+from gaident.control.controller import Controller
 from gaident.results.estimate import Estimate
 
-__all__ = ["found", "moved", "negative", "not_followed", "not_shown"]
+__all__ = ["course", "found", "moved", "negative", "not_followed", "not_shown", "other_course"]
 
 
 def found(estimates: Mapping[str, Estimate], rms: float, size: float) -> Text:
@@ -20,6 +22,17 @@ def found(estimates: Mapping[str, Estimate], rms: float, size: float) -> Text:
         "of {:.2g} {N m} rms."
     )
     return say(text, joined(", ", numbers), rms, size)
+
+
+def course(controller: Controller) -> str:
+    """How its position command goes between the lines."""
+    way = cascade_of(controller).interpolation
+    return f"a position command that goes {way} between the lines of the log (interpolation {way!r})"
+
+
+def other_course(controller: Controller, given: Controller) -> Text:
+    text = "The {torque} follows clearly better with {} (given: {!r}): all simulations use this."
+    return say(text, course(controller), cascade_of(given).interpolation)
 
 
 def moved(shift: int) -> Text:

@@ -15,7 +15,14 @@ AXIS = Plant(J=1e-3, D=2e-3, kp=0.05, ki=2.0, dt=T, name="axis")
 LAG = 0.3e-3
 
 
-def record(lag: float, noise: float = 0.01, late: int = 1, effects: dict[str, dict[str, float]] | None = None) -> ga.Record:
+def record(
+    lag: float,
+    noise: float = 0.01,
+    late: int = 1,
+    effects: dict[str, dict[str, float]] | None = None,
+    seed: int = 2,
+    pi: ga.PI | None = None,
+) -> ga.Record:
     """A ramped motion with reversals; what is logged is the torque behind the lag, as it stood when the controller sampled."""
     skip_without_library()
     levels = np.repeat([0.0, 30.0, 60.0, 12.0, -24.0, -60.0, -18.0, 6.0, 42.0, 0.0, 3.0, -3.0, 0.0], 200)
@@ -23,11 +30,12 @@ def record(lag: float, noise: float = 0.01, late: int = 1, effects: dict[str, di
     for n in range(1, len(speed)):
         speed[n] = speed[n - 1] + np.clip(levels[n] - speed[n - 1], -0.5, 0.5)
     hidden = {"coulomb_friction": {"torque": 0.1}} | (effects or {}) | ({"torque_lag": {"time_constant": lag}} if lag else {})
-    rng = np.random.default_rng(2)
+    rng = np.random.default_rng(seed)
     log = run_drive(AXIS, speed, hidden, velocity_noise=0.01 * rng.standard_normal(len(speed)))
+    made = log.torque if pi is None else pi.torque_of(ga.Record(T, command=speed, velocity=log.velocity))
     behind, a = np.zeros(len(speed)), np.exp(-T / lag) if lag else 0.0
     for n in range(1, len(speed)):
-        behind[n] = a * behind[n - 1] + (1.0 - a) * log.torque[n - late]
+        behind[n] = a * behind[n - 1] + (1.0 - a) * made[n - late]
     torque = behind + noise * rng.standard_normal(len(speed))
     return ga.Record(T, command=speed, velocity=log.velocity, torque=torque, torque_is="measured")
 
@@ -54,6 +62,39 @@ def test_where_other_gains_explain_more_no_lag_is_found() -> None:
     assert lag_shown([record(0.0, late=0)], PI) is None  # it follows as it is
     assert lag_shown([ga.Record(T, command=rec.command, velocity=rec.velocity, torque=rec.torque)], PI) is None  # commanded
     assert lag_shown([rec], None) is None
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_torque_that_is_only_late_has_no_lag(seed: int) -> None:
+    assert lag_shown([record(0.0, late=1, seed=seed)], PI) is None
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+def test_the_unit_of_torque_decides_nothing(unit: float) -> None:
+    def scaled(rec: ga.Record) -> ga.Record:
+        assert rec.torque is not None
+        return rec.with_channels(torque=unit * rec.torque)
+
+    pi = ga.PI(unit * PI.kp, unit * PI.ki)
+    late = [scaled(record(0.0, late=2, seed=seed)) for seed in range(4)]  # a lag of 1.4 samples is 46 BIC units worse
+    assert lag_shown(late, pi) is None
+    lag = lag_shown([scaled(record(LAG))], pi)
+    assert lag is not None and lag.time_constant == pytest.approx(lag_shown([record(LAG)], PI).time_constant, rel=1e-4)
+
+
+@pytest.mark.parametrize("begin", [0, 430, 1000])
+def test_a_torque_limit_hides_no_lag(begin: int) -> None:
+    """From line 430 on the record begins at the limit, with what the integrator held there."""
+    limited = ga.PI(PI.kp, PI.ki, torque_limit=0.6)
+    rec = record(LAG, pi=limited)
+    whole = limited.torque_of(rec)
+    assert 0.05 < np.mean(np.abs(whole) >= 0.6) < 0.95
+    lag = lag_shown([rec[begin:]], limited)
+    assert lag is not None and abs(lag.time_constant - LAG) < 3.0 * lag.std < 0.4 * LAG
+    made = commanded(rec[begin:], limited).torque
+    assert np.abs(made).max() <= 0.6
+    assert np.std(made - whole[begin:]) < 0.01
+    assert lag_shown([record(0.0, pi=limited)[begin:]], limited) is None
 
 
 def test_a_lag_of_the_measured_current_is_not_said_to_be_other_gains() -> None:

@@ -87,6 +87,33 @@ def test_a_feedforward_that_was_not_given_is_found_beside_the_way_of_the_command
     assert any("interpolation" in note for note in idn.warnings)
 
 
+def test_a_number_is_estimated_on_the_given_way_unless_another_is_clearly_better() -> None:
+    skip_without_library()
+    rng = np.random.default_rng(4)
+    straight = rig(AXIS, profile(2.0, T)[::EVERY], {}, "none", 1, position_logged=True)
+    for rec, true in ((record({}), "smooth"), (straight, "straight")):
+        for noise in (0.0, 0.05):
+            noisy = rec.with_channels(torque=rec.torque + noise * np.std(rec.torque) * rng.standard_normal(len(rec)))
+            for given in ("smooth", "straight"):
+                pi = ga.PI(0.3, None)
+                one = ga.Cascade(pi, T, position=ga.P(30.0), velocity_feedforward=1.0, interpolation=given)
+                found = with_estimates([noisy], one)
+                assert isinstance(found.controller, ga.Cascade) and found.controller.interpolation == true
+                assert found.estimates["velocity.ki"].value == pytest.approx(15.0, rel=0.01)
+                said = [note for note in found.notes if f"(interpolation '{true}') (given: '{given}')" in note]
+                assert len(said) == (given != true), found.notes
+
+
+@pytest.mark.parametrize("given", ["straight", "smooth"])
+def test_where_no_way_is_clearly_better_the_given_one_stays(given: str) -> None:
+    skip_without_library()
+    still = rig(AXIS, profile(2.0, T, rise=20.0)[::EVERY], {}, "none", 1, position_logged=True)
+    torque = still.torque + 0.05 * np.std(still.torque) * np.random.default_rng(4).standard_normal(len(still))
+    one = ga.Cascade(ga.PI(0.3, None), T, position=ga.P(30.0), velocity_feedforward=1.0, interpolation=given)
+    found = with_estimates([still.with_channels(torque=torque)], one)
+    assert isinstance(found.controller, ga.Cascade) and found.controller.interpolation == given and len(found.notes) == 1
+
+
 def test_a_command_that_goes_straight_stays_straight() -> None:
     skip_without_library()
     rec = rig(AXIS, profile(2.0, T)[::EVERY], {}, "none", 1, position_logged=True)

@@ -67,6 +67,19 @@ def test_saved_files_meet_the_schema(saved: dict[str, Path], diagnosis: ga.Diagn
     assert ga.load(saved["record"]) == rec
 
 
+@pytest.mark.parametrize(
+    "controller",
+    [ga.PI(0.3, 15.0), ga.Cascade(ga.PI(0.3, 15.0), 1e-3, position=ga.P(30.0), interpolation="smooth"),
+     ga.Cascade(ga.PI(0.3, 15.0, torque_limit=1.0), torque_filters=ga.LowPass(time_constant=1e-3), delay=1e-4)],
+)  # fmt: skip
+def test_every_controller_meets_the_schema(controller: Any, diagnosis: ga.Diagnosis, validator: Any) -> None:
+    data = diagnosis.to_dict()
+    data |= {"controller": controller.to_dict(), "identification": data["identification"] | {"controller": controller.to_dict()}}
+    validator.validate(json.loads(json_text(data)))
+    data["controller"] |= {"interpolation": "cubic"}
+    assert not validator.is_valid(data)
+
+
 def test_the_schema_refuses_what_load_refuses(saved: dict[str, Path], validator: Any, tmp_path: Path) -> None:
     for name, path in saved.items():
         data = json.loads(path.read_text())

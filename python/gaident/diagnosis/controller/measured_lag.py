@@ -6,7 +6,10 @@ first order is, where a line of the log is taken before (d = 1) or after (d = 0)
     u_m(n) = a u_m(n-1) + (1 - a) u(n-d) + I0 + noise,   a = exp(-T/tau)
 
 tau is fitted, I0 is what the integrator held before the record. Held against this is the same torque without a lag, d samples
-late and with other gains, by the information criterion with the noise of each.
+late and with other gains, by the information criterion with the noise of each, on the same lines of the log: none at the torque
+limit, and of each record none of the first, which a log without a lag may lack.
+A torque that is only late has a = 0: a lag is found where a is beyond its deviations, as tau is above 0 whatever the log says,
+and where no whole number of lines by which the torque is late comes near in that criterion.
 Where the lag explains the log no worse, no gains are said to be other, and the torque that the controller makes drives the model:
 it has no noise, and the lag stands between it and the shaft, where the search finds it in the motion too.
 """
@@ -14,8 +17,7 @@ it has no noise, and the lag stands between it and the shaft, where the search f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +41,8 @@ Matrix = NDArray[np.float64]
 SAMPLES_LATE = (0, 1)  # no decision: the ways in which a log is written
 OLDER = (0, 1, 2)  # no decision: samples by which the log without a lag is late
 FASTEST, SLOWEST = 0.05, 50.0  # no decision: samples; a lag that is searched for
-STEP = 1e-4  # no decision: of a time constant, for a slope
+STEP = 1e-4  # no decision: of a lag's pole, for a slope
+NEAR = 1e-3  # no decision: of a range's end, within which a search stands at it
 
 
 @dataclass(frozen=True)
@@ -70,25 +73,74 @@ def lag_shown(records: Sequence[Record], controller: PI | None) -> Lag | None:
     if any(r.torque_is != MEASURED or r.command is None for r in logs) or all(replay(r, controller).follows for r in logs):
         return None
     dt = logs[0].dt
-    made = [pi_torque(_command(r), r.velocity, r.dt, controller) for r in logs]
-    logged = [_logged(r) for r in logs]
-    tau, left, late = min((_fitted(made, logged, dt, d) for d in SAMPLES_LATE), key=lambda found: _power(found[1]))
-    noise = [white_noise(off, u) for off, u in zip(left, logged, strict=True)]
-    n, power = sum(len(u) for u in logged), _power(left)
-    if not all(noise) or bic(power / n, n, 1) > _without(logs, controller) + POLICY.rival_margin:
+    parts = [part for rec in logs if np.sum((part := _part(rec, controller)).used) >= POLICY.least_samples]
+    if not parts:
         return None
-    slope = np.concatenate(_left(made, logged, dt, tau * (1.0 + STEP), late)) - np.concatenate(left)
-    std = float(np.sqrt(power / n / max(float(slope @ slope), 1e-300))) * STEP * tau
-    return Lag(tau, std, float(np.sqrt(power / n))) if tau > POLICY.check_deviations * std else None
+    a, left, late = min((_fitted(parts, d) for d in SAMPLES_LATE), key=lambda found: _power(found[1]))
+    noise = [white_noise(off, part.logged[part.used]) for off, part in zip(left, parts, strict=True)]
+    n, power = sum(map(len, left)), _power(left)
+    least, margin = bic(power / n, n, 1), POLICY.rival_margin
+    if not all(noise) or least > min(_late(parts) - margin, _without(parts, controller) + margin):
+        return None
+    tau = -dt / float(np.log(a))
+    if not FASTEST * (1.0 + NEAR) < tau / dt < SLOWEST * (1.0 - NEAR):
+        return None
+    step = STEP * (1.0 - a)
+    slope = (np.concatenate(_left(parts, a + step, late)) - np.concatenate(left)) / step
+    std = float(np.sqrt(power / n / max(float(slope @ slope), 1e-300)))
+    if not a > POLICY.check_deviations * std:
+        return None
+    return Lag(tau, std * tau**2 / (a * dt), float(np.sqrt(power / n)))
 
 
 def commanded(rec: Record, controller: PI) -> Record:
     """The record with the torque that the controller makes of command and velocity, from what it held before."""
-    made = pi_torque(_command(rec), rec.velocity, rec.dt, controller)
-    held = 0.0 if rec.torque is None else float(np.mean(rec.torque - made))
-    significant = rec.torque is not None and abs(held) > POLICY.above_noise * float(np.std(rec.torque - made))
-    changed: dict[str, Any] = {"torque": made + held if significant else made}
-    return rec.with_channels(torque_is=COMMANDED, **changed)
+    start = 0.0 if rec.torque is None else _held_before(rec, controller)
+    return rec.with_channels(torque_is=COMMANDED, torque=pi_torque(_command(rec), rec.velocity, rec.dt, controller, start))
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A record, what its controller makes of it and what is logged [N m], (n,) each; used: lines that are compared."""
+
+    record: Record
+    made: Vector
+    logged: Vector
+    used: NDArray[np.bool_]
+
+
+def _part(rec: Record, controller: PI) -> _Part:
+    made = pi_torque(_command(rec), rec.velocity, rec.dt, controller, _held_before(rec, controller))
+    used = _free(made, controller)
+    used[: max(OLDER)] = False
+    return _Part(rec, made, _logged(rec), used)
+
+
+def _free(made: Vector, controller: PI) -> NDArray[np.bool_]:
+    """Lines at which the made torque is not at the limit, nor was, as late as a log may be.
+
+    The logged torque is not asked: near the limit it would choose lines by their noise.
+    """
+    limit = POLICY.at_limit * controller.limits[0]
+    free = np.ones(len(made), bool)
+    for older in OLDER:
+        free[older:] &= np.abs(made[: len(made) - older]) < limit
+    return free
+
+
+def _held_before(rec: Record, controller: PI) -> float:
+    """What the integrator held before the record [N m], where it is beyond the noise; else 0."""
+    logged, command = _logged(rec), _command(rec)
+    off = logged - pi_torque(command, rec.velocity, rec.dt, replace(controller, torque_limit=None))
+    below = np.abs(logged) < POLICY.noisy_plateau * controller.limits[0]
+    if not np.any(below):
+        return 0.0
+    held = float(np.median(off[below]))
+    free = _free(pi_torque(command, rec.velocity, rec.dt, controller, held), controller)
+    if not np.any(free):
+        return 0.0
+    held = float(np.mean(off[free]))
+    return held if abs(held) > POLICY.above_noise * float(np.std(off[free])) else 0.0
 
 
 def _command(rec: Record) -> Vector:
@@ -105,45 +157,58 @@ def _power(parts: Sequence[Vector]) -> float:
     return float(sum(part @ part for part in parts))
 
 
-def _behind(torque: Vector, dt: float, tau: float, late: int) -> Vector:
-    """The torque behind the lag."""
-    a = float(np.exp(-dt / tau))
+def _behind(torque: Vector, a: float, late: int) -> Vector:
+    """The torque behind the lag with the pole a."""
     numerator = np.array([0.0, 1.0 - a] if late else [1.0 - a])
     return np.asarray(filtered(numerator, np.array([1.0, -a]), torque[None, :], [len(torque)])[0])
 
 
-def _left(made: Sequence[Vector], logged: Sequence[Vector], dt: float, tau: float, late: int) -> list[Vector]:
+def _left(parts: Sequence[_Part], a: float, late: int) -> list[Vector]:
     """Measured minus made torque behind the lag, each record without its mean: what the integrator held before it."""
-    off = [u - _behind(v, dt, tau, late) for u, v in zip(logged, made, strict=True)]
-    return [part - np.mean(part) for part in off]
+    off = [(part.logged - _behind(part.made, a, late))[part.used] for part in parts]
+    return [d - np.mean(d) for d in off]
 
 
-def _fitted(made: Sequence[Vector], logged: Sequence[Vector], dt: float, late: int) -> tuple[float, list[Vector], int]:
-    """(time constant that leaves least, what it leaves, late)."""
+def _fitted(parts: Sequence[_Part], late: int) -> tuple[float, list[Vector], int]:
+    """(pole that leaves least, what it leaves, late)."""
     from scipy.optimize import minimize_scalar
 
-    ends = np.log(FASTEST * dt), np.log(SLOWEST * dt)
-    found = minimize_scalar(
-        lambda z: _power(_left(made, logged, dt, float(np.exp(z)), late)), bounds=ends, method="bounded", options={"xatol": 1e-8}
-    )
-    tau = float(np.exp(found.x))
-    return tau, _left(made, logged, dt, tau, late), late
+    def pole(z: float) -> float:
+        return float(np.exp(-np.exp(-z)))
+
+    ends = np.log(FASTEST), np.log(SLOWEST)
+    found = minimize_scalar(lambda z: _power(_left(parts, pole(z), late)), bounds=ends, method="bounded", options={"xatol": 1e-8})
+    a = pole(float(found.x))
+    return a, _left(parts, a, late), late
 
 
-def _without(logs: Sequence[Record], controller: PI) -> float:
+def _late(parts: Sequence[_Part]) -> float:
+    """BIC of the torque that the controller makes, without a lag, by some samples late."""
+    best = np.inf
+    for older in OLDER:
+        off = [part.logged[lines] - part.made[lines - older] for part in parts for lines in [np.flatnonzero(part.used)]]
+        left = np.concatenate([d - np.mean(d) for d in off])
+        best = min(best, bic(float(np.mean(left**2)), len(left), 0))
+    return best
+
+
+def _without(parts: Sequence[_Part], controller: PI) -> float:
     """BIC of the best explanation without a lag: kp and ki free, command and velocity some samples older than the log's."""
     best = np.inf
     for older in OLDER:
-        parts = []
-        for rec in logs:
-            e = _command(rec) - rec.velocity
-            columns = [e, rec.dt * (np.cumsum(e) - 0.5 * e)] if controller.ki else [e]  # no decision: the trapezoidal rule
-            table = np.column_stack([*columns, np.ones(len(e))])
-            table, u = table[: len(e) - older], _logged(rec)[older:]
-            own = [x - np.mean(x) for x in (*table.T[:-1], u)]
-            parts.append(np.column_stack(own))
-        rows = np.concatenate(parts)
+        pieces = []
+        for part in parts:
+            rec = part.record
+            columns = [_command(rec) - rec.velocity]
+            if controller.ki:
+                integral = replace(controller, kp=0.0, torque_limit=None)
+                columns.append(pi_torque(_command(rec), rec.velocity, rec.dt, integral))
+            lines = np.flatnonzero(part.used)
+            own = [*(x[lines - older] for x in columns), part.logged[lines]]
+            pieces.append(np.column_stack([x - np.mean(x) for x in own]))
+        rows = np.concatenate(pieces)
         table, u = rows[:, :-1], rows[:, -1]
-        off = u - table @ np.linalg.lstsq(table, u, rcond=1e-12)[0]
+        sizes = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
+        off = u - (table / sizes) @ np.linalg.lstsq(table / sizes, u, rcond=1e-12)[0]
         best = min(best, bic(float(np.mean(off**2)), len(u), table.shape[1]))
     return best
