@@ -189,9 +189,9 @@ class DataSet:
     def closable(self) -> bool:
         """Whether command and controller can drive a model from standstill, with what the integrator held.
 
-        Never where they do not make the logged torque.
+        Never where they do not make the logged torque; a measured one, which has noise and an error of its own, shows that less.
         """
-        if self.loop is None or any(self.moving) or not self.loop_follows:
+        if self.loop is None or any(self.moving) or not (self.loop_follows or (self.torque_measured and not self.slower)):
             return False
         loop = self.loop
         return all(loop.command_of(r) is not None for r in self.records)
