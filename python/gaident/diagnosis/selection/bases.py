@@ -133,7 +133,7 @@ def output_error_bases(task: Task, bases: Sequence[Fit]) -> list[Fit]:
     In closed loop where the log shows that the simulated loop is the drive's.
     A replayed torque that ignores a limit of the controller biases these fits, and the model was identified in closed loop.
     """
-    closed = task.data.loopable
+    closed = task.data.loopable and task.data.loop_follows
     predictor: Predictor = ClosedLoop(task.data) if closed else OpenLoop(task.data)
     starts = [(f.parameters, f.x) for f in bases]
     for model in rigid(task.model) + reduced(task.model):

@@ -204,7 +204,7 @@ class ModelSpace:
 
     def free_predictor(self, fit: Fit) -> Predictor:
         """What leaves a model to itself: the loop where it is the drive's, else the torque that drives the model."""
-        return self.closed(fit.predictor) if self.data.loopable else fit.predictor
+        return self.closed(fit.predictor) if self.data.loopable and self.data.loop_follows else fit.predictor
 
     def in_both_loops(self, simpler: Fit, fuller: Fit) -> bool:
         """Whether a generalisation is worth its cost in closed loop too, and not only because it is simulated with more substeps.
