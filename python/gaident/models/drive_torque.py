@@ -22,6 +22,7 @@ from gaident.models.starts import constant_beside, starts_moving
 from gaident.policy.table import POLICY
 
 __all__ = [
+    "HALF",
     "Driven",
     "as_old_as_its_velocity",
     "driven_by",

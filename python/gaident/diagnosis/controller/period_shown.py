@@ -11,8 +11,9 @@ A velocity is not old, or T/2 old where it is the difference of an encoder's ang
     lag = 0,   or, on the lattice of an encoder,   lag = -1/(2 r) lines
 
 with the lag of the inverse-dynamics regression (`estimation/regression/torque_lag.py`) under the torque that each controller
-makes between the lines. The nearest r is taken where it is near. Where the torque shows one alone, either lag confirms it, or
-that the torque follows from it.
+makes between the lines. The nearest r is taken where it is near; where the torque shows one alone, either lag will do, or that
+the torque follows from it. With r = 2 the second lag is also that of a torque held over each line: it shows nothing, and the
+torque has to follow, or to leave no more than `replay_noise` of what one at the log's rate leaves.
 """
 
 from __future__ import annotations
@@ -31,14 +32,13 @@ from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.controller.slow_forms import limited, run_error
 from gaident.estimation.regression.torque_lag import torque_lag
 from gaident.identification.logged_torque import comparable, not_followed
-from gaident.models.drive_torque import driven_by
+from gaident.models.drive_torque import HALF, driven_by
 from gaident.policy.table import POLICY
 
 __all__ = ["FASTER", "Period", "period_shown"]
 
 FASTER = (2, 4, 8, 16)  # no decision: work; samples of a controller to a line of the log, as drives have them
 UNLIKE = ("", "torque_limit", "anti_windup")  # what a replay at the log's rate may say: any other reason explains the torque
-HALF = 0.5  # no decision: of a sample, the age of a mean over it
 
 
 @dataclass(frozen=True)

@@ -42,13 +42,13 @@ from gaident.estimation.objective import Fit, Innovations, Objective
 from gaident.estimation.regression.force_error import band_of
 from gaident.estimation.regression.torque_lag import TorqueLag, torque_lag
 from gaident.estimation.term import Scales, Term
+from gaident.models.drive_torque import HALF
 from gaident.models.held_torque import sampled_between
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
 __all__ = ["searched"]
 
-HALF = 0.5  # no decision: of a sample, the age of a mean over it
 EXACT = 1e-3  # no decision: lines, what the parabola of a lag is exact to
 SURE = 0.02  # no decision: lines, to which a search finds by how much the torque is ahead
 
@@ -70,7 +70,7 @@ def searched(
         text = (
             "The motion comes {:.2g} ms before a {torque} that is held over each line of the log, which no axis does: between "
             "the lines the {torque} goes on, as that of a controller does that is faster than the log{}. The simulation has it; "
-            "what is late by less than half a line ({:.2g} ms) is not seen in this log. {}og every sample."
+            "what is late by less than half a line ({:.2g} ms) is not seen in this log. {}"
         )
 
         def under(lines: float) -> Selection:
@@ -81,7 +81,7 @@ def searched(
         found = found if closer is None else under(closer)
         used = ahead.lag if closer is None else closer
         late = ", or it was filtered or written late on its way into the log" if data.torque_measured else ""
-        asked = "L" if controller is None else "Give the controller's period, or l"
+        asked = "Log every sample." if controller is None else "Give the controller's period, or log every sample."
         return found, [say(text, 1e3 * used * data.dt, late, 1e3 * HALF * data.dt, asked)]
     if every == 1 and all(is_backward_difference(r.velocity, r.position, data.dt) for r in data.records):
         text = (
