@@ -93,7 +93,7 @@ class Work:
         data = data.with_its_period()
         self.notes += period_seen(data)
         self.scales = scales_of(data)
-        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.driving.logged.replays)
+        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales)
         self.notes += notes
         self.controller_steps += (*self.driving.logged.findings, *self.driving.findings)
         # Limits that the log shows act in every loop that is closed for a fit.
