@@ -198,7 +198,7 @@ class Work:
             self.notes += basis_of(self.found)
             gains = self._accepted_gains()
             driver = self.left.driver if self.adequate else self.left.strongest
-            adds_up = self.data.slower and not self.data.loopable  # what the torque lacks between the lines of the log
+            adds_up = self.data.slower and not self.data.fits_in_loop  # what the torque lacks between the lines of the log
             beyond = gains.after.rmse / floor if (floor := gains.floor) > 0.0 else 0.0
             if driver is None and not adds_up and beyond > POLICY.free_run_ratio:
                 # A noise filter removes a slow misfit completely; the free run shows it.
