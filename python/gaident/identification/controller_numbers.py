@@ -32,7 +32,7 @@ from gaident.errors import ControllerError, RecordError
 from gaident.estimation.criterion import effective_samples, gained
 from gaident.identification import number_words
 from gaident.identification.logged_stretches import centred, correlation, log_of, numbered, unlimited, whitened
-from gaident.identification.number_ranges import grid_of, inverse, off_bound, range_of
+from gaident.identification.number_ranges import SMALLEST, grid_of, inverse, off_bound, range_of
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
@@ -52,7 +52,6 @@ LOGARITHMIC = ("gain", "time_constant", "frequency", "denominator_damping")
 FIRST, WHOLE = 12, 60  # no decision: effort; evaluations of a search from the grid, and of the best of them
 STEP = 1e-5  # no decision: of a number, for a slope
 ROUNDING = 1e-12  # no decision: of the torque's deviation, what a sum is exact to
-SMALLEST = 1e-300  # no decision: no division by 0
 
 
 @dataclass(frozen=True)

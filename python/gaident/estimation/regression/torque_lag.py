@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gaident.data.record import Record
 from gaident.data.signals.decimation import low_passed
 from gaident.estimation.criterion import effective_samples
-from gaident.estimation.regression.motion import cutoff_of, motion_of
+from gaident.estimation.regression.motion import ORDER, cutoff_of, motion_of
 from gaident.estimation.regression.regression import solve
 from gaident.estimation.regression.rows import decimation_of
 from gaident.estimation.regression.torque_terms import columns_of
@@ -31,7 +31,6 @@ __all__ = ["TorqueLag", "torque_lag"]
 
 Vector = NDArray[np.float64]
 
-ORDER = 4  # no decision: of the low-pass
 LONGEST = 1 << 17  # no decision: work
 """Samples that are looked at."""
 
