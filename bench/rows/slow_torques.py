@@ -13,7 +13,7 @@ from drive_rig import Noise, Plant, rig, run_drive
 
 __all__ = ["ahead", "measured_torques", "named_ahead", "named_sampled"]
 
-FINE = 0.25e-3  # s
+FINE = 62.5e-6  # s, of a current controller: its torque is held so long
 SAMPLED = (1e-3, 2e-3, 3e-3, 5e-3, 10e-3)  # s, lines of a log of a faster torque
 HELD = (1e-3, 2e-3, 3e-3, 4e-3)  # s, of a torque that is held over each line: controllers as slow as there are
 LINES = 2500
@@ -56,12 +56,13 @@ def named_sampled(case: Case) -> Result:
     inertia = float(10.0 ** rng.uniform(-1.0, 1.0))
     waves = zip(rng.uniform(0.3, 1.0, 3), rng.uniform(0.5, 6.0, 3), rng.uniform(0.0, 6.0, 3), strict=True)
     u = 5.0 * inertia * np.sum([a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in waves], axis=0)
-    steps = np.repeat(rng.uniform(-5.0, 5.0, len(t) // 800 + 1), 800)[: len(t)] * inertia
-    u += np.convolve(steps, np.full(40, 1.0 / 40.0), "same")
+    lasts, rise = round(0.2 / FINE), round(0.01 / FINE)
+    steps = np.repeat(rng.uniform(-5.0, 5.0, len(t) // lasts + 1), lasts)[: len(t)] * inertia
+    u += np.convolve(steps, np.full(rise, 1.0 / rise), "same")
     u = np.repeat(u[::every], every) if kind == "held" else u
     plant = Plant(J=inertia, D=inertia, kp=0.0, ki=0.0, dt=FINE)
     friction = {"coulomb_friction": {"torque": 1.5 * inertia}}
-    log = run_drive(plant, None, friction, torque=np.ascontiguousarray(u), substeps=8)
+    log = run_drive(plant, None, friction, torque=np.ascontiguousarray(u), substeps=2)
     velocity = log.truth[::every] + 2e-3 * float(np.std(log.truth)) * rng.standard_normal(LINES)
     torque = u[::every] + 1e-3 * float(np.std(u)) * rng.standard_normal(LINES)
     return judged(ga.diagnose(ga.Record(dt, velocity=velocity, torque=torque, torque_is="measured")), inertia)

@@ -87,13 +87,13 @@ def with_estimates(records: Sequence[Record], controller: Controller | None) -> 
         return Numbers(controller, {})
     for rec in records:
         _check(rec, controller, controller.unknown[0])
-    given, *others = [_estimated(records, one) for one in controller.courses(records[0].dt)]
+    given, *others = [_estimated(records, one) for one in controller.interpolations(records[0].dt)]
     best = min((n for n in others if not n.doubt), key=lambda n: n.rms, default=given)
     gain = gained(given.rms**2, best.rms**2, min(given.samples, best.samples))
     as_good = given.rms <= POLICY.negligible * given.size or gain <= POLICY.rival_margin
     if best is given or best.controller is None or (not given.doubt and as_good):
         return given
-    return replace(best, notes=(*best.notes, number_words.other_course(best.controller, controller)))
+    return replace(best, notes=(*best.notes, number_words.other_interpolation(best.controller, controller)))
 
 
 def _estimated(records: Sequence[Record], controller: Controller) -> Numbers:
@@ -371,10 +371,10 @@ class _Fit:
         size = float(np.std(self.logged[self.used]))
         sigma = max(float(np.sqrt(np.sum(at**2) / max(count, 1))), ROUNDING * size)
         spread, back = inverse(J)
-        # Where another course between the lines, or another correlation, would have put the numbers.
-        course = back @ (self.free(rho, straight=True)(x) - at)
+        # Where linear interpolation of the velocity, or another correlation, would have put the numbers.
+        linear = back @ (self.free(rho, straight=True)(x) - at)
         uncorrelated = inverse(self.slopes(self.free(0.0), x, low))[1] @ free_left
-        stds = np.sqrt(sigma**2 * np.diag(spread) + course**2 + uncorrelated**2)
+        stds = np.sqrt(sigma**2 * np.diag(spread) + linear**2 + uncorrelated**2)
         values = self.values(x)
         natural = [
             float(std * v) if f in LOGARITHMIC else float(std) for std, v, f in zip(stds, values, self.fields, strict=True)

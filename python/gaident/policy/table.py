@@ -123,9 +123,8 @@ class Policy:
         0.9,
         "1",
         "least part that a cause explains of what a free function does; drag by friction 0.87, a joint's friction 0.946",
-        DRIVES,
+        SHORT_MOVES,
     )
-    class_stands: float = cause(0.5, "1", "the same for effects that no record tells apart: they are no single name", SHORT_MOVES)
     jump_deviations: float = cause(
         4.0,
         "1",
@@ -210,8 +209,11 @@ class Policy:
         PROFILES,
     )
     corner_seen: float = loop(20.0, "1", "times the other third differences of it: less is no corner of its slope", PROFILES)
-    course: float = loop(
-        4.0, "1", "times what the path of the velocity between a slow log's lines changes in the torque: less is not seen", SLOWER
+    interpolation: float = loop(
+        4.0,
+        "1",
+        "times what another interpolation of the velocity changes in the torque of a slow log: less is not seen",
+        SLOWER,
     )
     each_number: float = loop(
         0.8,
