@@ -22,11 +22,12 @@ from gaident.control.filtering import zero_phase
 from gaident.data.record import Record
 from gaident.models.starts import noise_std
 
-__all__ = ["BAND", "Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "torque_noise"]
+__all__ = ["BAND", "ORDER", "Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "torque_noise"]
 
 Vector = NDArray[np.float64]
 Spectrum = tuple[Vector, Vector, float]  # frequencies [Hz], power density, level of the noise
 
+ORDER = 4  # no decision: of the Butterworth filter of all regressions
 NOISE_SHARE = 1e-3  # no decision: how exact an inertia is
 """Most of the acceleration's power that may be noise: so much is the inertia too small by it."""
 
