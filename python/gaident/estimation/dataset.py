@@ -20,13 +20,14 @@ from gaident.axis import TURN, period_of
 from gaident.control.controller import Controller, Limiting
 from gaident.control.differencing import differencing
 from gaident.control.filtering import rate_limited
+from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.period import period_of_place
 from gaident.estimation.term import Term
-from gaident.models.drive_torque import late, torque_of
+from gaident.models.drive_torque import driven_by, late, torque_of
 from gaident.models.simulate_many import LoadedRecord
 from gaident.models.starts import noise_std, starts_moving
 from gaident.models.stored_torque import stored_torque
@@ -54,6 +55,8 @@ class DataSet:
     one that the records show.
     age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample of the
     controller old. What drives a model is late by as much, and in the loop that is simulated it is that difference.
+    other_ages: those that it may have as well; a model that does not exclude them is less certain by what they change.
+    found: numbers of the controller that the records show; what they may be off by is part of every deviation.
     """
 
     records: tuple[Record, ...]
@@ -73,6 +76,8 @@ class DataSet:
     period: float | None = TURN
     period_seen: bool = False
     age: float = 0.0
+    other_ages: tuple[float, ...] = ()
+    found: FoundNumbers | None = None
 
     @classmethod
     def of(
@@ -99,16 +104,32 @@ class DataSet:
         """The same records, whose torque is not logged, under another controller."""
         pi = bare_pi(controller)
         driven = tuple(_driven(r, controller.torque_of(r) if pi is None else torque_of(r, pi)) for r in self.records)
-        return replace(self, controller=controller, driven=driven, free=_freed(self.records, driven))
+        return replace(self, controller=controller, driven=driven, free=_freed(self.records, driven), found=None)
+
+    def moved(self, by: Vector) -> DataSet | None:
+        """The same with the found numbers of the controller moved; None where it refuses them."""
+        assert self.found is not None and self.controller is not None
+        found = self.found.moved(by)
+        here, there = self.found.controller, found.controller
+        if here is None or there is None:
+            return None
+        pairs = [(_made(r, here), _made(r, there)) for r in self.read or self.records]
+        driven = tuple(r.with_channels(torque=torque_in(r) + v - u) for r, (u, v) in zip(self.driven, pairs, strict=True))
+        limited = there.with_limits(*self.controller.limits)
+        return replace(self, controller=limited, driven=driven, free=_freed(self.records, driven), found=found)
+
+    def joined(self) -> DataSet:
+        """The same, the found numbers of the controller from now on moved by what the errors of a model show, too."""
+        return self if self.found is None else replace(self, found=self.found.joined())
 
     def with_its_period(self) -> DataSet:
         """The same with the period that the records show, where none is known."""
         shown = period_of_place(self.driven) if self.period is None else None
         return self if shown is None else replace(self, period=shown, period_seen=True)
 
-    def aged(self, lines: float) -> DataSet:
-        """The same with a measured velocity that is so many lines of the log old."""
-        return replace(self, age=lines)
+    def aged(self, lines: float, others: Sequence[float] = ()) -> DataSet:
+        """The same with a measured velocity that is so many lines of the log old; others: which it may be as well."""
+        return replace(self, age=lines, other_ages=tuple(others))
 
     def older(self, loop: Controller | None) -> Controller | None:
         """A loop in which the velocity has its age: it is the difference of the angle over a sample of the controller."""
@@ -341,6 +362,12 @@ def _followed(rec: Record, slope: float) -> Record:
     if rec.command is None or not np.isfinite(slope):
         return rec
     return rec.with_channels(command=rate_limited(rec.command, slope, rec.dt, 0.0))
+
+
+def _made(rec: Record, controller: Controller) -> Vector:
+    """The torque over each line [N m], as this controller makes it where the record has none, or fewer lines than it samples."""
+    pi = bare_pi(controller)
+    return torque_of(rec, pi) if pi is not None else torque_in(driven_by(rec, controller))
 
 
 def with_angle(rec: Record, angle: Vector | None) -> Record:

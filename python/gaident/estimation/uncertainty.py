@@ -18,9 +18,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.estimation.criterion import effective_samples
+from gaident.estimation.found_numbers import of_controller, variance_of
 from gaident.estimation.least_squares import fit as fitted
-from gaident.estimation.objective import Fit, Innovations, Objective
+from gaident.estimation.objective import Fit, Objective
 from gaident.models.effects import row_of
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
@@ -39,6 +39,10 @@ def covariance_of(objective: Objective, fit: Fit) -> Matrix:
 
 
 def _covariance(objective: Objective, fit: Fit) -> Matrix:
+    return _of_the_errors(objective, fit) + of_controller(objective, fit)
+
+
+def _of_the_errors(objective: Objective, fit: Fit) -> Matrix:
     cov = _at_one_point(objective, fit)
     if not any(t.multimodal and t.in_coupling for t in fit.parameters.terms):
         return cov
@@ -70,10 +74,7 @@ def _at_one_point(objective: Objective, fit: Fit) -> Matrix:
         cov[i, i] = np.inf
     if seen:
         rows = J[seen] / sizes[seen][:, None]
-        dof = max(objective.count - len(moved), 1.0)
-        # Output errors of colour say less than their number: s^2 grows by samples over independent samples.
-        repeats = 1.0 if isinstance(objective.family, Innovations) else objective.count / effective_samples(v)
-        small = repeats * float(v @ v) / dof * np.linalg.pinv(rows @ rows.T, rcond=1e-12, hermitian=True)
+        small = variance_of(objective, fit, v) * np.linalg.pinv(rows @ rows.T, rcond=1e-12, hermitian=True)
         cov[np.ix_(seen, seen)] = small / np.outer(sizes[seen], sizes[seen])
     return cov
 

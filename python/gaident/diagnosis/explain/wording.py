@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from gaident.axis import Text, called, joined, say
+from gaident.control.found import FoundNumbers
 from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
@@ -15,6 +18,7 @@ from gaident.results.estimate import Estimate
 
 __all__ = [
     "basis_of",
+    "closer_numbers",
     "closest",
     "drives_itself",
     "evidence_of",
@@ -147,3 +151,11 @@ def or_other_form(words: Text) -> Text:
         "does."
     )
     return say(text, words)
+
+
+def closer_numbers(torque: FoundNumbers, model: FoundNumbers) -> Text:
+    """What is said where the model of the axis moved the numbers of the controller that its torque had shown."""
+    text = "The model of the axis shows the controller's numbers closer than the {torque} alone: they were moved{}."
+    off = float(np.abs(model.deviations_off).max(initial=0.0))
+    by = say(" by up to {:.1f} of the deviations with which that shows them", off) if torque.covariance is not None else ""
+    return say(text, by)
