@@ -60,18 +60,6 @@ def of_controller(objective: Objective, fit: Fit) -> Matrix:
         furthest = max(others, key=lambda move: float(np.sum((move @ J) ** 2)))
         part += np.outer(furthest, furthest)
     return part
-    E, beside = np.zeros((0, len(v))), 0.0
-    if fit.predictor.data.found is not None:
-        E = _changes(objective, fit, v)
-        S = _answers(J[seen], E)
-        part[np.ix_(seen, seen)] = S @ _spread(objective, fit, v, J, E) @ S.T
-        beside = 0.0 if _found(fit).covariance is None else variance_of(objective, fit, v)
-    joint = E if fit.predictor.data.found is not None and _found(fit).joint else E[:0]
-    ages = [_of_age(objective, fit, v, age, np.vstack([J[seen], joint]), len(joint), beside) for age in _ages(fit)]
-    if moved := [a for a in ages if a is not None]:
-        answer = max(moved, key=lambda a: float(np.sum((a[: len(seen)] @ J[seen]) ** 2)))[: len(seen)]
-        part[np.ix_(seen, seen)] += np.outer(answer, answer)
-    return part
 
 
 def covariance_of_numbers(objective: Objective, fit: Fit) -> Matrix:
