@@ -25,7 +25,7 @@ from gaident.models.effects import row_of
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["covariance_of", "estimates_of"]
+__all__ = ["controller_part", "covariance_of", "estimates_of"]
 
 BLOCKS = 8  # no decision: of a jackknife, how finely a deviation is known
 
@@ -38,8 +38,13 @@ def covariance_of(objective: Objective, fit: Fit) -> Matrix:
     return objective.once(("covariance", fit.key), lambda: _covariance(objective, fit))
 
 
+def controller_part(objective: Objective, fit: Fit) -> Matrix:
+    """The part of the covariance that the numbers of the controller bring in. Worked out once for a fit."""
+    return objective.once(("controller part", fit.key), lambda: of_controller(objective, fit))
+
+
 def _covariance(objective: Objective, fit: Fit) -> Matrix:
-    return _of_the_errors(objective, fit) + of_controller(objective, fit)
+    return _of_the_errors(objective, fit) + controller_part(objective, fit)
 
 
 def _of_the_errors(objective: Objective, fit: Fit) -> Matrix:
@@ -81,7 +86,7 @@ def _at_one_point(objective: Objective, fit: Fit) -> Matrix:
 
 def estimates_of(objective: Objective, fit: Fit) -> dict[str, dict[str, Estimate]]:
     """Effect -> parameter -> Estimate."""
-    cov = covariance_of(objective, fit)
+    cov, by_controller = covariance_of(objective, fit), controller_part(objective, fit)
     limits = fit.parameters.limits()
     result: dict[str, dict[str, Estimate]] = {}
     for term in fit.parameters.terms:
@@ -94,7 +99,7 @@ def estimates_of(objective: Objective, fit: Fit) -> dict[str, dict[str, Estimate
         moved = term.natural(z + np.diag(h))
         slopes = (moved - values) / h[:, None]
         finite = np.where(np.isfinite(part), part, 0.0)
-        variances = np.einsum("ij,ik,kj->j", slopes, finite, slopes)
+        variances, parts = (np.einsum("ij,ik,kj->j", slopes, C, slopes) for C in (finite, by_controller[slot, slot]))
         lost = np.any((np.abs(slopes) > 0.0) & ~np.isfinite(np.diag(part))[:, None], axis=0)
         span = np.maximum(limits[1, slot] - limits[0, slot], 1e-300)
         near = (z <= limits[0, slot] + 1e-6 * span) | (z >= limits[1, slot] - 1e-6 * span)  # no decision: rounding at a bound
@@ -105,5 +110,6 @@ def estimates_of(objective: Objective, fit: Fit) -> dict[str, dict[str, Estimate
             std = float("inf") if lost[i] else float(np.sqrt(max(variances[i], 0.0)))
             value = float(values[i])
             known = std < abs(value) if value != 0.0 else np.isfinite(std)
-            result[effect][name] = Estimate(value, std, unit, bool(bound[i]), bool(known))
+            part_of_it = float(np.sqrt(max(parts[i], 0.0)))
+            result[effect][name] = Estimate(value, std, unit, bool(bound[i]), bool(known), part_of_it)
     return result

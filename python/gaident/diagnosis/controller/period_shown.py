@@ -103,8 +103,9 @@ def _step_error(records: Sequence[Record], controller: Cascade) -> float:
     changes = []
     for rec in records:
         log = log_of(rec, len(rec), controller, True)
-        free = np.abs(log.torque) < POLICY.at_limit * controller.velocity.limits[0]
-        changes.append(np.diff(log.torque - log.made(controller))[free[1:] & free[:-1]])
+        made = log.made(controller)
+        free = np.maximum(np.abs(log.torque), np.abs(made)) < POLICY.at_limit * controller.velocity.limits[0]
+        changes.append(np.diff(log.torque - made)[free[1:] & free[:-1]])
     return float(np.sqrt(np.mean(np.concatenate(changes) ** 2)))
 
 
