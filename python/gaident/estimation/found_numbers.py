@@ -148,11 +148,15 @@ def _answers(J: Matrix, E: Matrix) -> Matrix:
 
 
 def _of_age(objective: Objective, fit: Fit, age: float) -> Fit | None:
-    """The model with another age of the velocity; None where that leaves clearly more."""
+    """The model with another age of the velocity; None where that leaves clearly more.
+
+    Where the torque does not follow from the controller, what drives the model between the lines is not known, and a model that
+    leaves less may only make up for it: there no age is excluded.
+    """
     data = fit.predictor.data.aged(age)
     other = _under(objective, data, fit) if data.found is None or not data.found.joint else refined(objective, fit, data)
     more = gained(other.cost, fit.cost, objective.information)
-    return None if more > POLICY.rival_margin else other
+    return None if data.loop_follows and more > POLICY.rival_margin else other
 
 
 def _moved(objective: Objective, fit: Fit, v: Vector, by: Vector) -> Vector:
