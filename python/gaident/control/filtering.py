@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gaident import _core
 
-__all__ = ["clamped_sum", "filtered", "filtered_powers", "rate_limited", "recursion"]
+__all__ = ["clamped_sum", "filtered", "filtered_powers", "rate_limited", "recursion", "zero_phase"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -32,6 +32,24 @@ def filtered_powers(b: Matrix, a: Matrix, row: Vector, weight: Vector, lengths: 
     Raises ValueError where the sizes do not fit, and for more than 17 numbers.
     """
     return _core.filtered_powers(b, a, row, weight, lengths)
+
+
+def zero_phase(sections: Matrix, rows: Matrix, extension: int) -> Matrix:
+    """Rows behind a low-pass, forward and backward: no phase, and the square of its gain.
+
+    sections: (k, 6), b and a of second order, with a gain of 1 at rest; rows: (n, samples), continued by their point reflections
+    at both ends for `extension` samples, fewer than they have. As `scipy.signal.sosfiltfilt`, but all rows side by side: a fit
+    asks for it at every step. The filter begins and ends at rest at the first and the last value, which pass it unchanged.
+    """
+    before, after = rows[:, extension:0:-1], rows[:, -2 : -extension - 2 : -1]
+    x = np.hstack([2.0 * rows[:, :1] - before, rows, 2.0 * rows[:, -1:] - after])
+    for _ in ("forward", "backward"):
+        rest = x[:, :1].copy()
+        x = x - rest
+        for section in sections:
+            x = filtered(section[:3], section[3:], x, [x.shape[1]])
+        x = (x + rest)[:, ::-1]
+    return x[:, extension : extension + rows.shape[1]]
 
 
 def recursion(A: Complex, drive: ArrayLike, start: ArrayLike | None = None, newest: bool = False) -> Complex:

@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -209,7 +210,7 @@ class Record:
         """Duration n*dt [s]: each sample stands for one sample time, `between(0, duration)` is the whole record."""
         return len(self) * self.dt
 
-    @property
+    @cached_property
     def digest(self) -> str:
         """SHA-256 of the data, hexadecimal: of the sample time, the channels, and "measured" for such a torque.
 
@@ -360,10 +361,9 @@ class Record:
         missing = [key for key in ("dt", "name", *CHANNELS[:4]) if key not in data]
         if missing:
             raise RecordError(f"the saved record lacks {', '.join(missing)}; save it again")
-        channels = {key: data.get(key) for key in CHANNELS}
         # Early files hold neither of these, nor a position command.
         kind, notes = data.get("torque_is", COMMANDED), data.get("notes", ())
-        return cls(data["dt"], name=data["name"], torque_is=kind, notes=notes, **channels)
+        return cls(data["dt"], name=data["name"], torque_is=kind, notes=notes, **{key: data.get(key) for key in CHANNELS})
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the record as JSON, all digits, for `gaident.load`; the file appears whole or not at all."""

@@ -133,8 +133,10 @@ def _forces(
     second = None
     if found is not None:
         try:
-            part = [r[:first] for r, first in scored] if any(firsts) else list(records)
-            fitted = inverse_dynamics(part, terms=found.terms, cutoff_hz=found.cutoff_hz, axis=found.axis)
+            fitted = found
+            if any(firsts):  # not of what is held out
+                part = [r[:first] for r, first in scored]
+                fitted = inverse_dynamics(part, terms=found.terms, cutoff_hz=found.cutoff_hz, axis=found.axis)
             second = of(fitted)
         except GaidentError:
             second = None

@@ -97,7 +97,7 @@ class Work:
         data = data.with_its_period()
         self.notes += period_seen(data)
         self.scales = scales_of(data)
-        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales, self.driving.logged.replays)
+        self.controller_steps, self.at_controller, notes = controller_findings(data, self.scales)
         self.notes += notes
         self.controller_steps += (*self.driving.logged.findings, *self.driving.findings)
         # Limits that the log shows act in every loop that is closed for a fit.
@@ -219,7 +219,7 @@ class Work:
             self.notes += basis_of(self.found)
             gains = self._accepted_gains()
             driver = self.left.driver if self.adequate else self.left.strongest
-            adds_up = self.data.slower and not self.data.loopable  # what the torque lacks between the lines of the log
+            adds_up = self.data.slower and not self.data.fits_in_loop  # what the torque lacks between the lines of the log
             beyond = gains.after.rmse / floor if (floor := gains.floor) > 0.0 else 0.0
             if driver is None and not adds_up and beyond > POLICY.free_run_ratio:
                 # A noise filter removes a slow misfit completely; the free run shows it.

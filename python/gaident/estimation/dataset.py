@@ -196,18 +196,26 @@ class DataSet:
         did between the lines.
         """
         lost = self.slower or (self.spoiled and not self.torque_logged)
-        return lost and self.loopable
+        return lost and self.fits_in_loop
 
     @cached_property
-    def loopable(self) -> bool:
+    def fits_in_loop(self) -> bool:
         """Whether command and controller drive a model in fits too, from standstill.
 
         Under a bare PI at the log's rate only where its integrator was empty before the records: the logged torque serves there.
         """
-        return self.closable and not (self.pi is not None and any(self.stored))
+        return self.simulates_loop and not (self.pi is not None and any(self.stored))
+
+    @property
+    def left_in_loop(self) -> bool:
+        """Whether the loop is the drive's, so that it drives a model that is left to itself.
+
+        A loop that fits are made in for a measured torque's sake need not be.
+        """
+        return self.fits_in_loop and self.loop_follows
 
     @cached_property
-    def closable(self) -> bool:
+    def simulates_loop(self) -> bool:
         """Whether command and controller can drive a model from standstill, with what the integrator held.
 
         Never where they do not make the logged torque; a measured one, which has noise and an error of its own, shows that less.
@@ -236,7 +244,7 @@ class DataSet:
     @property
     def open_runs(self) -> bool:
         """Whether the torque drives a free run, for lack of a loop that can be simulated."""
-        return self.pi is None and not self.loopable
+        return self.pi is None and not self.fits_in_loop
 
     @property
     def slower(self) -> bool:

@@ -29,6 +29,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.filtering import zero_phase
+
 __all__ = ["Prefilter"]
 
 Vector = NDArray[np.float64]
@@ -62,10 +64,8 @@ class Prefilter:
         return np.asarray((np.gradient(smooth, self.dt, axis=1) + self.corner * smooth) / self._gain)
 
     def _smooth(self, E: Matrix) -> Matrix:
-        from scipy.signal import sosfiltfilt
-
         padding = int(2.0 / (self.cutoff * self.dt))  # samples, two periods of the cutoff
-        return np.asarray(sosfiltfilt(self._sections, E, axis=1, padlen=min(padding, E.shape[1] - 1)))
+        return zero_phase(self._sections, E, min(padding, E.shape[1] - 1))
 
     @cached_property
     def _sections(self) -> Any:

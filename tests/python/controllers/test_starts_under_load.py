@@ -77,7 +77,7 @@ def test_the_simulated_loop_begins_as_the_drive_did(loop: str) -> None:
     rec, cascade = case(loop, 4)
     driven = torque_driven([rec], cascade).records
     data = DataSet.of(driven, cascade)
-    assert data.loopable and data.stored[0] == pytest.approx(LOAD, rel=0.03)
+    assert data.fits_in_loop and data.stored[0] == pytest.approx(LOAD, rel=0.03)
     model = ga.OneMass(J=1e-3, D=0.01).model().with_effect("load_torque", torque=LOAD)
     state = np.append(np.zeros(model.linear.order), data.stored[0])
     off = ga.simulate(model, rec, cascade, state) - rec.velocity
@@ -108,8 +108,8 @@ def test_under_a_bare_pi_the_loop_says_whether_a_model_with_the_load_leaves_litt
     rec = ga.Record(1e-3, command=levels, velocity=done.velocity + noise, torque=disturbed)
     data = DataSet.of([rec], pi)
     assert data.stored[0] == pytest.approx(LOAD, rel=0.1)
-    assert data.closable and not data.loopable
-    assert not DataSet.of([rec.with_channels(command=None)], pi).closable
+    assert data.simulates_loop and not data.fits_in_loop
+    assert not DataSet.of([rec.with_channels(command=None)], pi).simulates_loop
     load = LIBRARY["load_torque"]
     task = Task(Objective(data, np.ones(len(rec))), scales_of(data), drive, (load,), lambda message: None)
     space, without = task.space(), task.one_mass()

@@ -6,10 +6,10 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 import gaident as ga
-from gaident.control.filtering import clamped_sum, filtered, filtered_powers, recursion
+from gaident.control.filtering import clamped_sum, filtered, filtered_powers, recursion, zero_phase
 from gaident.errors import ModelError
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.least_squares import damped_steps
@@ -156,3 +156,13 @@ def test_a_damped_step_that_has_no_solution_is_none() -> None:
     steps = damped_steps(np.ones((2, 2)), np.array([1.0, 2.0]), np.array([[0.0, 0.0], [1.0, 1.0]]))
     np.testing.assert_array_equal(steps[0], 0.0)
     np.testing.assert_allclose((np.ones((2, 2)) + np.eye(2)) @ steps[1], [1.0, 2.0])
+
+
+@pytest.mark.parametrize(("order", "cutoff"), [(1, 0.3), (4, 0.01), (4, 0.2), (10, 0.05)])
+@pytest.mark.parametrize("extension", [0, 1, 60, 299])
+def test_a_zero_phase_filter_is_that_of_scipy(order: int, cutoff: float, extension: int) -> None:
+    rows = np.random.default_rng(3).standard_normal((9, 300)).cumsum(axis=1) + 1e3
+    sections = butter(order, cutoff, output="sos")
+    wanted = sosfiltfilt(sections, rows, axis=1, padlen=extension)
+    np.testing.assert_allclose(zero_phase(sections, rows, extension), wanted, rtol=1e-9)
+    np.testing.assert_array_equal(zero_phase(sections, rows[4:5], extension)[0], zero_phase(sections, rows, extension)[4])

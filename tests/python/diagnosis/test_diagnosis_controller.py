@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import math
 
 import numpy as np
 import pytest
 
 import gaident as ga
+import gaident.diagnosis.controller.replay as replay_module
 from friction_drive import CONTROLLER, DRIVE, DT, drive_record
 from gaident.control.pi_torque import held_torque
 from gaident.diagnosis.controller.replay import Replay, replay
@@ -68,6 +70,18 @@ def test_outliers_are_found_on_slopes_and_side_by_side_and_only_where_the_model_
     spikes[at] = (3.0, 8.0, 5.0, -4.0, -9.0)
     np.testing.assert_array_equal(outliers(signal + noise + spikes, noise + spikes), at)
     assert len(outliers(signal + noise + spikes, noise)) == 0  # the model does the same
+
+
+def test_a_replay_is_made_once_for_a_record_and_kept_no_longer_than_it() -> None:
+    rec = limited_drive(0.2)
+    other = ga.PI(2.0 * CONTROLLER.kp, CONTROLLER.ki)
+    before = len(replay_module._KEPT)
+    assert replay(rec, CONTROLLER) is replay(rec, CONTROLLER)
+    assert replay(rec, other) is not replay(rec, CONTROLLER) and replay(rec, other).follows is False
+    assert replay(rec.with_channels(torque=0.5 * rec.torque), CONTROLLER).rms > 0.0
+    del rec
+    gc.collect()
+    assert len(replay_module._KEPT) == before
 
 
 def test_a_log_that_follows_from_the_recorded_velocity_is_not_held_against_the_cleaned_one() -> None:
@@ -189,21 +203,21 @@ def test_a_hum_in_two_records_is_one_frequency_with_a_phase_of_each() -> None:
     assert found.line == (pytest.approx(37.0, abs=0.3), pytest.approx(0.03, rel=0.1))
 
 
-def test_a_record_is_replayed_once_with_the_same_controller(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its replay is passed on; only other gains, or a record cleaned of outliers, ask for another."""
-    from gaident.diagnosis.controller import controller_place
-
+def test_a_diagnosis_replays_a_record_once_with_the_same_controller(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only another controller, or a record with other samples, asks for another replay."""
     done = []
+    made = replay_module._replayed
 
     def counted(rec: ga.Record, controller: ga.PI | None) -> Replay:
         done.append((rec.digest, controller))
-        return replay(rec, controller)
+        return made(rec, controller)
 
-    monkeypatch.setattr(controller_place, "replay", counted)
+    monkeypatch.setattr(replay_module, "_replayed", counted)
     first, second = limited_drive(1.0), limited_drive(1.0, seed=1)
     assert "torque_saturation" in {f.effect for f in ga.diagnose([second, first], CONTROLLER).causes}
-    assert sorted(digest for digest, _ in done) == sorted([first.digest, second.digest])
+    assert {(r.digest, CONTROLLER) for r in (first, second)} <= set(done) and len(set(done)) == len(done)
     done.clear()
-    used = ga.diagnose(drive_record(), ga.PI(kp=0.06, ki=1.5)).controller
+    rec = drive_record()
+    used = ga.diagnose(rec, ga.PI(kp=0.06, ki=1.5)).controller
     assert used is not None and used.kp == pytest.approx(CONTROLLER.kp, rel=1e-3)
-    assert done == [(drive_record().digest, ga.PI(kp=0.06, ki=1.5)), (drive_record().digest, used)]
+    assert {(rec.digest, ga.PI(kp=0.06, ki=1.5)), (rec.digest, used)} <= set(done) and len(set(done)) == len(done)

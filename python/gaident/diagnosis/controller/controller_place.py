@@ -6,7 +6,7 @@ only with other gains, these are used; where only with a limit, that is a findin
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -59,14 +59,10 @@ class AtController:
 
 @dataclass(frozen=True)
 class AsLogged:
-    """The controller as the logged torques show it, what differs as notes and findings; digest of a record -> its replay with it.
-
-    replays: empty where there was nothing to compare, or where the controller is not the given one any more.
-    """
+    """The controller as the logged torques show it, and what differs as notes and findings."""
 
     controller: PI | None
     notes: tuple[Text, ...] = ()
-    replays: Mapping[str, Replay] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
 
 
@@ -79,9 +75,9 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
     logged = [r for r in records if r.torque is not None]
     if controller is None or not logged or any(r.command is None for r in records):
         return AsLogged(controller)
-    replays = {r.digest: replay(r, controller) for r in logged}
-    as_given = AsLogged(controller, (), replays if len(logged) == len(records) else {})
-    off = [r for r in replays.values() if r.follows is False]
+    replays = [replay(r, controller) for r in logged]
+    as_given = AsLogged(controller)
+    off = [r for r in replays if r.follows is False]
     found = [r.controller for r in off if r.controller is not None and r.cause in ("gains", "scale", "integration_rule")]
     if not found or len(found) < len(replays):
         return as_given
@@ -102,8 +98,7 @@ def as_logged(records: Sequence[Record], controller: PI | None) -> AsLogged:
             controller.ki,
         )
     shown = replace(controller, kp=kp, ki=ki)
-    of_each = [replays[r.digest] for r in logged]
-    return AsLogged(shown, (off[0].sentence, used), {}, (_gains_finding(logged, shown, of_each),))
+    return AsLogged(shown, (off[0].sentence, used), (_gains_finding(logged, shown, replays),))
 
 
 def _gains_finding(records: Sequence[Record], shown: PI, off: Sequence[Replay]) -> Finding:
@@ -143,17 +138,12 @@ def _replay_error(rec: Record, controller: Controller) -> float:
     return float(np.mean((rec.torque - controller.torque_of(rec)) ** 2))
 
 
-def controller_findings(
-    data: DataSet, scales: Scales, known: Mapping[str, Replay]
-) -> tuple[list[Finding], AtController, list[Text]]:
-    """(findings, what is decided, notes). Without a logged torque nothing is decided here.
-
-    known: digest of a record -> its replay with the controller of `data`; records that are not in it are replayed.
-    """
+def controller_findings(data: DataSet, scales: Scales) -> tuple[list[Finding], AtController, list[Text]]:
+    """(findings, what is decided, notes). Without a logged torque nothing is decided here."""
     controller = data.controller
     if controller is None or not all(r.torque is not None and controller.replayable(r) for r in data.read):
         return [], AtController(), []
-    replays = [known.get(r.digest) or replay(r, controller) for r in data.read]
+    replays = [replay(r, controller) for r in data.read]
     off = [r for r in replays if not r.follows]
     if not off:
         return [], AtController(_decided()), []

@@ -2,12 +2,15 @@
 
 No plant is needed: what the controller does is decided before any mechanism is considered. Where the
 logged torque does not follow from a bare PI, `replay_causes` looks for the simple reasons.
+
+A diagnosis asks for the replay of a record in several places: each is kept for as long as its record is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import MutableMapping, Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,12 +68,22 @@ class Replay:
     controller: PI | None = None
 
 
+_KEPT: MutableMapping[Record, dict[Controller | None, Replay]] = WeakKeyDictionary()
+
+
 def replay(rec: Record, controller: Controller | None) -> Replay:
     """Runs the controller again on the measured velocity and compares with the logged torque.
 
     controller: None for the open loop, where the record's torque is returned as it is. Raises RecordError where neither a
     torque nor what makes one is there.
     """
+    kept = _KEPT.setdefault(rec, {})
+    if controller not in kept:
+        kept[controller] = _replayed(rec, controller)
+    return kept[controller]
+
+
+def _replayed(rec: Record, controller: Controller | None) -> Replay:
     logged = rec.torque
     if controller is None or not controller.replayable(rec):
         if logged is None:

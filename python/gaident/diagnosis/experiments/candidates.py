@@ -48,7 +48,7 @@ def candidates(
     inside = [t.name for t in LIBRARY.values() if t.in_controller]
     if data.loop is None:  # of a controller whose loop is not simulated the replay has decided
         why = {name: reason for name, reason in why.items() if name not in at.decided}
-    elif data.slower and not data.loopable:
+    elif data.slower and not data.fits_in_loop:
         still = Text("a record starts in motion, and the loop of this controller is simulated from rest only")
         if not data.loop_follows:
             still = say("the logged {torque} does not follow from this controller, so that no loop is simulated")

@@ -133,7 +133,7 @@ def output_error_bases(task: Task, bases: Sequence[Fit]) -> list[Fit]:
     In closed loop where the log shows that the simulated loop is the drive's.
     A replayed torque that ignores a limit of the controller biases these fits, and the model was identified in closed loop.
     """
-    closed = task.data.loopable and task.data.loop_follows
+    closed = task.data.left_in_loop
     predictor: Predictor = ClosedLoop(task.data) if closed else OpenLoop(task.data)
     starts = [(f.parameters, f.x) for f in bases]
     for model in rigid(task.model) + reduced(task.model):
@@ -155,7 +155,7 @@ def noise_floor(task: Task, one: Fit) -> float:
     floor = beyond(float(np.mean(objective.error(one)[used] ** 2)))
     if not np.isfinite(floor):
         return 0.0
-    if floor > 0.0 and data.loopable:  # what the loop suppresses is no noise either: without it a load is integrated
+    if floor > 0.0 and data.fits_in_loop:  # what the loop suppresses is no noise either: without it a load is integrated
         inside = np.concatenate([r.velocity - simulate(task.model, r, data.loop) for r in data.records])
         floor = min(floor, beyond(float(np.mean(inside[used] ** 2))))
     if floor > 0.0:  # a shaft that resonates is no misfit

@@ -126,8 +126,8 @@ class ModelSpace:
 
         A loop that begins under a load hides it from a model that has none: the torque drives that one.
         """
-        loaded = self.data.closable and any(LIBRARY[e].constant for e in fit.effects)
-        in_loop = self.data.loopable or loaded
+        loaded = self.data.simulates_loop and any(LIBRARY[e].constant for e in fit.effects)
+        in_loop = self.data.fits_in_loop or loaded
         inside = fit.hypothesis.driven_by(self.closed(fit.predictor)) if in_loop else fit.hypothesis
         cost = float(self.objective.costs(inside, fit.x[None, :], WHITE)[0])
         return bool(np.sqrt(cost / self.objective.count) < self.policy.free_run_ratio * self.noise_beside(fit))
@@ -204,7 +204,7 @@ class ModelSpace:
 
     def free_predictor(self, fit: Fit) -> Predictor:
         """What leaves a model to itself: the loop where it is the drive's, else the torque that drives the model."""
-        return self.closed(fit.predictor) if self.data.loopable and self.data.loop_follows else fit.predictor
+        return self.closed(fit.predictor) if self.data.left_in_loop else fit.predictor
 
     def in_both_loops(self, simpler: Fit, fuller: Fit) -> bool:
         """Whether a generalisation is worth its cost in closed loop too, and not only because it is simulated with more substeps.
@@ -215,7 +215,7 @@ class ModelSpace:
         """
         if self.neutral_score(simpler, fuller) <= self.score(fuller):
             return False
-        if fuller.predictor.closed or not self.data.loopable or fuller.noise.size == 0:
+        if fuller.predictor.closed or not self.data.fits_in_loop or fuller.noise.size == 0:
             return True
         inside = [self.predicted_by(f, self.closed(f.predictor)) for f in (simpler, fuller)]
         return self.score(inside[1]) < self.score(inside[0])

@@ -233,7 +233,7 @@ class Moves(SideMoves):
             if not rows:
                 continue
             longer = shorter.extended(t)
-            if t.multimodal and self.data.loopable:
+            if t.multimodal and self.data.fits_in_loop:
                 longer = longer.driven_by(self.closed(longer.predictor))
             X = np.array([shorter.parameters.inserted(y, np.array(row)) for row in rows])
             x = X[int(np.argmin(self.objective.costs(longer, X, WHITE)))]
@@ -256,7 +256,7 @@ class Moves(SideMoves):
         for term in [t for t in hypothesis.parameters.terms if not t.stands_with(hypothesis.effects)]:
             hypothesis, x = _nested(hypothesis, x, term, LIBRARY[term.nested[0]])
         less = self.continued(hypothesis, fit, x)
-        if any(t.multimodal and t.in_coupling for t in less.parameters.terms) and self.data.loopable and not self.quiet(less):
+        if any(t.multimodal and t.in_coupling for t in less.parameters.terms) and self.data.fits_in_loop and not self.quiet(less):
             less = min((less, self.evolved(less)), key=lambda f: f.bic)
         return less
 
@@ -287,7 +287,7 @@ class Moves(SideMoves):
         In open loop disturbance torques are integrated between the stops, and other effects fit the result.
         """
         rests = any(t.levels for t in fit.parameters.terms)
-        if not self.whitens or fit.predictor.closed or not self.data.loopable or not rests or self.quiet(fit):
+        if not self.whitens or fit.predictor.closed or not self.data.fits_in_loop or not rests or self.quiet(fit):
             return []
         return [self.predicted_by(fit, self.closed(fit.predictor))]
 
@@ -368,7 +368,7 @@ class Moves(SideMoves):
 
     def evolved(self, fit: Fit) -> Fit:
         """A global search nearby, in the loop where there is one."""
-        predictor = self.closed(fit.predictor) if self.data.loopable else fit.predictor
+        predictor = self.closed(fit.predictor) if self.data.fits_in_loop else fit.predictor
         start = replace(fit, hypothesis=fit.hypothesis.driven_by(predictor))
         key = "evolved", start.key, self.policy.evolution
         return self.objective.once(key, lambda: self.finished(ls.evolved(self.objective, start, self.policy.evolution)))

@@ -113,7 +113,7 @@ class ScoreTest:
     def add(self, hypothesis: Hypothesis, x: Vector, terms: Sequence[Term]) -> None:
         """Candidates as extensions of the model x."""
         valleys = [t for t in terms if t.multimodal]
-        if valleys and self.data.loopable and not hypothesis.predictor.closed:
+        if valleys and self.data.fits_in_loop and not hypothesis.predictor.closed:
             # A replayed torque that ignores a limit of the controller has biased the mechanism; the closed loop has not.
             inside = hypothesis.driven_by(ClosedLoop(self.data, hypothesis.predictor.own_angle))
             start = x if self.data.torque_logged else ls.fit(self.objective, inside, x, WHITE, POLICY.usual).x

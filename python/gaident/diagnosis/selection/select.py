@@ -223,7 +223,7 @@ def _explored(task: Task, space: Moves, bases: Sequence[Fit]) -> tuple[Fit, Fit]
 def _searched(space: Moves, base: Fit) -> Fit:
     """The beam search from one linear model."""
     best = _beam(space).run([base])
-    if space.quiet(best) or space.data.loopable or not space.whitens:
+    if space.quiet(best) or space.data.fits_in_loop or not space.whitens:
         return best
     for other in space.valleys(base):
         best = _improved(space, other, best)

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.filtering import zero_phase
 from gaident.data.record import Record
 from gaident.models.starts import noise_std
 
@@ -85,12 +86,10 @@ def _beside(still: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
 
 def low_passed(x: Vector, dt: float, cutoff_hz: float, order: int) -> Vector:
     """x behind the Butterworth filter run forward and backward; a straight line between its ends passes as it is."""
-    from scipy.signal import sosfiltfilt
-
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
     # no decision: samples beyond the ends, for a filter to settle
     extension = min(max(15, math.ceil(2.0 / (cutoff_hz * dt))), x.size - 1)
-    return np.asarray(sosfiltfilt(_sections(order, cutoff_hz * 2.0 * dt), x - line, padlen=extension) + line)
+    return zero_phase(_sections(order, cutoff_hz * 2.0 * dt), (x - line)[None, :], extension)[0] + line
 
 
 @lru_cache(maxsize=64)
