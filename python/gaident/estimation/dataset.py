@@ -27,7 +27,7 @@ from gaident.data.torque_kind import MEASURED
 from gaident.estimation.mean_velocity import means, with_middles
 from gaident.estimation.period import period_of_place
 from gaident.estimation.term import Term
-from gaident.models.drive_torque import driven_by, late, torque_of
+from gaident.models.drive_torque import late, torque_of
 from gaident.models.simulate_many import LoadedRecord
 from gaident.models.starts import noise_std, starts_moving
 from gaident.models.stored_torque import stored_torque
@@ -105,22 +105,6 @@ class DataSet:
         pi = bare_pi(controller)
         driven = tuple(_driven(r, controller.torque_of(r) if pi is None else torque_of(r, pi)) for r in self.records)
         return replace(self, controller=controller, driven=driven, free=_freed(self.records, driven), found=None)
-
-    def moved(self, by: Vector) -> DataSet | None:
-        """The same with the found numbers of the controller moved; None where it refuses them."""
-        assert self.found is not None and self.controller is not None
-        found = self.found.moved(by)
-        here, there = self.found.controller, found.controller
-        if here is None or there is None:
-            return None
-        pairs = [(_made(r, here), _made(r, there)) for r in self.read or self.records]
-        driven = tuple(r.with_channels(torque=torque_in(r) + v - u) for r, (u, v) in zip(self.driven, pairs, strict=True))
-        limited = there.with_limits(*self.controller.limits)
-        return replace(self, controller=limited, driven=driven, free=_freed(self.records, driven), found=found)
-
-    def joined(self) -> DataSet:
-        """The same, the found numbers of the controller from now on moved by what the errors of a model show, too."""
-        return self if self.found is None else replace(self, found=self.found.joined())
 
     def with_its_period(self) -> DataSet:
         """The same with the period that the records show, where none is known."""
@@ -370,12 +354,6 @@ def _followed(rec: Record, slope: float) -> Record:
     if rec.command is None or not np.isfinite(slope):
         return rec
     return rec.with_channels(command=rate_limited(rec.command, slope, rec.dt, 0.0))
-
-
-def _made(rec: Record, controller: Controller) -> Vector:
-    """The torque over each line [N m], as this controller makes it where the record has none, or fewer lines than it samples."""
-    pi = bare_pi(controller)
-    return torque_of(rec, pi) if pi is not None else torque_in(driven_by(rec, controller))
 
 
 def with_angle(rec: Record, angle: Vector | None) -> Record:

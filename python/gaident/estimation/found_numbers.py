@@ -14,24 +14,54 @@ by one deviation: what no slope shows, as a filter that is hardly known, counts 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.controller import Controller
 from gaident.control.found import FoundNumbers
+from gaident.control.pi import bare_pi
+from gaident.data.record import Record
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, effective_samples, gained
-from gaident.estimation.dataset import DataSet
+from gaident.estimation.dataset import DataSet, torque_in
 from gaident.estimation.objective import LOST, Fit, Innovations, Objective
 from gaident.estimation.projection import WORST, project_out
+from gaident.models.drive_torque import driven_by, torque_of
 from gaident.policy.table import POLICY
 
-__all__ = ["covariance_of_numbers", "of_controller", "refined", "variance_of", "worth"]
+__all__ = ["covariance_of_numbers", "moved", "of_controller", "refined", "variance_of", "worth"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 STEPS = 12  # no decision: work, of Gauss and Newton
 SMALLEST = 1e-300  # no decision: no division by 0
+
+
+def moved(data: DataSet, by: Vector) -> DataSet | None:
+    """The data with the found numbers of the controller moved; None where it refuses them."""
+    assert data.found is not None and data.controller is not None
+    found = data.found.moved(by)
+    here, there = data.found.controller, found.controller
+    if here is None or there is None:
+        return None
+    pairs = [(_made(r, here), _made(r, there)) for r in data.read or data.records]
+    driven = tuple(r.with_channels(torque=torque_in(r) + v - u) for r, (u, v) in zip(data.driven, pairs, strict=True))
+    limited = there.with_limits(*data.controller.limits)
+    return replace(data, controller=limited, driven=driven, free=data.freed(driven), found=found)
+
+
+def _made(rec: Record, controller: Controller) -> Vector:
+    """The torque over each line [N m], as this controller makes it where the record has none, or fewer lines than it samples."""
+    pi = bare_pi(controller)
+    return torque_of(rec, pi) if pi is not None else torque_in(driven_by(rec, controller))
+
+
+def _joined(data: DataSet) -> DataSet:
+    """The data with numbers that what the errors of a model show moves from now on."""
+    return data if data.found is None else replace(data, found=data.found.joined())
 
 
 def variance_of(objective: Objective, fit: Fit, v: Vector) -> float:
@@ -75,7 +105,7 @@ def refined(objective: Objective, fit: Fit, data: DataSet | None = None) -> Fit:
 
     data: other ones than those of the fit.
     """
-    here = _under(objective, (data or fit.predictor.data).joined(), fit)
+    here = _under(objective, _joined(data or fit.predictor.data), fit)
     for _ in range(STEPS):
         v, J, E = _slopes(objective, here)
         found = _found(here)
@@ -86,8 +116,8 @@ def refined(objective: Objective, fit: Fit, data: DataSet | None = None) -> Fit:
         size = np.sqrt(np.maximum(np.diag(A), SMALLEST))
         step = -(np.linalg.pinv(A / np.outer(size, size), rcond=1e-12, hermitian=True) @ (b / size)) / size
         for part in (1.0, 0.3, 0.1):  # no decision: of a step
-            moved = here.predictor.data.moved(part * step @ found.moves)
-            trial = here if moved is None else _under(objective, moved, here)
+            to = moved(here.predictor.data, part * step @ found.moves)
+            trial = here if to is None else _under(objective, to, here)
             fall = _cost(here, s2) - _cost(trial, s2)
             if fall > 0.0:
                 break
@@ -163,7 +193,7 @@ def _moved(objective: Objective, fit: Fit, v: Vector, by: Vector) -> Vector:
     """How the whitened errors change where the numbers of the controller are moved, one way or the other: the larger change."""
     rows = [np.zeros(len(v))]
     for sign in (1.0, -1.0):
-        data = fit.predictor.data.moved(sign * by)
+        data = moved(fit.predictor.data, sign * by)
         if data is None:
             continue
         driven = fit.hypothesis.over(data)

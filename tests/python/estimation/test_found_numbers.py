@@ -11,7 +11,7 @@ from gaident.control.found import FoundNumbers, loosened
 from gaident.diagnosis.mechanics import mechanics_of
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.estimation.dataset import DataSet
-from gaident.estimation.found_numbers import covariance_of_numbers, of_controller, refined, worth
+from gaident.estimation.found_numbers import covariance_of_numbers, moved, of_controller, refined, worth
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Objective
@@ -60,8 +60,8 @@ def test_the_part_of_the_controller_is_how_far_its_numbers_move_the_optimum(reco
     z = np.log([TAU])
     objective, fit = fit_of(record, FoundNumbers(filtered, z, np.array([[STD**2]])))
     part = of_controller(objective, fit)
-    moved = [fit_of(record, FoundNumbers(filtered, z + by))[1].x - fit.x for by in (STD, -STD)]
-    np.testing.assert_allclose(np.sqrt(np.diag(part)), 0.5 * np.abs(moved[0] - moved[1]), rtol=0.1)
+    there = [fit_of(record, FoundNumbers(filtered, z + by))[1].x - fit.x for by in (STD, -STD)]
+    np.testing.assert_allclose(np.sqrt(np.diag(part)), 0.5 * np.abs(there[0] - there[1]), rtol=0.1)
     without = fit_of(record, FoundNumbers(filtered, z, np.zeros((1, 1))))
     inertia = [mechanics_of(*one)["inertia"].std for one in ((objective, fit), without)]
     assert inertia[0] > 10.0 * inertia[1], "beside it the noise counts for nothing"
@@ -88,7 +88,7 @@ def test_numbers_that_no_torque_showed_are_in_the_covariance_as_parameters_are(r
     objective, fit = fit_of(record, FoundNumbers(filtered, np.log([TAU])))
     best = refined(objective, fit)
     v, rows = objective.linearised(best.hypothesis, best.x, WHITE)
-    data = best.predictor.data.moved(np.array([1e-3]))
+    data = moved(best.predictor.data, np.array([1e-3]))
     assert data is not None
     change = (objective.errors(best.hypothesis.over(data), best.x[None, :])[0] - objective.error(best)) * objective.counted
     both = np.vstack([rows, change / 1e-3])
