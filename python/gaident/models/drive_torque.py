@@ -69,7 +69,7 @@ def torque_driven(records: Sequence[Record], controller: Controller | None) -> D
         note = say("The controller is not a bare PI: its {torque} drives the model, and no loop is simulated.")
     else:
         text = (
-            "The log has a line for every {}th sample of the controller. The linear model is identified from the logged "
+            "The controller samples {} times for each line of the log. The linear model is identified from the logged "
             "{torque}, between the lines as this controller makes it; what it answered to noise there is lost."
         )
         note = say(text, every)
@@ -183,7 +183,7 @@ def made_by(rec: Record, controller: Controller) -> Vector:
     every = controller.log_every(rec.dt)
     if every > 1:
         raise RecordError(
-            f"the record has no torque, and a line for every {every}th sample of the controller only: what it made between "
+            f"the record has no torque, and the controller samples {every} times for each of its lines: what it made between "
             f"the lines of the velocity is lost; give {TORQUE}"
         )
     if not controller.replayable(rec):

@@ -224,7 +224,7 @@ def test_a_torque_that_another_controller_made_is_said() -> None:
 
 def test_what_is_lost_between_the_lines_is_an_error() -> None:
     rec, drive = servo_record(8)
-    with pytest.raises(ga.errors.RecordError, match="a line for every 8th sample of the controller only"):
+    with pytest.raises(ga.errors.RecordError, match="the controller samples 8 times for each of its lines"):
         ga.identify(rec.with_channels(torque=None), drive)
 
 

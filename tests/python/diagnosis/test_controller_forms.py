@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -177,6 +178,19 @@ def test_what_the_integrator_does_at_a_limit_is_told_by_the_whole_run(windup: st
     assert free.limit is None and free.controller == ga.Cascade(GIVEN, T)
 
 
+@pytest.mark.parametrize("windup", ["none", "hold"])
+def test_an_anti_windup_that_was_not_given_is_found_at_a_given_limit(windup: str) -> None:
+    """At the sample time that was given, and at one that nobody gave; a given limit is no finding."""
+    given, rec = ga.PI(KP, KI, torque_limit=0.6), slower(noise=0.005, torque_limit=0.6, windup=windup)
+    true = ga.Cascade(replace(given, anti_windup=windup), T)
+    found = limited([rec], ga.Cascade(given, T))
+    assert (found.limit, found.controller, found.gain > 0.0) == (None, true, windup != "none")
+    for controller in (ga.Cascade(given, T), given):
+        loop = loop_of([rec], controller)
+        assert loop.controller == true and loop.findings == ()
+        assert any("anti-windup 'hold'" in str(note) for note in loop.notes) == (windup == "hold")
+
+
 def test_a_slower_log_whose_torque_no_form_makes_names_none() -> None:
     rec = slower()
     assert rec.torque is not None
@@ -281,6 +295,19 @@ def test_a_form_that_was_found_is_not_looked_for_again() -> None:
         found = driving_of(driven.records, (), asked, driven, {driven.records[0].digest: rec})
     assert {f.effect for f in asked.findings} == {"torque_saturation", "command_weight"}
     assert found.findings == asked.findings and found.controller == asked.controller
+
+
+@pytest.mark.parametrize("every", [2, 4])
+def test_a_rule_at_a_faster_clock_is_taken_before_gains_that_differ_by_little(every: int) -> None:
+    """On the lines a rectangular integral of r samples to a line is about one of kp + ki dt/(2 r)."""
+    rec = slower(every, noise=0.0, rule="backward", ki=5.0)
+    given = ga.PI(KP, 5.0)
+    assert replay(rec, given).cause == "gains"
+    loop = loop_of([rec], given)
+    assert [f.effect for f in loop.findings] == ["integration_rule"]
+    assert loop.controller == ga.Cascade(replace(given, rule="backward"), T)
+    wrong = loop_of([log()], ga.PI(0.99 * KP, KI))  # at the log's rate gains that are off are gains that are off
+    assert wrong.controller == ga.PI(0.99 * KP, KI) and wrong.period_notes == ()
 
 
 @pytest.mark.parametrize("every", [2, 4])

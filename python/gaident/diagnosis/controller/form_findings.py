@@ -17,6 +17,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
 from gaident.diagnosis.controller.period_shown import FASTER, Period, period_shown
 from gaident.diagnosis.controller.replay import replay
+from gaident.diagnosis.controller.slow_forms import run_error
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.identification.controller_numbers import Numbers, with_estimates
 from gaident.models.drive_torque import driven_by
@@ -106,6 +107,8 @@ def _formed(records: Sequence[Record], given: Controller | None) -> Period | Non
 
     A form at the log's rate stands where none of a faster one leaves clearly less: a torque that follows to what its log could
     not tell may follow much closer with the right sample time.
+    Other gains at the log's rate stand where none of a faster controller with the given ones comes as close, but for what each
+    number has to take away: a rectangular integral of r samples to a line is, on the lines, one of kp + ki dt/(2 r).
     Of several sample times that of the fewest settings and, of these, the one that comes closest.
     """
     pi, dt = bare_pi(given), records[0].dt
@@ -116,13 +119,21 @@ def _formed(records: Sequence[Record], given: Controller | None) -> Period | Non
         or any(r.torque is None or r.command is None or r.dt != dt for r in records)
     ):
         return None
-    unsaid = [said for r in records if (said := replay(r, pi)).follows is False]
-    if not unsaid or any(said.cause for said in unsaid):
+    unsaid = [(r, said) for r in records if (said := replay(r, pi)).follows is False]
+    if not unsaid or any(said.cause not in ("", "gains") for _, said in unsaid):
         return None
     found = {every: shown for every in FASTER if (shown := form_shown(records, pi, (), every)) is not None}
-    close = {every: shown for every, shown in found.items() if shown.rms < POLICY.replay_noise * shown.before}
-    if close and (slow := form_shown(records, pi)) is not None:
-        close = {every: shown for every, shown in close.items() if shown.rms < POLICY.each_number * slow.rms}
+    gains = [(r, said.controller) for r, said in unsaid if said.controller is not None and said.cause == "gains"]
+    if len(gains) == len(unsaid):
+        left = max(run_error([r], Cascade(c, dt)) / run_error([r], Cascade(pi, dt)) for r, c in gains)
+        bare = {every: shown for every, shown in found.items() if not any(shown.numbers.values())}
+        close = {every: shown for every, shown in bare.items() if POLICY.each_number * shown.rms < left * shown.before}
+    elif gains:
+        return None
+    else:
+        close = {every: shown for every, shown in found.items() if shown.rms < POLICY.replay_noise * shown.before}
+        if close and (slow := form_shown(records, pi)) is not None:
+            close = {every: shown for every, shown in close.items() if shown.rms < POLICY.each_number * slow.rms}
     if not close:
         return None
     every = min(close, key=lambda n: (len(close[n].numbers), close[n].rms))
@@ -162,12 +173,18 @@ def _alone(controller: Controller | None, records: Sequence[Record]) -> tuple[PI
 
 def findings_of(shown: Shown) -> tuple[Finding, ...]:
     return tuple(
-        Finding(name, _estimates(numbers), (), 0.0, shown.gains[name], None, _evidence(shown, name), place="controller")
+        Finding(name, _estimates(numbers), (), 0.0, max(shown.gains[name], 0.0), None, _evidence(shown, name), place="controller")
         for name, numbers in shown.numbers.items()
     )
 
 
 def _evidence(shown: Shown, name: str) -> Text:
+    if shown.gains[name] <= 0.0:  # another one comes a little closer, with more numbers
+        text = (
+            "The logged {torque} shows {}: of the controllers that leave no more than what the log lost between its lines it has "
+            "the fewest numbers of its own. No model of the plant is involved."
+        )
+        return say(text, _part(shown, name))
     text = (
         "The logged {torque} shows {}: every controller without it is {:.0f} BIC units worse. No model of the plant is involved."
     )
@@ -181,7 +198,7 @@ def _estimates(numbers: Mapping[str, tuple[float, float]]) -> dict[str, Estimate
 
 def parts_of(shown: Shown) -> Text:
     """What differs from the bare PI."""
-    return joined(", ", (_part(shown, name) for name in shown.numbers))
+    return joined(", ", (_part(shown, name) for name in shown.numbers)) if shown.numbers else Text("an anti-windup at its limit")
 
 
 def _part(shown: Shown, name: str) -> Text:
@@ -209,7 +226,7 @@ def notes_of(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
         )
     ]
     scheme = shown.controller.velocity.anti_windup
-    if OF_SETTING["torque_limit"] in shown.numbers and scheme != "none":
+    if (OF_SETTING["torque_limit"] in shown.numbers or not shown.numbers) and scheme != "none":
         held = {"hold": "is held", "tracking": "is set back"}[scheme]
         notes.append(Text(f"At its limit the integrator {held} (anti-windup {scheme!r}): so the controller comes closest."))
     if shown.rivals:

@@ -286,7 +286,7 @@ def _with_limit(
     """
     best, (numbers, filters, cov) = candidates[0], fitted
     at_limit = limited(records, replace(controller_of(best, numbers, filters, given, law.period), period=law.period))
-    if not best.names and at_limit.limit is None:
+    if not best.names and not at_limit.gain:
         return None
     before, after = run_error(records, Cascade(given, law.period)), run_error(records, at_limit.controller)
     size = float(np.std(np.concatenate([r.torque for r in records if r.torque is not None])))

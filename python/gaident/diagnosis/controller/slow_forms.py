@@ -33,7 +33,8 @@ TIMES = np.geomspace(0.3e-3, 0.3, 16)  # no decision: starts; s, tracking times
 class Limited:
     """The controller with the limit that the logs show, if any; limit [N m] None: none, or the given one.
 
-    gain: BIC units by which the whole run is better than without the limit. std: of the limit [N m], of what stands at it.
+    gain: BIC units by which the whole run is better than without the limit, or the anti-windup at a given one; 0: neither.
+    std: of the limit [N m], of what stands at it.
     """
 
     controller: Cascade
@@ -67,20 +68,33 @@ def too_fast(controller: Cascade, dt: float) -> bool:
 
 
 def limited(records: Sequence[Record], controller: Cascade) -> Limited:
-    """The controller with the plateau of the logged torques as its limit, and the anti-windup that comes closest."""
+    """The controller with the plateau of the logged torques as its limit, and the anti-windup that comes closest.
+
+    At a given limit it is the given anti-windup, where none of them comes closer by the share that a number has to take away.
+    """
     filters_unseen = controller.torque_filters and controller.log_every(records[0].dt) > 1
-    if controller.velocity.torque_limit is not None or filters_unseen:
+    given = controller.velocity.torque_limit
+    in_motion = any(starts_moving(r, None) for r in records)  # no run from rest shows what the integrator does at the limit
+    if filters_unseen or (given is not None and in_motion):
         return Limited(controller, None, 0.0)
+    if given is not None:
+        best = _closest(records, controller, given)
+        closer = run_error(records, best) < POLICY.each_number * run_error(records, controller)
+        return Limited(best, None, _gain(records, controller, best)) if closer else Limited(controller, None, 0.0)
     parts = [np.abs(before_filters(r.torque, controller, r.dt)) for r in records if r.torque is not None]
     limit = plateau_of(np.concatenate(parts))
     if not np.isfinite(limit) or not limit > 0.0:
         return Limited(controller, None, 0.0)
-    if any(starts_moving(r, None) for r in records):  # no run from rest shows what the integrator does at the limit
+    if in_motion:
         known = replace(controller, velocity=replace(controller.velocity, torque_limit=limit))
         return Limited(known, limit, _gain(records, controller, known), _spread(records, limit))
-    tried = [(run_error(records, one), k, one) for k, one in enumerate(_schemes(controller, limit))]
-    best = min(tried)[2]
+    best = _closest(records, controller, limit)
     return Limited(best, limit, _gain(records, controller, best), _spread(records, limit))
+
+
+def _closest(records: Sequence[Record], controller: Cascade, limit: float) -> Cascade:
+    """The controller with the anti-windup at a limit with which its torque comes closest to the logged one."""
+    return min((run_error(records, one), k, one) for k, one in enumerate(_schemes(controller, limit)))[2]
 
 
 def _spread(records: Sequence[Record], limit: float) -> float:
