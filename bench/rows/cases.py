@@ -13,6 +13,13 @@
     winding     currents of motors from weak to strong inductance, `ga.estimate_winding`
     forms       servo controllers of another form than the bare PI that is given, the form's search alone (rows/forms.py)
     logs        clocks, counters, units and stamps of logs, read (rows/logs.py)
+    encoder     velocities on the lattices of encoders, and beside them: the lines of a turn (rows/encoders.py)
+    periods     logs with a line for every 1 to 16 samples of a controller, whose sample time nobody gave (rows/periods.py)
+    profiles    position commands that are straight or smooth between the lines of a slow log (rows/profiles.py)
+    ahead       logs whose torque goes on between the lines, by a controller that is not given (rows/slow_torques.py)
+    sampled     measured torques in lines of 1 to 10 ms, sampled or held (rows/slow_torques.py)
+    short_moves effects outside the library in a single step or move, which hardly tells effects apart (rows/short_moves.py)
+    lags        measured torques behind a lag, behind other gains, or only written late (rows/lags.py)
 
 A result has three parts: an outcome, what is said (verdict and findings; the structure; the terms), and a digest of the rest that
 a user reads: parameters to three digits, notes, comparisons, the next experiment.
@@ -35,8 +42,14 @@ import blind
 import numpy as np
 import success
 from rows.case import Case, Result, digest
+from rows.encoders import encoders, lines_shown
 from rows.forms import forms, shown
+from rows.lags import lag_found, lags
 from rows.logs import logs, read_log
+from rows.periods import period_taken, periods
+from rows.profiles import interpolated, profiles
+from rows.short_moves import described, short_moves
+from rows.slow_torques import ahead, measured_torques, named_ahead, named_sampled
 from rows.slower import EVERY, shown_slower, slower_forms
 
 import gaident as ga
@@ -242,5 +255,12 @@ KINDS: dict[str, tuple[Callable[[int, int], list[Case]], Callable[[Case], Result
     "winding": (windings, wound),
     "forms": (forms, shown),
     "logs": (logs, read_log),
+    "encoder": (encoders, lines_shown),
+    "periods": (periods, period_taken),
+    "profiles": (profiles, interpolated),
+    "ahead": (ahead, named_ahead),
+    "sampled": (measured_torques, named_sampled),
+    "short_moves": (short_moves, described),
+    "lags": (lags, lag_found),
 }
 """Kind -> what makes its cases (count, seed), and what runs one."""

@@ -261,7 +261,7 @@ class Cascade(Controller):
         """Controller samples for each line of a log with the sample time dt [s]; ControllerError where it is no whole number."""
         return 1 if self.period is None else multiple_of(dt, self.period, "the record's dt", "period")
 
-    def courses(self, dt: float) -> tuple[Cascade, ...]:
+    def interpolations(self, dt: float) -> tuple[Cascade, ...]:
         """See `Controller`: each interpolation of a position command."""
         if self.position is None or self.log_every(dt) == 1:
             return (self,)

@@ -126,8 +126,8 @@ class Controller(ABC):
     def log_every(self, dt: float) -> int:
         """Controller samples for each line of a log with the sample time dt [s]; ControllerError where it is no whole number."""
 
-    def courses(self, dt: float) -> tuple[Controller, ...]:
-        """This controller, and the same with its command on other ways between the lines of a log with the sample time dt [s]."""
+    def interpolations(self, dt: float) -> tuple[Controller, ...]:
+        """This controller, and the same with other interpolations of its command between the lines of a log, dt [s] apart."""
         return (self,)
 
     def command_of(self, log: Signals) -> Vector | None:

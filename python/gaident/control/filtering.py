@@ -47,7 +47,8 @@ def zero_phase(sections: Matrix, rows: Matrix, extension: int) -> Matrix:
         rest = x[:, :1].copy()
         x = x - rest
         for section in sections:
-            x = filtered(section[:3], section[3:], x, [x.shape[1]])
+            b, a = np.split(section, 2)
+            x = filtered(b, a, x, [x.shape[1]])
         x = (x + rest)[:, ::-1]
     return x[:, extension : extension + rows.shape[1]]
 

@@ -93,7 +93,7 @@ class Winding:
         RecordError
             Arrays that a Record would refuse, or of unequal lengths.
         """
-        return self._courses(voltage, velocity, dt)[0]
+        return self._currents(voltage, velocity, dt)[0]
 
     def torque(self, voltage: ArrayLike, velocity: ArrayLike, dt: float) -> Vector:
         """Return the mean torque over each sample: what a record's torque, held until the next one, stands for.
@@ -114,13 +114,13 @@ class Winding:
         ndarray of shape (n,)
             u [N m].
         """
-        current, steady, dt = self._courses(voltage, velocity, dt)
+        current, steady, dt = self._currents(voltage, velocity, dt)
         if self.inductance == 0.0:
             return self.torque_constant * steady
         samples = self.inductance / (self.resistance * dt)  # of the time constant L/R
         return np.asarray(self.torque_constant * (steady + (current - steady) * samples * -np.expm1(-1.0 / samples)))
 
-    def _courses(self, voltage: ArrayLike, velocity: ArrayLike, dt: float) -> tuple[Vector, Vector, float]:
+    def _currents(self, voltage: ArrayLike, velocity: ArrayLike, dt: float) -> tuple[Vector, Vector, float]:
         """(i(n), s(n) that it goes to, dt), checked."""
         U, w = channel(voltage, "voltage"), channel(velocity, "velocity")
         dt = positive_number(dt, "dt", "s", "give the sample time in seconds")

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from gaident.data.record import Record
 from gaident.estimation.criterion import effective_samples, gained
 from gaident.estimation.projection import project_out
-from gaident.estimation.regression.motion import cutoff_of
+from gaident.estimation.regression.motion import ORDER, cutoff_of
 from gaident.estimation.regression.rows import decimation_of, rows_of
 from gaident.policy.table import POLICY
 
@@ -33,7 +33,6 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 TERMS = ("inertia", "viscous_by_direction", "coulomb_by_direction")
-ORDER = 4  # no decision: of the filter
 FINER = 4.0  # no decision: lengths that are tried for each that the travel tells apart
 AT_ONCE = 1 << 21  # no decision: work; numbers of a block of waves
 

@@ -32,7 +32,7 @@ from gaident.errors import ControllerError, RecordError
 from gaident.estimation.criterion import effective_samples, gained
 from gaident.identification import number_words
 from gaident.identification.logged_stretches import centred, correlation, log_of, numbered, unlimited, whitened
-from gaident.identification.number_ranges import grid_of, inverse, off_bound, range_of
+from gaident.identification.number_ranges import SMALLEST, grid_of, inverse, off_bound, range_of
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
@@ -52,7 +52,6 @@ LOGARITHMIC = ("gain", "time_constant", "frequency", "denominator_damping")
 FIRST, WHOLE = 12, 60  # no decision: effort; evaluations of a search from the grid, and of the best of them
 STEP = 1e-5  # no decision: of a number, for a slope
 ROUNDING = 1e-12  # no decision: of the torque's deviation, what a sum is exact to
-SMALLEST = 1e-300  # no decision: no division by 0
 
 
 @dataclass(frozen=True)
@@ -90,13 +89,13 @@ def with_estimates(records: Sequence[Record], controller: Controller | None) -> 
     for rec in records:
         if why := number_words.lacking(rec, controller):
             raise RecordError(why)
-    given, *others = [_estimated(records, one) for one in controller.courses(records[0].dt)]
+    given, *others = [_estimated(records, one) for one in controller.interpolations(records[0].dt)]
     best = min((n for n in others if not n.doubt), key=lambda n: n.rms, default=given)
     gain = gained(given.rms**2, best.rms**2, min(given.samples, best.samples))
     as_good = given.rms <= POLICY.negligible * given.size or gain <= POLICY.rival_margin
     if best is given or best.controller is None or (not given.doubt and as_good):
         return given
-    return replace(best, notes=(*best.notes, number_words.other_course(best.controller, controller)))
+    return replace(best, notes=(*best.notes, number_words.other_interpolation(best.controller, controller)))
 
 
 def _estimated(records: Sequence[Record], controller: Controller) -> Numbers:
@@ -371,10 +370,10 @@ class _Fit:
         size = float(np.std(self.logged[self.used]))
         sigma = max(float(np.sqrt(np.sum(at**2) / max(count, 1))), ROUNDING * size)
         spread, back = inverse(J)
-        # Where another course between the lines, or another correlation, would have put the numbers.
-        course = back @ (self.free(rho, straight=True)(x) - at)
+        # Where linear interpolation of the velocity, or another correlation, would have put the numbers.
+        linear = back @ (self.free(rho, straight=True)(x) - at)
         uncorrelated = inverse(self.slopes(self.free(0.0), x, low))[1] @ free_left
-        covariance = sigma**2 * spread + np.outer(course, course) + np.outer(uncorrelated, uncorrelated)
+        covariance = sigma**2 * spread + np.outer(linear, linear) + np.outer(uncorrelated, uncorrelated)
         stds, values = np.sqrt(np.diag(covariance)), self.values(x)
         units = np.array([v if f in LOGARITHMIC else 1.0 for v, f in zip(values, self.fields, strict=True)])
         natural = [float(s) for s in stds * units]

@@ -1,7 +1,7 @@
 """Whether the torque of a log that is slower than its controller follows from command and velocity through that controller.
 
 The controller runs at its own clock on the logged signals; d is the logged torque minus what it makes at the lines of the log.
-What the velocity did between the lines is lost: d is compared with what other courses there make of the torque,
+What the velocity did between the lines is lost: d is compared with what other interpolations of it make of the torque,
 
     a straight line instead of a cubic spline, and that spline with white noise between the lines, as large as that at the lines,
 
@@ -29,7 +29,7 @@ from gaident.data.signals.lattice import rounding_step
 from gaident.errors import GaidentError
 from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.logged_stretches import Log, centred, correlation, log_of, whitened
-from gaident.identification.number_words import course as way_of
+from gaident.identification.number_words import interpolated
 from gaident.models.drive_torque import follows_not, torque_driven
 from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
@@ -71,23 +71,24 @@ def comparable(rec: Record, controller: Controller) -> bool:
 
 
 def _off(rec: Record, controller: Controller) -> float:
-    """Root mean square of logged minus made torque [N m], where that is more than the course between the lines can make; or 0."""
+    """Rms of logged minus made torque [N m], where that is more than the velocity between the lines can make; or 0."""
     cascade = cascade_of(controller)
     log = log_of(rec, len(rec), cascade, whole=True)
     made = log.made(cascade)
     left = log.torque - made
-    courses = [one.made(cascade, straight) - made for one, straight in _courses(log, rec)]
-    rho = correlation(np.sum(courses, axis=0), log.stretch)
+    others = [one.made(cascade, straight) - made for one, straight in _others(log, rec)]
+    rho = correlation(np.sum(others, axis=0), log.stretch)
 
     def rms(d: Vector, rho: float) -> float:
         return float(np.sqrt(np.mean(centred(*whitened(d, log.stretch, rho), False) ** 2)))
 
-    possible = float(np.sqrt(sum(rms(course, rho) ** 2 for course in courses)))
+    possible = float(np.sqrt(sum(rms(other, rho) ** 2 for other in others)))
     noise = noise_std(left, rounding_step(log.torque))  # of a measured, or rounded, torque
     measured = min(noise, POLICY.replay_noise * float(np.std(log.torque)))
     off, size = rms(left, 0.0), float(np.sqrt(np.mean(log.torque**2)))
     follows = (
-        rms(left, rho) <= max(POLICY.course * possible, POLICY.undecided_ratio * measured) or off <= POLICY.negligible * size
+        rms(left, rho) <= max(POLICY.interpolation * possible, POLICY.undecided_ratio * measured)
+        or off <= POLICY.negligible * size
     )
     return 0.0 if follows else off
 
@@ -99,8 +100,8 @@ def noise_between(rec: Record, count: int, every: int) -> Vector:
     return noise
 
 
-def _courses(log: Log, rec: Record) -> list[tuple[Log, bool]]:
-    """The log with other courses between its lines, and whether the velocity goes straight there."""
+def _others(log: Log, rec: Record) -> list[tuple[Log, bool]]:
+    """The log with other velocities between its lines, and whether the velocity goes straight there."""
     noise = noise_between(rec, len(log.velocity), len(log.velocity) // len(log.source))
     return [(log, True), (replace(log, velocity=log.velocity + noise), False)]
 
@@ -115,13 +116,13 @@ class Corrected(NamedTuple):
 
 
 def corrected(records: Sequence[Record], controller: Controller) -> Corrected | None:
-    """The other way of its command between the lines, or the one number, with which the torque of all records follows.
+    """The other interpolation of its command, or the one number, with which the torque of all records follows.
 
     None where there is none, or several numbers are as good.
     """
-    for course in controller.courses(records[0].dt)[1:]:
-        if not _doubts(records, course):
-            return Corrected(course, {}, say("With {} it does: all simulations use this.", way_of(course)))
+    for other in controller.interpolations(records[0].dt)[1:]:
+        if not _doubts(records, other):
+            return Corrected(other, {}, say("With {} it does: all simulations use this.", interpolated(other)))
     found = []
     for given, one in _with_one_open(cascade_of(controller)):
         try:
@@ -132,7 +133,7 @@ def corrected(records: Sequence[Record], controller: Controller) -> Corrected | 
             continue
         values = [_value(name, e) for name, e in numbers.estimates.items()]
         moved = cascade_of(numbers.controller).interpolation != cascade_of(controller).interpolation
-        also = say(", and {},", way_of(numbers.controller)) if moved else ""
+        also = say(", and {},", interpolated(numbers.controller)) if moved else ""
         text = "With {} (given: {}){} it does: all simulations use this."
         found.append(
             Corrected(numbers.controller, numbers.estimates, say(text, joined(" and ", values), given, also), numbers.found)

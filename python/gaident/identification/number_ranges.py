@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["grid_of", "inverse", "off_bound", "range_of"]
+__all__ = ["SMALLEST", "grid_of", "inverse", "off_bound", "range_of"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-SMALLEST = 1e-300  # no decision: a controller of two gains of 0 is none
+SMALLEST = 1e-300  # no decision: no division by 0, and a controller of two gains of 0 is none
 
 
 def grid_of(field: str, period: float) -> list[float]:

@@ -11,7 +11,7 @@ from gaident.control.controller import Controller
 from gaident.data.record import Record
 from gaident.results.estimate import Estimate
 
-__all__ = ["course", "found", "lacking", "moved", "negative", "not_followed", "not_shown", "other_course"]
+__all__ = ["found", "interpolated", "lacking", "moved", "negative", "not_followed", "not_shown", "other_interpolation"]
 
 
 def found(estimates: Mapping[str, Estimate], rms: float, size: float) -> Text:
@@ -26,15 +26,15 @@ def found(estimates: Mapping[str, Estimate], rms: float, size: float) -> Text:
     return say(text, joined(", ", numbers), rms, size)
 
 
-def course(controller: Controller) -> str:
-    """How its position command goes between the lines."""
+def interpolated(controller: Controller) -> str:
+    """How its position command is interpolated between the lines."""
     way = cascade_of(controller).interpolation
     return f"a position command that goes {way} between the lines of the log (interpolation {way!r})"
 
 
-def other_course(controller: Controller, given: Controller) -> Text:
+def other_interpolation(controller: Controller, given: Controller) -> Text:
     text = "The {torque} follows clearly better with {} (given: {!r}): all simulations use this."
-    return say(text, course(controller), cascade_of(given).interpolation)
+    return say(text, interpolated(controller), cascade_of(given).interpolation)
 
 
 def moved(shift: int) -> Text:

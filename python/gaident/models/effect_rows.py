@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 from gaident.axis import Text
 from gaident.models.own_effects import Parameter
 
-__all__ = ["AT_LOAD", "SIDES", "Row", "Table", "effect_and_side", "end_words", "key_of"]
+__all__ = ["AT_LOAD", "SHAFT", "SIDES", "Row", "Table", "effect_and_side", "end_words", "key_of"]
 
 SHAFT = "shaft"
+"""The place of effects that add a torque."""
 SIDES = ("motor", "load")
 AT_LOAD = "@load"
 

@@ -8,17 +8,24 @@ from pathlib import Path
 from typing import Any
 
 __all__ = [
+    "AHEAD",
     "CALIBRATED",
     "DRIVES",
     "EFFORT",
+    "ENCODER",
     "FORMS",
     "GAIN",
+    "LAGS",
     "LOOP",
     "NOISE",
+    "PERIODS",
+    "PROFILES",
     "REAL",
     "REGRESSION",
+    "SAMPLED",
     "SHIFTED",
     "SHORT",
+    "SHORT_MOVES",
     "SHOWN_BY",
     "SLOWER",
     "SUCCESS",
@@ -50,7 +57,17 @@ SUCCESS = "success"
 WINDING = "winding"
 FORMS = "forms"
 LOGS = "logs"
-SHOWN_BY = (DRIVES, SHORT, LOOP, SLOWER, SHIFTED, REAL, REGRESSION, SUCCESS, WINDING, FORMS, LOGS)
+ENCODER = "encoder"
+PERIODS = "periods"
+PROFILES = "profiles"
+AHEAD = "ahead"
+SAMPLED = "sampled"
+SHORT_MOVES = "short_moves"
+LAGS = "lags"
+SHOWN_BY = (
+    *(DRIVES, SHORT, LOOP, SLOWER, SHIFTED, REAL, REGRESSION, SUCCESS, WINDING, FORMS, LOGS),
+    *(ENCODER, PERIODS, PROFILES, AHEAD, SAMPLED, SHORT_MOVES, LAGS),
+)
 
 GAIN = "Is the gain enough?"
 NOISE = "Is this noise?"
@@ -95,8 +112,8 @@ def loop(value: float, unit: str, source: str, cases: str = LOOP) -> Any:
     return _row(CONTROLLER, value, unit, source, cases)
 
 
-def reading(value: float, unit: str, source: str) -> Any:
-    return _row(READING, value, unit, source, LOGS)
+def reading(value: float, unit: str, source: str, cases: str = LOGS) -> Any:
+    return _row(READING, value, unit, source, cases)
 
 
 def record(value: float, unit: str, source: str, cases: str) -> Any:

@@ -18,15 +18,22 @@ from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 from gaident.policy.declared import (
+    AHEAD,
     DRIVES,
+    ENCODER,
     FORMS,
     GAIN,
+    LAGS,
     LOOP,
     NOISE,
+    PERIODS,
+    PROFILES,
     REAL,
     REGRESSION,
+    SAMPLED,
     SHIFTED,
     SHORT,
+    SHORT_MOVES,
     SLOWER,
     SUCCESS,
     WINDING,
@@ -116,9 +123,8 @@ class Policy:
         0.9,
         "1",
         "least part that a cause explains of what a free function does; drag by friction 0.87, a joint's friction 0.946",
-        DRIVES,
+        SHORT_MOVES,
     )
-    class_stands: float = cause(0.5, "1", "the same for effects that no record tells apart: they are no single name", DRIVES)
     jump_deviations: float = cause(
         4.0,
         "1",
@@ -157,6 +163,7 @@ class Policy:
     # Does the logged torque follow from command and velocity through the controller?
     replay_steps: float = loop(3.0, "steps", "of the torque's rounding, by which a torque that follows is off at most")
     replay_rms: float = loop(2.0, "steps", "the same for the rms")
+    sum_of_roundings: float = loop(3.0, "1", "standard deviations of a sum of roundings, which it exceeds by chance alone")
     replay_left: float = loop(1e-3, "1", "most that an effect leaves of the replay's squared error where it explains it")
     replay_noise: float = loop(0.1, "1", "part of the torque's standard deviation: more is no noise of a measured torque")
     same_gains: float = loop(1e-2, "1", "relative difference of the gains of several logs, up to which they are the same")
@@ -170,6 +177,9 @@ class Policy:
     same_slope: float = loop(0.2, "1", "relative difference from a command's median slope, within which its rate is limited")
     better_reason: float = loop(0.99, "1", "of the rms that a simpler reason leaves: a more complicated one has to leave less")
     rounded_command: float = loop(5e-5, "1", "of the largest command: two commands of a log of few decimals differ by no more")
+    log_late: int = loop(
+        3, "samples", "by which a log may have written a channel late or early, at most; farther off is another log", LAGS
+    )
     log_shift: float = loop(
         50.0,
         "BIC units",
@@ -184,23 +194,26 @@ class Policy:
         SLOWER,
     )
     same_clock: float = loop(
-        1.5, "1", "times the least change from line to line that a controller faster than the log leaves: not told apart", SLOWER
+        1.5, "1", "times the least change from line to line that a controller faster than the log leaves: not told apart", PERIODS
     )
     near_age: float = loop(
         0.25,
         "samples",
         "of a controller, by which the motion's lag misses the age of its velocity at most; T/2 is the age",
-        SLOWER,
+        PERIODS,
     )
     corner_square: float = loop(
         0.1,
         "1",
         "of its curvature, by which a change of a position command may miss a square: a corner to 0.06, a cubic 0.42",
-        SLOWER,
+        PROFILES,
     )
-    corner_seen: float = loop(20.0, "1", "times the other third differences of it: less is no corner of its slope", SLOWER)
-    course: float = loop(
-        4.0, "1", "times what the path of the velocity between a slow log's lines changes in the torque: less is not seen", SLOWER
+    corner_seen: float = loop(20.0, "1", "times the other third differences of it: less is no corner of its slope", PROFILES)
+    interpolation: float = loop(
+        4.0,
+        "1",
+        "times what another interpolation of the velocity changes in the torque of a slow log: less is not seen",
+        SLOWER,
     )
     each_number: float = loop(
         0.8,
@@ -212,7 +225,16 @@ class Policy:
         0.125,
         "lines",
         "of a torque that drives a model ahead of its line, from which it is seen: half of what two samples make",
-        SLOWER,
+        AHEAD,
+    )
+    ahead_exact: float = loop(
+        0.02, "lines", "to which the regression knows by how much a torque is ahead; else the model that is found shows it", AHEAD
+    )
+    slowest_lag: float = loop(
+        100.0,
+        "samples",
+        "time constant at most of a lag behind the controller's torque; a current loop is faster",
+        LAGS,
     )
     lag_said: float = loop(0.75, "samples", "from which a lag of an open loop's log is said; a sampled torque's is 0.5", SHIFTED)
     slope_reach: float = loop(
@@ -250,7 +272,9 @@ class Policy:
     wrap_spared: float = reading(0.999, "1", "of the steps are no jumps then; the rest may be lost samples")
     overlap: float = reading(0.3, "1", "of the shorter of two logs, that both have at least")
     aligned: float = reading(0.5, "1", "correlation of two logs of one motion at least")
-    longest_hold: float = reading(4e-3, "s", "sample time of a controller at most: a torque measured less often is no held one")
+    longest_hold: float = reading(
+        4e-3, "s", "sample time of a controller at most: a torque measured less often is no held one", SAMPLED
+    )
     rate_seen: float = reading(3.0, "1", "standard deviations from 0, from which two clocks run at different rates")
 
     # What does a record show? What is spoiled in it, and what it could not have shown.
@@ -269,7 +293,8 @@ class Policy:
     sensor_step: float = record(1e-4, "1", "of the velocity's range: a finer quantisation is that of a text log", DRIVES)
     on_lattice: float = record(0.1, "steps", "from the places of a lattice, within which all values lie on it", DRIVES)
     whole_lines: float = record(0.01, "1", "lines of a turn, within which an encoder's number of lines is whole", DRIVES)
-    binary_lines: float = record(1e-4, "1", "share of a power of two, within which an encoder's lines are that", DRIVES)
+    fewest_lines: int = record(100, "1", "lines of a turn that an encoder of a drive has at least", ENCODER)
+    binary_lines: float = record(1e-4, "1", "share of a power of two, within which an encoder's lines are that", ENCODER)
     folded_steep: float = record(0.15, "1", "of the 95 % quantile of slopes: a turning point with less is a rest", REAL)
     folded_smoother: float = record(
         0.8, "1", "of the curvature at a turning point: below, the signal is smoother with its sign turned there", REAL
@@ -330,6 +355,7 @@ class Policy:
     beam_width: int = effort(3, "1", "models that are carried on side by side")
     beam_reach: float = effort(4.0, "penalties", "how far behind the best a model is carried on")
     hope: float = effort(0.5, "1", "of what is asked for, that a linearised gain has to promise to be worth a fit")
+    slow_fall: float = effort(0.1, "1", "of the cost: a fit that is far behind is left where a step brings less than this")
     screened: int = effort(6, "1", "candidates that each ranking of the score test sends into a short fit")
     finished: int = effort(5, "1", "of these, how many are fitted to the end")
     starts: int = effort(3, "1", "best ones of a list (starts, candidates, frequencies, rivals) that are followed up")

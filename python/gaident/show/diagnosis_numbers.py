@@ -133,10 +133,10 @@ def order_lines(position: Vector, torque: Vector, velocity: Vector, highest: flo
     # Collected over small steps of angle, the sums over all orders are one Fourier transform.
     per_turn = max(2.0 * highest, min(16.0 * highest, MOST_STEPS / turns))
     place = ((theta - theta.min()) / math.tau * per_turn).astype(int)
-    course = np.bincount(place, weight * rest)
-    size = 1 << max(len(course), math.ceil(per_turn / 0.25), math.ceil(4.0 * turns * per_turn)).bit_length()
+    summed = np.bincount(place, weight * rest)
+    size = 1 << max(len(summed), math.ceil(per_turn / 0.25), math.ceil(4.0 * turns * per_turn)).bit_length()
     orders = np.arange(size // 2 + 1, dtype=np.float64) * (per_turn / size)
-    lines = 2.0 * np.abs(np.fft.rfft(course, size))
+    lines = 2.0 * np.abs(np.fft.rfft(summed, size))
     shown = (orders >= max(0.5, 1.0 / turns)) & (orders <= highest)  # of less than a period the travel shows nothing
     orders, lines = orders[shown], lines[shown]
     # Of noise the amplitudes are Rayleigh: median sigma sqrt(2 ln 2), passed by one of K with 1 % at sigma sqrt(2 ln(K/0.01)).

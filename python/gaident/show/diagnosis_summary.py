@@ -15,6 +15,7 @@ from gaident.results.finding import Finding
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
 from gaident.show.units import Scales, beside, scales_of
 from gaident.show.wording import (
+    WIDTH,
     cause_words,
     certainty,
     controller_lines,
@@ -40,7 +41,6 @@ __all__ = [
     "verdict_words",
 ]
 
-WIDTH = 100  # no decision: letters of a line
 TESTED_UP_TO = "Tested up to what these records asked for"
 DRIVERS = {
     "velocity": "on the velocity",

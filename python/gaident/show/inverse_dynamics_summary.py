@@ -8,11 +8,9 @@ from typing import Protocol
 
 from gaident.axis import identifier_words, said, velocity_unit, word
 from gaident.results.estimate import Estimate
-from gaident.show.wording import number, table, with_std
+from gaident.show.wording import WIDTH, number, table, with_std
 
 __all__ = ["inverse_dynamics_summary"]
-
-WIDTH = 100  # no decision: letters of a line
 
 
 class Regression(Protocol):

@@ -18,7 +18,7 @@ _UNITS = {"command": "rad/s", "velocity": "rad/s", "torque": "N m", "position": 
 
 
 def record_html(rec: Record) -> str:
-    """name, samples, dt, duration, and per channel unit, range, mean and course; no script, everything escaped."""
+    """name, samples, dt, duration, and per channel unit, range, mean and a small chart; no script, everything escaped."""
     name = f"<b>{escape(rec.name)}</b> " if rec.name else ""
     head = f"<div>{name}Record, {len(rec)} samples, dt {rec.dt:.6g} s, {rec.duration:.4g} s</div>"
     kind = {"torque": " (measured)"} if rec.torque_is == MEASURED else {}
@@ -38,7 +38,7 @@ def _number(value: float) -> str:
 
 
 def sparkline(values: NDArray[np.float64]) -> str:
-    """An inline SVG of the course: lowest and highest of each column of pixels, so that no peak is lost."""
+    """An inline SVG over time: lowest and highest of each column of pixels, so that no peak is lost."""
     columns = min(_WIDTH, len(values))
     edges = np.linspace(0, len(values), columns + 1).astype(int)
     low = np.minimum.reduceat(values, edges[:-1])
@@ -54,6 +54,6 @@ def sparkline(values: NDArray[np.float64]) -> str:
     upper = [f"{a:.1f},{b:.1f}" for a, b in zip(x, height(high), strict=True)]
     lower = [f"{a:.1f},{b:.1f}" for a, b in zip(x[::-1], height(low)[::-1], strict=True)]
     return (
-        f'<svg width="{_WIDTH}" height="{_HEIGHT}" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="course over time">'
+        f'<svg width="{_WIDTH}" height="{_HEIGHT}" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="values over time">'
         f'<polygon points="{" ".join(upper + lower)}" fill="currentColor" stroke="currentColor" stroke-width="1"/></svg>'
     )

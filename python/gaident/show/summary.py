@@ -13,7 +13,7 @@ from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.identification import Identification
 from gaident.show.units import Scales, beside, scales_of
-from gaident.show.wording import controller_lines, number, structure_words, table, with_std
+from gaident.show.wording import WIDTH, controller_lines, number, structure_words, table, with_std
 
 __all__ = [
     "flags_of",
@@ -24,7 +24,6 @@ __all__ = [
     "stem_of",
 ]
 
-WIDTH = 100  # no decision: letters of a line
 SHOWN_STRUCTURES = 5  # no decision: how many are listed
 
 

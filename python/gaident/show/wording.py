@@ -12,9 +12,10 @@ from gaident.results.finding import Finding, where
 
 __all__ = [
     *("cause_words", "certainty", "controller_lines", "either", "missing_words", "number", "size_words", "structure_words"),
-    *("table", "with_std", "words"),
+    *("WIDTH", "table", "with_std", "words"),
 ]
 
+WIDTH = 100  # no decision: letters of a line
 _ANGULAR = ("frequency", "zero_frequency")  # angular frequencies in rad/s, which are read in Hz
 
 

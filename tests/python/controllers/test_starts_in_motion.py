@@ -34,7 +34,7 @@ def test_a_form_is_seen_and_leaves_little(name: str) -> None:
     assert all(0.0 < std < share * value for value, std in shown.numbers[effect].values())
     if name == "low pass":
         value, std = shown.numbers[effect]["time_constant"]
-        assert abs(value - 1e-3) < 3.0 * std  # what the course between the lines may do is in it
+        assert abs(value - 1e-3) < 3.0 * std  # what the velocity between the lines may do is in it
 
 
 def test_unknown_gains_are_found() -> None:

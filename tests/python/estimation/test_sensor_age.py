@@ -49,6 +49,8 @@ def test_lines_of_an_encoder_are_whole() -> None:
     for decimals, seen in ((4, LINES), (3, LINES), (1, 0)):  # of rpm: a line is not known from them, a power of two is
         assert encoder_lines(np.round(w * 30.0 / np.pi, decimals) * np.pi / 30.0, T, 2.0 * np.pi) == seen
     rpm = np.pi / 30.0 * np.round(angle / angle.max() * 900.0)
+    beside = LINES + 1.004  # what five decimals of rpm leave of 2^20 lines: no encoder has one line more
+    assert encoder_lines(w * LINES / beside, T, 2.0 * np.pi) == LINES
     assert encoder_lines(rpm, 1e-3, 2.0 * np.pi) == 0  # not 60000 lines
 
 

@@ -13,7 +13,6 @@ Vector = NDArray[np.float64]
 
 FEWEST = 4  # no decision: distinct values that a lattice could be told from chance by
 SAME = 1e-9  # no decision: of the largest value, the last digits of a float, in which two values are the same
-FEWEST_LINES = 100  # no decision: of a turn; no encoder of a drive has fewer
 SPEEDS = (1.0, np.pi / 30.0, np.pi / 180.0, 2.0 * np.pi)  # no decision: units of a speed; rad/s in each: rad/s, rpm, deg/s, 1/s
 EXACT = 1e-4  # no decision: steps, what a decimal number is exact to in binary and scaled by ten
 
@@ -58,19 +57,19 @@ def encoder_lines(velocity: Vector, period: float, turn: float) -> int:
     A difference of counts is a multiple of q = turn/(lines period), `turn` 2 pi rad, or 1 m where velocities are in m/s. The
     number of lines that q stands for is whole then, and for chance to make it whole is as rare as `whole_lines` says.
     Decimals of a log leave q less well known than to a line of a fine encoder. Nearly all of these have a power of two of lines:
-    such a number, within the share `binary_lines`, is as rare by chance.
+    such a number, within the share `binary_lines`, is as rare by chance, and it is taken before a whole number beside it.
     A step of 1, 2 or 5 in some decimal place of a unit of speed is a log's rounding: whole rpm each ms would be 60000 lines.
     """
     step = lattice_step(velocity, rounded=True)
     if not step > 0.0 or any(_decimal(step / unit) for unit in SPEEDS):
         return 0
     lines = turn / (step * period)
-    if lines < FEWEST_LINES:
+    if lines < POLICY.fewest_lines:
         return 0
     exact, whole, binary = lattice_step(velocity), round(lines), 2 ** round(np.log2(lines))
-    if exact == step and abs(lines - whole) < POLICY.whole_lines:
-        return whole
-    return int(binary) if abs(lines - binary) < POLICY.binary_lines * binary else 0
+    if abs(lines - binary) < POLICY.binary_lines * binary:
+        return int(binary)
+    return whole if exact == step and abs(lines - whole) < POLICY.whole_lines else 0
 
 
 def encoder_step(velocity: Vector, linear: bool = False) -> float:

@@ -79,7 +79,7 @@ class Law:
     lengths: lines of each record; period: of the controller [s].
     Of a log with r = 1 all used lines count alike, and a start of the integrator is one of the numbers. Of a slower one, what is
     fitted is x(k) - rho x(k-1) of each signal without its mean in each stretch between two limits, see `logged_stretches`.
-    courses: other velocities that have the same lines [rad/s] (n r,) each; () where the log has all samples.
+    velocities: others that have the same lines [rad/s] (n r,) each; () where the log has all samples.
     straight: the velocity straight between its lines [rad/s] (n r,).
     steps: that the velocities of each record are rounded to [rad/s], where r = 1.
     """
@@ -93,7 +93,7 @@ class Law:
     every: int = 1
     stretch: NDArray[np.intp] | None = None
     rho: float = 0.0
-    courses: tuple[Vector, ...] = ()
+    velocities: tuple[Vector, ...] = ()
     straight: Vector | None = None
     steps: tuple[float, ...] = ()
 
@@ -143,11 +143,11 @@ class Law:
         The proportional part answers on the line itself. Behind a filter it is made of the samples between the lines too.
         """
         made = self.columns(shape.places, shape.numbers)
-        others = [replace(self, velocity=w).columns(shape.places, shape.numbers) for w in self.courses]
+        others = [replace(self, velocity=w).columns(shape.places, shape.numbers) for w in self.velocities]
         return float(np.sqrt(sum(float(np.mean(((made - other) @ shape.coefficients) ** 2)) for other in others)))
 
-    def of_course(self, other: Law, coefficients: Vector) -> tuple[Vector, NDArray[np.intp]]:
-        """(what another course of the velocity between the lines makes of the torque [N m], stretch of each line)."""
+    def of_other(self, other: Law, coefficients: Vector) -> tuple[Vector, NDArray[np.intp]]:
+        """(what another velocity between the lines makes of the torque [N m], stretch of each line)."""
         assert self.stretch is not None
         none = np.zeros(0)
         off = (replace(self, rho=0.0).columns((), none) - replace(other, rho=0.0).columns((), none)) @ coefficients
@@ -170,7 +170,7 @@ class Shape:
 
 
 def law_of(records: Sequence[Record], given: PI, every: int = 1, steps: tuple[float, ...] = ()) -> tuple[Law, float] | None:
-    """(the regression's data, root mean square that the log's rounding, or a course between its lines, makes of a replay [N m]).
+    """(the regression's data, root mean square that the log's rounding, or what is between its lines, makes of a replay [N m]).
 
     given: its torque limit and gains. steps: that the velocities of each record are rounded to [rad/s], where every is 1, or
     nothing. None where a signal or too much is missing.
@@ -201,12 +201,12 @@ def law_of(records: Sequence[Record], given: PI, every: int = 1, steps: tuple[fl
         used = stretch >= 0
         law = Law(command, smooth, torque, used, lengths, period, every, stretch, straight=straight)
         coefficients = np.array([given.kp, given.kp, given.ki, *np.zeros(2 + len(records))])
-        off, own = law.of_course(replace(law, velocity=straight), coefficients)
+        off, own = law.of_other(replace(law, velocity=straight), coefficients)
         law = replace(law, rho=correlation_of(off, own))
         d, _ = whitened(_at(used, off), stretch, law.rho)
-        floor = POLICY.course * float(np.sqrt(np.mean(d**2)))
+        floor = POLICY.interpolation * float(np.sqrt(np.mean(d**2)))
         noise = np.concatenate([noise_between(rec, len(log.velocity), every) for rec, log in zip(records, logs, strict=True)])
-        law = replace(law, courses=(straight, smooth + noise))
+        law = replace(law, velocities=(straight, smooth + noise))
     return _with_enough(law, floor)
 
 

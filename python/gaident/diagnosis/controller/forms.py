@@ -230,7 +230,7 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
 
 
 def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[Candidate], floor: float) -> Shown | None:
-    """The same of a log with fewer lines: None where it leaves more than another course between them could make."""
+    """The same of a log with fewer lines: None where it leaves more than another velocity between them could make."""
     negligible = POLICY.negligible * float(np.abs(law.torque).max())
     # Where the given controller leaves no more, no other one is looked for; only a setting without a number of its own.
     plain = [c for c in candidates if not c.names]
@@ -245,7 +245,7 @@ def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Se
             if (shown := _with_limit(records, law, given, others, (numbers, filters, cov))) is not None:
                 return shown
             break
-    # Noise on the logged velocity leaves more than a course; with a limit the given controller may explain the whole.
+    # Noise on the logged velocity leaves more than interpolation does; with a limit the given controller may explain the whole.
     for best in plain[:1]:
         others = [best, *(c for c in candidates if c is not best)]
         return _with_limit(records, law, given, others, _fitted(law, best, given), float(np.sqrt(POLICY.replay_left)))

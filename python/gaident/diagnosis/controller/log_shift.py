@@ -39,7 +39,6 @@ __all__ = ["Aligned", "aligned"]
 
 Vector = NDArray[np.float64]
 
-FARTHEST = 2  # no decision: how far is looked, samples in either direction
 LONGEST = 1 << 16  # no decision: work; samples that the law is fitted to
 SHARES = (0.0, 0.5, -0.5)  # no decision: the rules that exist
 """Of ki dt, by which the newest error counts more than half: trapezoidal and rectangular integrals."""
@@ -120,12 +119,13 @@ def _shift_of_law(rec: Record, controller: PI) -> tuple[int, int]:
     """
     assert rec.command is not None and rec.torque is not None
     r, w, u = (x[:LONGEST] for x in (rec.command, rec.velocity, rec.torque))
-    inner = slice(FARTHEST, len(u) - FARTHEST)
+    farthest = POLICY.log_late
+    inner = slice(farthest, len(u) - farthest)
     within = np.abs(u[inner]) < POLICY.at_limit * float(np.abs(u).max())
     n, top = int(within.sum()), float(np.std(u))
     if n < POLICY.least_rows or not top > 0.0:
         return 0, 0
-    steps = range(-FARTHEST, FARTHEST + 1)
+    steps = range(-farthest, farthest + 1)
     least = (1e-6 * float(np.abs(u).max())) ** 2
     left: dict[tuple[int, int], float] = {}
     for a in steps:

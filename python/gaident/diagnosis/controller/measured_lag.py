@@ -39,8 +39,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 SAMPLES_LATE = (0, 1)  # no decision: the ways in which a log is written
-OLDER = (0, 1, 2)  # no decision: samples by which the log without a lag is late
-FASTEST, SLOWEST = 0.05, 50.0  # no decision: samples; a lag that is searched for
+FASTEST = 0.05  # no decision: samples, the fastest lag that is searched for; no log tells its pole of 2e-9 from 0
 STEP = 1e-4  # no decision: of a lag's pole, for a slope
 NEAR = 1e-3  # no decision: of a range's end, within which a search stands at it
 
@@ -83,7 +82,7 @@ def lag_shown(records: Sequence[Record], controller: PI | None) -> Lag | None:
     if not all(noise) or least > min(_late(parts) - margin, _without(parts, controller) + margin):
         return None
     tau = -dt / float(np.log(a))
-    if not FASTEST * (1.0 + NEAR) < tau / dt < SLOWEST * (1.0 - NEAR):
+    if not FASTEST * (1.0 + NEAR) < tau / dt < POLICY.slowest_lag * (1.0 - NEAR):
         return None
     step = STEP * (1.0 - a)
     slope = (np.concatenate(_left(parts, a + step, late)) - np.concatenate(left)) / step
@@ -112,8 +111,13 @@ class _Part:
 def _part(rec: Record, controller: PI) -> _Part:
     made = pi_torque(_command(rec), rec.velocity, rec.dt, controller, _held_before(rec, controller))
     used = _free(made, controller)
-    used[: max(OLDER)] = False
+    used[: POLICY.log_late] = False
     return _Part(rec, made, _logged(rec), used)
+
+
+def _older() -> range:
+    """Samples by which the log may be late."""
+    return range(POLICY.log_late + 1)
 
 
 def _free(made: Vector, controller: PI) -> NDArray[np.bool_]:
@@ -123,7 +127,7 @@ def _free(made: Vector, controller: PI) -> NDArray[np.bool_]:
     """
     limit = POLICY.at_limit * controller.limits[0]
     free = np.ones(len(made), bool)
-    for older in OLDER:
+    for older in _older():
         free[older:] &= np.abs(made[: len(made) - older]) < limit
     return free
 
@@ -176,7 +180,7 @@ def _fitted(parts: Sequence[_Part], late: int) -> tuple[float, list[Vector], int
     def pole(z: float) -> float:
         return float(np.exp(-np.exp(-z)))
 
-    ends = np.log(FASTEST), np.log(SLOWEST)
+    ends = np.log(FASTEST), np.log(POLICY.slowest_lag)
     found = minimize_scalar(lambda z: _power(_left(parts, pole(z), late)), bounds=ends, method="bounded", options={"xatol": 1e-8})
     a = pole(float(found.x))
     return a, _left(parts, a, late), late
@@ -185,7 +189,7 @@ def _fitted(parts: Sequence[_Part], late: int) -> tuple[float, list[Vector], int
 def _late(parts: Sequence[_Part]) -> float:
     """BIC of the torque that the controller makes, without a lag, by some samples late."""
     best = np.inf
-    for older in OLDER:
+    for older in _older():
         off = [part.logged[lines] - part.made[lines - older] for part in parts for lines in [np.flatnonzero(part.used)]]
         left = np.concatenate([d - np.mean(d) for d in off])
         best = min(best, bic(float(np.mean(left**2)), len(left), 0))
@@ -195,7 +199,7 @@ def _late(parts: Sequence[_Part]) -> float:
 def _without(parts: Sequence[_Part], controller: PI) -> float:
     """BIC of the best explanation without a lag: kp and ki free, command and velocity some samples older than the log's."""
     best = np.inf
-    for older in OLDER:
+    for older in _older():
         pieces = []
         for part in parts:
             rec = part.record

@@ -110,6 +110,10 @@ def _step_error(records: Sequence[Record], controller: Cascade) -> float:
 
 
 def _lag(records: Sequence[Record], controller: Cascade) -> float:
-    """Of the torque that the controller makes against the motion, mean of the records [lines]; infinite where none tells."""
-    lags = [lag.lag for r in records if (lag := torque_lag(driven_by(r, controller))) is not None]
+    """Of the torque that the controller makes against the velocity, mean of the records [lines]; infinite where none tells.
+
+    A logged position is left out: it is not as old as a velocity that was differenced from it.
+    """
+    driven = [driven_by(r, controller).with_channels(position=None) for r in records]
+    lags = [lag.lag for r in driven if (lag := torque_lag(r)) is not None]
     return float(np.mean(lags)) if lags else np.inf

@@ -31,7 +31,6 @@ __all__ = ["Replay", "replay", "rounding_of", "tolerance_of", "velocity_steps"]
 Vector = NDArray[np.float64]
 
 ROUNDING = 1e-6  # no decision: of the largest torque, what a controller in single precision is exact to
-DEVIATIONS = 3.0  # no decision: standard deviations of a sum of roundings that none exceeds
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +193,7 @@ class Allowed:
         at_once, drift = _of_signals(rec, command, controller, step)
         sample = controller.ki * rec.dt * (step + _of_command(command, step))
         error = controller.kp * (command - rec.velocity)
-        return cls(logged, error, own + at_once + DEVIATIONS * drift, 2.0 * own + at_once + sample)
+        return cls(logged, error, own + at_once + POLICY.sum_of_roundings * drift, 2.0 * own + at_once + sample)
 
     def __call__(self, off: Vector, limits: tuple[float, float] | None, edge: int = 0) -> bool:
         """Whether a replay that is off by so much [N m] (n,), from sample `edge` on, is the logged torque, rounded.

@@ -24,7 +24,6 @@ Vector = NDArray[np.float64]
 Allows: TypeAlias = Callable[[Vector, tuple[float, float], int], bool]
 """Whether what is off [N m] under limits of torque and integrator, from a sample on, is no more than rounding."""
 
-SHIFTS = (0, 1, -1, 2, -2)  # no decision: samples by which what the controller saw may be older (+) than the log's
 # By how much of ki dt the newest error counts more than half, and the one before less: the rule of integration in words.
 RULES = {0.0: "", 0.5: "a rectangular integral", -0.5: "a rectangular integral that lacks the newest error"}
 RPM = 30.0 / np.pi  # no decision: rpm in 1 rad/s
@@ -242,7 +241,8 @@ def _linear(case: _Case) -> Iterator[Explanation]:
 
 def _fitted(case: _Case) -> Iterator[Explanation]:
     top = case.controller.limits[0]
-    for shift in SHIFTS:
+    # Samples by which what the controller saw may be older (+) than the log's.
+    for shift in (0, *(s for k in range(1, POLICY.log_late + 1) for s in (k, -k))):
         e = _shifted(case.command - case.velocity, shift)
         for share, _ in _rules(case.controller):
             columns = [e, case.dt * _sum(e, share), np.ones(len(e))] if case.controller.ki else [e, np.ones(len(e))]

@@ -117,7 +117,7 @@ def first_experiment(
     (3776, True, True)
     """
     bench = _bench(dt, limits, inertia, kp)
-    course: tuple[tuple[Builder, float], ...] = (
+    parts: tuple[tuple[Builder, float], ...] = (
         (speed_ladder, 0.22),
         (slow_stairs, 0.18),
         (reversals, 0.10),
@@ -126,7 +126,7 @@ def first_experiment(
         (speed_ladder, 0.22),
     )
     command = _within(
-        np.concatenate([_filled(build, replace(bench, seconds=share * bench.seconds)) for build, share in course]), bench
+        np.concatenate([_filled(build, replace(bench, seconds=share * bench.seconds)) for build, share in parts]), bench
     )
     periodic = {name for name, term in LIBRARY.items() if term.harmonic} if checked_axis(axis) == "linear" else set()
     names = dict.fromkeys(effect for item in MENU for effect in item[2] if effect not in periodic)

@@ -168,9 +168,9 @@ def propose(
     table = [
         (pair, trial, [_tried(bench, item, trial, False) for item in items]) for pair in pairs for trial in _trials([pair], final)
     ]
-    hopeless = {id(pair) for pair, _, T in table if max(T, default=0.0) < POLICY.hope * POLICY.told_apart}
-    table = [row for row in table if id(row[0]) not in hopeless]
-    pairs = [pair for pair in pairs if id(pair) not in hopeless]
+    too_little = {id(pair) for pair, _, T in table if max(T, default=0.0) < POLICY.hope * POLICY.told_apart}
+    table = [row for row in table if id(row[0]) not in too_little]
+    pairs = [pair for pair in pairs if id(pair) not in too_little]
     if pairs:
         names = tuple(dict.fromkeys(name_of(e) for effect, rival in pairs for e in (effect, rival.effect)))
     trials = [trial for _, trial, _ in table]

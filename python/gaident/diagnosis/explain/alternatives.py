@@ -10,14 +10,13 @@ from gaident.diagnosis.library.terms import LIBRARY, level_of
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS
 from gaident.diagnosis.selection.rivals import Replacement
+from gaident.models.effect_rows import SHAFT
 from gaident.results.estimate import Estimate
 
 __all__ = ["alternatives_of", "impossible_here"]
 
 OF_THE_CONTROLLER = (OTHER_GAINS, "torque_filter")
 """What a controller that is not the drive's may lack, in words of the findings."""
-ON_THE_SHAFT = "shaft"
-"""The place of effects that add a torque."""
 
 
 def alternatives_of(
@@ -42,7 +41,7 @@ def alternatives_of(
     names += here
     if offset is None or effect != offset.effect:
         names += [name for name in equivalents(name_of(effect)) if name not in never]
-    if not follows and not shown and LIBRARY[effect].place != ON_THE_SHAFT:
+    if not follows and not shown and LIBRARY[effect].place != SHAFT:
         names += OF_THE_CONTROLLER
     return list(dict.fromkeys(names))
 

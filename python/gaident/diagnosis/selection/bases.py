@@ -24,8 +24,8 @@ from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import ClosedLoop, OpenLoop, Predictor
 from gaident.estimation.prefilter import Prefilter
 from gaident.estimation.projection import WORST
-from gaident.estimation.regression.inverse_dynamics import ORDER, inverse_dynamics
-from gaident.estimation.regression.motion import BAND, cutoff_of
+from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
+from gaident.estimation.regression.motion import BAND, ORDER, cutoff_of
 from gaident.estimation.regression.torque_terms import TERMS
 from gaident.estimation.term import Scales, Term
 from gaident.models.model import Model

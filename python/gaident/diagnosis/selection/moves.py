@@ -48,6 +48,7 @@ from gaident.estimation.objective import Fit, Hypothesis
 from gaident.estimation.prediction import OpenLoop
 from gaident.estimation.projection import WORST, orthonormal_rows
 from gaident.estimation.term import Term
+from gaident.models.effect_rows import SHAFT
 
 __all__ = ["Moves"]
 
@@ -227,7 +228,7 @@ class Moves(SideMoves):
         tries = [self.refitted(shorter, y, self.policy.long)]
         short: list[Fit] = []
         for t in self.candidates(tries[0]):
-            if t.size > 1 or t.place == "shaft":
+            if t.size > 1 or t.place == SHAFT:
                 continue
             rows = t.starts(shorter.parameters.scales)
             if not rows:

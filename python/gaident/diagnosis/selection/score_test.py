@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.axis import TURN
 from gaident.control.filtering import filtered
 from gaident.diagnosis.selection.mechanisms import evenly_damped
 from gaident.estimation import least_squares as ls
@@ -40,7 +41,6 @@ __all__ = ["Screened", "ScoreTest"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-TURN = 2.0 * np.pi  # no decision: rad
 RESONANCES, DAMPING = 48, 0.05  # no decision: a grid; steps of 8 %, each seen within its half-width of 5 %
 PROMISING = 2  # no decision: frequencies for each noise filter that are simulated
 ROOM = 8  # no decision: samples for each direction that is taken out before a noise filter is fitted

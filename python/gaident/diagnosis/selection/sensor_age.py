@@ -50,7 +50,6 @@ from gaident.policy.table import POLICY
 __all__ = ["searched"]
 
 EXACT = 1e-3  # no decision: lines, what the parabola of a lag is exact to
-SURE = 0.02  # no decision: lines, to which a search finds by how much the torque is ahead
 
 
 def searched(
@@ -150,7 +149,7 @@ def _refined(found: Selection, ahead: TorqueLag) -> float | None:
     """
     from scipy.optimize import minimize_scalar
 
-    if ahead.std < SURE:
+    if ahead.std < POLICY.ahead_exact:
         return None
     space, final = found.space, found.final
     for term in final.parameters.terms:
@@ -160,9 +159,9 @@ def _refined(found: Selection, ahead: TorqueLag) -> float | None:
     def score(lines: float) -> float:
         return _score_under(space.objective.data.aged(-float(lines)), final, space)
 
-    best = minimize_scalar(score, bounds=(0.0, HALF), method="bounded", options={"xatol": SURE})
+    best = minimize_scalar(score, bounds=(0.0, HALF), method="bounded", options={"xatol": POLICY.ahead_exact})
     closer = float(best.x)
-    return closer if abs(closer - ahead.lag) > SURE and best.fun < score(ahead.lag) else None
+    return closer if abs(closer - ahead.lag) > POLICY.ahead_exact and best.fun < score(ahead.lag) else None
 
 
 def _score_beside(again: Selection, found: Selection) -> float:

@@ -32,7 +32,6 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 STEPS = 12  # no decision: work, of Gauss and Newton
-SLOW = 0.1  # no decision: of the cost: a step with less of a fall does not lead out of a place far behind
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,21 +54,21 @@ class UnderController:
         objective: that of the space, with a memory of its own: every controller tried makes a data set.
         """
 
-        def hopeless(found: Fit) -> bool:
+        def too_far(found: Fit) -> bool:
             return space.score(ls.scored(objective, found)) > beyond
 
-        z, found = self.closest(objective, fit, WHITE, z, hopeless)
-        if hopeless(found):
+        z, found = self.closest(objective, fit, WHITE, z, too_far)
+        if too_far(found):
             return None
         if space.whitens:
-            z, found = self.closest(objective, found, objective.own_noise(found), z, hopeless)
+            z, found = self.closest(objective, found, objective.own_noise(found), z, too_far)
         found = ls.reestimated(objective, found)
         return None if found.cost >= WORST else (z, found)
 
     def closest(
-        self, objective: Objective, fit: Fit, noise: NoiseFilter, z: Vector, hopeless: Callable[[Fit], bool]
+        self, objective: Objective, fit: Fit, noise: NoiseFilter, z: Vector, too_far: Callable[[Fit], bool]
     ) -> tuple[Vector, Fit]:
-        """(z, model) of the least cost under one noise filter, or on the way there, where that is hopeless."""
+        """(z, model) of the least cost under one noise filter, or on the way there, where it stays too far behind."""
         found = ls.fit(objective, self.of(fit.hypothesis, z), fit.x, noise, POLICY.usual)
         for _ in range(STEPS):
             v, C = self.slopes(objective, found.hypothesis, found.x, noise, z)
@@ -82,7 +81,7 @@ class UnderController:
             else:
                 break
             fall, z, found = found.cost - trial.cost, to, trial
-            if ls.negligible(objective, fall, found.cost) or (fall < SLOW * found.cost and hopeless(found)):
+            if ls.negligible(objective, fall, found.cost) or (fall < POLICY.slow_fall * found.cost and too_far(found)):
                 break
         return z, found
 

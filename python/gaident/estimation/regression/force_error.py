@@ -29,7 +29,7 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.errors import ModelError, RecordError, SettingsError
-from gaident.estimation.regression.motion import Motion, cutoff_of, low_passed, motion_of, noise_share, torque_noise
+from gaident.estimation.regression.motion import ORDER, Motion, cutoff_of, low_passed, motion_of, noise_share, torque_noise
 from gaident.models.model import Model
 from gaident.models.simulate import run, simulate
 from gaident.results.inverse_dynamics import InverseDynamics
@@ -39,7 +39,6 @@ __all__ = ["FilteredRecords", "ForceError", "band_of", "effects_before_the_shaft
 Vector = NDArray[np.float64]
 TorqueOf = Callable[[Record], Vector]
 
-ORDER = 4  # no decision: of the low-pass
 LOOP = 0.4  # no decision: accuracy of the inversion
 """Gain of the stiff loop, of the one that takes an integrator to its command in a single step."""
 INTEGRAL = 0.02  # no decision: the same

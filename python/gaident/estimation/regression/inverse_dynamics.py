@@ -8,23 +8,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.axis import Text, checked_axis, say, turns
+from gaident.axis import TURN, Text, checked_axis, say, turns
 from gaident.data.record import Record
 from gaident.errors import RecordError, SettingsError
 from gaident.estimation.criterion import bic, effective_samples
-from gaident.estimation.regression.motion import cutoff_of, noise_share
+from gaident.estimation.regression.motion import ORDER, cutoff_of, noise_share
 from gaident.estimation.regression.regression import covariance, solve
 from gaident.estimation.regression.rows import Rows, decimation_of, rows_of
 from gaident.estimation.regression.torque_terms import CHOICES, TERMS, estimates_of
 from gaident.policy.table import POLICY
 from gaident.results.inverse_dynamics import InverseDynamics
 
-__all__ = ["ORDER", "inverse_dynamics"]
+__all__ = ["inverse_dynamics"]
 
 Vector = NDArray[np.float64]
-
-ORDER = 4  # no decision: of a Butterworth filter
-TURN = 2.0 * np.pi  # no decision: rad
 
 
 def inverse_dynamics(

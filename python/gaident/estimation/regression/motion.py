@@ -22,11 +22,12 @@ from gaident.control.filtering import zero_phase
 from gaident.data.record import Record
 from gaident.models.starts import noise_std
 
-__all__ = ["BAND", "Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "torque_noise"]
+__all__ = ["BAND", "ORDER", "Motion", "cutoff_of", "low_passed", "motion_of", "noise_share", "torque_noise"]
 
 Vector = NDArray[np.float64]
 Spectrum = tuple[Vector, Vector, float]  # frequencies [Hz], power density, level of the noise
 
+ORDER = 4  # no decision: of the Butterworth filter of all regressions
 NOISE_SHARE = 1e-3  # no decision: how exact an inertia is
 """Most of the acceleration's power that may be noise: so much is the inertia too small by it."""
 
@@ -89,7 +90,7 @@ def low_passed(x: Vector, dt: float, cutoff_hz: float, order: int) -> Vector:
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
     # no decision: samples beyond the ends, for a filter to settle
     extension = min(max(15, math.ceil(2.0 / (cutoff_hz * dt))), x.size - 1)
-    return zero_phase(_sections(order, cutoff_hz * 2.0 * dt), (x - line)[None, :], extension)[0] + line
+    return np.asarray(zero_phase(_sections(order, cutoff_hz * 2.0 * dt), (x - line)[None, :], extension)[0] + line)
 
 
 @lru_cache(maxsize=64)

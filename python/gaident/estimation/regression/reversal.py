@@ -22,7 +22,7 @@ import numpy as np
 from gaident.data.record import Record
 from gaident.errors import GaidentError
 from gaident.estimation.regression.inverse_dynamics import inverse_dynamics
-from gaident.estimation.regression.motion import cutoff_of, motion_of, torque_noise
+from gaident.estimation.regression.motion import ORDER, cutoff_of, motion_of, torque_noise
 from gaident.estimation.regression.regression import covariance, solve
 from gaident.estimation.regression.rows import rows_of
 from gaident.estimation.regression.torque_terms import STEEP_DRAG, estimates_of
@@ -30,7 +30,6 @@ from gaident.results.estimate import Estimate
 
 __all__ = ["jump_at_reversal", "torque_held_at_rest"]
 
-ORDER = 4  # no decision: of a Butterworth filter
 
 DIRECTED = ("coulomb_by_direction", "offset")  # the same columns as dry friction and a constant
 

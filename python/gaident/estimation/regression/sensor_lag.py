@@ -9,12 +9,10 @@ position's backward difference is late by half a sample; a velocity filter by it
 from __future__ import annotations
 
 from gaident.data.record import Record
-from gaident.estimation.regression.motion import cutoff_of, low_passed, motion_of
+from gaident.estimation.regression.motion import ORDER, cutoff_of, low_passed, motion_of
 from gaident.policy.table import POLICY
 
 __all__ = ["velocity_lag"]
-
-ORDER = 4  # no decision: of the low-pass
 
 
 def velocity_lag(rec: Record) -> float | None:

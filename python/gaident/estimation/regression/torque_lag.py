@@ -1,7 +1,7 @@
 """By how many samples a logged torque stands behind the motion that it makes, from the inverse-dynamics regression.
 
     u_h(n)  = (u(n) + u(n-1))/2                 a torque held over each sample, as it shows in w(n+1) - w(n-1)
-    J(k)    = min |u_h(n + k) - J a - B w - C sign(w) - T|^2 / |u_h - mean(u_h)|^2,   k = -3 .. 3
+    J(k)    = min |u_h(n + k) - J a - B w - C sign(w) - T|^2 / |u_h - mean(u_h)|^2,   |k| <= `log_late` + 1
     lag     = where the parabola through the least of J and its neighbours has its lowest point
     std     = sqrt(J_min/(n_eff c)),   J(k) = J_min + c (k - lag)^2
 
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gaident.data.record import Record
 from gaident.data.signals.decimation import low_passed
 from gaident.estimation.criterion import effective_samples
-from gaident.estimation.regression.motion import cutoff_of, motion_of
+from gaident.estimation.regression.motion import ORDER, cutoff_of, motion_of
 from gaident.estimation.regression.regression import solve
 from gaident.estimation.regression.rows import decimation_of
 from gaident.estimation.regression.torque_terms import columns_of
@@ -31,9 +31,6 @@ __all__ = ["TorqueLag", "torque_lag"]
 
 Vector = NDArray[np.float64]
 
-ORDER = 4  # no decision: of the low-pass
-FARTHEST = 3  # no decision: how far is looked
-"""Samples in either direction; what is farther away is no slip of a log's lines."""
 LONGEST = 1 << 17  # no decision: work
 """Samples that are looked at."""
 
@@ -69,7 +66,8 @@ def torque_lag(rec: Record, cutoff_hz: float | None = None) -> TorqueLag | None:
         return None
     columns = np.column_stack([low_passed(np.ascontiguousarray(c), factor) for c in columns_of(terms, motion).T])[kept]
     torque = low_passed(torque, factor)
-    steps = range(-FARTHEST, FARTHEST + 1)
+    farthest = POLICY.log_late + 1  # a parabola has a neighbour on either side
+    steps = range(-farthest, farthest + 1)
     left: list[float] = []
     residuals: list[Vector] = []
     for k in steps:

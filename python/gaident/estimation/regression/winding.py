@@ -13,7 +13,7 @@ from gaident.data.signals.arrays import channel
 from gaident.data.signals.decimation import decimated
 from gaident.data.winding import Winding
 from gaident.errors import RecordError
-from gaident.estimation.regression.motion import cutoff_of, low_passed
+from gaident.estimation.regression.motion import ORDER, cutoff_of, low_passed
 from gaident.estimation.regression.regression import covariance, solve
 from gaident.estimation.regression.rows import decimation_of
 from gaident.policy.table import POLICY
@@ -23,7 +23,6 @@ __all__ = ["WindingFit", "estimate_winding"]
 
 Vector = NDArray[np.float64]
 
-ORDER = 4  # no decision: of the low-pass
 NAMES = {"resistance": "Ohm", "back_emf_constant": "V s/rad", "inductance": "H", "offset": "V"}
 
 

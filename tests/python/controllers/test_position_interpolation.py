@@ -44,7 +44,7 @@ def record(effects: dict[str, dict[str, float]], decimals: int = 9) -> ga.Record
 def test_a_profile_is_found_again_between_its_lines(every: int, decimals: int) -> None:
     whole = profile(2.0, T)
     found, straight = (
-        course(np.round(whole[::every], decimals), every)[: len(whole)] for course in (profile_between, at_the_clock)
+        between(np.round(whole[::every], decimals), every)[: len(whole)] for between in (profile_between, at_the_clock)
     )
     off, plain = (np.abs(np.diff(x - whole)[: -2 * every]) / T for x in (found, straight))
     assert np.sqrt(np.mean(off**2)) < 0.05 * np.sqrt(np.mean(plain**2))  # rad/s
@@ -54,7 +54,7 @@ def test_a_profile_is_found_again_between_its_lines(every: int, decimals: int) -
 def test_a_smooth_profile_has_no_corners() -> None:
     t = np.arange(0.0, 1.0, T)
     whole = 3.0 * np.sin(20.0 * t) + np.sin(90.0 * t)
-    found, straight = (course(whole[::EVERY], EVERY)[: len(t)] for course in (profile_between, at_the_clock))
+    found, straight = (between(whole[::EVERY], EVERY)[: len(t)] for between in (profile_between, at_the_clock))
     inside = slice(EVERY, -2 * EVERY)  # before the first line and behind the last nothing is known
     assert np.abs(found - whole)[inside].max() < 0.02 * np.abs(straight - whole)[inside].max()
     assert np.array_equal(found[::EVERY], whole[::EVERY])
@@ -128,7 +128,7 @@ def test_the_way_of_a_command_is_a_setting() -> None:
     smooth = ga.Cascade(ga.PI(0.3, 15.0), T, position=ga.P(30.0), interpolation="smooth")
     assert ga.Cascade.from_dict(smooth.to_dict()) == smooth
     assert "interpolation" not in DRIVE.to_dict()
-    assert [c.interpolation for c in smooth.courses(1e-3)] == ["smooth", "straight"] and len(smooth.courses(T)) == 1
+    assert [c.interpolation for c in smooth.interpolations(1e-3)] == ["smooth", "straight"] and len(smooth.interpolations(T)) == 1
     rec = record({})
     assert line_equation([rec], DRIVE, None) and not line_equation([rec], smooth, None)
     with pytest.raises(ControllerError, match="interpolation is 'cubic'"):
