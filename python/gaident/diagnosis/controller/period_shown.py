@@ -37,7 +37,7 @@ from gaident.policy.table import POLICY
 
 __all__ = ["FASTER", "Period", "period_shown"]
 
-FASTER = (2, 4, 8, 16)  # no decision: work; samples of a controller to a line of the log, as drives have them
+FASTER = (2, 4, 8, 16)  # no decision: those that are tried; what lies between, 5 or 10, is taken for its neighbour
 UNLIKE = ("", "torque_limit", "anti_windup")  # what a replay at the log's rate may say: any other reason explains the torque
 
 
