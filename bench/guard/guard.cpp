@@ -140,10 +140,10 @@ constexpr Sizes sizes[] = {
 
 // The loop with effects, two masses, two substeps, from rest, without what a run costs that has no samples.
 // `chosen`: all but those of the coupling, or one by name.
-double effect_instructions(const EffectKernel* lanes, const std::string& chosen) {
+double effect_instructions(const EffectKernel& kernel, bool alone, const std::string& chosen) {
     const std::complex<double> poles[] = {-15.41, {-10.30, 150.9}, {-10.30, -150.9}};
     const std::complex<double> zeros[] = {{-4.26, 93.98}, {-4.26, -93.98}};
-    std::vector<EffectModel> models(lanes != nullptr ? effect_lanes : 1);
+    std::vector<EffectModel> models(alone ? 1 : effect_lanes);
     for (EffectModel& m : models) {
         m.linear = factors_from_roots(6545.29, poles, zeros);
         for (int e = 0; e < effect_count; ++e) {
@@ -184,8 +184,7 @@ double effect_instructions(const EffectKernel* lanes, const std::string& chosen)
     run.history_mask = 3;
     const auto go = [&](std::size_t n) {
         run.input = std::span(input).first(n);
-        if (lanes != nullptr) lanes->run(run, constants.data());
-        else run_effects<double>(run, load_constants<double>(constants.data()));
+        (alone ? kernel.alone : kernel.run)(run, constants.data());
     };
     go(samples_with_effects);  // the first call also looks up what the library brings along
     const auto count = [&](std::size_t n) { return static_cast<double>(guard::instructions([&] { go(n); })); };
@@ -258,12 +257,12 @@ void rows(Judge& judge) {
 
 void effect_rows(Judge& judge) {
     for (const char* set : {"alone", "baseline", "avx2", "avx512"}) {
-        const bool alone = set == std::string("alone");
-        const EffectKernel* lanes = alone ? nullptr : effects_named(set);
-        if (!alone && lanes == nullptr) continue;
+        const bool alone = set == std::string("alone");  // one candidate, as AVX2 has it
+        const EffectKernel* kernel = effects_named(alone ? "avx2" : set);
+        if (kernel == nullptr) continue;
         const auto row = [&](const std::string& chosen) {
             judge.row(std::string(set) + " effect " + chosen, most_share_effects,
-                      [&] { return effect_instructions(lanes, chosen); });
+                      [&] { return effect_instructions(*kernel, alone, chosen); });
         };
         for (const Sizes& s : sizes) row(s.name);
         row("all");

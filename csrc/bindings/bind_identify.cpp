@@ -217,6 +217,7 @@ void bind_identify(py::module_& m) {
         .def(py::init<std::vector<PyRecord>, const Loop&, const std::string&>(), py::arg("records"), py::arg("loop"),
              py::arg("kernels") = "")
         .def_property_readonly("kernels", [](const PyExperiment& e) { return e.experiment.kernels->name; })
+        .def_property_readonly("fused", [](const PyExperiment& e) { return e.experiment.kernels->fused; })
         .def("search", &search_records, py::arg("ranges"), py::arg("settings"), py::arg("trials"), py::arg("seed"),
              py::arg("workers"), py::arg("progress") = py::none())
         .def("refine", &refine, py::arg("models"), py::arg("ranges"), py::arg("whitening"), py::arg("max_iterations"),

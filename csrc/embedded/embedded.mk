@@ -62,7 +62,7 @@ $(OUT)/$1.host: $(SOURCES)
 	$(CXX) $(COMMON) $(WARNINGS) $(CORE) -DGAIDENT_ARITHMETIC=$(call arithmetic,$1) -c -o $$@.main.o $(HERE)/identify.cpp)
 	$(if $(filter slices,$(call program,$1)),\
 	$(CXX) $(COMMON) $(WARNINGS) $(CORE) -DGAIDENT_ARITHMETIC=$(call arithmetic,$1) -c -o $$@.core.o $(HERE)/gaident.cpp)
-	$(CC) -o $$@ $$@.main.o $(if $(filter slices,$(call program,$1)),$$@.core.o) $$@.board.o
+	$(CC) -o $$@ $$@.main.o $(if $(filter slices,$(call program,$1)),$$@.core.o) $$@.board.o -lm
 
 $(OUT)/$1.host.txt: $(OUT)/$1.host
 	$$< > $$@

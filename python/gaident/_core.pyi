@@ -175,7 +175,7 @@ def servo_order(*, loop: Loop, clock: Clock) -> int:
 class Experiment:
     """Records and their loop: what candidates are simulated against.
 
-    kernels: an instruction set, "" for the machine's best.
+    kernels: an instruction set, "" for the machine's best; fused: whether it has an instruction for a b + c.
     Ctrl-C ends long work, and so does an exception that `progress` raises. It gets
     (generations done, best fitness, number of species, (p, q) of the one that leads or (-1, -1)).
     """
@@ -183,6 +183,8 @@ class Experiment:
     def __init__(self, records: Sequence[Record], loop: Loop, kernels: str = "") -> None: ...
     @property
     def kernels(self) -> str: ...
+    @property
+    def fused(self) -> bool: ...
     def search(
         self,
         ranges: SearchRanges,

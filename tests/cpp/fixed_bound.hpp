@@ -47,6 +47,8 @@ inline Doubtful operator-(Doubtful a) { return {-a.value, a.error, 0.0}; }
 inline Doubtful operator*(Doubtful a, Doubtful b) {
     return {a.value * b.value, std::abs(a.value) * b.error + std::abs(b.value) * a.error, 1.0};
 }
+inline Doubtful fma(Doubtful a, Doubtful b, Doubtful c) { return c + a * b; }
+inline Doubtful fnma(Doubtful a, Doubtful b, Doubtful c) { return c - a * b; }
 inline Doubtful operator/(Doubtful a, Doubtful b) {
     return {a.value / b.value, (a.error + std::abs(a.value / b.value) * b.error) / std::abs(b.value), 2.0};
 }

@@ -20,10 +20,10 @@ template <class R, int N>
     const int n = N >= 0 ? N : plant.order;
     Delta < R, N<0 ? -1 : N + 1> loop;
     loop.order = n + 1;
-    const R scale = R(1.0) / (R(1.0) + c1 * plant.b[0]);
+    const R scale = R(1.0) / fma(c1, plant.b[0], R(1.0));
     for (int i = 0; i <= n + 1; ++i) {
         const R head = i <= n ? R(c1 * plant.b[i]) : R(0.0);
-        const R numerator = i > 0 ? R(head + c0 * plant.b[i - 1]) : head;
+        const R numerator = i > 0 ? R(fma(c0, plant.b[i - 1], head)) : head;
         loop.b[i] = numerator * scale;
         if (i > 0) loop.a[i - 1] = ((i <= n ? plant.a[i - 1] : R(0.0)) + numerator) * scale;
     }
@@ -35,7 +35,8 @@ template <class R, int N>
 //     y(n)       = x[0](n) + b[0] r(n)
 //     x[i](n+1)  = x[i](n) + x[i+1](n) + b[i+1] r(n) - a[i] y(n),   x[N] = 0
 //
-// y enters last: what does not depend on it is ready before it is, which shortens the chain from one sample to the next.
+// y enters last, by one fused operation: what does not depend on it is ready before it is, which shortens the chain from one sample to
+// the next.
 // `N` is the order when known at compile time, so that the state lives in registers; -1 otherwise.
 // Without input (r = 0) the terms in b are left out.
 // Coefficients C and states X are of the signals' own type R, but for a drive's arithmetic that keeps them in memory words and
@@ -44,12 +45,12 @@ template <class R, int N, bool driven = true, class C = R, class X = R>
 [[gnu::always_inline]] inline R recurrence_step(int order, const C* a, const std::type_identity_t<C>* b, X* x, R r) {
     const int n = N >= 0 ? N : order;
     const auto with_input = [&](const auto& sum, int i) [[gnu::always_inline]] {
-        if constexpr (driven) return sum + b[i] * r;
+        if constexpr (driven) return fma(b[i], r, sum);
         else return sum;
     };
     const R y = with_input(x[0], 0);
-    for (int i = 0; i + 1 < n; ++i) x[i] = with_input(x[i] + x[i + 1], i + 1) - a[i] * y;
-    if (n > 0) x[n - 1] = with_input(x[n - 1], n) - a[n - 1] * y;
+    for (int i = 0; i + 1 < n; ++i) x[i] = fnma(a[i], y, with_input(x[i] + x[i + 1], i + 1));
+    if (n > 0) x[n - 1] = fnma(a[n - 1], y, with_input(x[n - 1], n));
     return y;
 }
 
@@ -57,9 +58,10 @@ template <class R, int N, bool driven = true, class C = R, class X = R>
 template <class R, int N>
 [[gnu::always_inline]] inline R recurrence_step(int order, const R* a, const R* b, const R* c, R* x, R r, R s) {
     const int n = N >= 0 ? N : order;
-    const R y = (x[0] + b[0] * r) + c[0] * s;
-    for (int i = 0; i + 1 < n; ++i) x[i] = (((x[i] + x[i + 1]) + b[i + 1] * r) + c[i + 1] * s) - a[i] * y;
-    if (n > 0) x[n - 1] = ((x[n - 1] + b[n] * r) + c[n] * s) - a[n - 1] * y;
+    const auto with_inputs = [&](const R& sum, int i) [[gnu::always_inline]] { return fma(c[i], s, fma(b[i], r, sum)); };
+    const R y = with_inputs(x[0], 0);
+    for (int i = 0; i + 1 < n; ++i) x[i] = fnma(a[i], y, with_inputs(x[i] + x[i + 1], i + 1));
+    if (n > 0) x[n - 1] = fnma(a[n - 1], y, with_inputs(x[n - 1], n));
     return y;
 }
 

@@ -52,9 +52,9 @@ struct ControllerState {
           integrator_limit(R(c.integrator_limit)) {}
 
     R step(R e) {
-        const R I = clamp(s + g * e, -integrator_limit, integrator_limit);
-        s = I + g * e;
-        return clamp(kp * e + I, -torque_limit, torque_limit);
+        const R I = clamp(fma(g, e, s), -integrator_limit, integrator_limit);
+        s = fma(g, e, I);
+        return clamp(fma(kp, e, I), -torque_limit, torque_limit);
     }
 };
 

@@ -46,9 +46,9 @@ public:
     R step(const FilterChain& chain, R u) {
         for (int i = 0; i < chain.count; ++i) {
             const DigitalFilter& f = chain.filter[i];
-            const R y = R(f.b0) * u + x1_[i];
-            x1_[i] = (R(f.b1) * u - R(f.a1) * y) + x2_[i];
-            x2_[i] = R(f.b2) * u - R(f.a2) * y;
+            const R y = fma(R(f.b0), u, x1_[i]);
+            x1_[i] = fnma(R(f.a1), y, fma(R(f.b1), u, x2_[i]));
+            x2_[i] = fnma(R(f.a2), y, R(f.b2) * u);
             u = y;
         }
         return u;
@@ -58,7 +58,7 @@ public:
         for (int i = 0; i < chain.count; ++i) {
             const DigitalFilter& f = chain.filter[i];
             x2_[i] = R(f.b2 - f.a2) * u;
-            x1_[i] = R(f.b1 - f.a1) * u + x2_[i];
+            x1_[i] = fma(R(f.b1 - f.a1), u, x2_[i]);
         }
     }
 

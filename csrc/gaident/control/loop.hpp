@@ -18,18 +18,18 @@ struct SteppedLoop {
     // the rest follows. Without feed-through (held plant, b0 = 0) the same lines reduce to the plain digital controller.
     [[gnu::always_inline]] R step(int order, const R* a, const R* b, R* x, R r, R& u) {
         const R h = r - x[0], one = R(1.0);
-        const R free_error = (h - b[0] * pi.s) / (one + b[0] * (pi.kp + pi.g));
-        const R I_free = pi.s + pi.g * free_error;
+        const R free_error = fnma(b[0], pi.s, h) / fma(b[0], pi.kp + pi.g, one);
+        const R I_free = fma(pi.g, free_error, pi.s);
         const R I = clamp(I_free, -pi.integrator_limit, pi.integrator_limit);
         // Where I is clamped it is a constant, and the loop closes over kp alone; where not, both lines agree.
-        const R clamped_error = (h - b[0] * I) / (one + b[0] * pi.kp);
-        u = clamp(pi.kp * clamped_error + I, -pi.torque_limit, pi.torque_limit);
-        const R e = h - b[0] * u;
-        pi.s = clamp(pi.s + pi.g * e, -pi.integrator_limit, pi.integrator_limit) + pi.g * e;
+        const R clamped_error = fnma(b[0], I, h) / fma(b[0], pi.kp, one);
+        u = clamp(fma(pi.kp, clamped_error, I), -pi.torque_limit, pi.torque_limit);
+        const R e = fnma(b[0], u, h);
+        pi.s = fma(pi.g, e, clamp(fma(pi.g, e, pi.s), -pi.integrator_limit, pi.integrator_limit));
         const int n = N >= 0 ? N : order;
-        const R y = x[0] + b[0] * u;
-        for (int i = 0; i + 1 < n; ++i) x[i] = ((x[i] + x[i + 1]) + b[i + 1] * u) - a[i] * y;
-        if (n > 0) x[n - 1] = (x[n - 1] + b[n] * u) - a[n - 1] * y;
+        const R y = fma(b[0], u, x[0]);
+        for (int i = 0; i + 1 < n; ++i) x[i] = fnma(a[i], y, fma(b[i + 1], u, x[i] + x[i + 1]));
+        if (n > 0) x[n - 1] = fnma(a[n - 1], y, fma(b[n], u, x[n - 1]));
         return y;
     }
 };

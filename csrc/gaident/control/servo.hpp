@@ -28,7 +28,7 @@ struct Servo : ControllerState<R> {
 
     // As it stands in steady motion: velocity w under the command r, the torque u.
     void rest(R r, R w, R u) {
-        integral_ = this->s = u - this->kp * (R(settings_.command_weight) * r - w);
+        integral_ = this->s = fnma(this->kp, fma(R(settings_.command_weight), r, -w), u);
         command_.rest(settings_.command_filters, r);
         velocity_.rest(settings_.velocity_filters, w);
         torque_.rest(settings_.torque_filters, u);
@@ -39,27 +39,27 @@ struct Servo : ControllerState<R> {
     R command(std::size_t n, R source, R feedforward, R angle) {
         if (settings_.position_gain == 0.0) asked_ = source;
         else if (n % static_cast<std::size_t>(settings_.position_every) == 0)
-            asked_ = R(settings_.position_gain) * (source - angle) + feedforward;
+            asked_ = fma(R(settings_.position_gain), source - angle, feedforward);
         return command_.step(settings_.command_filters, asked_);
     }
 
     // The torque under the velocity command r, at the measured velocity.
     R torque(R r, R measured, R feedforward) {
         const R w = velocity_.step(settings_.velocity_filters, measured), e = r - w;
-        const R proportional = this->kp * (R(settings_.command_weight) * r - w) + feedforward;
+        const R proportional = fma(this->kp, fma(R(settings_.command_weight), r, -w), feedforward);
         const R integral_before = integral_;
-        R I = clamp(this->s + this->g * e, -this->integrator_limit, this->integrator_limit);
+        R I = clamp(fma(this->g, e, this->s), -this->integrator_limit, this->integrator_limit);
         const R v = proportional + I;
         R u = clamp(v, -this->torque_limit, this->torque_limit);
         if (settings_.anti_windup == AntiWindup::tracking) {
-            I = I + (u - v) * R(tracking_);
+            I = fma(u - v, R(tracking_), I);
         } else if (settings_.anti_windup == AntiWindup::hold) {
             // (v - u) e > 0: limited, and driven further
             I = greater((v - u) * e, R(0.0), integral_before, I);
             u = clamp(proportional + I, -this->torque_limit, this->torque_limit);
         }
         integral_ = I;
-        this->s = I + R(before_) * e;
+        this->s = fma(R(before_), e, I);
         return torque_.step(settings_.torque_filters, u);
     }
 

@@ -151,7 +151,7 @@ private:
     static void add(const Polynomial& x, R factor, int power, Powers<R>& out, int n = max_loop_order) {
         for (std::size_t i = 0; i < x.size() && power + static_cast<int>(i) <= n; ++i) {
             R& c = out.c[power + static_cast<int>(i)];
-            c = c + R(x[i]) * factor;
+            c = fma(R(x[i]), factor, c);
         }
     }
 
@@ -162,15 +162,15 @@ private:
         Powers<R>* const pair = &w;
         for (int i = 0; i < n; ++i) {
             const R lower = w.c[i + 1];
-            angle.c[i] = angle.c[i] + (lower + lower) * half;
+            angle.c[i] = fma(lower + lower, half, angle.c[i]);
             angle.c[i + 1] = lower * half;
         }
         const Between held[2] = {Between::held, Between::held};
         inner_(n, D, pair, held, 2);
         const R gain(position_gain_), slope(slope_ / position_period_);
         for (int i = n; i >= 0; --i) {
-            D.c[i] = D.c[i] + gain * angle.c[i];
-            w.c[i] = gain * w.c[i] + (i > 0 ? R(slope * w.c[i - 1]) : R(0.0));
+            D.c[i] = fma(gain, angle.c[i], D.c[i]);
+            w.c[i] = fma(gain, w.c[i], i > 0 ? R(slope * w.c[i - 1]) : R(0.0));
         }
     }
 

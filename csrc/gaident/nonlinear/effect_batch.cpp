@@ -195,8 +195,7 @@ private:
             run.own_answer = &asked[3 * width];
             own->begin(models, run.own_signals, &asked[3 * width]);
         }
-        if (alone) run_effects<double>(run, load_constants<double>(constants.data()));
-        else job_.kernel->run(run, constants.data());
+        (alone ? job_.kernel->alone : job_.kernel->run)(run, constants.data());
         spread(group, velocity, out_.velocity, width, write);
         spread(group, torque, out_.torque, width, write);
         spread(group, angle, out_.angle, width, write);

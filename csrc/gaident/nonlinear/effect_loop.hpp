@@ -53,7 +53,7 @@ public:
         if constexpr (!is_servo) pi_.s = c_.stored;
         else if (run.moving) pi_.rest(start.command, start.velocity, c_.stored);
         angle_ = R(run.start_angle);
-        theta_middle_ = angle_ + plant_.velocity() * R(0.5 * h_);
+        theta_middle_ = fma(plant_.velocity(), R(0.5 * h_), angle_);
         if (looking_back_)
             for (std::size_t i = 0; i <= run.history_mask; ++i) Pack<R>::store(c_.before, run.history + i * width);
         // Friction that drives the shaft is none: such a candidate counts as diverged.
@@ -130,7 +130,7 @@ private:
             const int steps = n == 0 && run_.moving ? 0 : run_.substeps;
             for (int j = 0; j < steps; ++j) {
                 // Adams and Bashforth's mean over the substep to come.
-                act(u * R(23.0 / 12.0) - u_before * R(16.0 / 12.0) + u_long_before * R(5.0 / 12.0));
+                act(fma(u, R(23.0 / 12.0), fnma(u_before, R(16.0 / 12.0), u_long_before * R(5.0 / 12.0))));
                 middle(here, next, (j + 0.5) * share);
                 substep(0, (static_cast<double>(n) - 1.0 + (j + 0.5) * share) * run_.sample_time);
                 theta_ = run_.position.empty() ? angle_ : R(here + (next - here) * ((j + 1) * share));
@@ -158,7 +158,7 @@ private:
         turning_ = turning_ || load_.turning;
         // As for friction at the motor; where the step is too coarse for the resonance both ends cannot be solved.
         if (load_.dry) {
-            const R alone = plant_.load_beta() - (plant_.back() / plant_.beta()) * plant_.across();
+            const R alone = fnma(plant_.back() / plant_.beta(), plant_.across(), plant_.load_beta());
             plant_.x[0] = greater(minimum(plant_.load_beta(), alone), R(0.0), plant_.x[0], R(any_value));
         }
     }
@@ -172,7 +172,7 @@ private:
         }
         // Predicted a substep ahead (second order), so that the sine is computed in time.
         theta_ = theta_middle_;
-        theta_middle_ = angle_ + plant_.velocity() * R(1.5 * h_);
+        theta_middle_ = fma(plant_.velocity(), R(1.5 * h_), angle_);
     }
 
     [[gnu::always_inline]] void write(std::size_t n, R y, R u) {
@@ -283,16 +283,17 @@ private:
         if constexpr (Plant::both_ends) {
             w_next = move_both(T, w, t);
         } else {
-            const R w_free = plant_.free_velocity(T, friction_torque_);
-            w_next = w_free;
+            const typename Plant::Free free = plant_.without_friction(T, friction_torque_);
+            w_next = free.x[0];
             if (dry_) {
-                w_next = under_friction<Side::motor>(states_, law_, {w, w_free, plant_.beta()}, t);
-                friction_torque_ = (w_free - w_next) * per_beta_;
-                T = T - friction_torque_;
+                w_next = under_friction<Side::motor>(states_, law_, {w, free.x[0], plant_.beta()}, t);
+                if constexpr (Plant::remembers_friction) friction_torque_ = (free.x[0] - w_next) * per_beta_;
+                plant_.move(free, w_next);
+            } else {
+                plant_.move(free);
             }
-            plant_.move(T, w_next);
         }
-        angle_ = angle_ + (w + w_next) * R(0.5 * h_);
+        angle_ = fma(w + w_next, R(0.5 * h_), angle_);
     }
 
     // The velocity at the substep's end at one end of the shaft, and the state of its friction there.
@@ -334,8 +335,8 @@ private:
         const R w_load = plant_.load_velocity();
         R T_load = R(0.0);
         if (load_.turning || run_.effects.meets(load_effects_with(Hooks::torque))) {
-            const R middle = (run_.position.empty() ? angle_ + w * R(0.5 * h_) : theta_) -
-                             (plant_.twist() - load_.twist_at_start) - (w - w_load) * R(0.5 * h_);
+            const R at_motor = run_.position.empty() ? fma(w, R(0.5 * h_), angle_) : theta_;
+            const R middle = fnma(w - w_load, R(0.5 * h_), at_motor - (plant_.twist() - load_.twist_at_start));
             each_at<Side::load>([&]<class Key, class E>() __attribute__((always_inline)) {
                 if constexpr (hook::torque<E>)
                     if (run_.effects.has<Key>()) T_load = T_load - E::torque(c_.template of<Key>(), middle);
@@ -359,11 +360,11 @@ private:
         } else if (load_.dry) {
             w_next_load = apart<Side::load>(load_.states, load_.law, load, t);
             load_.friction = (load.w_free - w_next_load) / load.beta;
-            w_next = w_next - plant_.across() * load_.friction;
+            w_next = fnma(plant_.across(), load_.friction, w_next);
         } else if (dry_) {
             w_next = apart<Side::motor>(states_, law_, motor, t);
             friction_torque_ = (motor.w_free - w_next) * per_beta_;
-            w_next_load = w_next_load - plant_.back() * friction_torque_;
+            w_next_load = fnma(plant_.back(), friction_torque_, w_next_load);
         }
         plant_.move(friction_torque_, load_.friction, w_next, w_next_load);
         return w_next;

@@ -114,7 +114,7 @@ public:
 
     // The torque with that of the effects at the shaft, evaluated at the predicted mean velocity.
     [[gnu::always_inline]] R with_torque(R w, R theta, R T, double t) {
-        const R middle = w + (w - w_before_) * R(0.5);
+        const R middle = fma(w - w_before_, R(0.5), w);
         w_before_ = w;
         if (friction_) level_ = asked(run_, OwnPlace::friction, middle, theta, T, t > 0.0 ? t : 0.0);
         return torque_ ? T + asked(run_, OwnPlace::torque, middle, theta, T, t > 0.0 ? t : 0.0) : T;

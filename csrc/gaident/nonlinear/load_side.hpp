@@ -43,19 +43,19 @@ template <class R, class Motor, class Load>
                                                           R& w_next, R& w_next_load, R& f_motor, R& f_load, Motor&& motor,
                                                           Load&& load) {
     const R zero = R(0.0), per_beta = R(1.0) / at_motor.beta;
-    const R clamped_free = at_load.w_free - (back * per_beta) * at_motor.w_free;
-    const R clamped_beta = at_load.beta - (back * per_beta) * across;
+    const R clamped_free = fnma(back * per_beta, at_motor.w_free, at_load.w_free);
+    const R clamped_beta = fnma(back * per_beta, across, at_load.beta);
     for (int round = 0; round < 2; ++round) {
-        const R w_free = at_motor.w_free - across * f_load;
+        const R w_free = fnma(across, f_load, at_motor.w_free);
         w_next = motor(round, w_free, at_motor.beta);
         f_motor = (w_free - w_next) * per_beta;
         const R slips = absolute(w_next);
-        const R load_free = greater(slips, zero, at_load.w_free - back * f_motor, clamped_free);
+        const R load_free = greater(slips, zero, fnma(back, f_motor, at_load.w_free), clamped_free);
         const R load_beta = greater(slips, zero, at_load.beta, clamped_beta);
         w_next_load = load(round, load_free, load_beta);
         f_load = (load_free - w_next_load) / load_beta;
     }
-    f_motor = ((at_motor.w_free - across * f_load) - w_next) * per_beta;
+    f_motor = (fnma(across, f_load, at_motor.w_free) - w_next) * per_beta;
 }
 
 // What the loop keeps of the load.

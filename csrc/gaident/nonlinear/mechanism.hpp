@@ -1,5 +1,9 @@
-// The mechanism behind a zero-order hold of one substep, asked twice: which velocity w+ a torque would bring, then to move, under
-// the total torque, to the velocity that friction left.
+// The mechanism behind a zero-order hold of one substep, asked twice: which state the torque would bring without friction, velocity
+// w_free, then to move to the velocity w+ that friction left. A friction f takes beta f from the velocity and b_i f from the state x_i:
+//
+//     x_i+ = free_i + (b_i/beta) (w+ - w_free)
+//
+// so that from w+ to the next substep there are two operations, a difference and a fused product and sum.
 #pragma once
 
 #include "coefficients.hpp"
@@ -9,32 +13,48 @@ namespace gaident {
 // Any linear plant, in the delta observer form of closed_loop.hpp; N its order, -1 where it is known only at run time.
 template <class R, int N>
 struct ObserverPlant {
-    static constexpr bool both_ends = false;  // whether effects act at the load, too
+    static constexpr bool both_ends = false;           // whether effects act at the load, too
+    static constexpr bool remembers_friction = false;  // of the substep before
     static constexpr int capacity = N >= 0 ? N : max_plant_order;
     R a[capacity], b[capacity + 1], x[capacity];
+    R share[capacity];  // b_i/beta
     int order;
+    // The state at the substep's end without friction.
+    struct Free {
+        R x[capacity];
+    };
 
     ObserverPlant(const EffectConstants<R>& c, int n) : order(N >= 0 ? N : n) {
         for (int i = 0; i < order; ++i) a[i] = c.a[i];
         for (int i = 0; i <= order; ++i) b[i] = c.b[i];
         for (int i = 0; i < order; ++i) x[i] = c.x[i];
+        for (int i = 0; i < order; ++i) share[i] = c.b[i + 1] / c.b[1];
     }
 
     [[gnu::always_inline]] R velocity() const { return x[0]; }
     [[gnu::always_inline]] R twist() const { return R(0.0); }
     [[gnu::always_inline]] R beta() const { return b[1]; }
 
-    [[gnu::always_inline]] R free_velocity(R T, R) {
-        const int n = N >= 0 ? N : order;
-        const R own = n > 1 ? x[0] + x[1] : x[0];
-        return (own + b[1] * T) - a[0] * x[0];
-    }
-
-    [[gnu::always_inline]] void move(R T, R w_next) {
+    // w is there first, x[1] and x[2] two operations later.
+    [[gnu::always_inline]] Free without_friction(R T, R) {
         const int n = N >= 0 ? N : order;
         const R w = x[0];
-        for (int i = 1; i + 1 < n; ++i) x[i] = ((x[i] + x[i + 1]) + b[i + 1] * T) - a[i] * w;
-        if (n > 1) x[n - 1] = (x[n - 1] + b[n] * T) - a[n - 1] * w;
+        Free free;
+        for (int i = 0; i < n; ++i) {
+            free.x[i] = fnma(a[i], w, fma(b[i + 1], T, x[i]));
+            if (i + 1 < n) free.x[i] = free.x[i] + x[i + 1];
+        }
+        return free;
+    }
+
+    [[gnu::always_inline]] void move(const Free& free) {
+        const int n = N >= 0 ? N : order;
+        for (int i = 0; i < n; ++i) x[i] = free.x[i];
+    }
+    [[gnu::always_inline]] void move(const Free& free, R w_next) {
+        const int n = N >= 0 ? N : order;
+        const R change = w_next - free.x[0];
+        for (int i = 1; i < n; ++i) x[i] = fma(share[i], change, free.x[i]);
         x[0] = w_next;
     }
 };
@@ -52,10 +72,15 @@ struct ObserverPlant {
 // Each leaves in x is left of the twist to the effects that follow.
 template <class R>
 struct TwoMassPlant {
-    static constexpr bool both_ends = false;
+    static constexpr bool both_ends = false, remembers_friction = true;
     R phi[3][3], motor[3], coupling[3];
     R KG, DG, per_scale;
-    R x[3];  // w_M, w_L, psi
+    R x[3];      // w_M, w_L, psi
+    R share[3];  // motor/beta
+    // The same at the substep's end without friction.
+    struct Free {
+        R x[3];
+    };
     R correction = R(0.0);
     const typename Effects::Coefficients<R>& effects;
 
@@ -65,6 +90,7 @@ struct TwoMassPlant {
             motor[i] = c.motor[i];
             coupling[i] = c.coupling[i];
             x[i] = c.x[i];
+            share[i] = c.motor[i] / c.motor[0];
         }
     }
 
@@ -73,13 +99,14 @@ struct TwoMassPlant {
     [[gnu::always_inline]] R beta() const { return motor[0]; }
 
     [[gnu::always_inline]] R linear(int i, R T) const {
-        return (x[i] + motor[i] * T) + ((phi[i][0] * x[0] + phi[i][1] * x[1]) + phi[i][2] * x[2]);
+        return fma(phi[i][0], x[0], fma(motor[i], T, x[i])) + fma(phi[i][2], x[2], phi[i][1] * x[1]);
     }
 
-    [[gnu::always_inline]] R free_velocity(R T, R friction_before) {
-        const R T_total = T - friction_before;
-        correct([&](int i) __attribute__((always_inline)) { return linear(i, T_total); });
-        return linear(0, T) + coupling[0] * correction;
+    [[gnu::always_inline]] Free without_friction(R T, R friction_before) {
+        Free free{{linear(0, T), linear(1, T), linear(2, T)}};
+        correct([&](int i) __attribute__((always_inline)) { return fnma(motor[i], friction_before, free.x[i]); });
+        for (int i = 0; i < 3; ++i) free.x[i] = fma(coupling[i], correction, free.x[i]);
+        return free;
     }
 
     // The correction; end(i): where w_M, w_L and psi would come to without it.
@@ -91,8 +118,8 @@ struct TwoMassPlant {
             if constexpr (hook::coupling<E>) return sum + E::coupling(effects.template of<E>(), KG, DG, left0, dx0);
             else return sum;
         });
-        R left1 = (end(2) + coupling[2] * now) * per_scale;
-        const R dx1 = (end(0) - end(1)) + (coupling[0] - coupling[1]) * now, dx = (dx0 + dx1) * R(0.5);
+        R left1 = fma(coupling[2], now, end(2)) * per_scale;
+        const R dx1 = fma(coupling[0] - coupling[1], now, end(0) - end(1)), dx = (dx0 + dx1) * R(0.5);
         left0 = x0;
         correction = Effects::chain(R(0.0), [&]<class E>(R sum) __attribute__((always_inline)) {
             if constexpr (hook::coupling<E>) return sum + E::mean_coupling(effects.template of<E>(), KG, DG, left0, left1, dx);
@@ -100,11 +127,13 @@ struct TwoMassPlant {
         });
     }
 
-    [[gnu::always_inline]] void move(R T, R w_next) {
-        const R w_L = linear(1, T) + coupling[1] * correction, psi = linear(2, T) + coupling[2] * correction;
+    [[gnu::always_inline]] void move(const Free& free) {
+        for (int i = 0; i < 3; ++i) x[i] = free.x[i];
+    }
+    [[gnu::always_inline]] void move(const Free& free, R w_next) {
+        const R change = w_next - free.x[0];
         x[0] = w_next;
-        x[1] = w_L;
-        x[2] = psi;
+        for (int i = 1; i < 3; ++i) x[i] = fma(share[i], change, free.x[i]);
     }
 };
 
@@ -130,18 +159,18 @@ struct LoadedTwoMassPlant : TwoMassPlant<R> {
 
     // T and T_L at motor and load; the friction of the substep before.
     [[gnu::always_inline]] void free_velocities(R T, R T_load, R friction_before, R load_friction_before) {
-        for (int i = 0; i < 3; ++i) free[i] = this->linear(i, T) + load[i] * T_load;
+        for (int i = 0; i < 3; ++i) free[i] = fma(load[i], T_load, this->linear(i, T));
         if (!correcting) return;
         this->correct([&](int i) __attribute__((always_inline)) {
-            return free[i] - (motor[i] * friction_before + load[i] * load_friction_before);
+            return fnma(load[i], load_friction_before, fnma(motor[i], friction_before, free[i]));
         });
-        for (int i = 0; i < 3; ++i) free[i] = free[i] + coupling[i] * correction;
+        for (int i = 0; i < 3; ++i) free[i] = fma(coupling[i], correction, free[i]);
     }
 
     [[gnu::always_inline]] void move(R friction, R load_friction, R w_next, R w_next_load) {
         x[0] = w_next;
         x[1] = w_next_load;
-        x[2] = free[2] - (motor[2] * friction + load[2] * load_friction);
+        x[2] = fnma(load[2], load_friction, fnma(motor[2], friction, free[2]));
     }
 };
 

@@ -38,6 +38,7 @@ void run_effects(const EffectRun& run, const EffectConstants<R>& c) {
     if (run.loop.kind == LoopKind::servo) {
         if (run.effects.meets(effects_with(Hooks::load))) return run_servo_on<R, LoadedTwoMassPlant<R>>(run, c);
         if (run.two_masses) return run_servo_on<R, TwoMassPlant<R>>(run, c);
+        if (run.order == 3) return run_servo_on<R, ObserverPlant<R, 3>>(run, c);
         return run_servo_on<R, ObserverPlant<R, -1>>(run, c);
     }
     if (run.effects.meets(effects_with(Hooks::load))) return run_loaded_on<R>(run, c);

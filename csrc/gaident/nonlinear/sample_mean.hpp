@@ -20,7 +20,7 @@ public:
         return seen;
     }
     // The velocity behind the substep j of a sample, but for its last.
-    void behind_substep(int j, R w) { sum_ = sum_ + w * R(j % 2 == 0 ? 4.0 : 2.0); }
+    void behind_substep(int j, R w) { sum_ = fma(w, R(j % 2 == 0 ? 4.0 : 2.0), sum_); }
 
 private:
     R sum_ = R(0.0);

@@ -105,6 +105,9 @@ constexpr C30 operator-(C30 a) { return C30() - a; }
 constexpr C30 operator*(C30 a, C30 b) {
     return C30::normal((a.mantissa >> 8) * (b.mantissa >> 8) >> 15, a.exponent + b.exponent);
 }
+// The product keeps its register's width: MPYF3, then ADDF3 or SUBF3.
+constexpr C30 fma(C30 a, C30 b, C30 c) { return c + a * b; }
+constexpr C30 fnma(C30 a, C30 b, C30 c) { return c - a * b; }
 constexpr C30 operator/(C30 a, C30 b) {
     const bool negative = b.mantissa < 0;
     const C30 v = negative ? -b : b, two = C30::normal(1, 32);

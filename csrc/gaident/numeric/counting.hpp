@@ -52,6 +52,9 @@ inline Counted operator*(const Counted& a, const Counted& b) {
     ++operations.multiplies;
     return Counted(a.value * b.value);
 }
+// Two operations of a processor that has no third.
+inline Counted fma(const Counted& a, const Counted& b, const Counted& c) { return c + a * b; }
+inline Counted fnma(const Counted& a, const Counted& b, const Counted& c) { return c - a * b; }
 inline Counted operator/(const Counted& a, const Counted& b) {
     ++operations.divides;
     return Counted(a.value / b.value);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "lanes.hpp"
+#include "single.hpp"
 
 #include <bit>
 #include <cstdint>
@@ -17,6 +18,7 @@ template <>
 struct Pack<double> {
     static constexpr int width = 1, registers = 1;
     [[gnu::always_inline]] static inline double load(const double* p) { return *p; }
+    [[gnu::always_inline]] static inline double gather(auto&& of) { return of(std::size_t{0}); }
     [[gnu::always_inline]] static inline void store(double x, double* p) { *p = x; }
 };
 
@@ -24,7 +26,19 @@ template <int W, class Isa>
 struct Pack<Lanes<double, W, Isa>> {
     static constexpr int width = W, registers = Lanes<double, W, Isa>::registers;
     [[gnu::always_inline]] static inline Lanes<double, W, Isa> load(const double* p) { return Lanes<double, W, Isa>::load(p); }
+    // of(lane) for each
+    [[gnu::always_inline]] static inline Lanes<double, W, Isa> gather(auto&& of) { return Lanes<double, W, Isa>::gather(of); }
     [[gnu::always_inline]] static inline void store(const Lanes<double, W, Isa>& x, double* p) { x.store(p); }
+};
+
+template <class Isa>
+struct Pack<Single<double, Isa>> {
+    static constexpr int width = 1, registers = 1;
+    [[gnu::always_inline]] static inline Single<double, Isa> load(const double* p) { return Single<double, Isa>::all(*p); }
+    [[gnu::always_inline]] static inline Single<double, Isa> gather(auto&& of) {
+        return Single<double, Isa>::all(of(std::size_t{0}));
+    }
+    [[gnu::always_inline]] static inline void store(Single<double, Isa> x, double* p) { *p = x.v; }
 };
 
 // x where a > b, else y
@@ -38,6 +52,12 @@ template <class T, int W, class Isa>
 #pragma GCC unroll 8
     for (int i = 0; i < L::registers; ++i) r.v[i] = typename L::Register(a.v[i] > b.v[i] ? x.v[i] : y.v[i]);
     return r;
+}
+
+template <class Isa>
+[[gnu::always_inline]] inline Single<double, Isa> greater(Single<double, Isa> a, Single<double, Isa> b, Single<double, Isa> x,
+                                                          Single<double, Isa> y) {
+    return a.v > b.v ? x : y;
 }
 
 // A vector of words in `bytes` bytes.
@@ -57,6 +77,10 @@ template <std::size_t bytes>
 
 // Whether a > b everywhere: for short cuts that change no result.
 [[gnu::always_inline]] inline bool all_above(double a, double b) { return a > b; }
+template <class Isa>
+[[gnu::always_inline]] inline bool all_above(Single<double, Isa> a, Single<double, Isa> b) {
+    return a.v > b.v;
+}
 
 template <int W, class Isa>
 [[gnu::always_inline]] inline bool all_above(const Lanes<double, W, Isa>& a, const Lanes<double, W, Isa>& b) {
@@ -77,6 +101,10 @@ template <class R>
     return greater(a, b, a, b);
 }
 [[gnu::always_inline]] inline double absolute(double x) { return __builtin_fabs(x); }
+template <class Isa>
+[[gnu::always_inline]] inline Single<double, Isa> absolute(Single<double, Isa> x) {
+    return Single<double, Isa>::all(__builtin_fabs(x.v));
+}
 
 template <int W, class Isa>
 [[gnu::always_inline]] inline Lanes<double, W, Isa> absolute(const Lanes<double, W, Isa>& x) {
@@ -89,6 +117,10 @@ template <int W, class Isa>
 }
 
 [[gnu::always_inline]] inline double square_root(double x) { return __builtin_sqrt(x); }
+template <class Isa>
+[[gnu::always_inline]] inline Single<double, Isa> square_root(Single<double, Isa> x) {
+    return Single<double, Isa>::all(__builtin_sqrt(x.v));
+}
 
 template <int W, class Isa>
 [[gnu::always_inline]] inline Lanes<double, W, Isa> square_root(const Lanes<double, W, Isa>& x) {
@@ -105,6 +137,11 @@ inline constexpr double round_magic = 6755399441055744.0;  // 1.5 * 2^52: adding
 // x * 2^k, where `shifted` is round_magic + k; no overflow is looked after
 [[gnu::always_inline]] inline double scaled(double x, double shifted) {
     return std::bit_cast<double>(std::bit_cast<std::uint64_t>(x) + (std::bit_cast<std::uint64_t>(shifted) << 52U));
+}
+
+template <class Isa>
+[[gnu::always_inline]] inline Single<double, Isa> scaled(Single<double, Isa> x, Single<double, Isa> shifted) {
+    return Single<double, Isa>::all(scaled(x.v, shifted.v));
 }
 
 template <int W, class Isa>
@@ -129,13 +166,13 @@ template <class R>
 template <class R>
 [[gnu::always_inline]] inline R exp_of_minus(R y) {
     const R t = minimum(y, R(700.0));
-    const R shifted = R(detail::round_magic) - t * R(1.4426950408889634);
-    const R r = (R(detail::round_magic) - shifted) * R(0.69314718055994531) - t;
+    const R shifted = fnma(t, R(1.4426950408889634), R(detail::round_magic));
+    const R r = fma(R(detail::round_magic) - shifted, R(0.69314718055994531), -t);
     // Taylor series to r^9, abs(r) < 0.347, in pairs so that the chain is short
     const R r2 = r * r, r4 = r2 * r2;
-    const R p01 = R(1.0) + r, p23 = R(1.0 / 2) + r * R(1.0 / 6), p45 = R(1.0 / 24) + r * R(1.0 / 120);
-    const R p67 = R(1.0 / 720) + r * R(1.0 / 5040), p89 = R(1.0 / 40320) + r * R(1.0 / 362880);
-    return detail::scaled((p01 + r2 * p23) + r4 * ((p45 + r2 * p67) + r4 * p89), shifted);
+    const R p01 = R(1.0) + r, p23 = fma(r, R(1.0 / 6), R(1.0 / 2)), p45 = fma(r, R(1.0 / 120), R(1.0 / 24));
+    const R p67 = fma(r, R(1.0 / 5040), R(1.0 / 720)), p89 = fma(r, R(1.0 / 362880), R(1.0 / 40320));
+    return detail::scaled(fma(r4, fma(r4, p89, fma(r2, p67, p45)), fma(r2, p23, p01)), shifted);
 }
 
 // sin x; 1e-13 absolute for abs(x) < 100, beyond that the rounding of x itself.
@@ -147,10 +184,10 @@ template <class R>
     const R half = greater(r, R(0.0), R(0.5), R(-0.5));
     const R t = greater(absolute(r), R(0.25), half - r, r);
     const R x1 = t * R(6.283185307179586476925), x2 = x1 * x1, x4 = x2 * x2, x8 = x4 * x4;
-    const R a = R(1.0) - x2 * R(1.0 / 6), b = R(1.0 / 120) - x2 * R(1.0 / 5040);
-    const R c = R(1.0 / 362880) - x2 * R(1.0 / 39916800), d = R(1.0 / 6227020800) - x2 * R(1.0 / 1307674368000);
-    const R e = R(1.0 / 355687428096000) - x2 * R(1.0 / 121645100408832000);
-    return x1 * ((a + x4 * b) + x8 * ((c + x4 * d) + x8 * e));
+    const R a = fnma(x2, R(1.0 / 6), R(1.0)), b = fnma(x2, R(1.0 / 5040), R(1.0 / 120));
+    const R c = fnma(x2, R(1.0 / 39916800), R(1.0 / 362880)), d = fnma(x2, R(1.0 / 1307674368000), R(1.0 / 6227020800));
+    const R e = fnma(x2, R(1.0 / 121645100408832000), R(1.0 / 355687428096000));
+    return x1 * fma(x8, fma(x8, e, fma(x4, d, c)), fma(x4, b, a));
 }
 
 template <class R>

@@ -85,6 +85,8 @@ constexpr FixedNumber operator-(FixedNumber a) {
     return a;
 }
 constexpr FixedNumber operator-(FixedNumber a, FixedNumber b) { return a + -b; }
+constexpr FixedNumber fma(FixedNumber a, FixedNumber b, FixedNumber c) { return c + a * b; }
+constexpr FixedNumber fnma(FixedNumber a, FixedNumber b, FixedNumber c) { return c - a * b; }
 constexpr FixedNumber operator/(FixedNumber a, FixedNumber b) {
     if (b.word == 0) return a.word < 0 ? -FixedNumber::largest() : FixedNumber::largest();
     return FixedNumber::normal(a.word * (std::int64_t{1} << 31) / b.word, a.point + 31 - b.point);
@@ -170,6 +172,10 @@ constexpr FixedProduct operator*(FixedSignal a, FixedSignal b) {
     return {std::int64_t{a.word} * b.word, a.point + b.point, a.saturated || b.saturated};
 }
 
+// A product that joins a sum is rounded to the sum's point, 16 bits behind the word's.
+constexpr FixedSum fma(FixedNumber a, FixedSignal b, FixedSum c) { return c + a * b; }
+constexpr FixedSum fnma(FixedNumber a, FixedSignal b, FixedSum c) { return c - a * b; }
+
 // Of squared errors: 16 bits of each square are dropped, so that 2^16 of the largest fit.
 struct FixedErrorSum {
     static constexpr int dropped = 16;
@@ -182,6 +188,7 @@ struct FixedErrorSum {
         if (!a.saturated) a.value += square.value >> dropped;
         return a;
     }
+    friend constexpr FixedErrorSum fma(FixedSignal a, FixedSignal b, FixedErrorSum c) { return c + a * b; }
 };
 
 }  // namespace gaident

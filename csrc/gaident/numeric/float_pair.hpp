@@ -28,6 +28,8 @@ struct FloatPair {
         const float product = a.hi * b.hi, error = std::fma(a.hi, b.hi, -product);
         return normal(product, error + (a.hi * b.lo + a.lo * b.hi));
     }
+    friend FloatPair fma(FloatPair a, FloatPair b, FloatPair c) { return c + a * b; }
+    friend FloatPair fnma(FloatPair a, FloatPair b, FloatPair c) { return c - a * b; }
     friend FloatPair operator/(FloatPair a, FloatPair b) {
         const FloatPair first = normal(a.hi / b.hi, 0.0F), rest = a - b * first;
         return normal(first.hi, rest.hi / b.hi);

@@ -31,7 +31,7 @@ Delta<R, N> bilinear_plant(const Plant& g, double sample_time) {
     for (int i = 0; i < s.pole_pairs; ++i) {
         const R e1 = g.pole_pair[i].e1 * h, e0 = (g.pole_pair[i].e0 * h) * h;
         const R scale = one / ((one + e1) + e0);
-        denominator.times(one, (two * e1 + four * e0) * scale, (four * e0) * scale);
+        denominator.times(one, fma(four, e0, two * e1) * scale, (four * e0) * scale);
         gain = gain * scale;
     }
     if (s.single_pole) {
@@ -41,7 +41,7 @@ Delta<R, N> bilinear_plant(const Plant& g, double sample_time) {
     }
     for (int i = 0; i < s.zero_pairs; ++i) {
         const R e1 = g.zero_pair[i].e1 * h, e0 = (g.zero_pair[i].e0 * h) * h;
-        numerator.times((one + e1) + e0, two * e1 + four * e0, four * e0);
+        numerator.times((one + e1) + e0, fma(four, e0, two * e1), four * e0);
     }
     if (s.single_zero) {
         const R b = g.zero * h;

@@ -159,7 +159,7 @@ private:
         static void times(int n, const Powers<R>& x, const Powers<R>& y, Powers<R>& out) {
             for (int i = 0; i <= n; ++i) {
                 R sum = x.c[0] * y.c[i];
-                for (int j = 1; j <= i; ++j) sum = sum + x.c[j] * y.c[i - j];
+                for (int j = 1; j <= i; ++j) sum = fma(x.c[j], y.c[i - j], sum);
                 out.c[i] = sum;
             }
         }
@@ -168,7 +168,7 @@ private:
             const int degree = 2 * (p - 1);
             for (int i = 0; i <= n; ++i) {
                 R sum = R(x[0]) * y.c[i];
-                for (int j = 1; j <= i && j <= degree; ++j) sum = sum + R(x[j]) * y.c[i - j];
+                for (int j = 1; j <= i && j <= degree; ++j) sum = fma(R(x[j]), y.c[i - j], sum);
                 out.c[i] = sum;
             }
         }
@@ -241,7 +241,7 @@ private:
             for (int k = 0; k <= n; ++k) {
                 const R found = sum.c[k] = sum.c[k] * R(1.0 / rows[k][k]);
                 const int last = lead < 0 || 2 * k + lead > n ? n : 2 * k + lead;
-                for (int i = k + 1; i <= last; ++i) sum.c[i] = sum.c[i] - R(rows[k][i]) * found;
+                for (int i = k + 1; i <= last; ++i) sum.c[i] = fnma(R(rows[k][i]), found, sum.c[i]);
             }
         }
 

@@ -54,14 +54,14 @@ struct Polynomial {
 
     // times (k1 x + k0)
     void times(R k1, R k0) {
-        for (int i = size() - 1; i > 0; --i) c[i] = k1 * c[i] + k0 * c[i - 1];
+        for (int i = size() - 1; i > 0; --i) c[i] = fma(k0, c[i - 1], k1 * c[i]);
         c[0] = k1 * c[0];
     }
 
     // times (k2 x^2 + k1 x + k0)
     void times(R k2, R k1, R k0) {
-        for (int i = size() - 1; i > 1; --i) c[i] = (k2 * c[i] + k1 * c[i - 1]) + k0 * c[i - 2];
-        if (size() > 1) c[1] = k2 * c[1] + k1 * c[0];
+        for (int i = size() - 1; i > 1; --i) c[i] = fma(k0, c[i - 2], fma(k1, c[i - 1], k2 * c[i]));
+        if (size() > 1) c[1] = fma(k1, c[0], k2 * c[1]);
         c[0] = k2 * c[0];
     }
 };

@@ -41,7 +41,7 @@ struct Hessenberg {
             for (int j = 0; j <= last(i, n); ++j) {
                 const int first = j > 0 ? j - 1 : 0;
                 R sum = x.m[i][first] * y.m[first][j];
-                for (int k = first + 1; k <= last(i, n); ++k) sum = sum + x.m[i][k] * y.m[k][j];
+                for (int k = first + 1; k <= last(i, n); ++k) sum = fma(x.m[i][k], y.m[k][j], sum);
                 r.m[i][j] = sum;
             }
         return r;
@@ -159,7 +159,7 @@ Delta<R, N> held_plant(const Plant& g, double sample_time, int doublings) {
     for (int i = 0; i < pairs; ++i) {
         const int k = 1 + 2 * i;
         const R f11 = F.m[k][k], f12 = F.m[k][k + 1], f21 = F.m[k + 1][k], f22 = F.m[k + 1][k + 1];
-        denominator.times(one, -(f11 + f22), f11 * f22 - f12 * f21);
+        denominator.times(one, -(f11 + f22), fnma(f12, f21, f11 * f22));
     }
     if (single_pole) denominator.times(one, -F.m[n][n]);
 
@@ -171,11 +171,11 @@ Delta<R, N> held_plant(const Plant& g, double sample_time, int doublings) {
     for (int i = 1; i <= n; ++i) x[i] = F.m[i][0];
     for (int k = 0; k < n; ++k) {
         R h = zero, next[detail::held_states];
-        for (int i = 1; i <= n; ++i) h = h + row[i] * x[i];
+        for (int i = 1; i <= n; ++i) h = fma(row[i], x[i], h);
         markov[k] = gain * h;
         for (int i = 1; i <= n; ++i) {
             R sum = zero;
-            for (int j = 1; j <= Matrix::last(i, n + 1); ++j) sum = sum + F.m[i][j] * x[j];
+            for (int j = 1; j <= Matrix::last(i, n + 1); ++j) sum = fma(F.m[i][j], x[j], sum);
             next[i] = sum;
         }
         for (int i = 1; i <= n; ++i) x[i] = next[i];
@@ -187,7 +187,7 @@ Delta<R, N> held_plant(const Plant& g, double sample_time, int doublings) {
     d.b[0] = zero;
     for (int k = 0; k < n; ++k) {
         R sum = zero;
-        for (int j = 0; j <= k; ++j) sum = sum + denominator.c[k - j] * markov[j];
+        for (int j = 0; j <= k; ++j) sum = fma(denominator.c[k - j], markov[j], sum);
         d.b[k + 1] = sum;
     }
     return d;

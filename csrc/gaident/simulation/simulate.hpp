@@ -20,29 +20,18 @@ void simulate(const Factors<double>& g, std::span<const double> input, double sa
     record.output = input;
     record.sample_time = sample_time;
     const Prepared c = prepare(g, record, loop, start);
-    const int n = c.response.order;
-    R a[max_loop_order], b[max_loop_order + 1], x[max_loop_order];
-    for (int i = 0; i < n; ++i) a[i] = static_cast<R>(c.response.a[i]);
-    for (int i = 0; i <= n; ++i) b[i] = static_cast<R>(c.response.b[i]);
-    for (int i = 0; i < max_loop_order; ++i) x[i] = static_cast<R>(c.x[i]);
-
-    ControllerState<R> controller(loop.controller, Clock{sample_time});
-    controller.s = static_cast<R>(c.s);
-    if (loop.limited()) {
-        SteppedLoop<R, -1> stepped{controller};
-        for (std::size_t k = 0; k < input.size(); ++k) {
-            R u;
-            velocity[k] = static_cast<double>(stepped.step(n, a, b, x, static_cast<R>(input[k]), u));
-            torque[k] = static_cast<double>(u);
-        }
-        return;
-    }
-    for (std::size_t k = 0; k < input.size(); ++k) {
-        const R r = static_cast<R>(input[k]);
-        const R y = recurrence_step<R, -1>(n, a, b, x, r);
-        velocity[k] = static_cast<double>(y);
-        torque[k] = loop.kind == LoopKind::open ? input[k] : static_cast<double>(controller.step(r - y));
-    }
+    AloneRun<R> run{loop.kind, loop.limited(), c.response.order, {}, {}, {}, {loop.controller, Clock{sample_time}}};
+    for (int i = 0; i < run.order; ++i) run.a[i] = static_cast<R>(c.response.a[i]);
+    for (int i = 0; i <= run.order; ++i) run.b[i] = static_cast<R>(c.response.b[i]);
+    for (int i = 0; i < max_loop_order; ++i) run.x[i] = static_cast<R>(c.x[i]);
+    run.controller.s = static_cast<R>(c.s);
+    double *const w = velocity.data(), *const u = torque.data();
+    if constexpr (std::same_as<R, double>) best_kernels().in_double.alone(run, input.data(), input.size(), w, u);
+    else if constexpr (std::same_as<R, float>) best_kernels().in_float.alone(run, input.data(), input.size(), w, u);
+    else
+        run_alone(
+            run, input.data(), input.size(), [](double x) { return static_cast<R>(x); },
+            [](const R& x) { return static_cast<double>(x); }, w, u);
 }
 
 // In 32-bit arithmetic: plain floats where they hold the loop's polynomial, pairs of floats where they do not, and where a limit

@@ -97,7 +97,7 @@ typename A::Sum squared_errors(const Delta<typename A::Number>& h, typename A::S
     for (std::size_t k = 0; k < samples; ++k) {
         const Signal y = recurrence_step<Signal, N, driven>(n, a, b, x, driven ? A::signal(input[k], scaling) : Signal());
         const Signal e = A::signal(output[k], scaling) - y;
-        sum = sum + e * e;
+        sum = fma(e, e, sum);
         use(y);
     }
     for (int i = 0; i < n; ++i) states[i] = x[i];

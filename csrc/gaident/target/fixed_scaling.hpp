@@ -18,23 +18,25 @@
 #pragma once
 
 #include "candidate.hpp"
+#include "../numeric/apart.hpp"
 #include "../numeric/fixed.hpp"
 
 namespace gaident {
 
 // The end of every range: all roots conjugate pairs as fast as they get.
-inline Factors<double> end_of_ranges(const SearchRanges& ranges, Structure s) {
+inline Factors<Apart> end_of_ranges(const SearchRanges& ranges, Structure s) {
     const auto size = [](Range r) {
         const double lo = r.lo < 0.0 ? -r.lo : r.lo, hi = r.hi < 0.0 ? -r.hi : r.hi;
         return lo < hi ? hi : lo;
     };
     const double re = size(ranges.real), im = size(ranges.imaginary);
-    Factors<double> f;
+    const Pair<double> both = conjugate_pair(re, im);
+    Factors<Apart> f;
     f.structure = s;
-    f.gain = ranges.gain.hi * ranges.gain_unit(s.p);
-    for (Pair<double>& pair : f.pole_pair) pair = conjugate_pair(re, im);
-    for (Pair<double>& pair : f.zero_pair) pair = conjugate_pair(re, im);
-    f.pole = f.zero = re;
+    f.gain = Apart(ranges.gain.hi * ranges.gain_unit(s.p));
+    for (Pair<Apart>& pair : f.pole_pair) pair = {Apart(both.e1), Apart(both.e0)};
+    for (Pair<Apart>& pair : f.zero_pair) pair = {Apart(both.e1), Apart(both.e0)};
+    f.pole = f.zero = Apart(re);
     return f;
 }
 
@@ -49,8 +51,8 @@ struct StatePoints {
 
     StatePoints() = default;
     // `h`: the closed loop with the largest coefficients; `peak`: of the signals, headroom included; `T`: samples
-    StatePoints(const Delta<double>& h, double peak, double T) {
-        const auto size = [](double x) { return x < 0.0 ? -x : x; };
+    StatePoints(const Delta<Apart>& h, double peak, double T) {
+        const auto size = [](Apart x) { return x.v < 0.0 ? -x.v : x.v; };
         const double rate = h.order > 0 && size(h.a[0]) < 1.0 ? size(h.a[0]) : 1.0;
         double bound = 1.0;  // of d^i y + a[0] d^(i-1) y + ... + a[i-1] y
         for (int i = 0; i < h.order; ++i) {
@@ -77,8 +79,8 @@ struct FixedScaling {
         signal_point = point_for(peak);
         for (int p = extent.ranges->p_min; p <= extent.ranges->p_max; ++p)
             for (int q = extent.ranges->q_min; q <= extent.ranges->q_max; ++q) {
-                const Factors<double> end = end_of_ranges(*extent.ranges, {p, q});
-                const Delta<double> plant = bilinear_plant(end, extent.clock.period);
+                const Factors<Apart> end = end_of_ranges(*extent.ranges, {p, q});
+                const Delta<Apart> plant = bilinear_plant(end, extent.clock.period);
                 states[p][q] =
                     StatePoints(close_loop(plant, extent.controller, extent.clock), peak, static_cast<double>(extent.samples));
             }

@@ -85,6 +85,11 @@ def examine() -> Examination:
     )  # fmt: skip
 
 
+def instructions(kernels: str, fused: bool) -> str:
+    """The instruction set in words."""
+    return kernels if fused else f"{kernels}, without fused multiply-add: the same results, several times slower"
+
+
 def _threads() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
@@ -131,7 +136,8 @@ def _self_test() -> tuple[str, str, bool]:
     from gaident.identification.identify import identify
 
     rest = np.zeros(20)
-    chosen = core.experiment([core.record(1e-3, rest, rest, "rest", 0.0)], None, 1e-3).kernels
+    experiment = core.experiment([core.record(1e-3, rest, rest, "rest", 0.0)], None, 1e-3)
+    chosen = instructions(experiment.kernels, experiment.fused)
     rec = demo.two_mass_record(0)
     began = time.perf_counter()
     idn = identify(rec, controller=demo.CONTROLLER, seed=0)

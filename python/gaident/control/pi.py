@@ -235,9 +235,10 @@ class PI(Controller):
         return core.servo_torque(log.dt, of_lines(command, None), log.velocity, limited.core_loop(log.dt))
 
     def with_limits(self, torque: float | None, integrator: float | None) -> PI:
-        """See `Controller`."""
+        """See `Controller`; without a torque limit there is nothing for an anti-windup to act at."""
         torque, integrator = (None if x is None or math.isinf(x) else x for x in (torque, integrator))
-        return replace(self, torque_limit=torque, integrator_limit=integrator)
+        limited = replace(self, anti_windup="none", tracking_time=None) if torque is None else self
+        return replace(limited, torque_limit=torque, integrator_limit=integrator)
 
     def ticks(self, dt: float, command: Vector, position: Vector | None) -> Ticks:
         """See `Controller`."""

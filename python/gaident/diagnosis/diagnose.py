@@ -146,6 +146,7 @@ def diagnose(
             # What was found under other gains explains the records under the given ones as well.
             work = given_work
             work.settle(stands)
+        work.with_joint_numbers()
         driving = work.driving
         result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
         result = driving.moved.noted(result)

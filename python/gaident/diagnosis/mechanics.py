@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.estimation.objective import Fit, Objective
-from gaident.estimation.uncertainty import covariance_of
+from gaident.estimation.uncertainty import controller_part, covariance_of
 from gaident.models.two_mass import mechanics_with_shaft_damping
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
@@ -49,19 +49,21 @@ def mechanics_of(objective: Objective, fit: Fit) -> dict[str, Estimate]:
     stiffness, e0 + a e1 <= f0, only inertia and viscous friction of the whole are given.
     """
     parameters = fit.parameters
-    cov = covariance_of(objective, fit)[: parameters.base, : parameters.base]
+    base = slice(parameters.base)
+    cov, of_controller = covariance_of(objective, fit)[base, base], controller_part(objective, fit)[base, base]
     found = _numbers(parameters.base_values(fit.x[None, :])[0])
     h = 1e-6 * np.maximum(np.abs(fit.x[: parameters.base]), 1.0)
     X = np.repeat(fit.x[None, :], len(h), axis=0)
     X[np.arange(len(h)), np.arange(len(h))] += h
     slopes = np.array([(_numbers(row) - found) / step for row, step in zip(parameters.base_values(X), h, strict=True)])
     known = np.isfinite(np.diag(cov))
-    variances = np.einsum("ij,ik,kj->j", slopes, np.where(known[:, None] & known[None, :], cov, 0.0), slopes)
+    finite = np.where(known[:, None] & known[None, :], cov, 0.0)
+    variances, parts = (np.maximum(np.einsum("ij,ik,kj->j", slopes, C, slopes), 0.0) for C in (finite, of_controller))
     lost = np.any((np.abs(slopes) > 0.0) & ~known[:, None], axis=0)
-    std = np.where(lost, np.inf, np.sqrt(np.maximum(variances, 0.0)))
+    std = np.where(lost, np.inf, np.sqrt(variances))
     return {
-        name: Estimate(float(value), float(s), MECHANICS[name], False, bool(s < abs(value)))
-        for name, value, s in zip(MECHANICS, found, std, strict=False)
+        name: Estimate(float(value), float(s), MECHANICS[name], False, bool(s < abs(value)), float(part))
+        for name, value, s, part in zip(MECHANICS, found, std, np.sqrt(parts), strict=False)
         if np.isfinite(value)
     }
 

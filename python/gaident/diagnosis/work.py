@@ -14,6 +14,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
 from gaident.diagnosis.controller.controller_place import as_read, controller_findings
 from gaident.diagnosis.controller.driving import Driving
+from gaident.diagnosis.controller.joint_numbers import joint_numbers
 from gaident.diagnosis.experiments.candidates import candidates, loop_notes
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.alternatives import alternatives_of, impossible_here
@@ -21,11 +22,13 @@ from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import (
     basis_of,
+    closer_numbers,
     closest,
     drives_itself,
     evidence_of,
     far_off,
     hidden_by_torque_noise,
+    of_the_controller,
     or_other_form,
     or_other_gains,
     period_seen,
@@ -49,6 +52,7 @@ from gaident.diagnosis.selection.select import Selection, by_whitened_errors, co
 from gaident.diagnosis.selection.sensor_age import searched
 from gaident.diagnosis.selection.unlogged_form import UnloggedForm, in_series, leaves_noise, unlogged_form
 from gaident.estimation.dataset import DataSet
+from gaident.estimation.found_numbers import covariance_of_numbers
 from gaident.estimation.objective import Fit, Objective
 from gaident.estimation.term import Term
 from gaident.estimation.uncertainty import estimates_of
@@ -85,7 +89,7 @@ class Work:
             self.notes += open_loop_notes(self.records, self.pi)
         hit = [left_out(r, self.idn.model, self.pi) for r in self.records]
         clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
-        self.clean = tuple(clean)
+        self.hit, self.clean = hit, tuple(clean)
         self.step = quantisation(self.records)
         whole = self.driving.read
         read = as_read(whole, [cleaned(r, h) for r, h in zip(whole, hit, strict=True)], self.controller)
@@ -103,7 +107,7 @@ class Work:
         }
         shown = self.at_controller.controller or self.controller
         self.follows = self.at_controller.follows and not (data.slower and self.driving.in_doubt)
-        data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise)
+        data = replace(data, controller=shown, loop_follows=self.follows, known_noise=self.noise, found=self.driving.found)
         self.data = data if self.at_controller.controller is not None else data.with_effects(known)
         self.excited = excitation(
             self.clean, self.data.loop, axis=self.axis, pitch=data.period if data.period_seen else self.pitch
@@ -138,6 +142,23 @@ class Work:
         again = self.driving.regained_from is not None
         self.gain_doubt = gain_doubt(self.found.space, self.final, again)
         self.form = None if again or self.form_refused else unlogged_form(self.found.space, self.final)
+
+    def with_joint_numbers(self) -> None:
+        """The numbers of the controller that its torque showed, where the model of the axis shows them closer."""
+        old = self.driving.found
+        if old is None or self.pi is not None:
+            return
+        self.note(0.88, "the controller's numbers once more")
+        found = joint_numbers(self.found, lambda found, final: compared(found, final, self._equivalent_here, self._say))
+        if found is None or (numbers := found.space.data.found) is None:
+            return
+        self.take(found)
+        self.driving = self.driving.refound(numbers, covariance_of_numbers(self.under, self.estimate))
+        self.controller, (self.records, self.held) = self.driving.controller, self.driving.driven
+        self.clean = tuple(cleaned(r, h) for r, h in zip(self.records, self.hit, strict=True))
+        others = [f for f in self.controller_steps if f.effect not in {g.effect for g in self.driving.findings}]
+        self.controller_steps = [*others, *self.driving.findings]
+        self.notes.append(closer_numbers(old, numbers))
 
     def other_form(self) -> UnloggedForm | None:
         """A form of controller with which these records are explained better, also than with other gains; no torque shows it."""
@@ -250,7 +271,7 @@ class Work:
         if driver is not None and (dropped := [e for e in self.final.effects if e not in causes]):
             shown = driver if self.left.gains[driver] > self.left.needed else None
             self.notes.append(closest(dropped, shown, bool(real)))
-        self.notes += check.notes
+        self.notes += (*of_the_controller(mechanics), *check.notes)
         if self.final.parameters.held and any(LIBRARY[e].constant for e in self.final.effects):
             self.notes.append(
                 Text("The axis is held by a spring: its tension where the record starts is part of the constant load.")

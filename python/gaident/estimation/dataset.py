@@ -20,6 +20,7 @@ from gaident.axis import TURN, period_of
 from gaident.control.controller import Controller, Limiting
 from gaident.control.differencing import differencing
 from gaident.control.filtering import rate_limited
+from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
@@ -54,6 +55,8 @@ class DataSet:
     one that the records show.
     age: of the measured velocity [lines of the log]: one that is the difference of an encoder's angle is half a sample of the
     controller old. What drives a model is late by as much, and in the loop that is simulated it is that difference.
+    other_ages: those that it may have as well; a model that does not exclude them is less certain by what they change.
+    found: numbers of the controller that the records show; what they may be off by is part of every deviation.
     """
 
     records: tuple[Record, ...]
@@ -73,6 +76,8 @@ class DataSet:
     period: float | None = TURN
     period_seen: bool = False
     age: float = 0.0
+    other_ages: tuple[float, ...] = ()
+    found: FoundNumbers | None = None
 
     @classmethod
     def of(
@@ -99,16 +104,16 @@ class DataSet:
         """The same records, whose torque is not logged, under another controller."""
         pi = bare_pi(controller)
         driven = tuple(_driven(r, controller.torque_of(r) if pi is None else torque_of(r, pi)) for r in self.records)
-        return replace(self, controller=controller, driven=driven, free=_freed(self.records, driven))
+        return replace(self, controller=controller, driven=driven, free=_freed(self.records, driven), found=None)
 
     def with_its_period(self) -> DataSet:
         """The same with the period that the records show, where none is known."""
         shown = period_of_place(self.driven) if self.period is None else None
         return self if shown is None else replace(self, period=shown, period_seen=True)
 
-    def aged(self, lines: float) -> DataSet:
-        """The same with a measured velocity that is so many lines of the log old."""
-        return replace(self, age=lines)
+    def aged(self, lines: float, others: Sequence[float] = ()) -> DataSet:
+        """The same with a measured velocity that is so many lines of the log old; others: which it may be as well."""
+        return replace(self, age=lines, other_ages=tuple(others))
 
     def older(self, loop: Controller | None) -> Controller | None:
         """A loop in which the velocity has its age: it is the difference of the angle over a sample of the controller."""

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import NoiseFilter
 from gaident.estimation.parameterisation import Parameterisation
 from gaident.estimation.prediction import Predictor
@@ -42,6 +43,10 @@ class Hypothesis:
     def driven_by(self, predictor: Predictor) -> Hypothesis:
         """The same model under another predictor."""
         return replace(self, predictor=predictor)
+
+    def over(self, data: DataSet) -> Hypothesis:
+        """The same model over other data, driven in the same way."""
+        return replace(self, predictor=replace(self.predictor, data=data))  # type: ignore[type-var]
 
 
 @dataclass(frozen=True, eq=False)

@@ -213,7 +213,7 @@ class Objective:
 
     def whitened_errors(self, fit: Fit, noise: NoiseFilter) -> Vector:
         """The errors of a fit under a noise filter; its cost is their sum of squares."""
-        rows = self.whitened(self.error(fit)[None, :], noise, self._inertias(fit.hypothesis, fit.x[None, :]))
+        rows = self.whitened(self.error(fit)[None, :], noise, self.inertias(fit.hypothesis, fit.x[None, :]))
         return np.asarray(rows[0])
 
     def whitened(self, E: Matrix, noise: NoiseFilter, inertias: Vector | None = None) -> Matrix:
@@ -282,9 +282,9 @@ class Objective:
     def costs_and_errors(self, hypothesis: Hypothesis, X: Matrix, noise: NoiseFilter) -> tuple[Vector, Matrix]:
         """(V of each row, WORST where a model diverges; rows of raw errors)."""
         E = self.errors(hypothesis, X)
-        return sums_of_squares(self.whitened(E, noise, self._inertias(hypothesis, X))), E
+        return sums_of_squares(self.whitened(E, noise, self.inertias(hypothesis, X))), E
 
-    def _inertias(self, hypothesis: Hypothesis, X: Matrix) -> Vector | None:
+    def inertias(self, hypothesis: Hypothesis, X: Matrix) -> Vector | None:
         """Of each row of x, where the family weighs errors by it [kg m^2]."""
         return hypothesis.parameters.inertias(X) if self.family.weighs_inertias else None
 
@@ -297,7 +297,7 @@ class Objective:
         """
         X, h = self._neighbours(hypothesis, x)
         E = self._errors_around(hypothesis, X, error)
-        V = self.whitened(E, noise, self._inertias(hypothesis, X))
+        V = self.whitened(E, noise, self.inertias(hypothesis, X))
         return V[0], slopes(V, h)
 
     def sensitivities(self, hypothesis: Hypothesis, x: Vector) -> tuple[Matrix, Vector]:

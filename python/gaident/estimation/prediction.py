@@ -46,6 +46,11 @@ class Predictor(Protocol):
     """Simulated velocities of models, and what a torque at the shaft adds to them."""
 
     @property
+    def data(self) -> DataSet:
+        """The records, and what drives a model on them."""
+        ...
+
+    @property
     def closed(self) -> bool:
         """Whether the simulated controller closes the loop."""
         ...

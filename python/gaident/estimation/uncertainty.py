@@ -18,14 +18,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.estimation.criterion import effective_samples
+from gaident.estimation.found_numbers import of_controller, variance_of
 from gaident.estimation.least_squares import fit as fitted
-from gaident.estimation.objective import Fit, Innovations, Objective
+from gaident.estimation.objective import Fit, Objective
 from gaident.models.effects import row_of
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["covariance_of", "estimates_of"]
+__all__ = ["controller_part", "covariance_of", "estimates_of"]
 
 BLOCKS = 8  # no decision: of a jackknife, how finely a deviation is known
 
@@ -38,7 +38,16 @@ def covariance_of(objective: Objective, fit: Fit) -> Matrix:
     return objective.once(("covariance", fit.key), lambda: _covariance(objective, fit))
 
 
+def controller_part(objective: Objective, fit: Fit) -> Matrix:
+    """The part of the covariance that the numbers of the controller bring in. Worked out once for a fit."""
+    return objective.once(("controller part", fit.key), lambda: of_controller(objective, fit))
+
+
 def _covariance(objective: Objective, fit: Fit) -> Matrix:
+    return _of_the_errors(objective, fit) + controller_part(objective, fit)
+
+
+def _of_the_errors(objective: Objective, fit: Fit) -> Matrix:
     cov = _at_one_point(objective, fit)
     if not any(t.multimodal and t.in_coupling for t in fit.parameters.terms):
         return cov
@@ -70,17 +79,14 @@ def _at_one_point(objective: Objective, fit: Fit) -> Matrix:
         cov[i, i] = np.inf
     if seen:
         rows = J[seen] / sizes[seen][:, None]
-        dof = max(objective.count - len(moved), 1.0)
-        # Output errors of colour say less than their number: s^2 grows by samples over independent samples.
-        repeats = 1.0 if isinstance(objective.family, Innovations) else objective.count / effective_samples(v)
-        small = repeats * float(v @ v) / dof * np.linalg.pinv(rows @ rows.T, rcond=1e-12, hermitian=True)
+        small = variance_of(objective, fit, v) * np.linalg.pinv(rows @ rows.T, rcond=1e-12, hermitian=True)
         cov[np.ix_(seen, seen)] = small / np.outer(sizes[seen], sizes[seen])
     return cov
 
 
 def estimates_of(objective: Objective, fit: Fit) -> dict[str, dict[str, Estimate]]:
     """Effect -> parameter -> Estimate."""
-    cov = covariance_of(objective, fit)
+    cov, by_controller = covariance_of(objective, fit), controller_part(objective, fit)
     limits = fit.parameters.limits()
     result: dict[str, dict[str, Estimate]] = {}
     for term in fit.parameters.terms:
@@ -93,7 +99,7 @@ def estimates_of(objective: Objective, fit: Fit) -> dict[str, dict[str, Estimate
         moved = term.natural(z + np.diag(h))
         slopes = (moved - values) / h[:, None]
         finite = np.where(np.isfinite(part), part, 0.0)
-        variances = np.einsum("ij,ik,kj->j", slopes, finite, slopes)
+        variances, parts = (np.einsum("ij,ik,kj->j", slopes, C, slopes) for C in (finite, by_controller[slot, slot]))
         lost = np.any((np.abs(slopes) > 0.0) & ~np.isfinite(np.diag(part))[:, None], axis=0)
         span = np.maximum(limits[1, slot] - limits[0, slot], 1e-300)
         near = (z <= limits[0, slot] + 1e-6 * span) | (z >= limits[1, slot] - 1e-6 * span)  # no decision: rounding at a bound
@@ -104,5 +110,6 @@ def estimates_of(objective: Objective, fit: Fit) -> dict[str, dict[str, Estimate
             std = float("inf") if lost[i] else float(np.sqrt(max(variances[i], 0.0)))
             value = float(values[i])
             known = std < abs(value) if value != 0.0 else np.isfinite(std)
-            result[effect][name] = Estimate(value, std, unit, bool(bound[i]), bool(known))
+            part_of_it = float(np.sqrt(max(parts[i], 0.0)))
+            result[effect][name] = Estimate(value, std, unit, bool(bound[i]), bool(known), part_of_it)
     return result

@@ -1,4 +1,5 @@
-/* The gaident runtime: the loop that the simulation steps through. Compared with it, effect by effect. */
+/* The gaident runtime: the loop that the simulation steps through. Compared with it, effect by effect.
+   Its arithmetic is the simulation's: fma(a, b, c) is a b + c, rounded once, one instruction where the processor has it. */
 #ifndef GAIDENT_RUNTIME_DEFINED
 #define GAIDENT_RUNTIME_DEFINED
 
@@ -20,11 +21,12 @@ static double gaident_under_friction(const gaident_friction *f) {
     const double direction = speed > 0.0 ? w : change, sign = direction > 0.0 ? 1.0 : -1.0;
     const int way = direction > 0.0 ? 0 : 1;
     const double rise = sign * change, B = 0.5 * f->viscous[way];
-    const double onward = ((speed + rise) - beta * f->level[way] - beta * B * speed) / (1.0 + beta * (B + f->drag * speed));
+    const double kept = fma(-(beta * B), speed, fma(-beta, f->level[way], speed + rise));
+    const double onward = kept / fma(beta, fma(f->drag, speed, B), 1.0);
     if (onward > 0.0) return sign * onward;
     {
         const double rest = onward / ((onward - speed) - 1e-300); /* share of the substep after the stop */
-        const double back = rise + beta * (f->level[1 - way] + f->more_at_rest);
+        const double back = fma(beta, f->level[1 - way] + f->more_at_rest, rise);
         return sign * rest * (back < 0.0 ? back : 0.0);
     }
 }
@@ -36,8 +38,8 @@ static void gaident_add_level(gaident_friction *f, double level) {
 
 /* The level between the torque Tc of motion and Ts at rest, at the mean velocity, which is foreseen, but never beyond a stop. */
 static double gaident_falling(double Tc, double Ts, double slowness, double w, double w_before) {
-    const double foreseen = w + 0.5 * (w - w_before), x = (w * foreseen > 0.0 ? foreseen : 0.0) * slowness;
-    return Tc + (Ts - Tc) * exp(-x * x);
+    const double foreseen = fma(0.5, w - w_before, w), x = (w * foreseen > 0.0 ? foreseen : 0.0) * slowness;
+    return fma(Ts - Tc, exp(-x * x), Tc);
 }
 
 static void gaident_stribeck(const gaident_shaft *k, gaident_shaft_memory *s, gaident_friction *f) {
@@ -50,26 +52,23 @@ static void gaident_stribeck(const gaident_shaft *k, gaident_shaft_memory *s, ga
 
 /* An elastic bristle, solved jointly with the velocity; theta weighs the end of the substep, e = theta h, one_plus = 1 + e abs(W)/zc. */
 static void gaident_weigh(gaident_bristle *r, double h, double decay, double spring) {
-    r->theta = 1.0 - 1.0 / (2.0 + decay / 3.0 + 0.058 * decay * decay + 0.5 * spring);
+    r->theta = 1.0 - 1.0 / fma(decay, fma(0.058, decay, 1.0 / 3.0), fma(0.5, spring, 2.0));
     r->e = r->theta * h;
 }
 
 /* The torque stiffness * (mean deflection) put into w+ = w_free - beta f. */
 static void gaident_join(gaident_bristle *r, double stiffness, double per_break, gaident_friction *f) {
     const double ez = r->e * per_break, kb = r->theta * f->beta * stiffness;
-    const double A = f->w + r->theta * ((f->w_free - f->w) - f->beta * r->other), drive = A - kb * r->z;
-    const double c = fabs(drive), b = (1.0 + kb * r->e) - (drive > 0.0 ? A : -A) * ez;
-    const double q = fabs(b) + sqrt(b * b + 4.0 * ez * c), V = b > 0.0 ? 2.0 * c / q : q / (2.0 * ez);
-    double slope, stiffer;
-    r->one_plus = 1.0 + ez * V;
-    slope = stiffness * r->e / r->one_plus;
-    stiffer = 1.0 + f->beta * slope * r->theta;
-    f->w_free = (f->w_free - f->beta * (stiffness * r->z / r->one_plus + slope * (1.0 - r->theta) * f->w)) / stiffer;
-    f->beta /= stiffer;
+    const double A = fma(r->theta, fma(-f->beta, r->other, f->w_free - f->w), f->w), drive = fma(-kb, r->z, A);
+    const double c = 2.0 * ez * fabs(drive), b = fma(drive > 0.0 ? -A : A, ez, fma(kb, r->e, 1.0));
+    const double q = fabs(b) + sqrt(fma(b, b, 2.0 * c)), P = 1.0 + (b > 0.0 ? c / q : 0.5 * q), stiffer = fma(kb, r->e, P);
+    f->w_free = fma(P, f->w_free, -(f->beta * stiffness) * fma(r->e * (1.0 - r->theta), f->w, r->z)) / stiffer;
+    f->beta *= P / stiffer;
+    r->one_plus = P;
 }
 
 static void gaident_move(gaident_bristle *r, const gaident_friction *f, double w_next, double limit) {
-    const double W = f->w + r->theta * (w_next - f->w), zm = (r->z + r->e * W) / r->one_plus;
+    const double W = fma(r->theta, w_next - f->w, f->w), zm = fma(r->e, W, r->z) / r->one_plus;
     r->other = (f->w_free - w_next) / f->beta;
     r->z = gaident_clip(r->z + (zm - r->z) / r->theta, limit);
 }
@@ -86,9 +85,9 @@ static void gaident_lugre(const gaident_shaft *k, gaident_shaft_memory *s, doubl
     const double per_break = stiffness / fmax(g, 1e-6 * Ts);
     gaident_bristle *r = &s->lugre_friction.bristle;
     double bending;
-    gaident_weigh(r, h, h * fabs(f->w) * per_break + f->beta * damping, f->beta * h * stiffness);
+    gaident_weigh(r, h, fma(h * fabs(f->w), per_break, f->beta * damping), f->beta * h * stiffness);
     bending = damping / r->e;
-    f->w_free += f->beta * bending * r->z;
+    f->w_free = fma(f->beta * bending, r->z, f->w_free);
     gaident_join(r, stiffness + bending, per_break, f);
     s->lugre_friction.w_before = f->w;
 }
@@ -107,9 +106,9 @@ static double gaident_dry(const gaident_shaft *k, gaident_shaft_memory *s, doubl
     f.viscous[1] = k->asymmetric_friction.viscous_negative;
     f.drag = k->quadratic_drag.coefficient;
     if (k->effects & GAIDENT_FRICTION_DRIFT)
-        gaident_add_level(&f, k->friction_drift.torque * fmax(1.0 + k->friction_drift.rate * t, 0.0));
+        gaident_add_level(&f, k->friction_drift.torque * fmax(fma(k->friction_drift.rate, t, 1.0), 0.0));
     if (k->effects & GAIDENT_LOAD_DEPENDENT_FRICTION)
-        gaident_add_level(&f, k->load_dependent_friction.torque + k->load_dependent_friction.share * fabs(s->braking));
+        gaident_add_level(&f, fma(k->load_dependent_friction.share, fabs(s->braking), k->load_dependent_friction.torque));
     if (k->effects & GAIDENT_STRIBECK_FRICTION) gaident_stribeck(k, s, &f);
     if (k->effects & GAIDENT_PRESLIDING_FRICTION) gaident_presliding(k, s, h, &f);
     if (k->effects & GAIDENT_LUGRE_FRICTION) gaident_lugre(k, s, h, &f);
@@ -126,7 +125,7 @@ static double gaident_braking(const gaident_shaft *k, double theta) {
     double T = 0.0;
     if (k->effects & GAIDENT_LOAD_TORQUE) T += k->load_torque.load;
     if (k->effects & GAIDENT_UNBALANCE) T += k->unbalance.amplitude * sin(theta + k->unbalance.phase);
-    if (k->effects & GAIDENT_COGGING) T += k->cogging.amplitude * sin(k->cogging.order * theta + k->cogging.phase);
+    if (k->effects & GAIDENT_COGGING) T += k->cogging.amplitude * sin(fma(k->cogging.order, theta, k->cogging.phase));
     return T;
 }
 
@@ -135,18 +134,18 @@ static double gaident_braking(const gaident_shaft *k, double theta) {
 /* At the twist x and its rate dx. */
 static double gaident_correction(const gaident_drive *k, double x, double dx) {
     const double gap = k->backlash.half_gap, beyond = x - gaident_clip(x, gap);
-    return -(k->stiffness * gaident_clip(x, gap) + (gap > fabs(x) ? k->damping * dx : 0.0)) +
+    return -fma(k->stiffness, gaident_clip(x, gap), gap > fabs(x) ? k->damping * dx : 0.0) +
            k->hardening_stiffness.cubic * beyond * beyond * beyond;
 }
 
 /* Its mean along a twist that goes evenly from x0 to x1. */
 static double gaident_mean_correction(const gaident_drive *k, double x0, double x1, double dx) {
     const double gap = k->backlash.half_gap, c0 = gaident_clip(x0, gap), c1 = gaident_clip(x1, gap), step = x1 - x0;
-    const double b0 = x0 - c0, b1 = x1 - c1, S = c1 * (x1 - 0.5 * c1) - c0 * (x0 - 0.5 * c0);
+    const double b0 = x0 - c0, b1 = x1 - c1, S = fma(c1, fma(-0.5, c1, x1), -(c0 * fma(-0.5, c0, x0)));
     const int moves = fabs(step) > 1e-6 * gap;
     const double spring = moves ? S / step : 0.5 * (c0 + c1);
     const double share = moves ? (c1 - c0) / step : gap > fabs(x0) ? 1.0 : 0.0;
-    return -(k->stiffness * spring + k->damping * dx * share) +
+    return -fma(k->stiffness, spring, k->damping * dx * share) +
            0.5 * k->hardening_stiffness.cubic * (b0 * b0 * b0 + b1 * b1 * b1);
 }
 
@@ -154,15 +153,14 @@ static double gaident_mean_correction(const gaident_drive *k, double x0, double 
 
 static void gaident_observer(const gaident_drive *k, gaident_memory *s, double T, double t) {
     const int n = k->order;
-    const double w = s->x[0], w_free = (w + (n > 1 ? s->x[1] : 0.0) + k->b[1] * T) - k->a[0] * w;
+    const double w = s->x[0], w_free = fma(-k->a[0], w, fma(k->b[1], T, w)) + (n > 1 ? s->x[1] : 0.0);
     double w_next = w_free;
     int i;
     if (k->at_motor.effects & GAIDENT_DRY) {
         w_next = gaident_dry(&k->at_motor, &s->at_motor, k->h, w, w_free, k->b[1], t);
         T -= (w_free - w_next) / k->b[1];
     }
-    for (i = 1; i + 1 < n; ++i) s->x[i] = (s->x[i] + s->x[i + 1] + k->b[i + 1] * T) - k->a[i] * w;
-    if (n > 1) s->x[n - 1] = (s->x[n - 1] + k->b[n] * T) - k->a[n - 1] * w;
+    for (i = 1; i < n; ++i) s->x[i] = fma(-k->a[i], w, fma(k->b[i + 1], T, s->x[i])) + (i + 1 < n ? s->x[i + 1] : 0.0);
     s->x[0] = w_next;
 }
 
@@ -175,20 +173,20 @@ static void gaident_both_dry(const gaident_drive *k, gaident_memory *s, double w
     double f = 0.0, f_load = load.friction;
     int round;
     for (round = 0; round < 2; ++round) {
-        double free = w_free - across * f_load, b = beta_load;
+        double free = fma(-across, f_load, w_free), b = beta_load;
         s->at_motor = motor;
         s->at_load = load;
         *w_next = gaident_dry(&k->at_motor, &s->at_motor, k->h, s->x[0], free, beta, t);
         f = (free - *w_next) / beta;
-        free = w_free_load - back * f;
+        free = fma(-back, f, w_free_load);
         if (*w_next == 0.0) {
-            free = w_free_load - back / beta * w_free;
-            b -= back / beta * across;
+            free = fma(-(back / beta), w_free, w_free_load);
+            b = fma(-(back / beta), across, b);
         }
         *w_next_load = gaident_dry(&k->at_load, &s->at_load, k->h, s->x[1], free, b, t);
         f_load = (free - *w_next_load) / b;
     }
-    s->at_motor.friction = (w_free - across * f_load - *w_next) / beta;
+    s->at_motor.friction = (fma(-across, f_load, w_free) - *w_next) / beta;
     s->at_load.friction = f_load;
 }
 
@@ -197,17 +195,18 @@ static void gaident_masses(const gaident_drive *k, gaident_memory *s, double T, 
     double free[3], end[3], load[3], T_load, now, mean, w_next, w_next_load;
     int i;
     for (i = 0; i < 3; ++i) load[i] = k->motor[i] + k->coupling[i];
-    s->at_load.braking = gaident_braking(&k->at_load, s->angle + 0.5 * k->h * s->x[1] - x0);
+    s->at_load.braking = gaident_braking(&k->at_load, fma(0.5 * k->h, s->x[1], s->angle) - x0);
     T_load = -s->at_load.braking;
     for (i = 0; i < 3; ++i) {
-        free[i] = s->x[i] + k->phi[3 * i] * s->x[0] + k->phi[3 * i + 1] * s->x[1] + k->phi[3 * i + 2] * s->x[2];
-        free[i] += k->motor[i] * T + load[i] * T_load;
-        end[i] = free[i] - k->motor[i] * s->at_motor.friction - load[i] * s->at_load.friction;
+        free[i] = fma(k->phi[3 * i], s->x[0], fma(k->motor[i], T, s->x[i])) +
+                  fma(k->phi[3 * i + 2], s->x[2], k->phi[3 * i + 1] * s->x[1]);
+        free[i] = fma(load[i], T_load, free[i]);
+        end[i] = fma(-load[i], s->at_load.friction, fma(-k->motor[i], s->at_motor.friction, free[i]));
     }
     now = gaident_correction(k, x0, dx0);
-    mean = gaident_mean_correction(k, x0, (end[2] + k->coupling[2] * now) * k->per_scale,
-                                   0.5 * (dx0 + (end[0] - end[1]) + (k->coupling[0] - k->coupling[1]) * now));
-    for (i = 0; i < 3; ++i) free[i] += k->coupling[i] * mean;
+    mean = gaident_mean_correction(k, x0, fma(k->coupling[2], now, end[2]) * k->per_scale,
+                                   0.5 * (dx0 + fma(k->coupling[0] - k->coupling[1], now, end[0] - end[1])));
+    for (i = 0; i < 3; ++i) free[i] = fma(k->coupling[i], mean, free[i]);
     w_next = free[0];
     w_next_load = free[1];
     if ((k->at_motor.effects & GAIDENT_DRY) && (k->at_load.effects & GAIDENT_DRY)) {
@@ -215,15 +214,15 @@ static void gaident_masses(const gaident_drive *k, gaident_memory *s, double T, 
     } else if (k->at_load.effects & GAIDENT_DRY) {
         w_next_load = gaident_dry(&k->at_load, &s->at_load, k->h, s->x[1], free[1], load[1], t);
         s->at_load.friction = (free[1] - w_next_load) / load[1];
-        w_next -= load[0] * s->at_load.friction;
+        w_next = fma(-load[0], s->at_load.friction, w_next);
     } else if (k->at_motor.effects & GAIDENT_DRY) {
         w_next = gaident_dry(&k->at_motor, &s->at_motor, k->h, s->x[0], free[0], k->motor[0], t);
         s->at_motor.friction = (free[0] - w_next) / k->motor[0];
-        w_next_load -= k->motor[1] * s->at_motor.friction;
+        w_next_load = fma(-k->motor[1], s->at_motor.friction, w_next_load);
     }
     s->x[0] = w_next;
     s->x[1] = w_next_load;
-    s->x[2] = free[2] - k->motor[2] * s->at_motor.friction - load[2] * s->at_load.friction;
+    s->x[2] = fma(-load[2], s->at_load.friction, fma(-k->motor[2], s->at_motor.friction, free[2]));
 }
 
 /* -- the loop ------------------------------------------------------------------------------------------------------------- */
@@ -240,16 +239,16 @@ static double gaident_linear_step(const gaident_drive *k, gaident_memory *s, dou
     int i;
     if (k->closed) {
         const double lead = input - s->x[0], b0 = k->b[0];
-        const double unlimited = (lead - b0 * s->stored) / (1.0 + b0 * (k->kp + k->g));
-        const double I = gaident_clip(s->stored + k->g * unlimited, k->integrator_limit);
+        const double unlimited = fma(-b0, s->stored, lead) / fma(b0, k->kp + k->g, 1.0);
+        const double I = gaident_clip(fma(k->g, unlimited, s->stored), k->integrator_limit);
         double e;
-        u = gaident_clip(k->kp * (lead - b0 * I) / (1.0 + b0 * k->kp) + I, k->torque_limit);
-        e = input - (s->x[0] + b0 * u);
-        s->stored = gaident_clip(s->stored + k->g * e, k->integrator_limit) + k->g * e;
+        u = gaident_clip(fma(k->kp, fma(-b0, I, lead) / fma(b0, k->kp, 1.0), I), k->torque_limit);
+        e = fma(-b0, u, lead);
+        s->stored = fma(k->g, e, gaident_clip(fma(k->g, e, s->stored), k->integrator_limit));
     }
-    y = s->x[0] + k->b[0] * u;
-    for (i = 0; i + 1 < k->order; ++i) s->x[i] += s->x[i + 1] + k->b[i + 1] * u - k->a[i] * y;
-    if (k->order > 0) s->x[k->order - 1] += k->b[k->order] * u - k->a[k->order - 1] * y;
+    y = fma(k->b[0], u, s->x[0]);
+    for (i = 0; i < k->order; ++i)
+        s->x[i] = fma(-k->a[i], y, fma(k->b[i + 1], u, s->x[i] + (i + 1 < k->order ? s->x[i + 1] : 0.0)));
     *torque = u;
     return y;
 }
@@ -265,9 +264,9 @@ static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, do
             r = s->command_rate_limit.before += gaident_clip(r - s->command_rate_limit.before, k->command_rate_limit.step);
         if (k->effects & GAIDENT_INTEGRATOR_CLAMP) limit = fmin(limit, k->integrator_clamp.limit);
         e = r - y;
-        I = gaident_clip(s->stored + k->g * e, limit);
-        s->stored = I + k->g * e;
-        u = gaident_clip(k->kp * e + I, k->torque_limit);
+        I = gaident_clip(fma(k->g, e, s->stored), limit);
+        s->stored = fma(k->g, e, I);
+        u = gaident_clip(fma(k->kp, e, I), k->torque_limit);
     }
     *torque = u;
     if (k->effects & GAIDENT_TORQUE_SATURATION) u = gaident_clip(u, k->torque_saturation.limit);
@@ -283,24 +282,25 @@ static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, do
             const int back = k->transport_delay.back[j], length = k->transport_delay.length;
             const double old = issued[(s->newest - back + length) % length];
             const double young = issued[(s->newest - back + (back > 0) + length) % length];
-            T = old + (young - old) * k->transport_delay.share[j];
+            T = fma(young - old, k->transport_delay.share[j], old);
         }
         if (k->effects & GAIDENT_TORQUE_LAG) {
             const double gap = s->torque_lag.T - T;
-            s->torque_lag.T = T + gap * k->torque_lag.decay;
-            T += gap * k->torque_lag.mean;
+            s->torque_lag.T = fma(gap, k->torque_lag.decay, T);
+            T = fma(gap, k->torque_lag.mean, T);
         }
         s->at_motor.braking = gaident_braking(&k->at_motor, s->theta);
         T -= s->at_motor.braking;
-        s->theta = s->angle + 1.5 * k->h * w;
+        s->theta = fma(1.5 * k->h, w, s->angle);
         if (k->two_masses) gaident_masses(k, s, T, s->time + 0.5 * k->h);
         else gaident_observer(k, s, T, s->time + 0.5 * k->h);
         s->time += k->h;
-        s->angle += 0.5 * k->h * (w + s->x[0]);
+        s->angle = fma(0.5 * k->h, w + s->x[0], s->angle);
         if (k->effects & GAIDENT_VELOCITY_FILTER) {
             const double now = gaident_measured(k, s);
-            s->velocity_filter.output = k->velocity_filter.decay * s->velocity_filter.output +
-                                        k->velocity_filter.of_old * s->velocity_filter.w + k->velocity_filter.of_new * now;
+            const double before = k->velocity_filter.decay * s->velocity_filter.output;
+            s->velocity_filter.output =
+                fma(k->velocity_filter.of_new, now, fma(k->velocity_filter.of_old, s->velocity_filter.w, before));
             s->velocity_filter.w = now;
         }
     }

@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.arguments import TORQUE, arg
 from gaident.axis import Text
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller
+from gaident.control.found import FoundNumbers, loosened
 from gaident.control.pi import PI
 from gaident.control.unknown import UNITS, field_of
 from gaident.data.record import Record
@@ -58,7 +58,7 @@ ROUNDING = 1e-12  # no decision: of the torque's deviation, what a sum is exact 
 class Numbers:
     """A controller with all its numbers, those that were estimated by their names (`Controller.unknown`), and a note on them.
 
-    doubt: why these are no numbers of it, as an error; empty where they are. Others: see `_Solved`.
+    doubt: why these are no numbers of it, as an error; empty where they are. found: they vary together so. Others: see `_Solved`.
     """
 
     controller: Controller | None
@@ -68,6 +68,7 @@ class Numbers:
     rms: float = 0.0
     size: float = 0.0
     samples: float = 1.0
+    found: FoundNumbers | None = None
 
     def trusted(self) -> Numbers:
         """These; raises ControllerError where they are not to be trusted."""
@@ -86,7 +87,8 @@ def with_estimates(records: Sequence[Record], controller: Controller | None) -> 
     if controller is None or not controller.unknown:
         return Numbers(controller, {})
     for rec in records:
-        _check(rec, controller, controller.unknown[0])
+        if why := number_words.lacking(rec, controller):
+            raise RecordError(why)
     given, *others = [_estimated(records, one) for one in controller.interpolations(records[0].dt)]
     best = min((n for n in others if not n.doubt), key=lambda n: n.rms, default=given)
     gain = gained(given.rms**2, best.rms**2, min(given.samples, best.samples))
@@ -115,22 +117,18 @@ def _estimated(records: Sequence[Record], controller: Controller) -> Numbers:
     elif hidden:
         doubt = number_words.not_shown(hidden[0], estimates[hidden[0]])
     notes = (number_words.found(estimates, numbers.rms, numbers.size), *((number_words.moved(shift),) if shift else ()))
-    return Numbers(controller.with_numbers(values), estimates, notes, doubt, numbers.rms, numbers.size, numbers.samples)
 
+    def made(x: Vector) -> Controller:
+        return controller.with_numbers(dict(zip(unknown, map(float, x), strict=True)))
 
-def _check(rec: Record, controller: Controller, name: str) -> None:
-    name_of = f"record {rec.name or '(without a name)'}"
-    if rec.torque is None:
-        raise RecordError(
-            f"{name} of the controller is None, not known, and {name_of} has no torque that would show it: give {TORQUE}, or "
-            f"the number of {name}"
-        )
-    for channel in controller.reads:
-        if getattr(rec, channel) is None:
-            raise RecordError(
-                f"{name} of the controller is None, not known, and {name_of} has no {channel}, from which it follows: give "
-                f"{arg(channel)}, or the number of {name}"
-            )
+    def named(x: Vector, spread: Matrix) -> dict[str, dict[str, tuple[float, float]]]:
+        return {"": {n: (float(v), float(s)) for n, v, s in zip(unknown, x, np.sqrt(np.diag(spread)), strict=True)}}
+
+    low = np.array([0.0 if field_of(name) in (*BOUNDED, *LOGARITHMIC, "numerator_damping") else -np.inf for name in unknown])
+    spread = loosened(numbers.covariance) if any(controller.log_every(r.dt) > 1 for r in records) else numbers.covariance
+    found = FoundNumbers(made, numbers.values, spread, low, named=named)
+    solved = numbers.rms, numbers.size, numbers.samples
+    return Numbers(controller.with_numbers(values), estimates, notes, doubt, *solved, found)
 
 
 def _remedy(controller: Controller, records: Sequence[Record]) -> str:
@@ -201,6 +199,7 @@ class _Solved:
     rms: float
     size: float
     samples: float
+    covariance: Matrix
 
 
 class _Fit:
@@ -374,11 +373,10 @@ class _Fit:
         # Where linear interpolation of the velocity, or another correlation, would have put the numbers.
         linear = back @ (self.free(rho, straight=True)(x) - at)
         uncorrelated = inverse(self.slopes(self.free(0.0), x, low))[1] @ free_left
-        stds = np.sqrt(sigma**2 * np.diag(spread) + linear**2 + uncorrelated**2)
-        values = self.values(x)
-        natural = [
-            float(std * v) if f in LOGARITHMIC else float(std) for std, v, f in zip(stds, values, self.fields, strict=True)
-        ]
+        covariance = sigma**2 * spread + np.outer(linear, linear) + np.outer(uncorrelated, uncorrelated)
+        stds, values = np.sqrt(np.diag(covariance)), self.values(x)
+        units = np.array([v if f in LOGARITHMIC else 1.0 for v, f in zip(values, self.fields, strict=True)])
+        natural = [float(s) for s in stds * units]
         own = [float(np.sqrt(np.mean(column**2))) for column in J.T]
         seen = [
             bool(np.isfinite(std)) and (std < abs(v) or std_x * rms < POLICY.negligible * size)
@@ -396,4 +394,5 @@ class _Fit:
             for b, f, v, s in zip(beyond, self.fields, values, own_std, strict=True)
         ]
         rms = float(np.sqrt(np.mean(free_left**2)))
-        return _Solved(x, values, natural, bound, seen, free, rms, size, effective_samples(free_left))
+        samples = effective_samples(free_left)
+        return _Solved(x, values, natural, bound, seen, free, rms, size, samples, covariance * np.outer(units, units))

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import FEEDFORWARDS, Cascade, P, cascade_of
 from gaident.control.controller import Controller
+from gaident.control.found import FoundNumbers
 from gaident.data.record import Record
 from gaident.data.signals.lattice import rounding_step
 from gaident.errors import GaidentError
@@ -106,11 +107,12 @@ def _others(log: Log, rec: Record) -> list[tuple[Log, bool]]:
 
 
 class Corrected(NamedTuple):
-    """The controller with another number, the estimate of it, and a sentence on that."""
+    """The controller with another number, the estimate of it, a sentence on that; found: that number in the controller."""
 
     controller: Controller
     estimates: Mapping[str, Estimate]
     note: Text
+    found: FoundNumbers | None = None
 
 
 def corrected(records: Sequence[Record], controller: Controller) -> Corrected | None:
@@ -133,7 +135,9 @@ def corrected(records: Sequence[Record], controller: Controller) -> Corrected | 
         moved = cascade_of(numbers.controller).interpolation != cascade_of(controller).interpolation
         also = say(", and {},", interpolated(numbers.controller)) if moved else ""
         text = "With {} (given: {}){} it does: all simulations use this."
-        found.append(Corrected(numbers.controller, numbers.estimates, say(text, joined(" and ", values), given, also)))
+        found.append(
+            Corrected(numbers.controller, numbers.estimates, say(text, joined(" and ", values), given, also), numbers.found)
+        )
     return found[0] if len(found) == 1 else None
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from gaident.arguments import TORQUE, arg
 from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import cascade_of
 from gaident.control.controller import Controller
+from gaident.data.record import Record
 from gaident.results.estimate import Estimate
 
-__all__ = ["found", "interpolated", "moved", "negative", "not_followed", "not_shown", "other_interpolation"]
+__all__ = ["found", "interpolated", "lacking", "moved", "negative", "not_followed", "not_shown", "other_interpolation"]
 
 
 def found(estimates: Mapping[str, Estimate], rms: float, size: float) -> Text:
@@ -60,3 +62,20 @@ def negative(name: str, value: float, unit: str) -> str:
         f"but no such controller has a number below 0: give {name.rsplit('.', 1)[-1]}=0 where it has no such "
         "part, else its filters and feedforward too, or check the sign of the torque"
     )
+
+
+def lacking(rec: Record, controller: Controller) -> str:
+    """Which signal a record lacks that would show the first unknown number, as an error; empty where it lacks none."""
+    name, name_of = controller.unknown[0], f"record {rec.name or '(without a name)'}"
+    if rec.torque is None:
+        return (
+            f"{name} of the controller is None, not known, and {name_of} has no torque that would show it: give {TORQUE}, or "
+            f"the number of {name}"
+        )
+    for channel in controller.reads:
+        if getattr(rec, channel) is None:
+            return (
+                f"{name} of the controller is None, not known, and {name_of} has no {channel}, from which it follows: give "
+                f"{arg(channel)}, or the number of {name}"
+            )
+    return ""

@@ -194,7 +194,7 @@ class Policy:
         SLOWER,
     )
     same_clock: float = loop(
-        3.0, "1", "times the least that a controller faster than the log leaves: not told apart by it", PERIODS
+        1.5, "1", "times the least change from line to line that a controller faster than the log leaves: not told apart", PERIODS
     )
     near_age: float = loop(
         0.25,

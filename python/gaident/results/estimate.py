@@ -30,6 +30,9 @@ class Estimate:
         Whether the value is at a bound of its search range.
     identifiable : bool
         Whether the record determines the value to better than its own size.
+    of_controller : float
+        The part of `std` that numbers and clock of the controller bring in, where the records had to show these: its square is
+        part of that of `std`. 0 where they were given.
 
     Examples
     --------
@@ -44,6 +47,7 @@ class Estimate:
     unit: str
     at_bound: bool = False
     identifiable: bool = True
+    of_controller: float = 0.0
 
 
 def of_axis(name: str, estimate: Estimate, axis: str) -> Estimate:
@@ -52,5 +56,6 @@ def of_axis(name: str, estimate: Estimate, axis: str) -> Estimate:
     There a model counts an order as a rotary axis does, periods in 2 pi m: 628.3 of it are 100 1/m.
     """
     if axis == "linear" and estimate.unit == "1/turn":
-        return replace(estimate, value=estimate.value / math.tau, std=estimate.std / math.tau, unit="1/m")
+        part = estimate.of_controller / math.tau
+        return replace(estimate, value=estimate.value / math.tau, std=estimate.std / math.tau, unit="1/m", of_controller=part)
     return estimate if name in ANGULAR else replace(estimate, unit=unit(estimate.unit, axis))

@@ -314,6 +314,8 @@ def test_doctor_tells_what_is_there(capsys: pytest.CaptureFixture[str], monkeypa
     data = json.loads(capsys.readouterr().out)
     assert data["flaws"] == [] and data["threads"] >= 1 and data["instruction_set"]
     assert "two masses found" in data["self_test"]
+    assert doctor.instructions("avx2", True) == "avx2"
+    assert "baseline, without fused multiply-add" in doctor.instructions("baseline", False)
     assert [(x["name"], x["extra"]) for x in data["libraries"]] == [("numpy", ""), ("h5py", "hdf5"), ("nothing-such", "tdms")]
     monkeypatch.setattr(doctor.metadata, "requires", lambda _: ["pillow>=9.1"])  # its module is PIL
     assert doctor.examine().flaws == ()

@@ -141,5 +141,7 @@ def test_controllers_answer_for_themselves() -> None:
     assert cascade.simulated_with(4e-3) is cascade
     assert bare.limited and bare.limits == (np.inf, 0.2) and not cascade.limited
     assert cascade.with_limits(None, 0.3).velocity.integrator_limit == 0.3
+    holding = ga.PI(0.1, 1.0, torque_limit=2.0, anti_windup="tracking", tracking_time=1e-3)
+    assert holding.with_limits(None, None) == ga.PI(0.1, 1.0), "without a limit there is nothing to hold at"
     assert np.array_equal(other.torque_of(REC), ga.Cascade(other).torque_of(REC))
     assert [controller_of(c.to_dict()) for c in (bare, other, cascade)] == [bare, other, cascade]

@@ -116,6 +116,19 @@ def test_a_sample_time_is_told_by_the_torque_and_by_the_age_of_the_velocity(ever
         assert shown is not None and shown.controller == ga.Cascade(ga.PI(0.15, 8.0), 1e-3 / every)
 
 
+def test_a_current_loop_beside_a_coarse_encoder_does_not_hide_the_sample_time() -> None:
+    """What the encoder's steps make of the integral between the lines is more than what another sample time would."""
+    skip_without_library()
+    pi, every, period = ga.PI(0.0232, 1.367), 4, 125e-6
+    axis = Plant(J=1.1e-4, D=4e-4, kp=pi.kp, ki=pi.ki, dt=every * period, cascade=ga.Cascade(pi, period), name="axis")
+    levels = np.repeat([0, 30.0, -50, 5, -5, 80, -80, 20, -1, 1, -20, 60], 160 * every)
+    lag = {"torque_lag": {"time_constant": 0.3e-3}}
+    whole = run_drive(axis, levels, lag, encoder=2.0 * np.pi / 2**17, differenced=True)
+    log = ga.Record(axis.dt, command=levels[::every], velocity=whole.velocity[::every], torque=whole.torque[::every])
+    shown = period_shown([log], pi)
+    assert shown is not None and shown.controller == ga.Cascade(pi, period)
+
+
 def test_behind_a_limit_a_forgotten_sample_time_makes_no_second_mass() -> None:
     dia = ga.diagnose(at_limit(4), ga.PI(0.15, 8.0))
     assert any("0.25 ms is taken for its sample time" in note for note in dia.notes), dia.summary()

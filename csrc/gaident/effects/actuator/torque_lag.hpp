@@ -39,8 +39,8 @@ struct TorqueLag {
     template <class R, class Past>
     [[gnu::always_inline]] static R actuator_dynamics(const Coefficients<R>& c, State<R>& s, const Past&, R v) {
         const R gap = s.T - v;
-        s.T = v + gap * c.decay;
-        return v + gap * c.mean;
+        s.T = fma(gap, c.decay, v);
+        return fma(gap, c.mean, v);
     }
 };
 

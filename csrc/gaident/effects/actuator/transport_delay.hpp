@@ -22,9 +22,9 @@ struct TransportDelay {
     };
     static constexpr Hooks hooks = Hooks::actuator_dynamics | Hooks::possible | Hooks::tabulate | Hooks::later;
 
-    // The mean over substep j: (1 - share) u(n - back) + share u(n - back + 1).
+    // The mean over substep j: (1 - share) u(n - back) + share u(n - younger), younger = back - 1 where share is not 0.
     struct Table {
-        int back[max_substeps];
+        int back[max_substeps], younger[max_substeps];
         double share[max_substeps];
     };
     static constexpr Pace pace = Pace::fine;
@@ -33,7 +33,10 @@ struct TransportDelay {
     static void later(double* p, double delay) { p[0] += delay; }
     static void tabulate(const double* p, const Timing& time, Table& table) {
         const double delay = possible(p) ? p[0] : 0.0;
-        for (int j = 0; j < time.steps; ++j) mean(delay, time.hold, j, time.steps, table.back[j], table.share[j]);
+        for (int j = 0; j < time.steps; ++j) {
+            mean(delay, time.hold, j, time.steps, table.back[j], table.share[j]);
+            table.younger[j] = table.back[j] > 0 ? table.back[j] - 1 : 0;
+        }
     }
     static int reach(const Table& table, int steps) {
         int back = 0;
@@ -58,17 +61,14 @@ struct TransportDelay {
 
     template <class None, class NoState, class Past, class R>
     [[gnu::always_inline]] static R actuator_dynamics(const None&, NoState&, const Past& past, R) {
-        constexpr std::size_t width = static_cast<std::size_t>(Pack<R>::width);
-        alignas(64) double old[width], young[width], share[width];
-        for (std::size_t lane = 0; lane < width; ++lane) {
-            const Table& table = past.template table<TransportDelay>(lane);
-            const std::size_t at = past.newest - static_cast<std::size_t>(table.back[past.substep]);
-            old[lane] = past.torque(at, lane);
-            young[lane] = past.torque(at + (table.back[past.substep] > 0 ? 1U : 0U), lane);
-            share[lane] = table.share[past.substep];
-        }
-        const R from = Pack<R>::load(old), to = Pack<R>::load(young);
-        return from + (to - from) * Pack<R>::load(share);
+        const auto table = [&](std::size_t lane) -> const Table& { return past.template table<TransportDelay>(lane); };
+        const auto before = [&](int back, std::size_t lane) {
+            return past.torque(past.newest - static_cast<std::size_t>(back), lane);
+        };
+        const R from = Pack<R>::gather([&](std::size_t lane) { return before(table(lane).back[past.substep], lane); });
+        const R to = Pack<R>::gather([&](std::size_t lane) { return before(table(lane).younger[past.substep], lane); });
+        const R share = Pack<R>::gather([&](std::size_t lane) { return table(lane).share[past.substep]; });
+        return fma(to - from, share, from);
     }
 };
 

@@ -41,13 +41,13 @@ struct Backlash {
     [[gnu::always_inline]] static R coupling(const Coefficients<R>& c, R K, R D, R& x, R dx) {
         const R damping = greater(c.half_gap, absolute(x), D * dx, R(0.0)), inside = clamp(x, -c.half_gap, c.half_gap);
         x = x - inside;
-        return -(K * inside + damping);
+        return -fma(K, inside, damping);
     }
     template <class R>
     [[gnu::always_inline]] static R mean_coupling(const Coefficients<R>& c, R K, R D, R& x0, R& x1, R dx) {
         const R c0 = clamp(x0, -c.half_gap, c.half_gap), c1 = clamp(x1, -c.half_gap, c.half_gap), step = x1 - x0;
         // S = c (x - c/2)
-        const R S = c1 * (x1 - R(0.5) * c1) - c0 * (x0 - R(0.5) * c0);
+        const R S = fma(c1, fnma(R(0.5), c1, x1), -(c0 * fnma(R(0.5), c0, x0)));
         // With almost no movement the quotient has no digits: there the mean of both ends is taken.
         const R shortest = R(1e-6) * c.half_gap;
         const R moves = absolute(step), per_step = R(1.0) / greater(moves, shortest, step, R(1.0));
@@ -56,7 +56,7 @@ struct Backlash {
         const R share = greater(moves, shortest, (c1 - c0) * per_step, inside);
         x0 = x0 - c0;
         x1 = x1 - c1;
-        return -(K * spring + (D * dx) * share);
+        return -fma(K, spring, (D * dx) * share);
     }
 };
 

@@ -34,7 +34,7 @@ struct HardeningStiffness {
     }
     template <class R>
     [[gnu::always_inline]] static R mean_coupling(const Coefficients<R>& c, R, R, R& x0, R& x1, R) {
-        return (((c.cubic * x0) * x0) * x0 + ((c.cubic * x1) * x1) * x1) * R(0.5);
+        return fma((c.cubic * x1) * x1, x1, ((c.cubic * x0) * x0) * x0) * R(0.5);
     }
 };
 

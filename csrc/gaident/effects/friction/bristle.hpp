@@ -14,11 +14,14 @@
 
 namespace gaident {
 
+// With P = 1 + e abs(W)/zc this is linear in the velocities:
+//
+//     w+ = (P w_free - beta k (z + e (1 - theta) w) - P beta f)/(P + beta k e theta),   f the other friction
 template <class R>
 struct Bristle {
-    R z;                   // rad
-    R other;               // the other friction's torque one substep ago [N m]
-    R theta, e, one_plus;  // of the substep being solved
+    R z;                                        // rad
+    R other;                                    // the other friction's torque one substep ago [N m]
+    R theta, per_theta, e, per_plus, per_beta;  // of the substep being solved: 1/theta, 1/P, 1/beta of the other friction
 
     // theta towards 1 where the substep does not resolve the bristle.
     // `decay`, the share of it that decays in the substep, fits the exact decay (W. Liniger, R. A. Willoughby,
@@ -26,33 +29,37 @@ struct Bristle {
     // `spring` = beta h s0 is the resonance of the inertia on the bristle.
     [[gnu::always_inline]] void weigh(R h, R decay, R spring) {
         const R one = R(1.0);
-        theta = one - one / (((R(2.0) + decay * R(1.0 / 3.0)) + (decay * decay) * R(0.058)) + spring * R(0.5));
+        const R D = fma(decay, fma(decay, R(0.058), R(1.0 / 3.0)), fma(spring, R(0.5), R(2.0)));
+        theta = one - one / D;
+        per_theta = D / (D - one);
         e = theta * h;
     }
 
     // Puts the torque k zm into w+ = w_free - beta f: afterwards f stands for the other friction alone.
     // Its torque one substep ago is good enough for choosing abs(W).
     [[gnu::always_inline]] void join(R k, R per_break, FrictionStep<R>& step) {
-        const R one = R(1.0), two = R(2.0), four = R(4.0), zero = R(0.0);
+        const R one = R(1.0), two = R(2.0), half = R(0.5), zero = R(0.0);
         const R ez = e * per_break, kb = (theta * step.beta) * k;
-        const R A = step.w + theta * ((step.w_free - step.w) - step.beta * other);
-        const R drive = A - kb * z;
-        const R c = absolute(drive), b = (one + kb * e) - greater(drive, zero, A, zero - A) * ez;
-        const R q = absolute(b) + square_root(b * b + (four * ez) * c);
-        const R V = greater(b, zero, (two * c) / q, q / (two * ez));
-        one_plus = one + ez * V;
-        const R offset = (k * z) / one_plus, slope = (k * e) / one_plus;
-        const R stiffer = one + (step.beta * slope) * theta;
-        step.w_free = (step.w_free - step.beta * (offset + (slope * (one - theta)) * step.w)) / stiffer;
-        step.beta = step.beta / stiffer;
+        const R A = fma(theta, fnma(step.beta, other, step.w_free - step.w), step.w);
+        const R drive = fnma(kb, z, A);
+        const R c2 = two * (ez * absolute(drive)), b = fnma(greater(drive, zero, A, zero - A), ez, fma(kb, e, one));
+        // P - 1, the positive root of x^2 + b x - c2/2
+        const R q = absolute(b) + square_root(fma(b, b, two * c2));
+        const R P = one + greater(b, zero, c2 / q, q * half);
+        per_plus = one / P;
+        const R per = one / fma(kb, e, P), P_beta = P * step.beta;
+        const R bent = fma(e - e * theta, step.w, z);
+        step.w_free = fnma(step.beta * k, bent, P * step.w_free) * per;
+        per_beta = fma(kb, e, P) / P_beta;
+        step.beta = P_beta * per;
     }
 
     // After the velocity is known; `limit`: the largest deflection.
     [[gnu::always_inline]] void move(const FrictionStep<R>& step, R w_next, R limit) {
-        other = (step.w_free - w_next) / step.beta;
-        const R W = step.w + theta * (w_next - step.w);
-        const R zm = (z + e * W) / one_plus;
-        z = clamp(z + (zm - z) / theta, -limit, limit);
+        other = (step.w_free - w_next) * per_beta;
+        const R W = fma(theta, w_next - step.w, step.w);
+        const R zm = fma(e, W, z) * per_plus;
+        z = clamp(fma(zm - z, per_theta, z), -limit, limit);
     }
 };
 

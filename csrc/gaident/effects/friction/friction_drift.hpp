@@ -25,7 +25,7 @@ struct FrictionDrift {
 
     template <class R>
     [[gnu::always_inline]] static R level(const Coefficients<R>& c, R t) {
-        return maximum(c.torque * (R(1.0) + c.rate * t), R(0.0));
+        return maximum(c.torque * fma(c.rate, t, R(1.0)), R(0.0));
     }
 };
 

@@ -40,21 +40,23 @@ struct FrictionStep {
 template <class R>
 [[gnu::always_inline]] inline R velocity_under_friction(const FrictionLaw<R>& law, R w, R w_free, R beta) {
     const R zero = R(0.0), one = R(1.0), half = R(0.5);
-    const R speed = absolute(w), change = w_free - w;
-    const R direction = greater(speed, zero, w, change);  // from rest, where the other torques push
-    const R sign = greater(direction, zero, one, -one);
-    const R C = greater(direction, zero, law.level_positive, law.level_negative);
-    const R rise = sign * change;
-    R onward = (speed + rise) - beta * C;
-    if (law.steep) {
-        const R B = greater(direction, zero, law.viscous_positive, law.viscous_negative) * half;
-        onward = (onward - (beta * B) * speed) / (one + beta * (B + law.drag * speed));
-    }
-    if (all_above(onward, zero)) return sign * onward;  // a short cut past a division, no other result
+    const R speed = absolute(w);
+    // w+ where the motion keeps its direction d: C and B are those of d, d C = +-C
+    const auto onward = [&](R d) __attribute__((always_inline)) {
+        const R kept = fnma(beta, greater(d, zero, law.level_positive, zero - law.level_negative), w_free);
+        if (!law.steep) return kept;
+        const R B = greater(d, zero, law.viscous_positive, law.viscous_negative) * half;
+        return fnma(beta * B, w, kept) / fma(beta, fma(law.drag, speed, B), one);
+    };
+    // A short cut past the stop, where all go on as they went; no other result. Nothing is asked of w_free before w+ is there.
+    const R kept_as_w = onward(w);
+    if (all_above(w * kept_as_w, zero)) return kept_as_w;
+    const R direction = greater(speed, zero, w, w_free);  // from rest, where the other torques push
+    const R kept = onward(direction), sign = greater(direction, zero, one, -one), ahead = sign * kept;
     const R C_back = greater(direction, zero, law.level_negative, law.level_positive);
-    const R rest = onward / ((onward - speed) - R(1e-300));  // share of the substep after the stop; 0/0 becomes 0
-    const R back = rest * minimum(rise + beta * (C_back + law.more_at_rest), zero);
-    return sign * greater(onward, zero, onward, back);
+    const R rest = ahead / ((ahead - speed) - R(1e-300));  // share of the substep after the stop; 0/0 becomes 0
+    const R back = rest * minimum(fma(beta, C_back + law.more_at_rest, sign * (w_free - w)), zero);
+    return greater(ahead, zero, kept, sign * back);
 }
 
 }  // namespace gaident

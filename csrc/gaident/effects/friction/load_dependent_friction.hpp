@@ -29,7 +29,7 @@ struct LoadDependentFriction {
 
     template <class R>
     [[gnu::always_inline]] static R loaded(const Coefficients<R>& c, R load) {
-        return c.torque + c.share * absolute(load);
+        return fma(c.share, absolute(load), c.torque);
     }
 };
 

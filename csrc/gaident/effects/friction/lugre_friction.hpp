@@ -37,13 +37,16 @@ struct LugreFriction {
     template <class R>
     struct Coefficients {
         R torque, static_torque, slowness, stiffness, damping;  // Tc, Ts, 1/vs, s0, s1
+        R damping_per_step, limit;                              // s1/h, Ts/s0
     };
     template <class R>
     struct State : Bristle<R> {
         R w_before;  // rad/s
     };
     static constexpr Pace pace = Pace::finer;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[0], p[1], 1.0 / p[2], p[3], p[4]}; }
+    static void prepare(const double* p, const Timing& time, Coefficients<double>& c) {
+        c = {p[0], p[1], 1.0 / p[2], p[3], p[4], p[4] / time.step, p[1] / p[3]};
+    }
     static double substeps(const double* p, const Circumstances& at) {
         return __builtin_sqrt(__builtin_fabs(at.inverse_inertia * p[3])) * at.sample_time / 0.3;
     }
@@ -54,20 +57,20 @@ struct LugreFriction {
 
     template <class R>
     [[gnu::always_inline]] static void friction(const Coefficients<R>& c, State<R>& s, FrictionStep<R>& step) {
-        const R zero = R(0.0), w = step.w, foreseen = w + (w - s.w_before) * R(0.5);
+        const R zero = R(0.0), w = step.w, foreseen = fma(w - s.w_before, R(0.5), w);
         const R x = greater(w * foreseen, zero, foreseen, zero) * c.slowness;
-        const R g = maximum(c.torque + (c.static_torque - c.torque) * exp_of_minus(x * x), R(1e-6) * c.static_torque);
+        const R g = maximum(fma(c.static_torque - c.torque, exp_of_minus(x * x), c.torque), R(1e-6) * c.static_torque);
         const R per_break = c.stiffness / g;
-        s.weigh(step.h, (step.h * absolute(w)) * per_break + step.beta * c.damping, (step.beta * step.h) * c.stiffness);
-        const R bending = c.damping / s.e;
-        step.w_free = step.w_free + (step.beta * bending) * s.z;
+        s.weigh(step.h, fma(step.h * absolute(w), per_break, step.beta * c.damping), (step.beta * step.h) * c.stiffness);
+        const R bending = c.damping_per_step * s.per_theta;
+        step.w_free = fma(step.beta * bending, s.z, step.w_free);
         s.join(c.stiffness + bending, per_break, step);
         s.w_before = w;
     }
     template <class R>
     [[gnu::always_inline]] static void after_friction(const Coefficients<R>& c, State<R>& s, const FrictionStep<R>& step,
                                                       R w_next) {
-        s.move(step, w_next, c.static_torque / c.stiffness);
+        s.move(step, w_next, c.limit);
     }
 };
 

@@ -25,12 +25,12 @@ struct PreslidingFriction {
 
     template <class R>
     struct Coefficients {
-        R stiffness, per_break;  // s0 [N m/rad], 1/zc [1/rad]
+        R stiffness, per_break, limit;  // s0 [N m/rad], 1/zc [1/rad], zc [rad]
     };
     template <class R>
     using State = Bristle<R>;
     static constexpr Pace pace = Pace::fine;
-    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[1], p[1] / p[0]}; }
+    static void prepare(const double* p, const Timing&, Coefficients<double>& c) { c = {p[1], p[1] / p[0], p[0] / p[1]}; }
     static double substeps(const double* p, const Circumstances& at) {
         return __builtin_sqrt(__builtin_fabs(at.inverse_inertia * p[1])) * at.sample_time / 0.3;
     }
@@ -43,7 +43,7 @@ struct PreslidingFriction {
     template <class R>
     [[gnu::always_inline]] static void after_friction(const Coefficients<R>& c, Bristle<R>& s, const FrictionStep<R>& step,
                                                       R w_next) {
-        s.move(step, w_next, R(1.0) / c.per_break);
+        s.move(step, w_next, c.limit);
     }
 };
 

@@ -41,12 +41,12 @@ struct StribeckFriction {
     template <class R>
     [[gnu::always_inline]] static R level_at(const Coefficients<R>& c, R w) {
         const R x = w * c.slowness;
-        return c.torque + (c.static_torque - c.torque) * exp_of_minus(x * x);
+        return fma(c.static_torque - c.torque, exp_of_minus(x * x), c.torque);
     }
     // The level at the mean velocity, which is foreseen, but never beyond a stop: at rest the static level holds.
     template <class R>
     [[gnu::always_inline]] static void friction(const Coefficients<R>& c, State<R>& s, FrictionStep<R>& step) {
-        const R zero = R(0.0), w = step.w, foreseen = w + (w - s.w_before) * R(0.5);
+        const R zero = R(0.0), w = step.w, foreseen = fma(w - s.w_before, R(0.5), w);
         const R at = level_at(c, greater(w * foreseen, zero, foreseen, zero));
         step.law.level_positive = step.law.level_positive + at;
         step.law.level_negative = step.law.level_negative + at;

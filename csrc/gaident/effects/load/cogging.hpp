@@ -30,7 +30,7 @@ struct Cogging {
 
     template <class R>
     [[gnu::always_inline]] static R torque(const Coefficients<R>& c, R theta) {
-        return c.amplitude * sine(c.order * theta + c.phase);
+        return c.amplitude * sine(fma(c.order, theta, c.phase));
     }
 };
 

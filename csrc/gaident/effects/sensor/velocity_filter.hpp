@@ -37,7 +37,7 @@ struct VelocityFilter {
 
     template <class R>
     [[gnu::always_inline]] static R sensor_dynamics(const Coefficients<R>& c, State<R>& s, R w_next) {
-        s.output = (c.decay * s.output + c.of_old * s.w) + c.of_new * w_next;
+        s.output = fma(c.of_new, w_next, fma(c.of_old, s.w, c.decay * s.output));
         s.w = w_next;
         return s.output;
     }

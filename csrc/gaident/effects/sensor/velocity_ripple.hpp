@@ -29,7 +29,7 @@ struct VelocityRipple {
 
     template <class R>
     [[gnu::always_inline]] static R sensor(const Coefficients<R>& c, R theta, R w) {
-        return w * (R(1.0) + (c.amplitude * c.order) * cosine(c.order * theta + c.phase));
+        return w * fma(c.amplitude * c.order, cosine(fma(c.order, theta, c.phase)), R(1.0));
     }
 };
 

@@ -9,6 +9,8 @@ struct EffectKernel {
     const char* name;
     // `constants`: effect_constants numbers, each once per lane.
     void (*run)(const EffectRun&, const double* constants);
+    // One candidate, and each number once.
+    void (*alone)(const EffectRun&, const double* constants);
 };
 
 inline constexpr std::size_t effect_lanes = 8;

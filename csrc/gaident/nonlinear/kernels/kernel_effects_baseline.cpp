@@ -11,10 +11,15 @@ void run(const EffectRun& run, const double* constants) {
     using L = Lanes<double, static_cast<int>(effect_lanes), Isa_effects_baseline>;
     run_effects<L>(run, load_constants<L>(constants));
 }
+
+void alone(const EffectRun& run, const double* constants) {
+    using One = Single<double, Isa_effects_baseline>;
+    run_effects<One>(run, load_constants<One>(constants));
+}
 }  // namespace
 
 const EffectKernel& baseline_effects() {
-    static const EffectKernel kernel{"baseline", run};
+    static const EffectKernel kernel{"baseline", run, alone};
     return kernel;
 }
 

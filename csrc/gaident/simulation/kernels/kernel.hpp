@@ -3,6 +3,7 @@
 
 #include "../../plant/held.hpp"
 #include "../../numeric/lanes.hpp"
+#include "../../numeric/single.hpp"
 #include "../../control/loop.hpp"
 #include "../../control/servo_equation.hpp"
 #include "kernels.hpp"
@@ -166,7 +167,7 @@ struct KernelSource {
                     if constexpr (inputs == 2)
                         e = wanted - recurrence_step<L, N>(order, a[s], b[s], c[s], x[s], r, L::all(straight[i]));
                     else e = wanted - recurrence_step<L, N, driven>(order, a[s], b[s], x[s], r);
-                    sum[s] = sum[s] + e * e;
+                    sum[s] = fma(e, e, sum[s]);
                 }
             }
             for (int s = 0; s < S; ++s) {
@@ -195,7 +196,7 @@ struct KernelSource {
             L sum(0.0), u(0.0);
             for (std::size_t i = 0; i < n; ++i) {
                 const L e = L::all(output[i]) - loop.step(k.order, k.a, k.b, k.x, L::all(input[i]), u);
-                sum = sum + e * e;
+                sum = fma(e, e, sum);
             }
             k.save(g);
             loop.pi.s.store(g.s);
@@ -262,13 +263,31 @@ struct KernelSource {
         by_order<8>(g.order, [&](auto N) { Stepped<T, W, N>::outputs(g, c, in, n, y); });
     }
 
+    template <class T>
+    static void alone(AloneRun<T>& given, const double* input, std::size_t n, double* velocity, double* torque) {
+        using One = Single<T, Isa>;
+        const ControllerState<T>& c = given.controller;
+        AloneRun<One> run{given.kind, given.limited, given.order, {}, {}, {}, ControllerState<One>(Controller{}, Clock{})};
+        for (int i = 0; i < run.order; ++i) run.a[i] = One::all(given.a[i]);
+        for (int i = 0; i <= run.order; ++i) run.b[i] = One::all(given.b[i]);
+        for (int i = 0; i < max_loop_order; ++i) run.x[i] = One::all(given.x[i]);
+        run.controller.kp = One::all(c.kp);
+        run.controller.g = One::all(c.g);
+        run.controller.torque_limit = One::all(c.torque_limit);
+        run.controller.integrator_limit = One::all(c.integrator_limit);
+        run.controller.s = One::all(c.s);
+        run_alone(
+            run, input, n, [](double x) { return One(x); }, [](One x) { return static_cast<double>(x.v); }, velocity, torque);
+    }
+
     template <class T, int W>
     static constexpr KernelSet<Group<T, W>, T> set() {
-        return {group_errors<T, W>, errors<T, W>, settling_errors<T, W>, outputs<T, W>};
+        return {group_errors<T, W>, errors<T, W>, settling_errors<T, W>, outputs<T, W>, alone<T>};
     }
     static Kernels all(const char* name) {
         using Products = ProductSource<Isa>;
         return {name,
+                LD::Fused::there,
                 coefficients,
                 servo_coefficients,
                 words,

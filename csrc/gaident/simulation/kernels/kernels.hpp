@@ -4,7 +4,7 @@
 // states stand, so a long record is run in chunks. Candidates of a lower order than the group's have zeros at the end.
 #pragma once
 
-#include "../../control/controller.hpp"
+#include "../alone.hpp"
 #include "../../numeric/rng.hpp"
 
 namespace gaident {
@@ -52,6 +52,8 @@ struct KernelSet {
     void (*settling_errors)(G* groups, int lanes, const T* output, std::size_t n, T* sums);
     // y[sample][lane]
     void (*outputs)(G&, const T* input, std::size_t n, T* y);
+    // One candidate.
+    void (*alone)(AloneRun<T>&, const double* input, std::size_t n, double* velocity, double* torque);
 };
 
 // The same with the controller's limits, the group holding plants and not closed loops; and with two inputs.
@@ -66,6 +68,7 @@ struct SteppedKernelSet : KernelSet<DoubleGroup, double> {
 
 struct Kernels {
     const char* name;
+    bool fused;  // products and sums by the processor, not by calls of the C library
     // Coefficients of the plants (`closed` false) or of the closed loops into the group's a, b and order; its states are left
     // alone.
     void (*coefficients)(const FactorGroup&, const Loop&, double sample_time, bool closed, DoubleGroup&);

@@ -24,7 +24,7 @@ struct ProductSource {
             for (std::size_t k = 0; k < n; ++k) {
                 const L row = L::load(b + k * W);
 #pragma GCC unroll 8
-                for (int t = 0; t < T; ++t) part[t] = part[t] + L::all(a[k * W + static_cast<std::size_t>(i + t)]) * row;
+                for (int t = 0; t < T; ++t) part[t] = fma(L::all(a[k * W + static_cast<std::size_t>(i + t)]), row, part[t]);
             }
             for (int t = 0; t < T; ++t) {
                 double* const sum = sums + static_cast<std::size_t>(i + t) * W;
@@ -52,7 +52,7 @@ struct ProductSource {
             const double* past = in + k * W;
             for (std::size_t i = 0; i < order; ++i) {
                 past -= W;
-                v = v - L::all(phi[i]) * L::load(past);
+                v = fnma(L::all(phi[i]), L::load(past), v);
             }
             v.store(out + k * W);
         }
@@ -63,7 +63,7 @@ struct ProductSource {
         for (std::size_t k = 0; k < n; ++k) {
             L v = L::load(in + k * W);
             const double* past = z + k * W;
-            for (std::size_t i = order; i-- > 0;) v = v + L::all(phi[i]) * L::load(past - (i + 1) * W);
+            for (std::size_t i = order; i-- > 0;) v = fma(L::all(phi[i]), L::load(past - (i + 1) * W), v);
             v.store(z + k * W);
         }
     }

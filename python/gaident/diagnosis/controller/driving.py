@@ -6,9 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gaident.axis import Text
 from gaident.control.controller import Controller
+from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI, bare_pi
+from gaident.control.unknown import field_of
 from gaident.data.record import Record
 from gaident.diagnosis.controller.controller_place import AsLogged, as_logged
 from gaident.diagnosis.controller.form_findings import Loop, driver_of
@@ -25,6 +30,8 @@ from gaident.results.finding import Finding
 
 __all__ = ["Driving", "driving_of"]
 
+Matrix = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Driving:
@@ -34,7 +41,7 @@ class Driving:
     doubts: notes on torques that do not follow from a controller that is no bare PI. numbers: those that were not given.
     limited: whether a limit of the controller, which was not given either, makes the torques follow.
     regained_from: the PI that was given, where records without a torque show other gains. lag: behind which a measured torque was
-    logged; the records then hold the one before it.
+    logged; the records then hold the one before it. found: the controller's numbers that the records show.
     """
 
     moved: Aligned
@@ -47,6 +54,7 @@ class Driving:
     limited: bool = False
     regained_from: PI | None = None
     lag: Lag | None = None
+    found: FoundNumbers | None = None
 
     def regained(self, other: OtherGains) -> Driving:
         """The same under other gains, which command and velocity show where no torque is logged; a finding says so."""
@@ -59,6 +67,7 @@ class Driving:
             logged=replace(self.logged, controller=other.controller),
             findings=(*kept, other.finding(given)),
             regained_from=given,
+            found=other.found,
         )
 
     def formed(self, other: UnloggedForm) -> Driving:
@@ -68,7 +77,27 @@ class Driving:
         given = {driven.digest: self.moved.given[here.digest] for part in pairs for driven, here in part}
         moved = replace(self.moved, records=records, held=held, given=given)
         findings = (*self.findings, other.finding)
-        return replace(self, moved=moved, controller=other.controller, logged=as_logged(records, None), findings=findings)
+        logged = as_logged(records, None)
+        return replace(self, moved=moved, controller=other.controller, logged=logged, findings=findings, found=other.found)
+
+    def refound(self, found: FoundNumbers, covariance: Matrix) -> Driving:
+        """The same with other numbers of the controller, which the model of the axis shows closer; covariance: of them."""
+        controller = found.controller
+        assert controller is not None
+        named = {} if found.named is None else found.named(found.at, covariance)
+        findings = tuple(replace(f, parameters=_closer(f.parameters, named.get(f.effect, {}))) for f in self.findings)
+        numbers = _closer(self.numbers, named.get("", {}))
+        moved = self.moved
+        pairs = [[(driven_by(moved.given[r.digest], controller), r) for r in part] for part in (moved.records, moved.held)]
+        records, held = (tuple(driven for driven, _ in part) for part in pairs)
+        given = {driven.digest: moved.given[r.digest] for part in pairs for driven, r in part}
+        moved = replace(moved, records=records, held=held, given=given)
+        return replace(self, moved=moved, controller=controller, findings=findings, numbers=numbers, found=found)
+
+    @property
+    def driven(self) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
+        """The records and those held out, as their torque drives a model."""
+        return self.moved.records, self.moved.held
 
     @property
     def regained_by(self) -> int:
@@ -104,7 +133,7 @@ def driving_of(
         records, held, origin = _again(records, held, origin, partial(commanded, controller=pi))
     moved = aligned(records, held, pi)
     form = None if moved.shifts else driver_of(records, held, pi, tuple(n.removeprefix("velocity.") for n in asked.estimates))
-    findings, numbers, limited = asked.findings, asked.estimates, False
+    findings, numbers, limited, found = asked.findings, asked.estimates, False, asked.found
     if form is None:
         notes = (*(asked.notes or asked.numbers.trusted().notes), *notes)
         if doubts and pi is None and controller is not None and not numbers:
@@ -112,13 +141,14 @@ def driving_of(
             limited = other is None and by_a_limit(whole, controller)
             if other is not None:
                 controller, numbers, notes, doubts = other.controller, other.estimates, (*notes, *doubts, other.note), ()
+                found = other.found
                 records, held, origin = _again(records, held, origin, partial(driven_by, controller=controller))
                 moved = aligned(records, held, None)
             elif not limited and not asked.findings:  # a form that a bare PI lacked was found already
                 form = other_form(whole, [origin.get(r.digest, r) for r in held], controller)
     if form is not None:
         controller, pi, notes, doubts = form.controller, None, (*notes, *form.notes), ()
-        findings, numbers = form.findings, form.estimates
+        findings, numbers, found = form.findings, form.estimates, form.found
         pairs = zip((*form.records, *form.held), (*records, *held), strict=True)
         origin = {changed.digest: origin.get(given.digest, given) for changed, given in pairs}
         moved = aligned(form.records, form.held, None)
@@ -130,7 +160,7 @@ def driving_of(
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
     used = controller if bare_pi(controller) is None else logged.controller
-    return Driving(moved, used, logged, findings, (*asked.period_notes, *notes), doubts, numbers, limited, lag=lag)
+    return Driving(moved, used, logged, findings, (*asked.period_notes, *notes), doubts, numbers, limited, None, lag, found)
 
 
 def _again(
@@ -141,3 +171,12 @@ def _again(
     changed = [tuple(map(drive, part)) for part in given]
     pairs = zip((*changed[0], *changed[1]), (*given[0], *given[1]), strict=True)
     return changed[0], changed[1], {now.digest: whole for now, whole in pairs}
+
+
+def _closer(estimates: Mapping[str, Estimate], named: Mapping[str, tuple[float, float]]) -> dict[str, Estimate]:
+    """Estimates with other values and deviations, where there are some by their names, or the last part of these."""
+    found = {name: named.get(name) or named.get(field_of(name)) for name in estimates}
+    return {
+        name: e if (pair := found[name]) is None else replace(e, value=pair[0], std=pair[1], identifiable=pair[1] < abs(pair[0]))
+        for name, e in estimates.items()
+    }

@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gaident.control.cascade import Cascade
 from gaident.control.filters import LowPass
+from gaident.control.found import FoundNumbers, loosened
 from gaident.control.pi import PI, RULES
-from gaident.diagnosis.controller.form_regression import Shape
+from gaident.diagnosis.controller.form_regression import Shape, at_places
 
-__all__ = ["FEEDS", "FILTER_NAMES", "FIRST_FEED", "GAINS", "KI", "KP_R", "KP_W", "WEIGHTS", "Candidate", "Form", "named"]
+__all__ = [
+    "FEEDS",
+    "FILTER_NAMES",
+    "FIRST_FEED",
+    "GAINS",
+    "KI",
+    "KP_R",
+    "KP_W",
+    "WEIGHTS",
+    "Candidate",
+    "Form",
+    "controller_of",
+    "found_of",
+    "named",
+]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -124,3 +140,49 @@ def named(
 
 def _of_logarithm(logarithm: float, std: float, unit: float) -> tuple[float, float]:
     return (value := float(np.exp(logarithm)) * unit), value * float(std)
+
+
+def controller_of(best: Candidate, numbers: Vector, filters: Vector, given: PI, period: float) -> Cascade:
+    """The controller of a form with these numbers."""
+    kp, kp_b, ki = (max(float(x), 0.0) for x in numbers[:FIRST_FEED])
+    pi = PI(
+        kp=kp,
+        ki=ki,
+        torque_limit=given.torque_limit,
+        integrator_limit=given.integrator_limit,
+        rule=best.form.rule,
+        command_weight=kp_b / kp if kp else 1.0,
+    )
+    feeds = {name: float(numbers[FIRST_FEED + FEEDS.index(name)]) for name in best.form.feeds}
+    return Cascade(pi, **feeds, **at_places(best.shape.places, filters, period))  # type: ignore[arg-type]
+
+
+def found_of(
+    best: Candidate, fitted: tuple[Vector, Vector, Matrix], given: PI, whole: Cascade, period: float, slow: bool
+) -> FoundNumbers:
+    """The numbers of a form with their covariance; whole: the controller, with what is no number of the form.
+
+    slow: whether the log has fewer lines than the controller samples.
+    """
+    numbers, filters, cov = fitted
+    gains = len(numbers)
+
+    def made(at: Vector) -> Cascade:
+        one = controller_of(best, at[:gains], at[gains:], given, period)
+        own = one.velocity
+        velocity = replace(whole.velocity, kp=own.kp, ki=own.ki, command_weight=own.command_weight)
+        return replace(one, period=whole.period, velocity=velocity)
+
+    def said(at: Vector, spread: Matrix) -> dict[str, dict[str, tuple[float, float]]]:
+        unknown = {name: (float(at[k]), float(np.sqrt(spread[k, k]))) for name, k in GAINS.items() if name in best.form.unknown}
+        return {**named(best, at[:gains], at[gains:], spread, period), "": unknown}
+
+    at = np.concatenate([numbers, filters])
+    low = np.full(len(at), -np.inf)
+    low[:FIRST_FEED] = 0.0
+    dampings, k = [], gains
+    for _, kind in best.shape.places:
+        dampings += [] if kind is LowPass else [k + 1]
+        k += 1 if kind is LowPass else 3
+    low[dampings] = 0.0
+    return FoundNumbers(made, at, loosened(cov) if slow else cov, low, named=said)

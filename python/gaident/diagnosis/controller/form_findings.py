@@ -10,6 +10,7 @@ import numpy as np
 from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import Cascade, cascade_of
 from gaident.control.controller import Controller
+from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI, bare_pi
 from gaident.control.simplest import simplest
 from gaident.data.record import Record
@@ -51,6 +52,7 @@ class Driver:
     findings: tuple[Finding, ...]
     notes: tuple[Text, ...]
     estimates: Mapping[str, Estimate]  # of gains that were not given
+    found: FoundNumbers | None = None
 
 
 def driver_of(
@@ -69,14 +71,15 @@ def driver_of(
     if shown is None:
         return None
     driven, held = (tuple(driven_by(r, shown.controller) for r in part) for part in (records, held))
-    return Driver(driven, held, shown.controller, findings_of(shown), notes_of(shown, records), _estimates(shown.estimated))
+    said = findings_of(shown), notes_of(shown, records)
+    return Driver(driven, held, shown.controller, *said, _estimates(shown.estimated), shown.found)
 
 
 @dataclass(frozen=True)
 class Loop:
     """The controller that a diagnosis works with: the given one, with its numbers, or the one that a slower log shows.
 
-    period_notes: on a sample time of it that was not given.
+    period_notes: on a sample time of it that was not given. found: its numbers that were not given, or differ.
     """
 
     controller: Controller | None
@@ -85,6 +88,7 @@ class Loop:
     notes: tuple[Text, ...] = ()
     estimates: Mapping[str, Estimate] = field(default_factory=dict)
     period_notes: tuple[Text, ...] = ()
+    found: FoundNumbers | None = None
 
 
 def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
@@ -100,6 +104,8 @@ def loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
 def _formed(records: Sequence[Record], given: Controller | None) -> Period | None:
     """A bare PI with a sample time that was not given, where only another form of it makes the logged torques, and a faster one.
 
+    A form at the log's rate stands where none of a faster one leaves clearly less: a torque that follows to what its log could
+    not tell may follow much closer with the right sample time.
     Of several sample times that of the fewest settings and, of these, the one that comes closest.
     """
     pi, dt = bare_pi(given), records[0].dt
@@ -111,15 +117,17 @@ def _formed(records: Sequence[Record], given: Controller | None) -> Period | Non
     ):
         return None
     unsaid = [said for r in records if (said := replay(r, pi)).follows is False]
-    if not unsaid or any(said.cause for said in unsaid) or form_shown(records, pi) is not None:
+    if not unsaid or any(said.cause for said in unsaid):
         return None
     found = {every: shown for every in FASTER if (shown := form_shown(records, pi, (), every)) is not None}
     close = {every: shown for every, shown in found.items() if shown.rms < POLICY.replay_noise * shown.before}
+    if close and (slow := form_shown(records, pi)) is not None:
+        close = {every: shown for every, shown in close.items() if shown.rms < POLICY.each_number * slow.rms}
     if not close:
         return None
     every = min(close, key=lambda n: (len(close[n].numbers), close[n].rms))
     text = (
-        "The logged {torque} follows from no form of this controller at the log's rate. It does from the one below, where that "
+        "The logged {torque} follows from no form of this controller at the log's rate as from the one below, where that "
         "samples {} times for each line: {:.4g} ms is taken for its sample time. Where that is not it, give period (s)."
     )
     return Period(Cascade(pi, period=dt / every), say(text, every, 1e3 * dt / every))
@@ -129,7 +137,7 @@ def _loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     """The same of a controller whose sample time is known."""
     numbers = with_estimates(records, given)
     numbers = replace(numbers, controller=simplest(numbers.controller, (r.dt for r in records)))
-    as_given = Loop(numbers.controller, numbers, (), (), numbers.estimates)
+    as_given = Loop(numbers.controller, numbers, (), (), numbers.estimates, found=numbers.found)
     pi, every = _alone(numbers.controller, records)
     if pi is None or every == 1 or any(r.torque is None or r.command is None for r in records):
         return as_given
@@ -138,7 +146,8 @@ def _loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     if shown is None:
         return replace(as_given, numbers=numbers.trusted())
     estimates = {f"velocity.{name}": e for name, e in _estimates(shown.estimated).items()}
-    return Loop(shown.controller, replace(numbers, doubt=""), findings_of(shown), notes_of(shown, records), estimates)
+    known = replace(numbers, doubt="")
+    return Loop(shown.controller, known, findings_of(shown), notes_of(shown, records), estimates, found=shown.found)
 
 
 def _alone(controller: Controller | None, records: Sequence[Record]) -> tuple[PI | None, int]:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.cascade import Cascade
+from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI, RULES
 from gaident.data.record import Record
 from gaident.diagnosis.controller.form import (
@@ -32,6 +33,8 @@ from gaident.diagnosis.controller.form import (
     WEIGHTS,
     Candidate,
     Form,
+    controller_of,
+    found_of,
     named,
 )
 from gaident.diagnosis.controller.form_regression import (
@@ -39,7 +42,6 @@ from gaident.diagnosis.controller.form_regression import (
     FILTER_SETS_OF_ONE,
     Law,
     Shape,
-    at_places,
     bounds_of,
     fitted_shape,
     law_of,
@@ -76,6 +78,7 @@ class Shown:
     starts      the highest integral before a record's begin [N m]; 0: none
     estimated   gains that were not given -> (value, standard deviation)
     exact       the torques follow to the rounding, at every sample
+    found       the controller with its numbers, and how far they may be off together
     """
 
     controller: Cascade
@@ -86,6 +89,7 @@ class Shown:
     rms: float
     starts: float
     estimated: dict[str, tuple[float, float]]
+    found: FoundNumbers
     exact: bool = False
 
 
@@ -199,7 +203,7 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
     """The best candidate fitted and run as a whole on every sample; None where the torque does not follow from it."""
     best = candidates[0]
     numbers, filters, cov = _fitted(law, best, given)
-    controller = _controller(best, numbers, filters, given, law.period)
+    controller = controller_of(best, numbers, filters, given, law.period)
     starts = numbers[FIRST_FEED + len(FEEDS) :]
     off, exact = [], True
     for rec, start, allowed in zip(records, starts, _allowed(records, law, controller.velocity), strict=True):
@@ -220,6 +224,7 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
         rms=_rms(off),
         starts=float(np.abs(starts).max()),
         estimated=_estimated(best, numbers, cov),
+        found=found_of(best, (numbers, filters, cov), given, controller, law.period, slow=False),
         exact=exact,
     )
 
@@ -235,7 +240,7 @@ def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Se
         left = law.logged - law.columns(best.shape.places, filters) @ (best.form.of_columns(len(numbers), law.period) @ numbers)
         least = float(np.hypot(floor, law.unseen(best.shape)))
         follows = _rms([left]) <= max(POLICY.near_rounding * least, negligible)
-        if follows and not too_fast(_controller(best, numbers, filters, given, law.period), records[0].dt):
+        if follows and not too_fast(controller_of(best, numbers, filters, given, law.period), records[0].dt):
             others = [best, *(c for c in candidates if c is not best)]
             if (shown := _with_limit(records, law, given, others, (numbers, filters, cov))) is not None:
                 return shown
@@ -280,7 +285,7 @@ def _with_limit(
     noise of a measured torque.
     """
     best, (numbers, filters, cov) = candidates[0], fitted
-    at_limit = limited(records, replace(_controller(best, numbers, filters, given, law.period), period=law.period))
+    at_limit = limited(records, replace(controller_of(best, numbers, filters, given, law.period), period=law.period))
     if not best.names and at_limit.limit is None:
         return None
     before, after = run_error(records, Cascade(given, law.period)), run_error(records, at_limit.controller)
@@ -300,6 +305,7 @@ def _with_limit(
         rms=after,
         starts=0.0,
         estimated=_estimated(best, numbers, cov),
+        found=found_of(best, fitted, given, at_limit.controller, law.period, law.every > 1),
     )
 
 
@@ -373,17 +379,3 @@ def _fitted(law: Law, best: Candidate, given: PI) -> tuple[Vector, Vector, Matri
     outward[: len(fixed), :k] = wide
     outward[len(fixed) :, k:] = np.eye(len(shape.numbers))
     return fixed + moved @ x[:m], x[m:], outward @ spread @ outward.T
-
-
-def _controller(best: Candidate, numbers: Vector, filters: Vector, given: PI, period: float) -> Cascade:
-    kp, kp_b, ki = (max(float(x), 0.0) for x in numbers[:FIRST_FEED])
-    pi = PI(
-        kp=kp,
-        ki=ki,
-        torque_limit=given.torque_limit,
-        integrator_limit=given.integrator_limit,
-        rule=best.form.rule,
-        command_weight=kp_b / kp if kp else 1.0,
-    )
-    feeds = {name: float(numbers[FIRST_FEED + FEEDS.index(name)]) for name in best.form.feeds}
-    return Cascade(pi, **feeds, **at_places(best.shape.places, filters, period))  # type: ignore[arg-type]

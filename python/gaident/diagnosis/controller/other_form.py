@@ -53,7 +53,8 @@ def other_form(records: Sequence[Record], held: Sequence[Record], given: Control
     beside = "" if shown is None else say("{} with {}", " and" if absent else "", parts_of(shown))
     notes = (say(words, without, beside), *(() if shown is None else notes_of(shown, records)[1:]))
     driven, later = (tuple(driven_by(r, found) for r in part) for part in (records, held))
-    return Driver(driven, later, found, findings, notes, {})
+    numbers = None if shown is None else shown.found.then(lambda one: replace(cascade_of(one), delay=cascade.delay))
+    return Driver(driven, later, found, findings, notes, {}, numbers)
 
 
 def _differs(name: str, found: Cascade, given: Cascade) -> bool:

@@ -4,8 +4,9 @@ A controller that is faster than the log makes another torque of the same lines 
 by what its integrator adds up between the lines, by what an anti-windup keeps at a limit.
 Each of r = 2, 4, 8, 16 samples to a line is tried, with the plateau of the torque as a limit where it shows one. Such a
 controller is the drive's where it leaves less than the share `each_number` of what one at the log's rate leaves.
-What the velocity did between the lines is lost, and at a limit it changes what an anti-windup keeps: two that leave alike, up to
-the factor `same_clock`, are told apart by the motion.
+What the velocity did between the lines is lost and adds up in the integral, so that two are compared by how much of what they
+leave changes from line to line, where no limit acts; two that are alike in it, up to the factor `same_clock`, are told apart by
+the motion.
 A velocity is not old, or T/2 old where it is the difference of an encoder's angle:
 
     lag = 0,   or, on the lattice of an encoder,   lag = -1/(2 r) lines
@@ -31,6 +32,7 @@ from gaident.data.signals.lattice import encoder_step
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.controller.slow_forms import limited, run_error
 from gaident.estimation.regression.torque_lag import torque_lag
+from gaident.identification.logged_stretches import log_of
 from gaident.identification.logged_torque import comparable, not_followed
 from gaident.models.drive_torque import HALF, driven_by
 from gaident.policy.table import POLICY
@@ -66,7 +68,8 @@ def period_shown(records: Sequence[Record], given: Controller | None) -> Period 
     least = min(left for _, left in found.values())
     if not least < POLICY.each_number * before:
         return None
-    alike = [n for n, (_, left) in found.items() if left <= POLICY.same_clock * least]
+    steps = {every: _step_error(records, one) for every, (one, _) in found.items()}
+    alike = [n for n, step in steps.items() if step <= POLICY.same_clock * min(steps.values())]
     lags = {n: _lag(records, found[n][0]) for n in alike}
     old = HALF if encoder_step(np.concatenate([r.velocity for r in records])) > 0.0 else 0.0
     every = min(alike, key=lambda n: abs(lags[n] + old / n))
@@ -90,6 +93,20 @@ def _left(records: Sequence[Record], controller: Cascade) -> tuple[Cascade, floa
     """(the controller with the limit that the logs show, root mean square of logged minus made torque [N m])."""
     one = limited(records, controller).controller
     return one, run_error(records, one)
+
+
+def _step_error(records: Sequence[Record], controller: Cascade) -> float:
+    """Root mean square of the change of logged minus made torque from line to line [N m], where no limit acts.
+
+    What the velocity did between the lines adds up in the integral, so that the difference itself says little.
+    """
+    changes = []
+    for rec in records:
+        log = log_of(rec, len(rec), controller, True)
+        made = log.made(controller)
+        free = np.maximum(np.abs(log.torque), np.abs(made)) < POLICY.at_limit * controller.velocity.limits[0]
+        changes.append(np.diff(log.torque - made)[free[1:] & free[:-1]])
+    return float(np.sqrt(np.mean(np.concatenate(changes) ** 2)))
 
 
 def _lag(records: Sequence[Record], controller: Cascade) -> float:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from gaident.axis import Text, called, joined, say
+from gaident.control.found import FoundNumbers
 from gaident.diagnosis.library.sides import called_of
 from gaident.diagnosis.selection.offset import Offset
 from gaident.diagnosis.selection.select import Selection
@@ -15,11 +18,13 @@ from gaident.results.estimate import Estimate
 
 __all__ = [
     "basis_of",
+    "closer_numbers",
     "closest",
     "drives_itself",
     "evidence_of",
     "far_off",
     "hidden_by_torque_noise",
+    "of_the_controller",
     "or_other_form",
     "or_other_gains",
     "period_seen",
@@ -147,3 +152,21 @@ def or_other_form(words: Text) -> Text:
         "does."
     )
     return say(text, words)
+
+
+def closer_numbers(torque: FoundNumbers, model: FoundNumbers) -> Text:
+    """What is said where the model of the axis moved the numbers of the controller that its torque had shown."""
+    text = "The model of the axis shows the controller's numbers closer than the {torque} alone: they were moved{}."
+    off = float(np.abs(model.deviations_off).max(initial=0.0))
+    by = say(" by up to {:.1f} of the deviations with which that shows them", off) if torque.covariance is not None else ""
+    return say(text, by)
+
+
+def of_the_controller(mechanics: Mapping[str, Estimate]) -> list[Text]:
+    """What is said where most of the deviations of the mechanics comes from numbers of the controller that were found."""
+    mostly = [name for name, e in mechanics.items() if 2.0 * e.of_controller**2 > e.std**2 > 0.0]  # no decision: half of it
+    text = (
+        "Most of the deviation of {} comes from the numbers, or the clock, of the controller, which the records had to show: "
+        "give them, or log every one of its samples."
+    )
+    return [say(text, joined(", ", (Text(name.replace("_", " ")) for name in mostly)))] if mostly else []

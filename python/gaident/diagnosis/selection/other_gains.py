@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, joined, say, unit_text
+from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.select import Selection
@@ -50,6 +51,7 @@ class OtherGains:
     """A model under other gains: its fit, the PI, and how well its gains are known.
 
     gain: BIC units by which the selected model, under the given gains, is worse.
+    found: the gains' logarithms over the given ones.
     """
 
     fit: Fit
@@ -58,6 +60,7 @@ class OtherGains:
     score: float
     bic: float
     gain: float
+    found: FoundNumbers
 
     def moves(self, pi: PI) -> bool:
         """Whether a gain differs from that of a PI by more than its deviation."""
@@ -209,7 +212,7 @@ class _Search:
         }
         bic = found.bic + cost_of(self.freedom, objective.information)
         score = self.space.score(found) + cost_of(self.freedom, objective.information) + self.space.penalty
-        return OtherGains(found, pi, estimates, score, bic, self.final.bic - bic)
+        return OtherGains(found, pi, estimates, score, bic, self.final.bic - bic, self.under.found(z))
 
 
 def under_given(found: Selection, given: PI, gains: int) -> Selection | None:
@@ -222,7 +225,7 @@ def under_given(found: Selection, given: PI, gains: int) -> Selection | None:
     here = replace(space, objective=replace(space.objective, data=data), grown={})
 
     def moved(fit: Fit) -> Fit:
-        return here.refitted(fit.hypothesis.driven_by(replace(fit.predictor, data=data)), fit.x)  # type: ignore[type-var]
+        return here.refitted(fit.hypothesis.over(data), fit.x)
 
     final = moved(found.final)
     if here.score(final) > space.score(found.final) + cost_of(gains, space.objective.information) + space.penalty:

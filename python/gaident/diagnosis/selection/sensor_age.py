@@ -73,7 +73,8 @@ def searched(
         )
 
         def under(lines: float) -> Selection:
-            return search(Objective(data.aged(-lines), objective.weight, counter=objective.counter), most)
+            near = (-lines - ahead.std, ahead.std - lines)
+            return search(Objective(data.aged(-lines, near), objective.weight, counter=objective.counter), most)
 
         found = under(ahead.lag)
         closer = _refined(found, ahead)
@@ -89,8 +90,12 @@ def searched(
         )
         older = Objective(data.aged(HALF), objective.weight, counter=objective.counter)
         return search(older, most), [say(text, 1e3 * HALF * data.dt)]
+    # Between the lines of a log whose torque does not follow from its controller, the torque may go on.
+    going_on = (-HALF,) if every == 1 and controller is not None and data.torque_logged and not data.loop_follows else ()
+    if going_on:
+        objective = Objective(data.aged(0.0, going_on), objective.weight, counter=objective.counter)
     lines = encoder_lines(data.velocity, data.dt / every, TURN if data.axis == "rotary" else 1.0)
-    older = Objective(data.aged(HALF / every), objective.weight, counter=objective.counter)
+    older = Objective(data.aged(HALF / every, (0.0, *going_on)), objective.weight, counter=objective.counter)
     age = 1e3 * HALF * data.dt / every
     if lines and not _score(objective, scales, model) < _score(older, scales, model) - POLICY.rival_margin:
         each = Text("a turn", "a metre")
@@ -170,7 +175,7 @@ def _score_beside(again: Selection, found: Selection) -> float:
 def _score_under(data: DataSet, final: Fit, space: Moves) -> float:
     """Score of a model over these data, fitted again, under the errors of a search."""
     space = replace(space, objective=replace(space.objective, data=data), grown={})
-    return space.score(space.refitted(final.hypothesis.driven_by(replace(final.predictor, data=data)), final.x))  # type: ignore[type-var]
+    return space.score(space.refitted(final.hypothesis.over(data), final.x))
 
 
 def _score(objective: Objective, scales: Scales, model: Model) -> float:

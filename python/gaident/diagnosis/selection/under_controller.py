@@ -11,12 +11,13 @@ What comes out is held against a selected model. One that is fitted before white
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gaident.control.controller import Controller
+from gaident.control.found import STEP, FoundNumbers
 from gaident.diagnosis.selection.model_space import ModelSpace
 from gaident.estimation import least_squares as ls
 from gaident.estimation.dataset import DataSet
@@ -30,7 +31,6 @@ __all__ = ["STEP", "UnderController", "out_of_reach"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-STEP = 1e-3  # no decision: of a number of the controller, for a difference
 STEPS = 12  # no decision: work, of Gauss and Newton
 
 
@@ -46,7 +46,7 @@ class UnderController:
     def of(self, hypothesis: Hypothesis, z: Vector) -> Hypothesis:
         """A model driven by what the controller of z makes."""
         data = self.data.under(self.controller(z))
-        return hypothesis.driven_by(replace(hypothesis.predictor, data=data))  # type: ignore[type-var]
+        return hypothesis.over(data)
 
     def fitted(self, space: ModelSpace, objective: Objective, fit: Fit, z: Vector, beyond: float) -> tuple[Vector, Fit] | None:
         """(z, model) of the least cost, under a noise model of its own; None where it diverges or its score stays beyond.
@@ -97,6 +97,10 @@ class UnderController:
             E = objective.errors(self.of(hypothesis, to), x[None, :])
             rows.append((objective.whitened(E, noise)[0] - v) / (to[i] - z[i]))
         return v, project_out(J, np.array(rows))
+
+    def found(self, z: Vector) -> FoundNumbers:
+        """The numbers of z, which the errors of the model show."""
+        return FoundNumbers(self.controller, z, None, self.low, self.high)
 
     def deviations(self, objective: Objective, fit: Fit, z: Vector) -> Vector:
         """Standard deviations of z (k,) at a fit."""

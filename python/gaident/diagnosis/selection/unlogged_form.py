@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from gaident.axis import Text, joined, say, unit_text
 from gaident.control.cascade import Cascade
 from gaident.control.filters import LowPass, Notch
+from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.other_gains import OTHER_GAINS
@@ -42,6 +43,7 @@ from gaident.results.finding import Finding
 __all__ = ["UnloggedForm", "in_series", "leaves_noise", "unlogged_form"]
 
 Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 
 NYQUIST = 0.95  # no decision: of the Nyquist frequency, the highest notch
 SLOWEST = 0.1  # no decision: of the record's duration, the longest time constant and the longest period of a notch
@@ -88,6 +90,12 @@ class _Variant:
     def of(self, pi: PI, z: Vector) -> Cascade:
         """The controller with the numbers z as the search moves them."""
         return self.controller(pi, *(number.value(x) for number, x in zip(self.numbers, z, strict=True)))
+
+    def named(self, z: Vector, covariance: Matrix) -> dict[str, dict[str, tuple[float, float]]]:
+        """Finding -> parameter -> (value, standard deviation), of numbers as the search moves them."""
+        found = zip(self.numbers, z, np.sqrt(np.diag(covariance)), strict=True)
+        estimates = {n.name: n.estimate(float(x), float(std)) for n, x, std in found}
+        return {self.finding: {name: (e.value, e.std) for name, e in estimates.items()}}
 
     def ends(self, dt: float, duration: float) -> tuple[Vector, Vector]:
         """(lowest, highest) z."""
@@ -160,7 +168,7 @@ class UnloggedForm:
     """A model under another form of controller.
 
     Its fit, the controller, what that has in words, its finding; its score, and that of the selected model under the given
-    controller.
+    controller. found: the numbers of the form.
     """
 
     fit: Fit
@@ -169,6 +177,7 @@ class UnloggedForm:
     finding: Finding
     score: float
     selected: float
+    found: FoundNumbers
 
     def better(self, margin: float) -> bool:
         """Whether it explains the records better than the selected model does under the given controller."""
@@ -208,11 +217,12 @@ def unlogged_form(space: Moves, final: Fit) -> UnloggedForm | None:
     best = min(known, key=lambda f: f[1], default=None)
     if best is None or any(f[2].finding == OTHER_GAINS and f[1] < best[1] + space.margin for f in known):
         return None
-    fit, score, variant, z, stds = best
+    fit, score, variant, numbers, stds = best
+    z = numbers.at
     selected = min(space.score(final), space.score(_opened(space, final)))
     close = {f[2]: f[2].words for f in known if f[1] < score + space.margin and f[2].finding != variant.finding}
     finding = _finding(variant, z, stds, selected - score, list(close.values()))
-    return UnloggedForm(fit, variant.of(data.pi, z), variant.words, finding, score, selected)
+    return UnloggedForm(fit, variant.of(data.pi, z), variant.words, finding, score, selected, numbers)
 
 
 def leaves_noise(space: Moves, fit: Fit) -> bool:
@@ -248,7 +258,7 @@ def _opened(space: Moves, fit: Fit) -> Fit:
 
 
 _Start = tuple[_Variant, UnderController, Fit, Vector]
-_End = tuple[Fit, float, _Variant, Vector, Vector]
+_End = tuple[Fit, float, _Variant, FoundNumbers, Vector]
 
 
 def _promising(space: Moves, objective: Objective, pi: PI, bases: list[Fit]) -> list[_Start]:
@@ -291,7 +301,7 @@ def _fitted(
     if bool(at_end.any()):
         return None
     score = space.score(found) + cost_of(len(z), objective.information) + space.penalty
-    return found, score, variant, z, under.deviations(objective, found, z)
+    return found, score, variant, replace(under.found(z), named=variant.named), under.deviations(objective, found, z)
 
 
 def _finding(variant: _Variant, z: Vector, stds: Vector, gain: float, others: list[Text]) -> Finding:

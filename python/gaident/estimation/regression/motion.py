@@ -90,7 +90,7 @@ def low_passed(x: Vector, dt: float, cutoff_hz: float, order: int) -> Vector:
     line = x[0] + (x[-1] - x[0]) / (x.size - 1) * np.arange(x.size)
     # no decision: samples beyond the ends, for a filter to settle
     extension = min(max(15, math.ceil(2.0 / (cutoff_hz * dt))), x.size - 1)
-    return zero_phase(_sections(order, cutoff_hz * 2.0 * dt), (x - line)[None, :], extension)[0] + line
+    return np.asarray(zero_phase(_sections(order, cutoff_hz * 2.0 * dt), (x - line)[None, :], extension)[0] + line)
 
 
 @lru_cache(maxsize=64)

@@ -1,0 +1,65 @@
+"""Numbers of the controller that its torque showed, moved by what the model of the axis shows of them.
+
+A filter that the logged torque shows to a few per cent is exact to no model: what it is off by looks like a resonance, or a lag.
+So each model, and that without each of its effects, is fitted together with these numbers (`gaident.estimation.found_numbers`).
+What it costs to move them is part of the criterion: their distance from what the torque showed, in its deviations squared, and
+ln N for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from gaident.diagnosis.selection.moves import Moves
+from gaident.diagnosis.selection.select import Selection
+from gaident.estimation import least_squares as ls
+from gaident.estimation.found_numbers import refined, worth
+from gaident.estimation.objective import Fit
+
+__all__ = ["joint_numbers"]
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """Models of one space, with the numbers of the controller."""
+
+    space: Moves
+
+    def fitted(self, fit: Fit) -> Fit:
+        """A model with these numbers, under a noise model of its own."""
+        objective = replace(self.space.objective)  # with a memory of its own: every controller tried makes a data set
+        found = refined(objective, ls.scored(objective, refined(objective, fit)))
+        return ls.scored(objective, found)
+
+    def score(self, fit: Fit) -> float:
+        """The criterion, with what it costs to move the numbers."""
+        return self.space.score(fit) + worth(self.space.objective, fit)
+
+    def best(self, fit: Fit) -> Fit:
+        """The model with these numbers, without the effects that then are needed no more."""
+        best = self.fitted(fit)
+        while best.effects:
+            shorter = min((self.fitted(self.space.without(best, e)) for e in best.effects), key=self.score)
+            if self.score(shorter) >= self.score(best):
+                break
+            best = shorter
+        return best
+
+
+def joint_numbers(found: Selection, compared: Callable[[Selection, Fit], Selection]) -> Selection | None:
+    """What was selected, with the numbers of the controller where model and torque have them; None where that gains nothing.
+
+    compared: a selection with another model in the place of its own, and its rivals.
+    """
+    data = found.final.predictor.data.found
+    if data is None or not len(data.moves):
+        return None
+    joint = _Joint(found.space)
+    best = joint.best(found.final)
+    if not joint.score(best) < found.space.score(found.final) - found.space.policy.swap:
+        return None
+    moved = best.predictor.data
+    here = replace(found.space, objective=replace(found.space.objective, data=moved), grown={})
+    base = here.refitted(found.base.hypothesis.over(moved), found.base.x)
+    return compared(replace(found, space=here, base=base, final=best, rivals={}, whitened=None), best)

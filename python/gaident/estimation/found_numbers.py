@@ -1,0 +1,217 @@
+"""What the numbers of the controller that were found bring into a model, and what the model says of them.
+
+    V(x, z) = |v(x, z)|^2/s^2 + (z - z_0)' C^-1 (z - z_0)
+
+x: numbers of the model, z: of the controller, z_0 and C: as the torque showed them. Where no torque did, the second part is 0.
+With E the slopes of the whitened errors v over z, J over x, and P what takes out of E all that x can explain,
+
+    cov x = s^2 (J J')^-1 + S M S',   S = -(J J')^-1 J E',   M = C                                where x alone is fitted
+                                                             M = (C^-1 + E P E'/s^2)^-1           where z is fitted too
+
+That is the covariance of both together, of which this is the part of x. z is moved in the directions in which it is independent,
+by one deviation: what no slope shows, as a filter that is hardly known, counts as it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.controller import Controller
+from gaident.control.found import FoundNumbers
+from gaident.control.pi import bare_pi
+from gaident.data.record import Record
+from gaident.estimation import least_squares as ls
+from gaident.estimation.criterion import cost_of, effective_samples, gained
+from gaident.estimation.dataset import DataSet, torque_in
+from gaident.estimation.objective import LOST, Fit, Innovations, Objective
+from gaident.estimation.projection import WORST, project_out
+from gaident.models.drive_torque import driven_by, torque_of
+from gaident.policy.table import POLICY
+
+__all__ = ["covariance_of_numbers", "moved", "of_controller", "refined", "variance_of", "worth"]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+STEPS = 12  # no decision: work, of Gauss and Newton
+SMALLEST = 1e-300  # no decision: no division by 0
+
+
+def moved(data: DataSet, by: Vector) -> DataSet | None:
+    """The data with the found numbers of the controller moved; None where it refuses them."""
+    assert data.found is not None and data.controller is not None
+    found = data.found.moved(by)
+    here, there = data.found.controller, found.controller
+    if here is None or there is None:
+        return None
+    pairs = [(_made(r, here), _made(r, there)) for r in data.read or data.records]
+    driven = tuple(r.with_channels(torque=torque_in(r) + v - u) for r, (u, v) in zip(data.driven, pairs, strict=True))
+    limited = there.with_limits(*data.controller.limits)
+    return replace(data, controller=limited, driven=driven, free=data.freed(driven), found=found)
+
+
+def _made(rec: Record, controller: Controller) -> Vector:
+    """The torque over each line [N m], as this controller makes it where the record has none, or fewer lines than it samples."""
+    pi = bare_pi(controller)
+    return torque_of(rec, pi) if pi is not None else torque_in(driven_by(rec, controller))
+
+
+def _joined(data: DataSet) -> DataSet:
+    """The data with numbers that what the errors of a model show moves from now on."""
+    return data if data.found is None else replace(data, found=data.found.joined())
+
+
+def variance_of(objective: Objective, fit: Fit, v: Vector) -> float:
+    """Mean square of the whitened errors; of output errors of colour it grows by samples over independent samples.
+
+    Those say less than their number.
+    """
+    dof = max(objective.count - int(np.count_nonzero(fit.parameters.steps() > 0.0)), 1.0)
+    repeats = 1.0 if isinstance(objective.family, Innovations) else objective.count / effective_samples(v)
+    return repeats * float(v @ v) / dof
+
+
+def of_controller(objective: Objective, fit: Fit) -> Matrix:
+    """What the numbers of the controller that were found, and its clock, bring into the covariance of x; 0 for neither."""
+    v, J = objective.linearised(fit.hypothesis, fit.x, fit.noise)
+    part = np.zeros((len(fit.x), len(fit.x)))
+    seen = np.array([i for i in np.flatnonzero(fit.parameters.steps() > 0.0) if np.all(np.isfinite(J[i])) and np.any(J[i])])
+    if not len(seen):
+        return part
+    if fit.predictor.data.found is not None:
+        E = _changes(objective, fit, v)
+        S = _answers(J[seen], E)
+        part[np.ix_(seen, seen)] = S @ _spread(objective, fit, v, J, E) @ S.T
+    others = [f.x - fit.x for age in fit.predictor.data.other_ages if (f := _of_age(objective, fit, age)) is not None]
+    if others:
+        furthest = max(others, key=lambda move: float(np.sum((move @ J) ** 2)))
+        part += np.outer(furthest, furthest)
+    return part
+
+
+def covariance_of_numbers(objective: Objective, fit: Fit) -> Matrix:
+    """The covariance of the numbers themselves (k, k)."""
+    found = _found(fit)
+    v, J, E = _slopes(objective, fit)
+    spread = _spread(objective, fit, v, J, E)
+    return np.asarray(found.moves.T @ spread @ found.moves)
+
+
+def refined(objective: Objective, fit: Fit, data: DataSet | None = None) -> Fit:
+    """The fit with the numbers of the controller moved to where the errors of the model, and the torque, have them.
+
+    data: other ones than those of the fit.
+    """
+    here = _under(objective, _joined(data or fit.predictor.data), fit)
+    for _ in range(STEPS):
+        v, J, E = _slopes(objective, here)
+        found = _found(here)
+        s2, rest = variance_of(objective, here, v), project_out(J, E)
+        A, b = rest @ rest.T, rest @ v
+        if found.covariance is not None:
+            A, b = A + s2 * np.eye(len(A)), b + s2 * found.deviations_off
+        size = np.sqrt(np.maximum(np.diag(A), SMALLEST))
+        step = -(np.linalg.pinv(A / np.outer(size, size), rcond=1e-12, hermitian=True) @ (b / size)) / size
+        for part in (1.0, 0.3, 0.1):  # no decision: of a step
+            to = moved(here.predictor.data, part * step @ found.moves)
+            trial = here if to is None else _under(objective, to, here)
+            fall = _cost(here, s2) - _cost(trial, s2)
+            if fall > 0.0:
+                break
+        else:
+            break
+        here = trial
+        if ls.negligible(objective, fall, here.cost):
+            break
+    return here
+
+
+def worth(objective: Objective, fit: Fit) -> float:
+    """What moving the numbers costs beside the criterion of the fit [BIC units]."""
+    found = fit.predictor.data.found
+    if found is None or found.shown is None or found.covariance is None:
+        return 0.0
+    off = found.deviations_off
+    return float(off @ off) + cost_of(len(found.moves), objective.information)
+
+
+def _under(objective: Objective, data: DataSet, fit: Fit) -> Fit:
+    """The model fitted over other data."""
+    return ls.fit(objective, fit.hypothesis.over(data), fit.x, fit.noise, POLICY.usual)
+
+
+def _found(fit: Fit) -> FoundNumbers:
+    """The numbers of a fit over data that have some."""
+    found = fit.predictor.data.found
+    assert found is not None
+    return found
+
+
+def _cost(fit: Fit, variance: float) -> float:
+    """s^2 V(x, z)."""
+    if fit.cost >= WORST:
+        return WORST
+    off = _found(fit).deviations_off
+    return float(fit.cost + variance * (off @ off))
+
+
+def _slopes(objective: Objective, fit: Fit) -> tuple[Vector, Matrix, Matrix]:
+    """(whitened errors v, their slopes J over x, their change E with each move of the controller's numbers)."""
+    v, J = objective.linearised(fit.hypothesis, fit.x, fit.noise)
+    return v, J, _changes(objective, fit, v)
+
+
+def _changes(objective: Objective, fit: Fit, v: Vector) -> Matrix:
+    """(m, samples): how the whitened errors change with each move of the controller's numbers."""
+    moves = _found(fit).moves
+    return np.array([_moved(objective, fit, v, by) for by in moves]).reshape(len(moves), len(v))
+
+
+def _answers(J: Matrix, E: Matrix) -> Matrix:
+    """(k, m): how the coordinates with the slopes J (k, samples) move where the errors change by E (m, samples)."""
+    sizes = np.sqrt(np.einsum("ij,ij->i", J, J))
+    unit = J / sizes[:, None]
+    return np.asarray(-(np.linalg.pinv(unit @ unit.T, rcond=1e-12, hermitian=True) @ (unit @ E.T)) / sizes[:, None])
+
+
+def _of_age(objective: Objective, fit: Fit, age: float) -> Fit | None:
+    """The model with another age of the velocity; None where that leaves clearly more.
+
+    Where the torque does not follow from the controller, what drives the model between the lines is not known, and a model that
+    leaves less may only make up for it: there no age is excluded.
+    """
+    data = fit.predictor.data.aged(age)
+    other = _under(objective, data, fit) if data.found is None or not data.found.joint else refined(objective, fit, data)
+    more = gained(other.cost, fit.cost, objective.information)
+    return None if data.loop_follows and more > POLICY.rival_margin else other
+
+
+def _moved(objective: Objective, fit: Fit, v: Vector, by: Vector) -> Vector:
+    """How the whitened errors change where the numbers of the controller are moved, one way or the other: the larger change."""
+    rows = [np.zeros(len(v))]
+    for sign in (1.0, -1.0):
+        data = moved(fit.predictor.data, sign * by)
+        if data is None:
+            continue
+        driven = fit.hypothesis.over(data)
+        E = objective.errors(driven, fit.x[None, :])
+        if float(np.abs(E).max()) < LOST:
+            row = objective.whitened(E, fit.noise, objective.inertias(driven, fit.x[None, :]))[0] - v
+            rows.append(sign * row)
+    return max(rows, key=lambda row: float(row @ row))
+
+
+def _spread(objective: Objective, fit: Fit, v: Vector, J: Matrix, E: Matrix) -> Matrix:
+    """M along the moves."""
+    found = _found(fit)
+    if not found.joint or not len(E):
+        return np.eye(len(E))
+    rest = project_out(J, E)
+    inner = rest @ rest.T / max(variance_of(objective, fit, v), SMALLEST)
+    if found.covariance is not None:
+        inner = inner + np.eye(len(E))
+    size = np.sqrt(np.maximum(np.diag(inner), SMALLEST))
+    return np.asarray(np.linalg.pinv(inner / np.outer(size, size), rcond=1e-12, hermitian=True) / np.outer(size, size))
