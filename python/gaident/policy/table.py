@@ -194,7 +194,7 @@ class Policy:
         SLOWER,
     )
     same_clock: float = loop(
-        1.5, "1", "times the least change from line to line that a controller faster than the log leaves: not told apart", PERIODS
+        0.5, "1", "of the least change from line to line that a faster controller leaves: another's is alike", PERIODS
     )
     near_age: float = loop(
         0.25,

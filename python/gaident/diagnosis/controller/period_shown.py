@@ -5,7 +5,7 @@ by what its integrator adds up between the lines, by what an anti-windup keeps a
 Each of r = 2, 4, 8, 16 samples to a line is tried, with the plateau of the torque as a limit where it shows one. Such a
 controller is the drive's where it leaves less than the share `each_number` of what one at the log's rate leaves.
 What the velocity did between the lines is lost and adds up in the integral, so that two are compared by how much of what they
-leave changes from line to line, where no limit acts; two that are alike in it, up to the factor `same_clock`, are told apart by
+leave changes from line to line, where no limit acts; two that are alike in it, up to the share `same_clock`, are told apart by
 the motion.
 A velocity is not old, or T/2 old where it is the difference of an encoder's angle:
 
@@ -39,7 +39,7 @@ from gaident.policy.table import POLICY
 
 __all__ = ["FASTER", "Period", "period_shown"]
 
-FASTER = (2, 4, 8, 16)  # no decision: work; samples of a controller to a line of the log, as drives have them
+FASTER = (2, 4, 8, 16)  # no decision: those that are tried; what lies between, 5 or 10, is taken for its neighbour
 UNLIKE = ("", "torque_limit", "anti_windup")  # what a replay at the log's rate may say: any other reason explains the torque
 
 
@@ -69,7 +69,7 @@ def period_shown(records: Sequence[Record], given: Controller | None) -> Period 
     if not least < POLICY.each_number * before:
         return None
     steps = {every: _step_error(records, one) for every, (one, _) in found.items()}
-    alike = [n for n, step in steps.items() if step <= POLICY.same_clock * min(steps.values())]
+    alike = [n for n, step in steps.items() if step <= (1.0 + POLICY.same_clock) * min(steps.values())]
     lags = {n: _lag(records, found[n][0]) for n in alike}
     old = HALF if encoder_step(np.concatenate([r.velocity for r in records])) > 0.0 else 0.0
     every = min(alike, key=lambda n: abs(lags[n] + old / n))
