@@ -300,12 +300,19 @@ def test_a_form_that_was_found_is_not_looked_for_again() -> None:
 @pytest.mark.parametrize("every", [2, 4])
 def test_a_rule_at_a_faster_clock_is_taken_before_gains_that_differ_by_little(every: int) -> None:
     """On the lines a rectangular integral of r samples to a line is about one of kp + ki dt/(2 r)."""
-    rec = slower(every, noise=0.0, rule="backward", ki=5.0)
-    given = ga.PI(KP, 5.0)
+    given, dt = ga.PI(0.15, 15.0), every * T / 2
+    true = ga.Cascade(replace(given, rule="backward"), T / 2)
+    ramps = [0.0]
+    for level in (0.0, 30.0, -30.0, 120.0, 6.0, -6.0, -150.0, 60.0, 0.0):
+        for _ in range(round(0.1 / dt)):
+            ramps.append(ramps[-1] + float(np.clip(level - ramps[-1], -300.0 * dt, 300.0 * dt)))
+    asked = np.array(ramps)
+    drive = ga.OneMass(J=4.2e-4, D=2.2e-3).model().with_effect("torque_lag", time_constant=2.5e-4)
+    done = ga.run(drive, ga.Record(dt, command=asked, velocity=0.0 * asked), true)
+    rec = ga.Record(dt, command=asked, velocity=done.velocity, torque=done.torque)
     assert replay(rec, given).cause == "gains"
     loop = loop_of([rec], given)
-    assert [f.effect for f in loop.findings] == ["integration_rule"]
-    assert loop.controller == ga.Cascade(replace(given, rule="backward"), T)
+    assert [f.effect for f in loop.findings] == ["integration_rule"] and loop.controller == true
     wrong = loop_of([log()], ga.PI(0.99 * KP, KI))  # at the log's rate gains that are off are gains that are off
     assert wrong.controller == ga.PI(0.99 * KP, KI) and wrong.period_notes == ()
 

@@ -78,7 +78,10 @@ def replay(rec: Record, controller: Controller | None) -> Replay:
     """
     kept = _KEPT.setdefault(rec, {})
     if controller not in kept:
-        kept[controller] = _replayed(rec, controller)
+        made = kept[controller] = _replayed(rec, controller)
+        for shared in (made.torque, made.replayed):
+            if shared is not None:
+                shared.flags.writeable = False
     return kept[controller]
 
 
