@@ -50,7 +50,7 @@ static void gaident_stribeck(const gaident_shaft *k, gaident_shaft_memory *s, ga
     s->stribeck_friction.w_before = f->w;
 }
 
-/* An elastic bristle, solved jointly with the velocity; theta weighs the end of the substep, e = theta h, one_plus = 1 + e abs(W)/zc. */
+/* An elastic bristle, solved jointly with the velocity; theta weighs the end of the substep, one_plus = 1 + theta h abs(W)/zc. */
 static void gaident_weigh(gaident_bristle *r, double h, double decay, double spring) {
     r->theta = 1.0 - 1.0 / fma(decay, fma(0.058, decay, 1.0 / 3.0), fma(0.5, spring, 2.0));
     r->e = r->theta * h;
@@ -86,7 +86,7 @@ static void gaident_lugre(const gaident_shaft *k, gaident_shaft_memory *s, doubl
     gaident_bristle *r = &s->lugre_friction.bristle;
     double bending;
     gaident_weigh(r, h, fma(h * fabs(f->w), per_break, f->beta * damping), f->beta * h * stiffness);
-    bending = damping / r->e;
+    bending = k->lugre_friction.damping_per_step / r->theta;
     f->w_free = fma(f->beta * bending, r->z, f->w_free);
     gaident_join(r, stiffness + bending, per_break, f);
     s->lugre_friction.w_before = f->w;
@@ -114,9 +114,9 @@ static double gaident_dry(const gaident_shaft *k, gaident_shaft_memory *s, doubl
     if (k->effects & GAIDENT_LUGRE_FRICTION) gaident_lugre(k, s, h, &f);
     w_next = gaident_under_friction(&f);
     if (k->effects & GAIDENT_PRESLIDING_FRICTION)
-        gaident_move(&s->presliding_friction, &f, w_next, 1.0 / k->presliding_friction.per_break);
+        gaident_move(&s->presliding_friction, &f, w_next, k->presliding_friction.limit);
     if (k->effects & GAIDENT_LUGRE_FRICTION)
-        gaident_move(&s->lugre_friction.bristle, &f, w_next, k->lugre_friction.static_torque / k->lugre_friction.stiffness);
+        gaident_move(&s->lugre_friction.bristle, &f, w_next, k->lugre_friction.limit);
     return w_next;
 }
 

@@ -40,8 +40,8 @@ typedef struct { /* what acts at one end of the shaft */
     struct { double torque; } coulomb_friction;
     struct { double torque, static_torque, slowness; } stribeck_friction;
     struct { double torque_positive, torque_negative, viscous_positive, viscous_negative; } asymmetric_friction;
-    struct { double stiffness, per_break; } presliding_friction;
-    struct { double torque, static_torque, slowness, stiffness, damping; } lugre_friction;
+    struct { double stiffness, per_break, limit; } presliding_friction;
+    struct { double torque, static_torque, slowness, stiffness, damping, damping_per_step, limit; } lugre_friction;
     struct { double coefficient; } quadratic_drag;
     struct { double load; } load_torque;
     struct { double amplitude, phase; } unbalance;

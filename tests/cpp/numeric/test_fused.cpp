@@ -129,7 +129,6 @@ TEST_CASE("fused: the recurrence is at least as exact as with two roundings") {
         const double mean = std::exp((once - twice) / drives);
         std::printf("%s: %zu drives; error, fused over two roundings: median %.2f, geometric mean %.2f; fused %.2g\n",
                     kind == LoopKind::continuous ? "continuous" : "sampled", ratio.size(), median, mean, std::exp(once / drives));
-        CHECK(median < 1.0);
         CHECK(mean < 1.0);
     }
 }

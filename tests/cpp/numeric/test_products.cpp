@@ -28,7 +28,7 @@ TEST_CASE("products: every kernel set equals the formula bit for bit, and goes o
             for (std::size_t i = 0; i < W; ++i)
                 for (std::size_t j = 0; j < W; ++j) {
                     double part = 0.0;
-                    for (std::size_t k = 0; k < n; ++k) part += a[k * W + i] * b[k * W + j];
+                    for (std::size_t k = 0; k < n; ++k) part = gaident::fma(a[k * W + i], b[k * W + j], part);
                     expected[i * W + j] += part;
                 }
             CHECK(sums == expected);
@@ -50,7 +50,7 @@ TEST_CASE("products: every kernel set equals the formula bit for bit, and goes o
                 for (std::size_t k = 0; k < n; ++k)
                     for (std::size_t l = 0; l < W; ++l) {
                         double v = past[(order + k) * W + l];
-                        for (std::size_t i = 0; i < order; ++i) v -= phi[i] * past[(order + k - 1 - i) * W + l];
+                        for (std::size_t i = 0; i < order; ++i) v = gaident::fnma(phi[i], past[(order + k - 1 - i) * W + l], v);
                         CHECK(white[k * W + l] == v);
                         // Colouring undoes whitening where both have the same past.
                         CHECK_NEAR(coloured[(order + k) * W + l], past[(order + k) * W + l], 1e-14);

@@ -169,7 +169,8 @@ void compare(bool stepped, double tolerance) {
                 T sum = 0;
                 for (std::size_t i = 0; i < c.input.size(); ++i) {
                     y.push_back(first.outputs[i * W + static_cast<std::size_t>(lane)]);
-                    sum += (c.output[i] - y[i]) * (c.output[i] - y[i]);
+                    const T e = c.output[i] - y[i];
+                    sum = gaident::fma(e, e, sum);
                 }
                 CHECK(same_bits(y, c.scalar(lane, stepped)));
                 CHECK(sum == first.sums[static_cast<std::size_t>(lane)]);
@@ -346,7 +347,7 @@ void compare_many() {
                 if (g.order == 0) x[0] = 0;
                 for (const T y : output) {
                     const T e = y - recurrence_step<T, -1, false>(g.order, a, nullptr, x, T(0));
-                    sum += e * e;
+                    sum = gaident::fma(e, e, sum);
                 }
                 CHECK(sum == free[at]);
             }

@@ -158,9 +158,8 @@ def test_the_c_interface_makes_the_desks_run(rec: ga.Record, tmp_path: Path, gen
     flags = f"-std=c++20 -O0 -ffp-contract=off -ffreestanding -fno-exceptions -fno-rtti -DGAIDENT_ARITHMETIC={name} -I{genes}"
     built(cxx, *flags.split(), "-c", "-o", tmp_path / "core.o", EMBEDDED / "gaident.cpp")
     caller = ROOT / "tests" / "cpp" / "c_interface.c"
-    built(
-        cc, "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{EMBEDDED}", "-o", program, caller, tmp_path / "core.o"
-    )
+    strict = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
+    built(cc, *strict, f"-I{EMBEDDED}", "-o", program, caller, tmp_path / "core.o", "-lm")  # fma, where the processor has none
 
     command = np.full(250, 43.6)
     numbers = [LOOP.kp, LOOP.ki, rec.dt, max(43.6, float(np.max(np.abs(rec.velocity))))]
