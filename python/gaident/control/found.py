@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gaident.control.controller import Controller
 from gaident.errors import ControllerError
+from gaident.policy.table import POLICY
 
 __all__ = ["STEP", "FoundNumbers", "loosened"]
 
@@ -92,8 +93,9 @@ class FoundNumbers:
 
 
 def loosened(covariance: Matrix) -> Matrix:
-    """A covariance with half of its correlations: of numbers that are off by what a log lost, and not by noise.
+    """A covariance with a part of its correlations: of numbers that are off by what a log lost, and not by noise.
 
     The deviations of each alone hold that; of a combination that noise would show closely it is not known.
     """
-    return np.asarray(0.5 * (covariance + np.diag(np.diag(covariance))))  # no decision: half way
+    kept = POLICY.kept_correlation
+    return np.asarray(kept * covariance + (1.0 - kept) * np.diag(np.diag(covariance)))

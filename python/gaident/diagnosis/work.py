@@ -363,7 +363,8 @@ class Work:
         return frozenset(t.name for t in LIBRARY.values() if t.late) if self.driving.lag is not None else frozenset()
 
     def _only_describes(self, effect: str, driver: str | None) -> bool:
-        return only_describes(self.found.space, self.final, effect, self.rivals[effect][0], driver, self.left)
+        of_class = bool(self._equivalent_here(effect))
+        return only_describes(self.found.space, self.final, effect, self.rivals[effect][0], driver, self.left, of_class)
 
     def _equivalent_here(self, effect: str) -> set[str]:
         """What these records cannot tell from an effect, whatever their noise, for lack of reversals or of sizes of steps."""

@@ -123,8 +123,9 @@ class Policy:
         0.9,
         "1",
         "least part that a cause explains of what a free function does; drag by friction 0.87, a joint's friction 0.946",
-        SHORT_MOVES,
+        DRIVES,
     )
+    class_stands: float = cause(0.5, "1", "the same for effects that no record tells apart: HSM150 in one direction", SHORT_MOVES)
     jump_deviations: float = cause(
         4.0,
         "1",
@@ -210,10 +211,7 @@ class Policy:
     )
     corner_seen: float = loop(20.0, "1", "times the other third differences of it: less is no corner of its slope", PROFILES)
     interpolation: float = loop(
-        4.0,
-        "1",
-        "times what another interpolation of the velocity changes in the torque of a slow log: less is not seen",
-        SLOWER,
+        4.0, "1", "times what another interpolation of the velocity changes in the torque of a slow log: less is not seen", SLOWER
     )
     each_number: float = loop(
         0.8,
@@ -231,12 +229,15 @@ class Policy:
         0.02, "lines", "to which the regression knows by how much a torque is ahead; else the model that is found shows it", AHEAD
     )
     slowest_lag: float = loop(
-        100.0,
-        "samples",
-        "time constant at most of a lag behind the controller's torque; a current loop is faster",
-        LAGS,
+        100.0, "samples", "time constant at most of a lag behind the controller's torque; a current loop is faster", LAGS
     )
     lag_said: float = loop(0.75, "samples", "from which a lag of an open loop's log is said; a sampled torque's is 0.5", SHIFTED)
+    kept_correlation: float = loop(
+        0.5,
+        "1",
+        "of the correlations of a controller's numbers from a slow log: their sums are less sure than noise says",
+        SLOWER,
+    )
     slope_reach: float = loop(
         0.3,
         "1",
@@ -305,9 +306,7 @@ class Policy:
     apart: float = record(0.05, "1", "of the highest speed, by which two speeds or jumps differ", DRIVES)
     slow: float = record(0.1, "1", "of the highest speed or torque: below, it is a slow or a small one", DRIVES)
     held_samples: int = record(20, "samples", "for which a speed is held at least", DRIVES)
-    no_ramp: float = record(
-        0.35, "1", "of the band of a held speed, by which its halves differ at most; on a ramp by 0.5", DRIVES
-    )
+    no_ramp: float = record(0.35, "1", "of the band of a held speed, by which its halves differ at most; on a ramp 0.5", DRIVES)
     seen_turn: float = record(0.75, "1", "of a period, that a record turns at least to show its order", DRIVES)
     seen_path: float = record(3.0, "periods", "that a record travels at least, there and back, to show an order", DRIVES)
     seen_band: float = record(0.8, "1", "of half the sampling frequency: what is faster does not show", DRIVES)

@@ -67,7 +67,7 @@ def test_json_is_what_is_saved_and_valid(here: Path, capsys: pytest.CaptureFixtu
     assert err == "" and data == json.loads(Path("idn.json").read_text())
     assert data["schema"] == "gaident/identification" and data["schema_version"] == 1
     assert {"model", "controller", "parameters", "mechanics", "adequacy", "structures", "seed"} <= set(data)
-    assert set(data["parameters"]["gain"]) == {"value", "std", "unit", "at_bound", "identifiable"}
+    assert set(data["parameters"]["gain"]) == {"value", "std", "unit", "at_bound", "identifiable", "of_controller"}
 
 
 def test_same_seed_same_result_for_any_workers(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

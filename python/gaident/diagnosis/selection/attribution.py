@@ -64,8 +64,13 @@ def what_is_left(space: Moves, final: Fit) -> tuple[bool, Dependence]:
     return False, without_torque(dependence(space.objective, final))
 
 
-def only_describes(space: Moves, final: Fit, effect: str, gain: float, driver: str | None, left: Dependence) -> bool:
-    """Whether a finding of this gain [BIC units] describes something that is not in the library."""
+def only_describes(
+    space: Moves, final: Fit, effect: str, gain: float, driver: str | None, left: Dependence, of_class: bool
+) -> bool:
+    """Whether a finding of this gain [BIC units] describes something that is not in the library.
+
+    of_class: the record cannot split it from other effects, whatever its noise, and it is reported with them.
+    """
     shown = shown_by_the_records(space, final, effect)
     if shown is not None:
         return not shown
@@ -74,7 +79,7 @@ def only_describes(space: Moves, final: Fit, effect: str, gain: float, driver: s
     doubtful = max(instead.values()) > gain + space.policy.rival_margin
     if not doubtful and driver is not None and left.gains[driver] >= space.policy.of_its_size * gain:
         doubtful = driver in final.parameters.term(effect).domains
-    return doubtful and share(space, without, final, left) < space.policy.stands
+    return doubtful and share(space, without, final, left) < (space.policy.class_stands if of_class else space.policy.stands)
 
 
 def shown_by_the_records(space: Moves, final: Fit, effect: str) -> bool | None:
