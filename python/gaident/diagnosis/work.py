@@ -258,7 +258,8 @@ class Work:
                 self.notes.append(or_other_gains(effect))
             two = self.final.parameters.masses > 1
             one_place = not two or any(t.resonates for t in self.final.parameters.terms)  # beside those nothing is at the load
-            sides = sides_of(effect, [r.effect for r in rivals], one_place)
+            steady = LIBRARY[effect].constant and any(self.data.stored)  # a torque that twists the shaft all the time
+            sides = sides_of(effect, [r.effect for r in rivals], one_place or steady)
             said_by = evidence_of(effect, gain, alternatives, offset, sides if two else ())
             what = name_of(effect), estimates[effect], alternatives, gains.of(effect), gain, None, said_by, False
             findings.append(Finding(*what, LIBRARY[effect].place, sides))

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from test_servo import KI, KP, T
 
 import gaident as ga
-from drive_rig import Noise, Plant, rig, skip_without_library
+from drive_rig import AT_LOAD, Noise, Plant, rig, skip_without_library
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.records.sizes import scales_of
 from gaident.diagnosis.selection.bases import Task
@@ -119,3 +119,16 @@ def test_under_a_bare_pi_the_loop_says_whether_a_model_with_the_load_leaves_litt
     assert space.small_unwhitened(there) and not space.small_unwhitened(without)
     limit = len(rec) * (space.policy.free_run_ratio * space.noise_beside(there)) ** 2
     assert space.objective.costs(hypothesis, there.x[None, :], WHITE)[0] > limit, "driven by the torque it leaves much"
+
+
+@pytest.mark.parametrize("end", ["", AT_LOAD])
+def test_where_on_the_shaft_a_load_acts_that_was_there_before_is_not_said(end: str) -> None:
+    """It twists the shaft all the time, and turns the motor the same from either end."""
+    plant = Plant(J=4e-4, D=4e-3, kp=0.05, ki=2.0, dt=1e-3, JL=9e-4, DL=6e-3, KG=60.0, DG=0.02)
+    speeds = np.repeat([0.0, 20.0, -15.0, 5.0, -30.0, 10.0, 30.0, -5.0], 200)
+    rec = rig(plant, speeds, {"load_torque" + end: {"torque": LOAD}}, Noise(white=0.005), seed=1, settle=600)
+    dia = ga.diagnose(rec, plant.controller)
+    (load,) = dia.causes
+    assert load.effect == "load_torque" and load.sides == ("motor", "load"), dia.summary()
+    assert load.parameters["torque"].value == pytest.approx(LOAD, rel=0.01)
+    assert "at the motor or at the load (these data do not say which)" in " ".join(dia.summary().split())

@@ -168,6 +168,8 @@ def test_in_open_loop_it_is_said_and_nothing_is_moved() -> None:
         assert (
             moves == {} and "without a controller the data cannot tell" in found.notes[0] and "shift torque=1" in found.notes[0]
         )
+        # A torque that follows from a controller stands on the lines of what it read.
+        assert aligned([late], [], None, follows=True).notes == ()
 
 
 def test_the_diagnosis_names_the_cause_behind_a_shift_and_speaks_of_the_records_that_it_was_given(tmp_path: Path) -> None:

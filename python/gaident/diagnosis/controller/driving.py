@@ -131,7 +131,8 @@ def driving_of(
     if lag is not None and pi is not None:
         notes = (*notes, lag.note)
         records, held, origin = _again(records, held, origin, partial(commanded, controller=pi))
-    moved = aligned(records, held, pi)
+    follows = controller is not None and not doubts and all(controller.replayable(r) for r in whole)
+    moved = aligned(records, held, pi, follows)
     form = None if moved.shifts else driver_of(records, held, pi, tuple(n.removeprefix("velocity.") for n in asked.estimates))
     findings, numbers, limited, found = asked.findings, asked.estimates, False, asked.found
     if form is None:
@@ -143,7 +144,7 @@ def driving_of(
                 controller, numbers, notes, doubts = other.controller, other.estimates, (*notes, *doubts, other.note), ()
                 found = other.found
                 records, held, origin = _again(records, held, origin, partial(driven_by, controller=controller))
-                moved = aligned(records, held, None)
+                moved = aligned(records, held, None, True)
             elif not limited and not asked.findings:  # a form that a bare PI lacked was found already
                 form = other_form(whole, [origin.get(r.digest, r) for r in held], controller)
     if form is not None:
@@ -151,7 +152,7 @@ def driving_of(
         findings, numbers, found = form.findings, form.estimates, form.found
         pairs = zip((*form.records, *form.held), (*records, *held), strict=True)
         origin = {changed.digest: origin.get(given.digest, given) for changed, given in pairs}
-        moved = aligned(form.records, form.held, None)
+        moved = aligned(form.records, form.held, None, True)
     elif doubts and driven.slower and not limited:
         # What this controller would make between the lines is not what the drive's made there.
         assert driven.controller is not None

@@ -71,14 +71,19 @@ class Aligned:
         )
 
 
-def aligned(records: Sequence[Record], held: Sequence[Record], controller: PI | None) -> Aligned:
-    """The records without shifts of their logs, those that the controller's law shows beyond doubt."""
+def aligned(records: Sequence[Record], held: Sequence[Record], controller: PI | None, follows: bool = False) -> Aligned:
+    """The records without shifts of their logs, those that the controller's law shows beyond doubt.
+
+    follows: a controller that is no bare PI makes the logged torques, so that these are on the lines of what it read.
+    """
     notes: dict[Text, None] = dict.fromkeys(reading_notes((*records, *held)))
     shifts: dict[str, Mapping[str, int]] = {}
     given: dict[str, Record] = {}
 
     def one(rec: Record) -> Record:
-        moves, note = _of_law(rec, controller) if controller is not None else ({}, _of_motion(rec))
+        moves, note = _of_law(rec, controller)
+        if controller is None and not follows:
+            note = _of_motion(rec)
         if note:
             name = f"{rec.name}: " if len(records) + len(held) > 1 and rec.name else ""
             notes[joined("", (name, note))] = None
