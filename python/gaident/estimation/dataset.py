@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from gaident.axis import TURN, period_of
 from gaident.control.controller import Controller, Limiting
 from gaident.control.differencing import differencing
-from gaident.control.filtering import rate_limited
+from gaident.control.filtering import filtered, rate_limited
 from gaident.control.found import FoundNumbers
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
@@ -31,6 +31,7 @@ from gaident.models.drive_torque import late, torque_of
 from gaident.models.simulate_many import LoadedRecord
 from gaident.models.starts import noise_std, starts_moving
 from gaident.models.stored_torque import stored_torque
+from gaident.policy.table import POLICY
 
 __all__ = ["DataSet", "with_angle"]
 
@@ -229,6 +230,18 @@ class DataSet:
     def open_runs(self) -> bool:
         """Whether the torque drives a free run, for lack of a loop that can be simulated."""
         return self.pi is None and not self.fits_in_loop
+
+    @cached_property
+    def corrected(self) -> DataSet:
+        """The same under a share s of the controller, with commands r: s C (r - w_measured) = u, the records' torques."""
+        assert self.pi is not None
+        pi, half, share = self.pi, 0.5 * self.pi.ki * self.dt, POLICY.corrected_share
+        own = PI(kp=share * pi.kp, ki=share * pi.ki)
+        b, a = np.array([1.0, -1.0]) / (share * (pi.kp + half)), np.array([1.0, (half - pi.kp) / (pi.kp + half)])
+        pairs = zip(self.records, self.driven, self.turned, strict=True)
+        commands = [(r, t, r.velocity + filtered(b, a, torque_in(d)[None, :], [len(d)])[0]) for r, d, t in pairs]
+        records, turned = (tuple(part[i].with_channels(command=part[2]) for part in commands) for i in (0, 1))
+        return replace(self, controller=own, records=records, turned=turned)
 
     @property
     def slower(self) -> bool:

@@ -36,7 +36,7 @@ from gaident.models.simulate import simulate
 from gaident.models.simulate_many import simulate_values
 from gaident.models.starts import noise_std
 
-__all__ = ["ClosedLoop", "OpenLoop", "Predictor", "coupling_response", "torque_noise_in", "twist"]
+__all__ = ["ClosedLoop", "CorrectedLoop", "OpenLoop", "Predictor", "coupling_response", "torque_noise_in", "twist"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -154,6 +154,40 @@ class ClosedLoop:
         pi = self.data.pi or PI(kp=loop.gains.kp, ki=loop.gains.ki)
         d = linear.discrete(parameters.scales.dt, pi)
         return open_loop - filtered(d.alpha, np.append(1.0, -d.beta), open_loop, self.data.lengths)
+
+
+@dataclass(frozen=True)
+class CorrectedLoop:
+    """The torque drives the model, and a share of the controller holds its velocity near the measured one.
+
+        u = u_record + s C(q) (w_measured - w),   s = `corrected_share`
+
+    A predictor with a fixed observer (Ljung 1999, chapter 4). A gap or an impact makes the path of a model that the torque alone
+    drives depend on rounding after some of them; in the drive's loop, s = 1, the whole of the controller's answer to the
+    sensor's noise is missing from the simulation. An effect inside the controller is simulated in the drive's loop.
+    """
+
+    data: DataSet
+    own_angle: bool = False
+    closed = True
+    difference = 3e-3
+
+    def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
+        """See `Predictor`."""
+        return self._loop(parameters).velocities(parameters, X)
+
+    def torque_response(self, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
+        """See `Predictor`."""
+        return self._loop(parameters).torque_response(parameters, x, torques)
+
+    @staticmethod
+    def possible(data: DataSet) -> bool:
+        """Under a bare PI at the log's rate that reads the velocity as it is."""
+        return data.pi is not None and data.pi.loop == "sampled" and data.fits_in_loop and not data.age
+
+    def _loop(self, parameters: Parameterisation) -> ClosedLoop:
+        inside = any(t.in_controller for t in parameters.terms)
+        return ClosedLoop(self.data if inside else self.data.corrected, self.own_angle)
 
 
 def substeps(data: DataSet, terms: Sequence[Term]) -> int | None:

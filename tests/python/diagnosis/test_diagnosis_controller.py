@@ -214,6 +214,7 @@ def test_a_diagnosis_replays_a_record_once_with_the_same_controller(monkeypatch:
         return made(rec, controller)
 
     monkeypatch.setattr(replay_module, "_replayed", counted)
+    monkeypatch.setattr(replay_module, "_KEPT", weakref.WeakKeyDictionary())  # no record of another test
     first, second = limited_drive(1.0), limited_drive(1.0, seed=1)
     assert "torque_saturation" in {f.effect for f in ga.diagnose([second, first], CONTROLLER).causes}
     assert {(r.digest, CONTROLLER) for r in (first, second)} <= set(done) and len(set(done)) == len(done)

@@ -39,6 +39,8 @@ def friction(names: Names) -> None:
 def backlash(names: Names) -> None:
     (finding,) = names["dia"].causes
     assert finding.effect == "backlash" and finding.named and near(finding.parameters["gap"].value, 0.02, 0.05)
+    for found, true in ((finding.parameters["gap"], 0.02), (names["dia"].mechanics["inertia"], 7.2e-4)):
+        assert abs(found.value - true) < 3.0 * found.std
 
 
 def ambiguous(names: Names) -> None:
