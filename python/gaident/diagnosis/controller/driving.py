@@ -161,7 +161,7 @@ def driving_of(
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
     used = controller if bare_pi(controller) is None else logged.controller
-    return Driving(moved, used, logged, findings, (*asked.period_notes, *notes), doubts, numbers, limited, None, lag, found)
+    return Driving(moved, used, logged, findings, (*asked.period_notes, *notes), doubts, numbers, limited, lag=lag, found=found)
 
 
 def _again(
