@@ -6,7 +6,9 @@ from dataclasses import asdict
 from math import nan
 from typing import Any
 
+from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import of_axis
+from gaident.results.identification import Identification
 
 __all__ = ["diagnosis_table", "identification_table"]
 
@@ -19,7 +21,7 @@ def _pandas() -> Any:
     return pandas
 
 
-def identification_table(idn: Any) -> Any:
+def identification_table(idn: Identification) -> Any:
     """One row per parameter, those of the mechanics behind those of the model; see `Identification.to_pandas`.
 
     at_bound: of the mechanics, whether any parameter that they follow from sits at a bound of its search range.
@@ -36,7 +38,7 @@ def identification_table(idn: Any) -> Any:
     return _pandas().DataFrame(rows, columns=columns).set_index(["of", "parameter"])
 
 
-def diagnosis_table(dia: Any) -> Any:
+def diagnosis_table(dia: Diagnosis) -> Any:
     """One row per parameter of each finding; see `Diagnosis.to_pandas`."""
     rows = []
     for order, finding in enumerate(dia.findings, 1):

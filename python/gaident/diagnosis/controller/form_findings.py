@@ -139,7 +139,7 @@ def _formed(records: Sequence[Record], given: Controller | None) -> Period | Non
     every = min(close, key=lambda n: (len(close[n].numbers), close[n].rms))
     text = (
         "The logged {torque} follows from no form of this controller at the log's rate as from the one below, where that "
-        "samples {} times for each line: {:.4g} ms is taken for its sample time. Where that is not it, give period (s)."
+        "samples about {} times for each line: {:.4g} ms is taken for its sample time. Where that is not it, give period (s)."
     )
     return Period(Cascade(pi, period=dt / every), say(text, every, 1e3 * dt / every))
 
