@@ -29,7 +29,7 @@ from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
-__all__ = ["AsLogged", "AtController", "as_logged", "as_read", "controller_findings"]
+__all__ = ["AsLogged", "AtController", "as_logged", "controller_findings"]
 
 Vector = NDArray[np.float64]
 
@@ -119,23 +119,6 @@ def _gains_finding(records: Sequence[Record], shown: PI, off: Sequence[Replay]) 
     fall = 1.0 - float(np.sqrt(min(after / before, 1.0)))
     gain = gained(before, max(after, floor), n, 1 if alone else 2)
     return Finding(name, {} if alone else gains, (), fall, gain, None, off[0].sentence, place="controller")
-
-
-def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: Controller | None) -> tuple[Record, ...]:
-    """The records as the controller read them: cleaned of outliers only where the logged torque follows better from that."""
-    if controller is None or any(r.torque is None or not controller.replayable(r) for r in recorded):
-        return tuple(cleaned)
-    pairs = [
-        (r, c) if r is c else min((r, c), (c, r), key=lambda pair: _replay_error(pair[0], controller))
-        for r, c in zip(recorded, cleaned, strict=True)
-    ]
-    return tuple(best for best, _ in pairs)
-
-
-def _replay_error(rec: Record, controller: Controller) -> float:
-    """Mean square of logged minus replayed torque [(N m)^2]."""
-    assert rec.torque is not None
-    return float(np.mean((rec.torque - controller.torque_of(rec)) ** 2))
 
 
 def controller_findings(data: DataSet, scales: Scales) -> tuple[list[Finding], AtController, list[Text]]:
