@@ -307,7 +307,7 @@ class Cascade(Controller):
         if self.position is not None:
             assert log.position is not None
             every, fed = self.position_every(log.dt), self.ticks(log.dt, source, log.position).velocity_feedforward
-            made = self.position.gain * (source - log.position) + (fed if len(fed) else 0.0)
+            made = self.position.gain * (source - log.position) + (fed[:: self.log_every(log.dt)] if len(fed) else 0.0)
             command = np.repeat(made[::every], every)[: len(source)]
         for one in self.command_filters:
             digital = one.digital(period)

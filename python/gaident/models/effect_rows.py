@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from gaident.axis import Text
 from gaident.models.own_effects import Parameter
 
-__all__ = ["AT_LOAD", "SHAFT", "SIDES", "EffectRow", "EffectTable", "effect_and_side", "end_words", "key_of"]
+__all__ = ["AT_LOAD", "SHAFT", "SIDES", "Row", "Table", "effect_and_side", "end_words", "key_of"]
 
 SHAFT = "shaft"
 """The place of effects that add a torque."""
@@ -40,7 +40,7 @@ def end_words(sides: Sequence[str]) -> str:
     return f"at the {sides[0]}" if sides else ""
 
 
-class EffectRow(NamedTuple):
+class Row(NamedTuple):
     """One effect of the table.
 
     Attributes
@@ -97,7 +97,7 @@ class EffectRow(NamedTuple):
         """What tells it from all others: its name, at the load with that behind it."""
         return key_of(self.name, SIDES[self.at_load])
 
-    def there(self) -> EffectRow:
+    def there(self) -> Row:
         """The row of the same effect at the load."""
         return self._replace(at_load=True, needs_two_masses=True)
 
@@ -107,7 +107,7 @@ class EffectRow(NamedTuple):
         return {"name": self.name, "place": self.place, "parameters": parameters, "meaning": self.meaning}
 
 
-class EffectTable(tuple[EffectRow, ...]):
+class Table(tuple[Row, ...]):
     """All effects, in the order of the documentation; prints as a table.
 
     See Also

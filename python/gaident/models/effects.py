@@ -17,31 +17,31 @@ from gaident import _core
 from gaident.axis import TURN, Text, say, unit
 from gaident.checks import known_keys, one_of, real_number
 from gaident.errors import ModelError
-from gaident.models.effect_rows import SIDES, EffectRow, EffectTable
+from gaident.models.effect_rows import SIDES, Row, Table
 from gaident.models.own_effects import OWN, PLACES, Function, Own, Parameter, Signals, checked
 
-__all__ = ["Effect", "Parameter", "EffectRow", "Signals", "EffectTable", "register", "table", "unregister"]
+__all__ = ["Effect", "Parameter", "Row", "Signals", "Table", "register", "table", "unregister"]
 
 
 @lru_cache(maxsize=1)
-def _built_in() -> tuple[EffectRow, ...]:
+def _built_in() -> tuple[Row, ...]:
     rows = []
     for name, place, meaning, parameters, simulated, two, relation, remark, turns in _core.effect_table():
         says = say(meaning)
         whole = say("{}; {}", says, say(remark)) if remark else says
         own = tuple(Parameter(*p) for p in parameters)
-        rows.append(EffectRow(name, place, own, whole, simulated, two, relation, says=says, turns=turns))
+        rows.append(Row(name, place, own, whole, simulated, two, relation, says=says, turns=turns))
     return tuple(rows)
 
 
 @lru_cache(maxsize=1)
-def table() -> EffectTable:
+def table() -> Table:
     """Return all effects with name, place, parameters with units, and meaning.
 
     Returns
     -------
-    EffectTable
-        A tuple of `EffectRow`, user-defined effects last; `print` shows it as a table.
+    Table
+        A tuple of `Row`, user-defined effects last; `print` shows it as a table.
 
     Examples
     --------
@@ -51,19 +51,19 @@ def table() -> EffectTable:
     ('shaft', [('torque', 'N m', '>= 0')])
     """
     own = (
-        EffectRow(o.name, PLACES[o.acts], o.parameters, o.meaning, True, False, "", own=True, says=Text(o.meaning))
+        Row(o.name, PLACES[o.acts], o.parameters, o.meaning, True, False, "", own=True, says=Text(o.meaning))
         for o in OWN.values()
     )
-    return EffectTable((*_built_in(), *own))
+    return Table((*_built_in(), *own))
 
 
 @lru_cache(maxsize=1)
-def _by_name() -> dict[str, tuple[int, EffectRow]]:
+def _by_name() -> dict[str, tuple[int, Row]]:
     return {row.name: (i, row) for i, row in enumerate(table())}
 
 
 @lru_cache(maxsize=1)
-def _by_key() -> dict[str, tuple[int, EffectRow]]:
+def _by_key() -> dict[str, tuple[int, Row]]:
     at_load = (row.there() for row in table() if SIDES[1] in row.sides)
     return {row.key: (i, row) for i, row in enumerate((*table(), *at_load))}
 
@@ -73,8 +73,8 @@ def place_of(key: str) -> int:
     return _by_key()[key][0]
 
 
-def row_of(key: str) -> EffectRow:
-    """The row of an effect's key (`EffectRow.key`)."""
+def row_of(key: str) -> Row:
+    """The row of an effect's key (`Row.key`)."""
     return _by_key()[key][1]
 
 
@@ -93,7 +93,7 @@ def register(
     actuator: Function | None = None,
     sensor: Function | None = None,
     replace: bool = False,
-) -> EffectRow:
+) -> Row:
     """Add a user-defined effect to the table, for this Python session.
 
     Exactly one of the four functions says what it does.
@@ -127,7 +127,7 @@ def register(
 
     Returns
     -------
-    EffectRow
+    Row
         The effect's row of the table.
 
     Raises
@@ -256,7 +256,7 @@ class Effect:
         object.__setattr__(self, "own", row.own)
 
     @property
-    def row(self) -> EffectRow:
+    def row(self) -> Row:
         """The effect's row in the table; raises ModelError for a user-defined effect that is no longer registered."""
         if self.name not in _by_name():
             raise ModelError(_unknown(self.name))
@@ -331,7 +331,7 @@ def _unknown(name: object) -> str:
     return f"{name!r} is an effect of your own that is not registered here: call gaident.effects.register({name!r}, ...) first"
 
 
-def _checked_side(row: EffectRow, side: object) -> str:
+def _checked_side(row: Row, side: object) -> str:
     """The side; "" of an effect that has none."""
     one_of(side, f"side of {row.name}", SIDES, ModelError)
     if side in row.sides:
@@ -372,7 +372,7 @@ def checked_effects(effects: Iterable[Effect], p: int, q: int) -> tuple[Effect, 
     return found
 
 
-def _value(row: EffectRow, parameter: Parameter, value: object) -> float:
+def _value(row: Row, parameter: Parameter, value: object) -> float:
     unit = "without unit" if parameter.unit == "1" else f"in {parameter.unit}"
     bounds = f" {parameter.bounds}" if parameter.bounds else ""
     what = f"{parameter.name} of {row.name}"

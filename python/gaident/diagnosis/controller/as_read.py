@@ -45,9 +45,10 @@ def _replay_error(rec: Record, controller: Controller) -> float:
 
 
 def outliers_of_the_log(records: Sequence[Record], controller: Controller | None) -> tuple[tuple[Record, ...], tuple[Lines, ...]]:
-    """(the records with what their controller read in the place of outliers, the lines of these) of logs slower than the controller.
+    """(the records with what their controller read in the place of outliers, the lines of these), of slow logs.
 
-    There a velocity smooth between the lines spreads an outlier over its neighbours, in the torque that drives a model too.
+    Where a log is slower than its controller, a velocity that is smooth between the lines spreads an outlier over its neighbours,
+    in the torque that drives a model, too.
     """
     found = [_of_the_log(r, controller) for r in records]
     return tuple(r for r, _ in found), tuple(lines for _, lines in found)

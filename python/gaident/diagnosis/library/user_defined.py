@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.library.sides import at_load, at_motor, name_of
-from gaident.models.effects import EffectRow, table
+from gaident.models.effects import Row, table
 from gaident.models.own_effects import starts
 
 __all__ = ["Library"]
@@ -30,7 +30,7 @@ class Library(Mapping[str, Cause]):
 
     def __init__(self, built_in: Mapping[str, Cause]) -> None:
         self._built_in = {name: at_motor(row) for name, row in built_in.items()}
-        self._own: dict[str, tuple[EffectRow, Cause]] = {}
+        self._own: dict[str, tuple[Row, Cause]] = {}
         self._at_load: dict[str, Cause] = {}
 
     def __getitem__(self, effect: str) -> Cause:
@@ -58,7 +58,7 @@ class Library(Mapping[str, Cause]):
         return sum(1 for _ in self)
 
 
-def _term(row: EffectRow) -> Cause:
+def _term(row: Row) -> Cause:
     logs = [i for i, p in enumerate(row.parameters) if p.logarithmic]
 
     def natural(z: Matrix) -> Matrix:
