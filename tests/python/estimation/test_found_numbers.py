@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -47,8 +49,7 @@ def fit_of(record: ga.Record, found: FoundNumbers) -> tuple[Objective, Fit]:
     controller = found.controller
     assert controller is not None
     whole = record.with_channels(torque=controller.torque_of(record), command=None)
-    data = DataSet.of([whole], controller, read=[record])
-    object.__setattr__(data, "found", found)
+    data = replace(DataSet.of([whole], controller, read=[record]), found=found)
     objective = Objective(data, np.ones(len(record)))
     model = ga.OneMass(J=J, D=D).model()
     parameters = Parameterisation.of(model, scales_of(data), (False,))
