@@ -54,6 +54,7 @@ from gaident.diagnosis.controller.replay_causes import white_noise
 from gaident.diagnosis.controller.slow_forms import limited, run_error, too_fast
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.estimation.criterion import bic, cost_of
+from gaident.estimation.projection import inverse_of
 from gaident.models.drive_torque import made_by
 from gaident.policy.table import POLICY
 
@@ -368,7 +369,7 @@ def _fitted(law: Law, best: FormCandidate, given: PI) -> tuple[Vector, Vector, M
     sizes = np.linalg.norm(J, axis=0)
     sizes[sizes == 0.0] = 1.0
     variance = max(float(np.mean((size * off(x)) ** 2)), (ROUNDING * float(np.abs(law.logged).max())) ** 2)
-    spread = variance * np.linalg.pinv((J / sizes).T @ (J / sizes), rcond=1e-12) / np.outer(sizes, sizes)
+    spread = variance * inverse_of(J.T @ J)
     here = np.linalg.lstsq(J / sizes, law.logged - table @ coefficients, rcond=1e-12)[0] / sizes
     for other in law.others:  # where the numbers would be by what is not known between the lines
         columns = other.columns(shape.places, x[m:])
