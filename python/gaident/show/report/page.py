@@ -27,7 +27,7 @@ def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
     drawn = Charts(view.scales, bool(plotly_js))
     if isinstance(result, Diagnosis):
         head_of, tiles, chapters = (
-            diagnosis.head(result, view.axis),
+            diagnosis.head(result, view),
             diagnosis.tiles(result, view),
             diagnosis.chapters(result, view, drawn),
         )
