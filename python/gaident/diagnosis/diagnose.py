@@ -33,8 +33,8 @@ IDENTIFIED_AGAIN = say(
     "were found, is in its place."
 )
 FIRST_CAUSE = Text(
-    "This was the quick search, which stops at the first cause: what it explains of the error need not be all that is wrong, and "
-    "another cause beside it may change its values. The whole search tells."
+    "This was the quick search, which stops at the first cause: whether there is another one was not looked for, and another one "
+    "would change these values. The whole search tells."
 )
 ROUNDS = 3  # no decision: work; searches under gains that the one before has shown
 
@@ -87,7 +87,7 @@ def diagnose(
         How accurate the simulation has to be: rms of the velocity [rad/s], or {"velocity": [rad/s], "torque": [N m]}.
         It decides nothing that is found; what is left below it is called negligible, see `Diagnosis.relevance`.
     quick : bool
-        Stop at the first cause: the search takes one effect at most, and asks after no other form or gains of the controller.
+        Stop at the first cause: the search takes one effect at most, or the fewest with which a cause is named.
         What else is there is left, and a note says so.
 
     Returns
@@ -139,38 +139,49 @@ def diagnose(
         driving = replace(driving, outliers={r.digest: hit for r, hit in zip(given, lines, strict=True)})
         note(0.02, "identifying the linear model")
 
-        def searched(driving: Driving, idn: Identification | None = None) -> Work:
+        def searched(driving: Driving, most: int, idn: Identification | None = None) -> Work:
             here, pi = driving.moved, bare_pi(driving.controller)
             note.searching()
             if idn is None:
                 idn = identify(list(here.records), pi, seed=seed)
                 note.identified()
-            work = Work(here.records, here.held, driving, idn, noise_std, note, axis, pitch, 1 if quick else POLICY.most_effects)
+            work = Work(here.records, here.held, driving, idn, noise_std, note, axis, pitch, most)
             work.search()
             return work
 
-        work = searched(driving, identification)
-        if not quick and (form := work.other_form()) is not None:
-            note(0.03, "once more, under another form of controller")
-            formed = searched(driving.formed(form))
-            if formed.confirms(work):
-                work = formed
-            else:
-                work.refused(form)
-        given_work = work
-        for _ in range(ROUNDS):
-            other = None if quick else work.other_gains(given_work)
-            if other is None:
+        def settled(most: int, idn: Identification | None) -> Work:
+            """The work with at most so many effects, under the controller with which it explains the records."""
+            work = searched(driving, most, idn)
+            if (form := work.other_form()) is not None:
+                note(0.03, "once more, under another form of controller")
+                formed = searched(driving.formed(form), most)
+                if formed.confirms(work):
+                    work = formed
+                else:
+                    work.refused(form)
+            given_work = work
+            for _ in range(ROUNDS):
+                other = work.other_gains(given_work)
+                if other is None:
+                    break
+                note(0.03, "once more, under other gains")
+                work = searched(work.driving.regained(other), most)
+            if work is not given_work and (stands := work.under_given()) is not None:
+                # What was found under other gains explains the records under the given ones as well.
+                work = given_work
+                work.settle(stands)
+            work.with_joint_numbers()
+            return work
+
+        linear = identification
+        for most in range(1 if quick else POLICY.most_effects, POLICY.most_effects + 1):
+            work = settled(most, linear)
+            found = work.report(seed)
+            if found.causes or found.driver is None:
                 break
-            note(0.03, "once more, under other gains")
-            work = searched(work.driving.regained(other))
-        if work is not given_work and (stands := work.under_given()) is not None:
-            # What was found under other gains explains the records under the given ones as well.
-            work = given_work
-            work.settle(stands)
-        work.with_joint_numbers()
+            linear = linear if work.driving.regained_from is not None else work.idn  # a name needs more than one effect here
         driving = work.driving
-        result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
+        result = replace(found, noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
         result = driving.moved.noted(result)
         if result.relevance is not None:
             wanted = {f"{name}_accuracy": value for name, value in asked_accuracy.items()}
