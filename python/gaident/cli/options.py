@@ -206,8 +206,8 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
 
     add_log_commands(command)
 
-    line = "saved result, and its logs -> one HTML page"
-    sub = command("report", "RESULT.json [LOG...] ", line, REPORT_HELP, REPORT_EXAMPLES)
+    line = "saved results, and their logs -> one HTML page"
+    sub = command("report", "RESULT.json... [LOG...] ", line, REPORT_HELP, REPORT_EXAMPLES)
     add_report_options(sub)
     add_log_options(sub)
 
