@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 from gaident.data.formats.units import Constants, factor, is_unit, known_units, of_other_axis
 from gaident.drive.drive_file import CONSTANTS, Drive
@@ -15,9 +16,13 @@ QUANTITIES = ("velocity", "torque")
 _NUMBER = re.compile(r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+)\s*(.*?)\s*")
 
 
-def accuracy_of(texts: Sequence[str] | None, drive: Drive) -> dict[str, float]:
-    """{"velocity": [rad/s], "torque": [N m]} of ["1 rpm", "2 %"]; a number alone is a velocity in the unit of [show], or SI."""
+def accuracy_of(texts: Sequence[str] | None, drive: Drive) -> tuple[dict[str, float], Drive]:
+    """({"velocity": [rad/s], "torque": [N m]} of ["1 rpm", "2 %"], the drive, which shows its results in these units).
+
+    A number alone is a velocity in the unit of [show], or in SI. What [show] says of a unit stays.
+    """
     found: dict[str, float] = {}
+    units: dict[str, str] = {}
     constants = Constants(**{key: drive.general[key] for key in CONSTANTS if key in drive.general})
     for text in texts or ():
         match = _NUMBER.fullmatch(text)
@@ -28,7 +33,8 @@ def accuracy_of(texts: Sequence[str] | None, drive: Drive) -> dict[str, float]:
         if name in found:
             raise SettingsError(f"--accuracy {text!r}: a second one of the {name}; give one of the velocity, one of the torque")
         found[name] = float(match[1]) * size
-    return found
+        units |= {name: unit} if unit else {}
+    return found, replace(drive, show={**units, **drive.show})
 
 
 def _meant(unit: str, constants: Constants, axis: str, text: str) -> tuple[str, float]:

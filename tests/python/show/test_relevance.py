@@ -11,7 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 import gaident as ga
+from gaident.cli.accuracy import accuracy_of
 from gaident.diagnosis.note import Note
+from gaident.drive.drive_file import Drive
 from gaident.results.relevance import Relevance
 from gaident.show.relevance_words import part_words, relevance_words
 from gaident.show.units import scales_of
@@ -160,3 +162,35 @@ def test_progress_says_the_time_that_is_left() -> None:
     note(0.03, "once more")
     assert told[-1] == pytest.approx(10.0 / 14.0 + 4.0 / 14.0 * 0.03)
     assert told == sorted(told)
+
+
+def drive_of(**sections: Any) -> Drive:
+    rest = {"general": {}, "columns": {}, "units": {}, "controller_values": {}, "space_values": {}, **sections}
+    return Drive(**rest)
+
+
+def test_the_command_line_takes_the_accuracy_in_the_users_units() -> None:
+    rated = drive_of(general={"rated_torque": 2.4})
+    found, drive = accuracy_of(["1 rpm", "2 %"], rated)
+    assert found == pytest.approx({"velocity": 2.0 * np.pi / 60.0, "torque": 0.048})
+    assert drive.show == {"velocity": "rpm", "torque": "%"}
+    found, drive = accuracy_of(["3"], drive_of(show={"velocity": "rpm"}))
+    assert found == pytest.approx({"velocity": 6.0 * np.pi / 60.0}) and drive.show == {"velocity": "rpm"}
+    assert accuracy_of(["3"], drive_of())[0] == {"velocity": 3.0} and accuracy_of(None, rated) == ({}, rated)
+    assert accuracy_of(["5 mm/s"], drive_of(general={"axis": "linear"}))[0] == pytest.approx({"velocity": 0.005})
+
+
+@pytest.mark.parametrize(
+    ("texts", "words"),
+    [
+        (["fast"], "give a number above 0"),
+        (["0 rpm"], "give a number above 0"),
+        (["1 furlong"], "'furlong' is no unit"),
+        (["1 mm/s"], "no unit of a velocity or a torque of a rotary axis"),
+        (["1 rpm", "2 rad/s"], "a second one of the velocity"),
+        (["2 %"], "rated_torque"),
+    ],
+)
+def test_a_wrong_accuracy_of_the_command_line_is_refused(texts: list[str], words: str) -> None:
+    with pytest.raises(ga.GaidentError, match=words):
+        accuracy_of(texts, drive_of())

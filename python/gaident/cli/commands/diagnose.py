@@ -98,7 +98,8 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
     sources = [*args.logs, *(args.validation or []), *([] if args.model is None else [args.model])]
     following = target_of(args.next_command, sources)
     files = ResultFiles.of(args, sources, **{"--next-command": following})
-    controller, accuracy = drive.controller(), accuracy_of(args.accuracy, drive)
+    accuracy, drive = accuracy_of(args.accuracy, drive)
+    controller = drive.controller()
     with (bar := Progress(None if args.quiet else sys.stderr)) as progress:
         records = read_all(drive, args.logs, controller, doing=bar.doing)
         validation = read_all(drive, args.validation, controller, doing=bar.doing) if args.validation else None
