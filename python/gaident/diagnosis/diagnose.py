@@ -184,8 +184,9 @@ def diagnose(
         result = replace(found, noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
         result = driving.moved.noted(result)
         if result.relevance is not None:
-            wanted = {f"{name}_accuracy": value for name, value in asked_accuracy.items()}
-            result = replace(result, relevance=replace(result.relevance, **wanted))
+            velocity, torque = (asked_accuracy.get(name) for name in ("velocity", "torque"))
+            wanted = replace(result.relevance, velocity_accuracy=velocity, torque_accuracy=torque)
+            result = replace(result, relevance=wanted)
         if quick:
             result = replace(result, notes=(*result.notes, FIRST_CAUSE))
         if identification is not None and work.idn is not identification:

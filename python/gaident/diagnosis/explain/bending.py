@@ -97,4 +97,5 @@ def _orthonormal(rows: Matrix) -> Matrix:
     if not len(unit):
         return unit
     _, values, Vt = np.linalg.svd(unit, full_matrices=False)
-    return np.asarray(Vt[values > RANK * values[0]])
+    spanned: Matrix = Vt[values > RANK * values[0]]
+    return spanned
