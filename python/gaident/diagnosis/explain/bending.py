@@ -93,7 +93,7 @@ def _beyond(error: float, noise: float) -> float:
 def _orthonormal(rows: Matrix) -> Matrix:
     """Orthonormal rows that span the same."""
     sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    unit = rows[sizes > 0.0] / sizes[sizes > 0.0][:, None]
+    unit: Matrix = rows[sizes > 0.0] / sizes[sizes > 0.0][:, None]
     if not len(unit):
         return unit
     _, values, Vt = np.linalg.svd(unit, full_matrices=False)
