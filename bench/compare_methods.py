@@ -59,7 +59,7 @@ def linear(task: Task) -> tuple[Predict, int, str]:
 
 def extended(task: Task) -> tuple[Predict, int, str]:
     dia = ga.diagnose(task.train, task.controller)
-    count = FactorCounts.of(dia.model.linear).size + sum(len(e.values) for e in dia.model.effects)
+    count = FactorCounts.of(dia.model.mechanism).size + sum(len(e.values) for e in dia.model.effects)
     certain = {f.effect for f in dia.causes if f.named}
     names = ", ".join(e.name.replace("_", " ") + ("" if e.name in certain else "?") for e in dia.model.effects)
     return _simulator(task, dia.model), count, f"{dia.verdict}: {names or 'nothing'}"

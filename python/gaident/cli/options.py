@@ -88,6 +88,7 @@ examples:
   gaident diagnose run1.csv --drive drive.toml
   gaident diagnose run1.csv run2.csv --validation run3.csv --drive drive.toml --plot run.png --out run.json
   gaident diagnose run1.csv --kp 0.0232 --ki 1.367 --bootstrap 99 --next-command next.csv
+  gaident diagnose run1.csv --drive drive.toml --quick --accuracy '1 rpm'
 
 A log of several axes: [axes.x.columns], [axes.x.controller], ... in drive.toml beside what is common; each is
 diagnosed, one row each, or those that --select names.
@@ -106,6 +107,12 @@ to V), and on a simulated rig with dry friction, in place of the original one, F
 least squares, the times, and the diagnosis that names the friction. Says what is reproduced, what is simulated,
 and where the paper disagrees with itself. Writes paper.html, which holds its pictures, and the pictures as PNG.
 """
+
+
+ACCURACY = (
+    "how accurate the simulation has to be, rms of the velocity or of the torque: '1 rpm', '2 %%' or both; what is left below it "
+    "is called negligible. A number alone is in the velocity's unit of [show], or in rad/s"
+)
 
 
 def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
@@ -166,6 +173,8 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
         metavar="N",
         help="simulated records for the p-value of the first finding (default 0: none)",
     )
+    g.add_argument("--accuracy", nargs="+", metavar="X", help=ACCURACY)
+    g.add_argument("--quick", action="store_true", help="name the first cause and stop: to look at a log, or at many")
     g.add_argument("--seed", type=int, default=0, metavar="N", help="same seed, same result (default 0)")
     g = sub.add_argument_group("results")
     g.add_argument("--out", metavar="FILE", help="save the diagnosis (JSON)")
@@ -197,8 +206,8 @@ def parser_of(commands: Mapping[str, str]) -> argparse.ArgumentParser:
 
     add_log_commands(command)
 
-    line = "saved result, and its logs -> one HTML page"
-    sub = command("report", "RESULT.json [LOG...] ", line, REPORT_HELP, REPORT_EXAMPLES)
+    line = "saved results, and their logs -> one HTML page"
+    sub = command("report", "RESULT.json... [LOG...] ", line, REPORT_HELP, REPORT_EXAMPLES)
     add_report_options(sub)
     add_log_options(sub)
 

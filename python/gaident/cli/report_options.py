@@ -9,22 +9,25 @@ __all__ = ["REPORT_EXAMPLES", "REPORT_HELP", "add_report_option", "add_report_op
 REPORT_HELP = """\
 Writes a saved diagnosis or identification as one HTML page that can be sent to a colleague: verdict, measured
 against simulated, what is wrong, cause and evidence, parameters, before and after, what could not be tested, the
-next experiment with its command, how it was computed. The page needs no network and no other file (about 2.5 MB,
+next experiment with its command, how it was computed. The page needs no network and no other file (about 1.7 MB,
 with --pictures 0.3).
 A saved result holds no samples: give the logs it was made from, and the page has its curves.
+Of several results, before and after a repair or the axes of a machine, it is one page: an overview, what differs,
+and what each says. Which log belongs to which result, its samples tell.
 """
 REPORT_EXAMPLES = """\
 examples:
   gaident report run.json run1.csv --validation run2.csv --drive drive.toml --out report.html
   gaident report run.json                        text and tables only, says what needs the log
+  gaident report before.json after.json monday.csv friday.csv --drive drive.toml --out repair.html
   gaident diagnose run1.csv --drive drive.toml --report report.html      at once
 """
 
 
 def add_report_options(parser: argparse.ArgumentParser) -> None:
     """What `gaident report` takes beside the options of logs."""
-    parser.add_argument("result", metavar="RESULT.json", help="what diagnose --out or identify --out saved")
-    parser.add_argument("logs", nargs="*", metavar="LOG", help="the logs it was made from")
+    parser.add_argument("result", metavar="RESULT.json", help="what diagnose --out or identify --out saved; several for one page")
+    parser.add_argument("logs", nargs="*", metavar="LOG", help="further results (.json), and the logs they were made from")
     parser.add_argument("--validation", nargs="+", metavar="LOG", help="the logs that were held out")
     g = parser.add_argument_group("results")
     g.add_argument("--out", metavar="FILE", default="report.html", help="where the page goes (default: report.html)")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -68,7 +68,7 @@ class ResultFiles:
 
 
 def write_report(
-    result: Diagnosis | Identification,
+    result: Diagnosis | Identification | Mapping[str, Diagnosis | Identification],
     target: Path,
     records: Sequence[Record],
     validation: Sequence[Record],

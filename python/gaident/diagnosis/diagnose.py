@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from gaident.axis import say
+from gaident.axis import Text, say
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
@@ -16,10 +16,12 @@ from gaident.diagnosis.controller.as_read import outliers_of_the_log
 from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.note import Note
-from gaident.diagnosis.records.arguments import ProgressCallback, checked, in_order, noise_std_of, records_of
+from gaident.diagnosis.records.arguments import ProgressCallback, accuracy_of, checked, in_order, noise_std_of, records_of
 from gaident.diagnosis.work import Work
+from gaident.errors import SettingsError
 from gaident.identification.identify import identify
 from gaident.models.drive_torque import torque_driven
+from gaident.policy.table import POLICY
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.finding import Finding
 from gaident.results.identification import Identification
@@ -29,6 +31,10 @@ __all__ = ["Diagnosis", "Finding", "diagnose"]
 IDENTIFIED_AGAIN = say(
     "The given identification is one under the given gains, which these records contradict: another one, under the gains that "
     "were found, is in its place."
+)
+FIRST_CAUSE = Text(
+    "This was the quick search, which stops at the first cause: whether there is another one was not looked for, and another one "
+    "would change these values. The whole search tells."
 )
 ROUNDS = 3  # no decision: work; searches under gains that the one before has shown
 
@@ -44,6 +50,8 @@ def diagnose(
     progress: ProgressCallback | None = None,
     axis: str = "rotary",
     pitch: float | None = None,
+    accuracy: float | Mapping[str, float] | None = None,
+    quick: bool = False,
 ) -> Diagnosis:
     """Show what the model of an axis gets wrong, name the physical cause where the data allow it, and measure the gain.
 
@@ -75,6 +83,12 @@ def diagnose(
     pitch : float, optional
         Of a linear axis, the length with which its cogging returns: pitch of the screw or of the poles [m].
         None: what the records show, if they do; a note says so.
+    accuracy : float or mapping, optional
+        How accurate the simulation has to be: rms of the velocity [rad/s], or {"velocity": [rad/s], "torque": [N m]}.
+        It decides nothing that is found; what is left below it is called negligible, see `Diagnosis.relevance`.
+    quick : bool
+        Stop at the first cause: the search takes one effect at most, or the fewest with which a cause is named.
+        What else is there is left, and a note says so.
 
     Returns
     -------
@@ -116,43 +130,65 @@ def diagnose(
     checked(records, held, driven.loop, identification, bootstrap, seed, progress, axis, pitch)
     origin = {r.digest: whole for r, whole in zip((*records, *held), (*given, *kept), strict=True)}
     records, held = in_order(records), in_order(held)
-    noise_std = noise_std_of(noise)
+    noise_std, asked_accuracy = noise_std_of(noise), accuracy_of(accuracy)
+    if not isinstance(quick, bool):
+        raise SettingsError(f"quick is {quick!r}: give True or False")
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
-        note(0.01, "replaying the controller")
+        note(0.01, "replaying the controller, and looking for its form where it does not fit")
         driving = driving_of(records, held, asked, driven, origin)
         driving = replace(driving, outliers={r.digest: hit for r, hit in zip(given, lines, strict=True)})
         note(0.02, "identifying the linear model")
 
-        def searched(driving: Driving, idn: Identification | None = None) -> Work:
+        def searched(driving: Driving, most: int, idn: Identification | None = None) -> Work:
             here, pi = driving.moved, bare_pi(driving.controller)
-            idn = identify(list(here.records), pi, seed=seed) if idn is None else idn
-            work = Work(here.records, here.held, driving, idn, noise_std, note, axis, pitch)
+            note.searching()
+            if idn is None:
+                idn = identify(list(here.records), pi, seed=seed)
+                note.identified()
+            work = Work(here.records, here.held, driving, idn, noise_std, note, axis, pitch, most)
             work.search()
             return work
 
-        work = searched(driving, identification)
-        if (form := work.other_form()) is not None:
-            note(0.03, "once more, under another form of controller")
-            formed = searched(driving.formed(form))
-            if formed.confirms(work):
-                work = formed
-            else:
-                work.refused(form)
-        given_work = work
-        for _ in range(ROUNDS):
-            other = work.other_gains(given_work)
-            if other is None:
+        def settled(most: int, idn: Identification | None) -> Work:
+            """The work with at most so many effects, under the controller with which it explains the records."""
+            work = searched(driving, most, idn)
+            if (form := work.other_form()) is not None:
+                note(0.03, "once more, under another form of controller")
+                formed = searched(driving.formed(form), most)
+                if formed.confirms(work):
+                    work = formed
+                else:
+                    work.refused(form)
+            given_work = work
+            for _ in range(ROUNDS):
+                other = work.other_gains(given_work)
+                if other is None:
+                    break
+                note(0.03, "once more, under other gains")
+                work = searched(work.driving.regained(other), most)
+            if work is not given_work and (stands := work.under_given()) is not None:
+                # What was found under other gains explains the records under the given ones as well.
+                work = given_work
+                work.settle(stands)
+            work.with_joint_numbers()
+            return work
+
+        linear = identification
+        for most in range(1 if quick else POLICY.most_effects, POLICY.most_effects + 1):
+            work = settled(most, linear)
+            found = work.report(seed)
+            if found.causes or found.driver is None:
                 break
-            note(0.03, "once more, under other gains")
-            work = searched(work.driving.regained(other))
-        if work is not given_work and (stands := work.under_given()) is not None:
-            # What was found under other gains explains the records under the given ones as well.
-            work = given_work
-            work.settle(stands)
-        work.with_joint_numbers()
+            linear = linear if work.driving.regained_from is not None else work.idn  # a name needs more than one effect here
         driving = work.driving
-        result = replace(work.report(seed), noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
+        result = replace(found, noise=noise_std, bootstrap=bootstrap, controller_numbers=driving.numbers)
         result = driving.moved.noted(result)
+        if result.relevance is not None:
+            velocity, torque = (asked_accuracy.get(name) for name in ("velocity", "torque"))
+            wanted = replace(result.relevance, velocity_accuracy=velocity, torque_accuracy=torque)
+            result = replace(result, relevance=wanted)
+        if quick:
+            result = replace(result, notes=(*result.notes, FIRST_CAUSE))
         if identification is not None and work.idn is not identification:
             result = replace(result, notes=(IDENTIFIED_AGAIN, *result.notes))
         answered = work.at_controller.decided or any(f.place == "controller" for f in result.findings)

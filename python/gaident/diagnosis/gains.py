@@ -253,14 +253,14 @@ def start_state(model: Model, rec: Record, controller: Controller | None, read: 
     """
     loop = read or controller
     if controller is not None and loop is not None and (held := stored_torque(rec, loop)):
-        return np.append(np.zeros(model.linear.order), held)
+        return np.append(np.zeros(model.mechanism.order), held)
     pi = bare_pi(loop)
     if not starts_moving(rec, pi) or (controller is not None and (controller.limited or model.effects)):
         return None
     if not model.effects:
         return np.asarray(initial_state(model, rec, controller))
     head = rec[: min(len(rec), POLICY.head)]
-    state = np.zeros(model.linear.order)
+    state = np.zeros(model.mechanism.order)
     state[0] = rec.velocity[0]
     step = 1e-3 * float(np.abs(head.velocity).max())
     for _ in range(2):

@@ -21,7 +21,7 @@ from gaident.models.two_mass import mechanics_with_shaft_damping
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 
-__all__ = ["MECHANICS", "base_shift", "mechanics_of", "moved", "negative_damping"]
+__all__ = ["MECHANICS", "base_shift", "mechanics_of", "moved", "negative_damping", "slopes_of"]
 
 Vector = NDArray[np.float64]
 
@@ -51,11 +51,7 @@ def mechanics_of(objective: Objective, fit: Fit) -> dict[str, Estimate]:
     parameters = fit.parameters
     base = slice(parameters.base)
     cov, of_controller = covariance_of(objective, fit)[base, base], controller_part(objective, fit)[base, base]
-    found = _numbers(parameters.base_values(fit.x[None, :])[0])
-    h = 1e-6 * np.maximum(np.abs(fit.x[: parameters.base]), 1.0)
-    X = np.repeat(fit.x[None, :], len(h), axis=0)
-    X[np.arange(len(h)), np.arange(len(h))] += h
-    slopes = np.array([(_numbers(row) - found) / step for row, step in zip(parameters.base_values(X), h, strict=True)])
+    found, slopes = _with_slopes(fit)
     known = np.isfinite(np.diag(cov))
     finite = np.where(known[:, None] & known[None, :], cov, 0.0)
     variances, parts = (np.maximum(np.einsum("ij,ik,kj->j", slopes, C, slopes), 0.0) for C in (finite, of_controller))
@@ -66,6 +62,22 @@ def mechanics_of(objective: Objective, fit: Fit) -> dict[str, Estimate]:
         for name, value, s, part in zip(MECHANICS, found, std, np.sqrt(parts), strict=False)
         if np.isfinite(value)
     }
+
+
+def slopes_of(fit: Fit) -> dict[str, Vector]:
+    """Name -> its slopes over the base parameters, which come first in x; of what a mechanism of its kind has."""
+    found, slopes = _with_slopes(fit)
+    return {name: row for name, value, row in zip(MECHANICS, found, slopes.T, strict=False) if np.isfinite(value)}
+
+
+def _with_slopes(fit: Fit) -> tuple[Vector, NDArray[np.float64]]:
+    """(values, [i, k]: slope of value k over base parameter i)."""
+    parameters = fit.parameters
+    found = _numbers(parameters.base_values(fit.x[None, :])[0])
+    h = 1e-6 * np.maximum(np.abs(fit.x[: parameters.base]), 1.0)
+    X = np.repeat(fit.x[None, :], len(h), axis=0)
+    X[np.arange(len(h)), np.arange(len(h))] += h
+    return found, np.array([(_numbers(row) - found) / step for row, step in zip(parameters.base_values(X), h, strict=True)])
 
 
 def negative_damping(mechanics: Mapping[str, Estimate]) -> Estimate | None:

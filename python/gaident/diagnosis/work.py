@@ -19,6 +19,7 @@ from gaident.diagnosis.controller.joint_numbers import joint_numbers
 from gaident.diagnosis.experiments.candidates import candidates, loop_notes
 from gaident.diagnosis.experiments.excitation import excitation
 from gaident.diagnosis.explain.alternatives import alternatives_of, impossible_here
+from gaident.diagnosis.explain.bending import bent_by, relevance_of
 from gaident.diagnosis.explain.held_out import standing
 from gaident.diagnosis.explain.verdict import verdict_of
 from gaident.diagnosis.explain.wording import (
@@ -80,6 +81,7 @@ class Work:
     note: Note
     axis: str
     pitch: float | None
+    most: int = POLICY.most_effects  # effects in one model
     form_refused: bool = field(init=False, default=False)  # whether a search under another form did not confirm it
 
     def __post_init__(self) -> None:
@@ -125,7 +127,10 @@ class Work:
         self.notes += loop_notes(self.data)
         rest = self.scales, self.idn.model, allowed, self._equivalent_here, self._say
         found, older = searched(
-            self.objective, self.scales, self.idn.model, lambda objective, most: selected(objective, *rest, most=most)
+            self.objective,
+            self.scales,
+            self.idn.model,
+            lambda objective, most: selected(objective, *rest, most=min(most, self.most)),
         )
         self.notes += older
         self.note(0.85, "looking for what is left")
@@ -314,6 +319,7 @@ class Work:
             regression=check.regression,
             regression_force_error=check.force_error,
             comparisons=check.comparisons,
+            relevance=relevance_of(check.after, gains.floor, bent_by(driver, self.left, self.under, self.estimate, mechanics)),
             force_reason=check.reason,
             notes=tuple(self.notes),
             identification=self.idn,

@@ -269,7 +269,7 @@ def torque_noise_in(mechanism: Model, records: Sequence[Record]) -> float:
             continue
         unit = np.zeros(len(rec))
         unit[0] = 1.0
-        response = simulate(mechanism.linear, Record(rec.dt, torque=unit, velocity=np.zeros(len(rec))))
+        response = simulate(mechanism.mechanism, Record(rec.dt, torque=unit, velocity=np.zeros(len(rec))))
         power += noise_std(rec.torque) ** 2 * float(np.sum(np.cumsum(response**2)))
     return float(np.sqrt(power / max(count, 1)))
 

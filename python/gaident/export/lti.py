@@ -65,7 +65,7 @@ def _chain(model: Model) -> Transfer:
             f"the model has {', '.join(others)}, which no linear system can hold: take it out with without_effect, use "
             f"model.linear, or write the whole with to_c (of the effects a linear system holds {', '.join(LINEAR)})"
         )
-    mechanism = model.linear
+    mechanism = model.mechanism
     chain = Transfer(mechanism.gain, mechanism.poles, mechanism.zeros)
     for effect in model.effects:
         if effect.row.place != "plant":  # else it is part of the mechanism

@@ -98,8 +98,8 @@ def sampled_response(model: Model, frequency: Vector, dt: float, controller: PI 
     """The linear part of a model as the loop samples it: zero-order hold, or bilinear; frequency [Hz] (n,), below 1/(2 dt)."""
     omega = 2.0 * np.pi * frequency
     if controller is not None and controller.loop == "continuous":
-        return model.linear.frequency_response(2.0 / dt * np.tan(0.5 * omega * dt))
-    equation = model.linear.discrete(dt)
+        return model.mechanism.frequency_response(2.0 / dt * np.tan(0.5 * omega * dt))
+    equation = model.mechanism.discrete(dt)
     back = np.exp(-1j * np.outer(omega * dt, np.arange(len(equation.alpha))))
     response: Complex = (back @ equation.alpha) / (1.0 - back[:, 1:] @ equation.beta)
     return response

@@ -24,7 +24,7 @@ from gaident.identification.arguments import check_arithmetic, check_numbers, ch
 from gaident.identification.closed_loop import input_of, looped_over, space_of
 from gaident.identification.controller_numbers import with_estimates
 from gaident.identification.noise import Autoregression, autoregression_of, highest_order
-from gaident.identification.notes import record_notes, warnings_of
+from gaident.identification.notes import record_notes, unseen_notes, warnings_of
 from gaident.identification.parts import search_parts
 from gaident.identification.selection import Candidate
 from gaident.messages import Message
@@ -33,6 +33,7 @@ from gaident.models.model import Model
 from gaident.models.search_space import SearchSpace
 from gaident.models.starts import noise_std, starts_moving
 from gaident.policy.table import POLICY
+from gaident.providers import provided
 from gaident.results.adequacy import Adequacy
 from gaident.results.identification import Identification
 from gaident.results.settings import Settings
@@ -143,7 +144,8 @@ def identify(
     found = work.search(int(trials), int(seed), progress)
     best, scored = work.select(found)
     result = work.report(best, scored, found, int(seed))
-    warnings = [*numbers.notes, *looped.notes, *result.warnings]
+    warnings = [*provided("replay_notes")(checked, controller), *numbers.notes, *looped.notes, *result.warnings]
+    warnings += unseen_notes(result.mechanics, given[0].dt)
     if derived and not settings.species:
         warnings.append(
             "Search ranges derived from the data are wide; the plain engine needs narrow ones: give the search space."
@@ -154,10 +156,8 @@ def identify(
         warnings.append(
             f"In {settings.arithmetic} {overflows} of {evaluations} candidates left its range or diverged; they count as worst."
         )
-    seconds = time.perf_counter() - began
-    return replace(
-        result, warnings=tuple(warnings), controller_numbers={**numbers.estimates, **looped.estimates}, seconds=seconds
-    )
+    shown = {**numbers.estimates, **looped.estimates}
+    return replace(result, warnings=tuple(warnings), controller_numbers=shown, seconds=time.perf_counter() - began)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from gaident.axis import Text, joined, say
@@ -15,7 +16,7 @@ from gaident.results.adequacy import Adequacy
 from gaident.results.estimate import Estimate
 from gaident.results.structures import Rival
 
-__all__ = ["open_loop_notes", "reading_notes", "record_notes", "warnings_of"]
+__all__ = ["open_loop_notes", "reading_notes", "record_notes", "unseen_notes", "warnings_of"]
 
 
 def warnings_of(
@@ -51,6 +52,17 @@ def warnings_of(
         notes.extend(_shaft_notes(mechanics))
         notes.extend(mechanics.notes)
     return tuple(notes)
+
+
+def unseen_notes(mechanics: OneMass | TwoMass | None, dt: float) -> list[str]:
+    """A sentence on a resonance above what the lines of the log show, dt [s] apart."""
+    highest = POLICY.seen_band * 0.5 / dt  # no decision: half the sampling frequency
+    if not isinstance(mechanics, TwoMass) or not mechanics.resonance / math.tau > highest:
+        return []
+    return [
+        f"A resonance above {highest:.2g} Hz does not show in a log with a line every {1e3 * dt:.3g} ms: the one of "
+        f"{mechanics.resonance / math.tau:.3g} Hz stands for something else that is fast; none of its numbers is the shaft's."
+    ]
 
 
 def _shaft_notes(mechanics: OneMass | TwoMass) -> list[str]:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import zip_longest
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gaident.models.roots import quadratic_roots
 
-__all__ = ["LINEAR", "Transfer"]
+__all__ = ["LINEAR", "Transfer", "response_of"]
 
 
 class Transfer(NamedTuple):
@@ -43,3 +47,19 @@ LINEAR: dict[str, Callable[[Sequence[float]], Transfer]] = {
     "velocity_filter": _lag,
 }
 """Effect -> its transfer function, from its parameters in the order of the table."""
+
+
+def response_of(parts: Sequence[Transfer], omega: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Product of the parts at j omega [rad/s], of the shape of omega; not finite where that is a pole."""
+    s = 1j * omega
+    response = np.exp(-s * sum(part.delay for part in parts))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for part in parts:
+            response *= part.gain
+            # Zero over pole in turn, so that no partial product leaves the range of the numbers.
+            for pole, zero in zip_longest(part.poles, part.zeros):
+                if zero is not None:
+                    response *= s - zero
+                if pole is not None:
+                    response /= s - pole
+    return np.asarray(response, dtype=np.complex128)

@@ -18,7 +18,7 @@ from gaident.control.pi import PI, checked_pi
 from gaident.errors import ModelError
 from gaident.models.discrete import Discrete, require_strictly_proper
 from gaident.models.effects import Effect, checked_effects
-from gaident.models.effects_linear import LINEAR
+from gaident.models.effects_linear import LINEAR, Transfer, response_of
 from gaident.models.roots import Mode, canonical_roots, modes_of, roots_of, text_of
 from gaident.providers import provided
 
@@ -148,10 +148,14 @@ class Model:
 
     @property
     def linear(self) -> Model:
-        """The linear drive: without effects, but with extra_resonance, which is linear, in its poles and zeros."""
-        if not self.effects:
-            return self
-        base = self._with(())
+        """The linear drive: extra_resonance in its poles and zeros, transport_delay, torque_lag, velocity_filter as effects."""
+        kept = tuple(e for e in self.effects if e.name in LINEAR and e.row.place != "plant")
+        return self.mechanism._with(kept) if kept else self.mechanism
+
+    @property
+    def mechanism(self) -> Model:
+        """Poles and zeros alone: without effects, but with extra_resonance, which is one of the mechanism's, among them."""
+        base = self._with(()) if self.effects else self
         for effect in self.effects:
             if effect.row.place == "plant":
                 more = LINEAR[effect.name](effect.values)
@@ -166,8 +170,7 @@ class Model:
         return model
 
     def _require_linear(self, what: str) -> None:
-        if self.effects:
-            names = ", ".join(effect.name for effect in self.effects)
+        if names := ", ".join(effect.name for effect in self.effects if effect.name not in LINEAR):
             raise ModelError(f"{what} is of a linear model, and this one has effects ({names}): use model.linear")
 
     def __getstate__(self) -> dict[str, Any]:
@@ -213,18 +216,11 @@ class Model:
     def frequency_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
         """Return G(j omega), complex, of the shape of `omega` [rad/s]; not finite where j omega is a pole.
 
-        Raises ModelError for a model with effects.
+        Delay, lag and filter of the linear drive are part of it. Raises ModelError for a model with other effects.
         """
         self._require_linear("frequency_response")
-        s = 1j * np.asarray(omega, dtype=np.float64)
-        response = np.full(s.shape, complex(self.gain))
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            # Zero over pole in turn, so that no partial product leaves the range of the numbers.
-            for i, pole in enumerate(self.poles):
-                if i < self.q:
-                    response *= s - self.zeros[i]
-                response /= s - pole
-        return response
+        parts = Transfer(self.gain, self.poles, self.zeros), *(LINEAR[e.name](e.values) for e in self.effects)
+        return response_of(parts, np.asarray(omega, dtype=np.float64))
 
     def discrete(self, dt: float, controller: PI | None = None) -> Discrete:
         """Return the difference equation (7) from command to velocity; without a controller from torque to velocity.
@@ -248,6 +244,8 @@ class Model:
             For dt <= 0, p = 0 in a sampled loop, a model with effects, and a controller that is no bare PI.
         """
         self._require_linear("discrete")
+        if self.effects:
+            raise ModelError(f"equation (7) has no {self.effects[0].name}: use model.to_scipy(dt), which has, or model.mechanism")
         sample_time = real_number(dt, "dt", ModelError, "give the sample time in s, > 0")
         if sample_time <= 0.0:
             raise ModelError(f"dt is {sample_time:g}: give the sample time in s, > 0")

@@ -187,7 +187,7 @@ def initial_state(model: AnyModel, rec: Record, controller: Controller | None = 
     >>> ga.initial_state(ga.OneMass(J=1e-3, D=0.0), rec).round(6).tolist()
     [20.0]
     """
-    plant = as_model(model).linear
+    plant = as_model(model).mechanism
     checked_controller(controller)
     if controller is not None and controller.limited:
         raise ModelError(

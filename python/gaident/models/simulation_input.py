@@ -62,7 +62,7 @@ def input_for(p: int, rec: Record, controller: Controller | None) -> tuple[Signa
 
 
 def check_start(plant: Model, controller: Controller | None, start: Signal, what: str) -> None:
-    size = plant.linear.order + (controller is not None)
+    size = plant.mechanism.order + (controller is not None)
     if start.shape != (size,):
         raise ModelError(
             f"initial_state has the shape {start.shape}: this model driven by the {what} has "

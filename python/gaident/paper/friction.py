@@ -59,5 +59,5 @@ def friction_test(mechanism: Mechanism, step: Record, seed: int) -> FrictionTest
         found,
         alone.identification.mechanics,
         found.identification.mechanics,
-        mechanics_from_model(found.model.linear),
+        mechanics_from_model(found.model.mechanism),
     )

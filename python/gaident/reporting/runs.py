@@ -33,7 +33,7 @@ Vector = NDArray[np.float64]
 def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
     """One record and what the models make of it."""
     loop = bare_pi(result.controller)
-    linear: Model = result.model.linear if isinstance(result, Diagnosis) else result.model
+    linear: Model = result.model.mechanism if isinstance(result, Diagnosis) else result.model
     digest = rec.digest
     used = "fitted" if digest in result.digests else "new"
     notes: list[str] = []

@@ -7,6 +7,7 @@ from .fitness import Comparison, Fitness
 from .frequency import FrequencyResponse, Responses
 from .identification import Identification
 from .inverse_dynamics import InverseDynamics
+from .relevance import Relevance
 from .settings import Settings
 from .store import load, schema
 
@@ -22,6 +23,7 @@ __all__ = [
     "InverseDynamics",
     "Limits",
     "Proposal",
+    "Relevance",
     "Responses",
     "Settings",
     "load",

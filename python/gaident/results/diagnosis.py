@@ -20,6 +20,7 @@ from gaident.results.finding import Finding, finding_of, where
 from gaident.results.fitness import Comparison, Fitness
 from gaident.results.identification import Identification
 from gaident.results.inverse_dynamics import InverseDynamics
+from gaident.results.relevance import Relevance
 from gaident.results.saved import SavedResult, undamaged
 
 if TYPE_CHECKING:
@@ -108,6 +109,8 @@ class Diagnosis(SavedResult):
         What both methods say of the same quantity; a contradiction is one of the notes, too.
     force_reason : str
         Why the force error is the figure to go by here, in words; empty where the free run is as good a figure.
+    relevance : Relevance or None
+        How large what is left is, and which mechanical values it can have bent; None in files of gaident 0.1.0.
     controller_numbers : mapping of str to Estimate
         What was None of the controller, as the logged torque shows it; names as "kp" or "torque_filters[0].frequency".
     axis : {"rotary", "linear"}
@@ -159,6 +162,7 @@ class Diagnosis(SavedResult):
     left_needed: float = 0.0
     axis: str = "rotary"
     controller_numbers: Mapping[str, Estimate] = field(default_factory=dict, hash=False)
+    relevance: Relevance | None = None
     records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
     validation_records: tuple[Record, ...] = field(default=(), compare=False, repr=False)
 
@@ -325,6 +329,7 @@ class Diagnosis(SavedResult):
             "force_reason": self.force_reason,
             "left_needed": self.left_needed,
             "axis": self.axis,
+            "relevance": None if self.relevance is None else self.relevance.to_dict(),
             "controller_numbers": {name: asdict(e) for name, e in self.controller_numbers.items()},
             "linear_axis": linear_sentences(self._sentences()),
         }
@@ -384,5 +389,6 @@ class Diagnosis(SavedResult):
                 force_reason=restored(data.get("force_reason", ""), linear),
                 left_needed=data.get("left_needed", 0.0),
                 axis=data.get("axis", "rotary"),
+                relevance=None if data.get("relevance") is None else Relevance.from_dict(data["relevance"]),
                 controller_numbers={name: Estimate(**e) for name, e in data.get("controller_numbers", {}).items()},
             )

@@ -12,6 +12,7 @@ from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate, of_axis
 from gaident.results.experiment import Proposal
 from gaident.results.finding import Finding
+from gaident.show.relevance_words import bent_of, part_words, relevance_words, remark_words
 from gaident.show.second_method import comparison_rows, force_rows, force_words, method_words
 from gaident.show.units import Scales, beside, scales_of
 from gaident.show.wording import (
@@ -60,7 +61,7 @@ def diagnosis_summary(dia: Diagnosis, axis: str = "rotary", units: Mapping[str, 
     """
     scales = scales_of(units, axis)
     sections = [
-        _verdict(dia, axis),
+        _verdict(dia, axis, scales),
         _causes(dia, axis, scales),
         _gain(dia, axis, scales),
         _force(dia, axis),
@@ -82,8 +83,8 @@ def _wrapped(text: str, indent: str = "", hanging: str = "") -> list[str]:
     return lines or [""]
 
 
-def _verdict(dia: Diagnosis, axis: str) -> list[str]:
-    head = " ".join(filter(None, (verdict_words(dia, axis), left_words(dia, axis))))
+def _verdict(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
+    head = " ".join(filter(None, (verdict_words(dia, axis), left_words(dia, axis), relevance_words(dia, axis, scales))))
     lines = [f"Verdict: {dia.verdict}", *_wrapped(head)]
     for note in dia.notes:
         lines += _wrapped(said(note, axis))
@@ -140,7 +141,7 @@ def _causes(dia: Diagnosis, axis: str, scales: Scales) -> list[str]:
         place = ", in the controller" if f.place == "controller" else ""
         lines.append(cause_words(f, dia, axis) + place + "".join(f", or {words(a, axis)}" for a in f.alternatives))
         lines += table([parameter_row(n, e, axis, scales) for n, e in f.parameters.items()], "    ")
-        lines += _wrapped(said(f.evidence, axis), "    ")
+        lines += _wrapped(" ".join(filter(None, (said(f.evidence, axis), part_words(dia, f, axis, scales)))), "    ")
         if f.p_value is not None:
             lines += _wrapped(chance_words(f, dia.bootstrap), "    ")
     return ["What was found", *(line if line.startswith(" ") else f"  {line}" for line in lines)] if lines else []
@@ -249,12 +250,13 @@ def _mechanics(dia: Diagnosis, axis: str) -> list[str]:
     """The linear part of the reported model, by its mechanical parameters."""
     if not dia.mechanics:
         return []
-    head = "Mechanics, biased by what is left" if dia.driver is not None else "Mechanics"
+    bent = bent_of(dia)
+    head = "Mechanics, biased by what is left" if bent and len(bent) == len(dia.mechanics) else "Mechanics"
     head += ", fitted together with the effects" if dia.model.effects else ""
     rows = []
     for name, e in dia.mechanics.items():
         u = "" if e.unit == "1" else unit(e.unit, axis)
-        rows.append((mechanical_name(name, axis), with_std(e.value, e.std), u, "" if e.identifiable else "not determined"))
+        rows.append((mechanical_name(name, axis), with_std(e.value, e.std), u, remark_words(dia, name, e)))
     lines = [head, *table(rows)]
     if "resonance" not in dia.mechanics and len(dia.model.poles) > 1:
         lines.append("  a second pair of poles that does not swing: no resonance of a shaft")

@@ -47,7 +47,7 @@ def test_identify_says_what_the_log_says_of_the_controller(here: Path, capsys: p
     biased = "The log has a command, but no gains were given"
     wrong = warnings("--kp", "0.05", "--ki", "1.367")[0]
     assert (
-        wrong.startswith("The logged torque does not follow from command and velocity") and "Give --kp 0.0230" in wrong
+        wrong.startswith("The logged torque does not follow from command and velocity") and "Give kp = 0.0230" in wrong
     )  # the log is noisy
     assert warnings("--loop", "open")[0].startswith(biased)
     for options in (("--columns", "command="), LOOP):

@@ -58,6 +58,8 @@ def test_a_command_imports_what_it_needs(here: Path) -> None:
         "controller",
         "controller.replay",
         "controller.replay_causes",
+        "explain",
+        "explain.replayed",
         "library",
         "library.settings",
     )

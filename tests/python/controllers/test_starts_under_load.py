@@ -79,7 +79,7 @@ def test_the_simulated_loop_begins_as_the_drive_did(loop: str) -> None:
     data = DataSet.of(driven, cascade)
     assert data.fits_in_loop and data.stored[0] == pytest.approx(LOAD, rel=0.03)
     model = ga.OneMass(J=1e-3, D=0.01).model().with_effect("load_torque", torque=LOAD)
-    state = np.append(np.zeros(model.linear.order), data.stored[0])
+    state = np.append(np.zeros(model.mechanism.order), data.stored[0])
     off = ga.simulate(model, rec, cascade, state) - rec.velocity
     assert np.sqrt(np.mean(off**2)) < 0.1  # the noise, which acts in the loop as well
     assert np.sqrt(np.mean((ga.simulate(model, rec, cascade) - rec.velocity)[:200] ** 2)) > 0.3

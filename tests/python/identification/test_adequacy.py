@@ -13,8 +13,10 @@ from scipy.special import chdtrc
 
 import gaident as ga
 from clock import fastest
+from gaident.axis import said
 from gaident.errors import RecordError, SpaceError
 from gaident.identification.noise import chi2_tail
+from gaident.identification.notes import unseen_notes
 
 DT = 0.444e-3
 ONE_MASS = ga.OneMass(J=2e-4, D=3e-3).model()
@@ -227,3 +229,21 @@ def test_the_tail_of_chi_square_is_scipys() -> None:
         for x in (0.01, 1.0, 7.3, 40.0, 300.0):
             assert chi2_tail(x, dof) == pytest.approx(float(chdtrc(dof, x)), rel=1e-12)
     assert chi2_tail(0.0, 3) == 1.0
+
+
+def test_python_says_what_the_log_says_of_the_controller() -> None:
+    command = np.repeat([20.0, -30.0, 10.0, -5.0], 100)
+    run = ga.run(ga.OneMass(J=0.01, D=0.05), ga.Record(1e-3, command=command, velocity=0.0 * command), ga.PI(kp=0.5, ki=5.0))
+    rec = ga.Record(1e-3, command=command, velocity=run.velocity, torque=run.torque)
+    wrong, right = (ga.identify(rec, ga.PI(kp=kp, ki=5.0)).warnings for kp in (0.4, 0.5))
+    assert wrong[0].startswith("The logged torque does not follow") and "Give kp = 0.5 N m s/rad" in wrong[0]
+    assert "Give kp = 0.5 N s/m" in said(wrong[0], "linear")
+    assert not any("does not follow" in w for w in right)
+
+
+def test_a_resonance_above_what_the_log_shows_is_said_to_be_unseen() -> None:
+    seen, fast = (ga.TwoMass(JM=1e-4, DM=0.003, JL=3e-4, DL=0.003, KG=K) for K in (60.0, 2200.0))
+    assert unseen_notes(seen, 1e-3) == [] == unseen_notes(ga.OneMass(J=1e-4, D=0.1), 1e-3) == unseen_notes(None, 1e-3)
+    (note,) = unseen_notes(fast, 1e-3)
+    assert "above 4e+02 Hz does not show" in note and "862 Hz stands for something else" in note
+    assert unseen_notes(fast, 0.25e-3) == []

@@ -112,3 +112,20 @@ def test_refusals(to: str) -> None:
         export(delayed, -1)
     with pytest.raises(ModelError, match="p = 0"):
         export(ga.Model(3.0, [-1.0], [-2.0]), DT)
+
+
+def test_the_linear_part_has_what_is_linear() -> None:
+    whole = linear(TWO, 1.7e-3).with_effect("coulomb_friction", torque=0.05)
+    part = whole.linear
+    assert {e.name for e in part.effects} == {"transport_delay", "torque_lag", "velocity_filter"}
+    assert part.q == TWO.q + 2 and part.mechanism.effects == () and whole.mechanism == part.mechanism
+    omega = np.array([1.0, 30.0, 400.0])
+    expected = part.mechanism.frequency_response(omega) * np.exp(-1.7e-3j * omega)
+    for name in ("torque_lag", "velocity_filter"):
+        (effect,) = (e for e in part.effects if e.name == name)
+        expected = expected / (1.0 + 1j * omega * effect.parameters["time_constant"])
+    np.testing.assert_allclose(part.frequency_response(omega), expected, rtol=1e-12)
+    with pytest.raises(ModelError, match="to_scipy"):
+        part.discrete(1e-3)
+    with pytest.raises(ModelError, match=r"coulomb_friction.*use model\.linear"):
+        whole.frequency_response(omega)

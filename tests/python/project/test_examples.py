@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import runpy
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gaident.cli.main import main
 from places import ROOT
 
 EXAMPLES = ROOT / "examples"
@@ -81,3 +83,54 @@ def test_example(stem: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cap
     out, err = capsys.readouterr()
     assert out and err == "" and not list(tmp_path.iterdir())
     CHECKS[stem](names)
+
+
+TRACES = {
+    "run1.csv": ("drive.toml", {"coulomb_friction": ("torque", 0.04)}),
+    "velocity_mode.csv": ("velocity_mode.toml", {"coulomb_friction": ("torque", 0.12)}),
+    "position_mode.csv": ("position_mode.toml", {"coulomb_friction": ("torque", 0.12)}),
+    "robot_joint.csv": ("robot_joint.toml", {"unbalance": ("amplitude", 1.5), "coulomb_friction": ("torque", 0.3)}),
+}
+
+
+@pytest.mark.parametrize("trace", TRACES)
+def test_a_trace_with_its_drive_file_shows_what_is_hidden_in_it(
+    trace: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(EXAMPLES / "traces")
+    drive, hidden = TRACES[trace]
+    assert main(["diagnose", trace, "--drive", drive, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    causes = {f["effect"]: f for f in found["findings"] if not f["is_noise"]}
+    assert found["verdict"] == "explained" and causes.keys() == hidden.keys()
+    for effect, (name, value) in hidden.items():
+        assert causes[effect]["alternatives"] == [] and near(causes[effect]["parameters"][name]["value"], value, 0.01)
+
+
+@pytest.mark.parametrize("trace", [*TRACES, "run2.csv"])
+def test_init_reads_every_trace(
+    trace: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", str(EXAMPLES / "traces" / trace)]) == 0
+    said = capsys.readouterr().out
+    assert "velocity" in said and "torque" in said and "FILL IN" in said
+
+
+def test_the_traces_are_what_their_script_makes(tmp_path: Path) -> None:
+    script = EXAMPLES / "traces" / "make_traces.py"
+    names = runpy.run_path(str(script))
+    names["two_masses"].__globals__["HERE"] = tmp_path
+    for make in ("two_masses", "velocity_mode", "position_mode", "robot_joint"):
+        names[make]()
+    written = {path.name: path.read_text(encoding="utf-8").splitlines() for path in tmp_path.iterdir()}
+    assert sorted(written) == sorted(path.name for path in script.parent.glob("*.csv"))
+    for name, lines in written.items():
+        there = (script.parent / name).read_text(encoding="utf-8").splitlines()
+        assert lines[0] == there[0] and len(lines) == len(there)
+        # The last digits of a simulation are the processor's.
+        fine, stored = (
+            np.array([row.replace(";", " ").replace(",", "." if ";" in row else " ").split() for row in rows[1:]], dtype=float)
+            for rows in (lines, there)
+        )
+        assert np.all(np.abs(fine - stored) <= 1e-4 * np.abs(stored).max(axis=0))

@@ -94,6 +94,7 @@ def fake() -> Any:
         gain_interval=(0.55, 0.64),
         held_out="validation records",
         controller_numbers={},
+        relevance=None,
         base_shift={
             "gain": (9000.0, 9790.0),
             "inertia": (7.4935e-4, 6.88e-4),

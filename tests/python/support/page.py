@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import json
+import lzma
 import re
 from html.parser import HTMLParser
 from typing import Any
 
-__all__ = ["Reader", "charts_of"]
+from gaident.show.report.packing import FILTER
+
+__all__ = ["Reader", "charts_of", "text_of", "unpacked"]
 
 
 class Reader(HTMLParser):
@@ -45,9 +46,20 @@ def unpacked(page: str) -> str:
     """The page with what its script unpacks, figures and the library that draws them, as text."""
 
     def text(found: re.Match[str]) -> str:
-        return f"{found[1]}{gzip.decompress(base64.b64decode(found[2])).decode()}</script>"
+        return f"{found[1].replace('x-packed', 'x-unpacked')}{text_of(found[2])}</script>"
 
-    return re.sub(r'(<script type="application/gzip"[^>]*>)([A-Za-z0-9+/=]*)</script>', text, page)
+    return re.sub(r'(<script type="application/x-packed"[^>]*>)([^<]*)</script>', text, page)
+
+
+def text_of(letters: str) -> str:
+    """What packing.py packed, by Python's own LZMA."""
+    values = [ord(c) - 35 - (c > "<") for c in letters]
+    bits = "".join(f"{a + 91 * b:013b}" for a, b in zip(values[::2], values[1::2], strict=True))
+    whole = len(bits) // 8  # bytes; what is left over was filled up
+    data = int(bits[: 8 * whole], 2).to_bytes(whole, "big")
+    decoder = lzma.LZMADecompressor(format=lzma.FORMAT_RAW, filters=[FILTER])
+    text = decoder.decompress(data[:-1])  # the last byte may be of what was filled up
+    return (text if decoder.eof else text + decoder.decompress(data[-1:])).decode()
 
 
 def charts_of(page: str) -> dict[str, Any]:

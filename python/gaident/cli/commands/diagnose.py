@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gaident.axis import velocity_unit
+from gaident.cli.accuracy import accuracy_of
 from gaident.cli.drive import drive_of, read_all
 from gaident.cli.output import print_json, proposal_csv, target_of, write
 from gaident.cli.remedies import in_options
@@ -97,6 +98,7 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
     sources = [*args.logs, *(args.validation or []), *([] if args.model is None else [args.model])]
     following = target_of(args.next_command, sources)
     files = ResultFiles.of(args, sources, **{"--next-command": following})
+    accuracy, drive = accuracy_of(args.accuracy, drive)
     controller = drive.controller()
     with (bar := Progress(None if args.quiet else sys.stderr)) as progress:
         records = read_all(drive, args.logs, controller, doing=bar.doing)
@@ -123,6 +125,8 @@ def _diagnosed(args: Namespace) -> tuple[Drive, Diagnosis, list[Path]]:
             progress=progress,
             axis=drive.axis,
             pitch=drive.pitch,
+            accuracy=accuracy,
+            quick=args.quick,
         )
         written = files.write(dia, records, validation or (), drive, lambda: dia.plot(axis=drive.axis), bar.doing)
     if following is not None and dia.next_experiment is not None:

@@ -13,6 +13,7 @@ from gaident.cli.output import print_json, target_of, write
 from gaident.control.pi import bare_pi
 from gaident.errors import SettingsError
 from gaident.export.c_source import c_name
+from gaident.models.effects_linear import LINEAR
 from gaident.models.model import Model
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate, of_axis
@@ -21,6 +22,8 @@ from gaident.results.json_text import ROOTS
 from gaident.results.store import load
 
 __all__ = ["export_command"]
+
+PADE = 3  # no decision: of a file for another tool, which says so
 
 
 def export_command(args: argparse.Namespace) -> None:
@@ -64,14 +67,16 @@ def _linear(result: Diagnosis | Identification, args: argparse.Namespace) -> tup
     model: Model = result.model
     if not args.linear:
         return model, ""
-    left = ", ".join(effect.name for effect in model.effects)
+    left = ", ".join(effect.name for effect in model.effects if effect.name not in LINEAR)
     return model.linear, f"; left out by --linear: {left}" if left else ""
 
 
 def _python(result: Diagnosis | Identification, args: argparse.Namespace) -> str:
     """A Python file that makes the system and needs no gaident."""
     model, left = _linear(result, args)
-    system = model.to_scipy()
+    delayed = any(effect.name in LINEAR and LINEAR[effect.name](effect.values).delay for effect in model.effects)
+    system = model.to_scipy(pade=PADE if delayed else None)
+    left += f"; its delay by a Pade approximation of order {PADE}" if delayed else ""
     rows = {"zeros": list(map(complex, system.zeros)), "poles": list(map(complex, system.poles)), "gain": float(system.gain)}
     head = [
         f'"""Torque to velocity in SI units, of {Path(args.result).name}, written by gaident export{left}."""',

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from gaident.errors import RecordError, SettingsError
 from gaident.policy.table import POLICY
 from gaident.results.identification import Identification
 
-__all__ = ["ProgressCallback", "checked", "in_order", "noise_std_of", "records_of"]
+__all__ = ["ProgressCallback", "accuracy_of", "checked", "in_order", "noise_std_of", "records_of"]
 
 ProgressCallback = Callable[[float, str], None]
 
@@ -67,6 +67,17 @@ def checked(
     for name, value, low, high in (("bootstrap", bootstrap, 0, 100_000), ("seed", seed, 0, 2**63 - 1)):
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not low <= value <= high:
             raise SettingsError(f"{name} is {value!r}: it must be a whole number from {low} to {high}")
+
+
+def accuracy_of(accuracy: float | Mapping[str, float] | None) -> dict[str, float]:
+    """{"velocity": [rad/s], "torque": [N m]} of what was asked for; a number alone is of the velocity."""
+    given = {} if accuracy is None else accuracy if isinstance(accuracy, Mapping) else {"velocity": accuracy}
+    for name, value in given.items():
+        if name not in ("velocity", "torque"):
+            raise SettingsError(f"accuracy has {name!r}: give a velocity in rad/s, or 'velocity' and 'torque' [N m] with numbers")
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < float(value) < float("inf"):
+            raise SettingsError(f"accuracy of the {name} is {value!r}: give a number above 0, in rad/s or N m")
+    return {name: float(value) for name, value in given.items()}
 
 
 def in_order(records: tuple[Record, ...]) -> tuple[Record, ...]:

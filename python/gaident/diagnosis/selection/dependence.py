@@ -23,7 +23,7 @@ from gaident.estimation.prediction import coupling_response, twist
 from gaident.estimation.projection import project_out
 from gaident.policy.table import POLICY
 
-__all__ = ["Dependence", "beside_torque_noise", "dependence", "without_torque"]
+__all__ = ["Dependence", "beside_torque_noise", "dependence", "families", "without_torque"]
 
 ROOM, LEAST = 16, 4  # no decision: samples for each function of a driver's family, and the functions that any record has room for
 LINES = (64, 31, 4)  # no decision: samples of a spectrum that peaks are looked for in, lines of its running mean, half a peak's
@@ -66,8 +66,34 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
     In 5 to 7 % of records of 500 and 1000 samples without effects the largest gain is above 0, in 26 % of steps of 250: the noise
     filter, which is fitted again without the family, is uncertain by more. What counts as a gain is calibrated on such records.
     """
+    data = objective.data
+    J, error = objective.sensitivities(fit.hypothesis, fit.x)
+    columns = _columns(objective, fit, error)
+    lines = _lines(project_out(J, error[None, :])[0], data.lengths)
+    account = _Account(objective, J, error, fit)
+    none = account.bic(np.zeros((0, len(error))))
+    gains = {driver: none - account.bic(rows) for driver, rows in columns.items()}
+    line = None
+    for pairs in lines:
+        # A frequency that was searched for counts as a number more.
+        gain = none - account.bic(pairs) - cost_of(1, objective.information)
+        if gain > gains["time"]:
+            gains["time"], line = gain, torque_of_line(objective, fit, J, error, pairs)
+    beside = {driver: np.vstack([J, rows]) for driver, rows in columns.items()}
+    least = {driver: objective.raw_rest(rows, error) for driver, rows in beside.items()}
+    unwhitened = {driver: objective.unwhitened_rest(rows, error) for driver, rows in beside.items()}
+    whitened = isinstance(objective.family, Innovations)
+    needed = POLICY.dependence_gain * (1.0 + (POLICY.short_record / objective.count if whitened else 0.0))
+    return Dependence({driver: float(gain) for driver, gain in gains.items()}, least, unwhitened, needed, line, whitened)
+
+
+def families(objective: Objective, fit: Fit) -> dict[str, Matrix]:
+    """Driver -> rows that span what a free function of it does to the error, before all filters."""
+    return _columns(objective, fit, objective.error(fit))
+
+
+def _columns(objective: Objective, fit: Fit, error: Vector) -> dict[str, Matrix]:
     data, parameters, x = objective.data, fit.parameters, fit.x
-    J, error = objective.sensitivities(fit.hypothesis, x)
     w = objective.measured - error
     room = max(len(w) // ROOM, LEAST)  # numbers for a family; from 290 samples on there is room for all
     torques: dict[str, Matrix] = {
@@ -85,23 +111,7 @@ def dependence(objective: Objective, fit: Fit) -> Dependence:
         columns["past"] = np.vstack(
             [columns["past"], coupling_response(data, parameters, x, _of_path(twist(data, parameters, x), data.lengths))]
         )
-    columns = {d: _strongest(rows, room) for d, rows in columns.items()}
-    lines = _lines(project_out(J, error[None, :])[0], data.lengths)
-    account = _Account(objective, J, error, fit)
-    none = account.bic(np.zeros((0, len(w))))
-    gains = {driver: none - account.bic(rows) for driver, rows in columns.items()}
-    line = None
-    for pairs in lines:
-        # A frequency that was searched for counts as a number more.
-        gain = none - account.bic(pairs) - cost_of(1, objective.information)
-        if gain > gains["time"]:
-            gains["time"], line = gain, torque_of_line(objective, fit, J, error, pairs)
-    beside = {driver: np.vstack([J, rows]) for driver, rows in columns.items()}
-    least = {driver: objective.raw_rest(rows, error) for driver, rows in beside.items()}
-    unwhitened = {driver: objective.unwhitened_rest(rows, error) for driver, rows in beside.items()}
-    whitened = isinstance(objective.family, Innovations)
-    needed = POLICY.dependence_gain * (1.0 + (POLICY.short_record / objective.count if whitened else 0.0))
-    return Dependence({driver: float(gain) for driver, gain in gains.items()}, least, unwhitened, needed, line, whitened)
+    return {d: _strongest(rows, room) for d, rows in columns.items()}
 
 
 def beside_torque_noise(objective: Objective, fit: Fit) -> Dependence:

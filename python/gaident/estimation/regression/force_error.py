@@ -258,8 +258,8 @@ def _led(model: Model, rec: Record, motion: Motion, cutoff_hz: float) -> Vector:
 
     if model.p != 1 or not model.gain > 0.0 or any(z.real > 0.0 for z in model.zeros):
         raise ModelError(
-            f"{model.linear!r} cannot be led along a motion, which takes p = 1, a positive gain and stable zeros: give one mass, "
-            "two, or a regression"
+            f"{model.mechanism!r} cannot be led along a motion, which takes p = 1, a positive gain and stable zeros: give one "
+            "mass, two, or a regression"
         )
     out = {*effects_before_the_shaft(model), *(e.name for e in model.effects if e.row.place == "controller")}
     mechanism = Model(model.gain, model.poles, model.zeros, [e for e in model.effects if e.name not in out])
@@ -288,7 +288,7 @@ def _noise_power(model: Model | InverseDynamics | TorqueOf, rec: Record, motion:
     """Variance of what noise leaves [(N m)^2]: J times that of the acceleration, and that of a measured torque."""
     if isinstance(model, Model):
         omega = math.pi * cutoff_hz
-        inertia = abs(float((1.0 / model.linear.frequency_response(omega)).imag)) / omega
+        inertia = abs(float((1.0 / model.mechanism.frequency_response(omega)).imag)) / omega
     else:
         inertia = model.parameters["inertia"].value if isinstance(model, InverseDynamics) else 0.0
     share = noise_share(rec, cutoff_hz, order, motion.spectrum)

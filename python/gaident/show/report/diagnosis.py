@@ -11,7 +11,6 @@ from gaident.models.factors import gain_unit
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
-from gaident.show.controller_words import controller_words
 from gaident.show.diagnosis_summary import (
     DRIVERS,
     TESTED_UP_TO,
@@ -26,8 +25,10 @@ from gaident.show.diagnosis_summary import (
     parameter_row,
 )
 from gaident.show.html import Html, Row, joined, number, table, tag, typeset
+from gaident.show.relevance_words import bent_of, part_words, relevance_words, remark_words
 from gaident.show.report import charts
 from gaident.show.report.command import proposal_csv
+from gaident.show.report.controller_words import controller_words
 from gaident.show.report.parts import (
     Charts,
     Head,
@@ -59,9 +60,10 @@ GOOD, HALF, BAD = ("good", "✓"), ("half", "◐"), ("bad", "✗")
 MARKS = {"adequate": GOOD, "explained": GOOD, "partly explained": HALF, "unexplained": BAD}
 
 
-def head(dia: Diagnosis, axis: str) -> Head:
+def head(dia: Diagnosis, view: View) -> Head:
     """What stands at the top of the page."""
-    return Head("Diagnosis", *mark(dia), headline(dia, axis), dia.notes)
+    text = " ".join(filter(None, (headline(dia, view.axis), relevance_words(dia, view.axis, view.scales))))
+    return Head("Diagnosis", *mark(dia), text, dia.notes)
 
 
 def headline(dia: Diagnosis, axis: str) -> str:
@@ -162,7 +164,7 @@ def _causes(dia: Diagnosis, view: View) -> Section:
         parts.append(
             box(
                 tag("h3", name, " ", tag("small", "cannot be told apart" if f.alternatives else "named")),
-                tag("p", typeset(said(f.evidence, axis))),
+                tag("p", typeset(" ".join(filter(None, (said(f.evidence, axis), part_words(dia, f, axis, view.scales)))))),
                 table(("parameter", "value", "unit", "", ""), [rows]) if rows else "",
                 tag("p", tag("small", typeset(figures))),
                 tag("p", tag("small", typeset(chance_words(f, dia.bootstrap)))) if f.p_value is not None else "",
@@ -192,12 +194,13 @@ def _parameters(dia: Diagnosis, view: View, drawn: Charts) -> Section:
         u = "" if e.unit == "1" else unit(e.unit, axis)
         old, new = dia.base_shift.get(name, (math.nan, math.nan))
         moved = typeset(moved_words(old, new, e.std))
-        remark = "" if e.identifiable else "not determined"
+        remark = remark_words(dia, name, e)
         rows.append((mechanical_name(name, axis).strip(), estimate(e.value, e.std), typeset(u), number(old), moved, remark))
     if rows:
         head = "The mechanism" + (", fitted together with the effects" if dia.model.effects else "")
         parts.append(tag("h3", head))
-        if dia.driver is not None:
+        bent = bent_of(dia)
+        if bent and len(bent) == len(dia.mechanics):
             parts.append(
                 box(tag("p", "Biased by what is left: do not trust these beyond what the figures below show."), kind="warn")
             )

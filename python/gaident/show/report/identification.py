@@ -9,8 +9,8 @@ from gaident.axis import unit, velocity_unit, word
 from gaident.models.mechanics import TwoMass
 from gaident.results.estimate import Estimate
 from gaident.results.identification import Identification
-from gaident.show.controller_words import controller_words
 from gaident.show.html import Html, Row, joined, number, table, tag, typeset
+from gaident.show.report.controller_words import controller_words
 from gaident.show.report.parts import (
     Charts,
     Head,

@@ -9,6 +9,7 @@ from gaident.results.identification import Identification
 from gaident.show.html import Html, Row, joined, number, table, tag, typeset
 from gaident.show.report import diagnosis, identification
 from gaident.show.report.parts import Head, estimate
+from gaident.show.report.views import View
 from gaident.show.summary import meaning_of
 from gaident.show.wording import cause_words, structure_words, words
 
@@ -40,7 +41,7 @@ def diagnosis_html(dia: Diagnosis) -> Html:
         errors.append(("extended model", number(dia.after.rmse), f"{dia.after.fit_percent:.2f}"))
     errors.append(("noise", number(dia.after.noise_floor), ""))
     where = f"{UNITS}; {dia.held_out}"
-    return _framed(diagnosis.head(dia, dia.axis), causes, table(("", "rmse", "fit [%]"), [errors], left=(0,)), where)
+    return _framed(diagnosis.head(dia, View(axis=dia.axis)), causes, table(("", "rmse", "fit [%]"), [errors], left=(0,)), where)
 
 
 def identification_html(idn: Identification) -> Html:

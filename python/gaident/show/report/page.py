@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
+from collections.abc import Sequence
 from functools import lru_cache
 from importlib.resources import files
 
@@ -13,10 +12,12 @@ from gaident.show.chart import PALETTES
 from gaident.show.html import Html, joined, tag, typeset
 from gaident.show.report import diagnosis, identification
 from gaident.show.report.live import figure, json_of
-from gaident.show.report.parts import Charts, box, sentences, title_of
+from gaident.show.report.packing import packed
+from gaident.show.report.parts import Charts, Section, box, sentences, title_of
+from gaident.show.report.several import Shown, several
 from gaident.show.report.views import View
 
-__all__ = ["packed", "page"]
+__all__ = ["page", "page_of_several"]
 
 # Nothing is fetched, whatever a page holds.
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:"
@@ -27,7 +28,7 @@ def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
     drawn = Charts(view.scales, bool(plotly_js))
     if isinstance(result, Diagnosis):
         head_of, tiles, chapters = (
-            diagnosis.head(result, view.axis),
+            diagnosis.head(result, view),
             diagnosis.tiles(result, view),
             diagnosis.chapters(result, view, drawn),
         )
@@ -45,6 +46,18 @@ def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
         class_=f"verdict {head_of.kind}",
         id="verdict",
     )
+    return _whole(title, view, verdict, chapters, drawn, plotly_js)
+
+
+def page_of_several(results: Sequence[Shown], plotly_js: str) -> str:
+    """The whole page of several results, see several.py."""
+    view = results[0][2]
+    drawn = Charts(view.scales, bool(plotly_js))
+    title = f"{len(results)} results: {', '.join(name for name, _, _ in results)}"
+    return _whole(title, view, Html(), several(results, drawn), drawn, plotly_js)
+
+
+def _whole(title: str, view: View, verdict: Html, chapters: Sequence[Section], drawn: Charts, plotly_js: str) -> str:
     contents = tag("nav", tag("ol", *(tag("li", tag("a", c.title, href=f"#{c.key}")) for c in chapters)), aria_label="Contents")
     data = {"charts": {c.key: {**figure(c), "link": c.link} for c in drawn.all}, "palettes": PALETTES}
     head = (
@@ -57,8 +70,9 @@ def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
         tag("script", Html('document.documentElement.classList.add("js");')) if plotly_js else "",
     )
     scripts = (
-        tag("script", _packed(plotly_js), type="application/gzip", id="library") if drawn.all else "",
-        tag("script", packed(json_of(data)), type="application/gzip", id="figures"),
+        _script("library", *_packed(plotly_js)) if drawn.all else "",
+        _script("figures", *packed(json_of(data))),
+        tag("script", _asset("unpack.js")),
         tag("script", _asset("page.js")),
     )
     licence = " Figures: plotly.js, MIT licence." if plotly_js else ""
@@ -76,12 +90,12 @@ def page(result: Diagnosis | Identification, view: View, plotly_js: str) -> str:
     return f"<!DOCTYPE html>\n{whole}\n"
 
 
-def packed(text: str) -> Html:
-    """The text for a script element that page.js unpacks: gzip in base64, the same for the same text."""
-    return Html(base64.b64encode(gzip.compress(text.encode(), compresslevel=9, mtime=0)).decode())
-
-
 _packed = lru_cache(maxsize=1)(packed)  # of the library, which is the same in every page
+
+
+def _script(key: str, letters: Html, size: int) -> Html:
+    """A script element that no browser runs: what page.js unpacks."""
+    return tag("script", letters, type="application/x-packed", data_bytes=str(size), id=key)
 
 
 def _about(view: View) -> Html:
@@ -101,6 +115,6 @@ def _switch() -> Html:
     return tag("div", *buttons, class_="switch", role="group", aria_label="Colours of the page")
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=3)
 def _asset(name: str) -> Html:
     return Html(files("gaident.show.report").joinpath(name).read_text(encoding="utf-8"))

@@ -1,0 +1,41 @@
+"""What the logs say of the controller that an identification takes as given: whether their torque follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from gaident.axis import Text, joined, say, unit_text
+from gaident.control.controller import Controller
+from gaident.control.pi import bare_pi
+from gaident.data.record import Record
+from gaident.diagnosis.controller.replay import Replay, replay
+
+__all__ = ["replay_notes"]
+
+REPLAYED = 1 << 18  # no decision: samples of a log on which the controller is run again; work
+UNITS = {"kp": "N m s/rad", "ki": "N m/rad", "torque_limit": "N m"}
+
+
+def replay_notes(records: Sequence[Record], controller: Controller | None) -> list[Text]:
+    """A sentence on each record, long ones by their start, whose torque does not follow from this loop.
+
+    Of any controller but a bare PI with all its numbers, `identify` says itself whether the torque follows.
+    """
+    loop = bare_pi(controller)
+    if loop is None or loop.unknown:
+        return []
+    found = []
+    for rec in records:
+        if rec.torque is not None and (said := replay(rec[:REPLAYED] if len(rec) > REPLAYED else rec, loop)).follows is False:
+            found.append(say("{}{}{}", f"{rec.name}: " if len(records) > 1 else "", said.sentence, _instead(said, loop)))
+    return found
+
+
+def _instead(said: Replay, loop: Controller) -> Text:
+    """The numbers of the controller that the log shows, where a PI with a trapezoidal integral has what differs."""
+    found, given = said.controller, bare_pi(loop)
+    if found is None or given is None or said.cause == "scale":  # a wrong unit is not to be mended by gains
+        return Text("")
+    shown = [(name, getattr(found, name), getattr(given, name)) for name in UNITS]
+    parts = [say("{} = {:.6g} {}", name, value, unit_text(UNITS[name])) for name, value, old in shown if value not in (None, old)]
+    return say(" Give {}.", joined(", ", parts)) if parts else Text("")
