@@ -41,7 +41,7 @@ class FoundNumbers:
     named: Callable[[Vector, Matrix], Mapping[str, Mapping[str, tuple[float, float]]]] | None = None
 
     @cached_property
-    def moves(self) -> Matrix:
+    def directions(self) -> Matrix:
         """(m, k): one deviation in each independent direction; without a covariance a small step of each number."""
         size = len(self.at)
         if self.covariance is None:
@@ -61,9 +61,9 @@ class FoundNumbers:
     def deviations_off(self) -> Vector:
         """(m,): how many deviations the numbers are from what the torque showed in each direction; 0 where none showed them."""
         if self.covariance is None or self.shown is None:
-            return np.zeros(len(self.moves))
-        size = np.maximum(np.abs(self.moves).max(axis=0, initial=0.0), 1e-300)
-        return np.asarray(np.linalg.lstsq((self.moves / size).T, (self.at - self.shown) / size, rcond=1e-12)[0])
+            return np.zeros(len(self.directions))
+        size = np.maximum(np.abs(self.directions).max(axis=0, initial=0.0), 1e-300)
+        return np.asarray(np.linalg.lstsq((self.directions / size).T, (self.at - self.shown) / size, rcond=1e-12)[0])
 
     def moved(self, by: Vector) -> FoundNumbers:
         """The same with its numbers moved, as far as they go."""

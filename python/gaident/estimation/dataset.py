@@ -232,10 +232,10 @@ class DataSet:
         return self.pi is None and not self.fits_in_loop
 
     @cached_property
-    def corrected(self) -> DataSet:
+    def observed(self) -> DataSet:
         """The same under a share s of the controller, with commands r: s C (r - w_measured) = u, the records' torques."""
         assert self.pi is not None
-        pi, half, share = self.pi, 0.5 * self.pi.ki * self.dt, POLICY.corrected_share
+        pi, half, share = self.pi, 0.5 * self.pi.ki * self.dt, POLICY.observer_share
         own = PI(kp=share * pi.kp, ki=share * pi.ki)
         b, a = np.array([1.0, -1.0]) / (share * (pi.kp + half)), np.array([1.0, (half - pi.kp) / (pi.kp + half)])
         pairs = zip(self.records, self.driven, self.turned, strict=True)

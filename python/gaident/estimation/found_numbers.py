@@ -103,7 +103,7 @@ def covariance_of_numbers(objective: Objective, fit: Fit) -> Matrix:
     found = numbers_in(fit.hypothesis)
     v, J, E = slopes(objective, fit.hypothesis, fit.x, fit.noise)
     spread = _spread(objective, fit, v, J, E)
-    return np.asarray(found.moves.T @ spread @ found.moves)
+    return np.asarray(found.directions.T @ spread @ found.directions)
 
 
 def refined(
@@ -127,7 +127,7 @@ def refined(
             A, b = A + s2 * np.eye(len(A)), b + s2 * found.deviations_off
         step = -inverse_of(A) @ b
         for part in (1.0, 0.3, 0.1):  # no decision: of a step
-            to = moved(here.predictor.data, part * step @ found.moves)
+            to = moved(here.predictor.data, part * step @ found.directions)
             trial = here if to is None else _under(objective, to, here)
             fall = _cost(here, s2) - _cost(trial, s2)
             if fall > 0.0:
@@ -148,7 +148,7 @@ def worth(objective: Objective, fit: Fit) -> float:
     if found is None or found.shown is None or found.covariance is None:
         return 0.0
     off = found.deviations_off
-    return float(off @ off) + cost_of(len(found.moves), objective.information)
+    return float(off @ off) + cost_of(len(found.directions), objective.information)
 
 
 def _under(objective: Objective, data: DataSet, fit: Fit, noise: NoiseFilter | None = None) -> Fit:
@@ -178,9 +178,9 @@ def slopes(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: Noise
 
 
 def _changes(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, v: Vector) -> Matrix:
-    """(m, samples): how the whitened errors change with each move of the controller's numbers."""
-    moves = numbers_in(hypothesis).moves
-    return np.array([_change(objective, hypothesis, x, noise, v, by) for by in moves]).reshape(len(moves), len(v))
+    """(m, samples): how the whitened errors change along each direction of the controller's numbers."""
+    directions = numbers_in(hypothesis).directions
+    return np.array([_change(objective, hypothesis, x, noise, v, by) for by in directions]).reshape(len(directions), len(v))
 
 
 def _answers(J: Matrix, E: Matrix) -> Matrix:

@@ -36,7 +36,7 @@ from gaident.models.simulate import simulate
 from gaident.models.simulate_many import simulate_values
 from gaident.models.starts import noise_std
 
-__all__ = ["ClosedLoop", "CorrectedLoop", "OpenLoop", "Predictor", "coupling_response", "torque_noise_in", "twist"]
+__all__ = ["ClosedLoop", "ObserverLoop", "OpenLoop", "Predictor", "coupling_response", "torque_noise_in", "twist"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -157,10 +157,10 @@ class ClosedLoop:
 
 
 @dataclass(frozen=True)
-class CorrectedLoop:
+class ObserverLoop:
     """The torque drives the model, and a share of the controller holds its velocity near the measured one.
 
-        u = u_record + s C(q) (w_measured - w),   s = `corrected_share`
+        u = u_record + s C(q) (w_measured - w),   s = `observer_share`
 
     A predictor with a fixed observer (Ljung 1999, chapter 4). A gap or an impact makes the path of a model that the torque alone
     drives depend on rounding after some of them; in the drive's loop, s = 1, the whole of the controller's answer to the
@@ -187,7 +187,7 @@ class CorrectedLoop:
 
     def _loop(self, parameters: Parameterisation) -> ClosedLoop:
         inside = any(t.in_controller for t in parameters.terms)
-        return ClosedLoop(self.data if inside else self.data.corrected, self.own_angle)
+        return ClosedLoop(self.data if inside else self.data.observed, self.own_angle)
 
 
 def substeps(data: DataSet, terms: Sequence[Term]) -> int | None:

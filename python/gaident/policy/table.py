@@ -234,7 +234,7 @@ class Policy:
         100.0, "samples", "time constant at most of a lag behind the controller's torque; a current loop is faster", LAGS
     )
     lag_said: float = loop(0.75, "samples", "from which a lag of an open loop's log is said; a sampled torque's is 0.5", SHIFTED)
-    corrected_share: float = loop(0.3, "1", "of the controller that holds a model with a gap near its record", DRIVES)
+    observer_share: float = loop(0.3, "1", "of the controller that holds a model with a gap near its record", DRIVES)
     kept_correlation: float = loop(0.5, "1", "of the correlations of a controller's numbers from a slow log", SLOWER)
     slope_reach: float = loop(
         0.3,

@@ -132,10 +132,10 @@ class Toy:
 
 @dataclass(frozen=True)
 class HalfFollowed(Toy):
-    """A loop that follows half of the drift, where `CorrectedLoop` may be used."""
+    """A loop that follows half of the drift, where `ObserverLoop` may be used."""
 
     closed: bool = True
-    possible = staticmethod(prediction.CorrectedLoop.possible)
+    possible = staticmethod(prediction.ObserverLoop.possible)
 
     def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
         return super().velocities(parameters, X) - 0.5 * DRIFT
@@ -691,7 +691,7 @@ def half_drifting(term: Term, age: float = 0.0, plain: bool = False) -> Fit:
 
 
 def test_a_gap_is_also_fitted_where_a_share_of_the_controller_holds_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(model_space, "CorrectedLoop", HalfFollowed)
+    monkeypatch.setattr(model_space, "ObserverLoop", HalfFollowed)
     best = half_drifting(IMPACTS)
     assert isinstance(best.predictor, HalfFollowed)
     assert best.x[-1] == pytest.approx(0.4, abs=0.02)
@@ -705,7 +705,7 @@ def test_a_gap_is_also_fitted_where_a_share_of_the_controller_holds_the_model(mo
 def test_elsewhere_no_share_of_the_controller_holds_a_model(
     monkeypatch: pytest.MonkeyPatch, term: Term, age: float, plain: bool
 ) -> None:
-    monkeypatch.setattr(model_space, "CorrectedLoop", HalfFollowed)
+    monkeypatch.setattr(model_space, "ObserverLoop", HalfFollowed)
     assert type(half_drifting(term, age=age, plain=plain).predictor) is Toy
 
 

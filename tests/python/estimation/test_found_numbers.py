@@ -160,8 +160,8 @@ def test_by_a_deviation_the_larger_change_counts_and_a_difference_goes_where_it_
 def test_moves_are_deviations_in_independent_directions() -> None:
     root = np.array([[1.0, 0.0, 0.0], [0.5, 1e-6, 0.0], [0.0, 0.0, 0.0]])
     found = FoundNumbers(filtered, np.zeros(3), root @ root.T, low=np.array([-1.0, 0.0, 0.0]))
-    np.testing.assert_allclose(found.moves.T @ found.moves, root @ root.T, atol=1e-12)
-    further = found.joined().moved(2.0 * found.moves[0])
+    np.testing.assert_allclose(found.directions.T @ found.directions, root @ root.T, atol=1e-12)
+    further = found.joined().moved(2.0 * found.directions[0])
     np.testing.assert_allclose(np.abs(further.deviations_off)[0], 2.0, rtol=1e-6)
     assert found.moved(np.array([-5.0, -5.0, 0.0])).at.tolist() == [-1.0, 0.0, 0.0]
     np.testing.assert_allclose(loosened(np.array([[4.0, 2.0], [2.0, 1.0]])), [[4.0, 1.0], [1.0, 1.0]])

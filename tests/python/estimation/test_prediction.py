@@ -12,7 +12,7 @@ from gaident.control.controller import Limiting
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.estimation.dataset import DataSet, torque_in, with_angle
 from gaident.estimation.parameterisation import Parameterisation
-from gaident.estimation.prediction import ClosedLoop, CorrectedLoop, OpenLoop
+from gaident.estimation.prediction import ClosedLoop, ObserverLoop, OpenLoop
 from gaident.estimation.term import Scales, Term
 from gaident.policy.table import POLICY
 
@@ -80,7 +80,7 @@ def test_an_effect_of_the_controller_may_have_several_parameters() -> None:
 
 def test_a_corrected_loop_adds_a_share_of_the_controller_to_the_torque_of_the_record() -> None:
     """u + s C (w_measured - w), sample by sample; C with a trapezoidal integral, the mass with its exact step."""
-    found, share = data(), POLICY.corrected_share
+    found, share = data(), POLICY.observer_share
     p, x = parameters()
     u, measured = torque_in(found.driven[0]), found.records[0].velocity
     decay = np.exp(-2e-3 / 5e-4 * DT)
@@ -91,13 +91,13 @@ def test_a_corrected_loop_adds_a_share_of_the_controller_to_the_torque_of_the_re
         integral += 0.5 * LOOP.ki * DT * (error + before)
         before = error
         w = decay * w + (1.0 - decay) / 2e-3 * (torque + share * (LOOP.kp * error + integral))
-    np.testing.assert_allclose(CorrectedLoop(found).velocities(p, x[None, :])[0], expected, atol=1e-9)
+    np.testing.assert_allclose(ObserverLoop(found).velocities(p, x[None, :])[0], expected, atol=1e-9)
     assert np.abs(ClosedLoop(found).velocities(p, x[None, :])[0] - expected).max() > 0.1
 
 
 def test_an_effect_inside_the_controller_is_simulated_in_the_drives_loop() -> None:
     found = data()
     p, x = parameters(CLAMP)
-    np.testing.assert_array_equal(CorrectedLoop(found).velocities(p, x[None, :]), ClosedLoop(found).velocities(p, x[None, :]))
-    assert CorrectedLoop.possible(found) and not CorrectedLoop.possible(found.aged(0.5))
-    assert not CorrectedLoop.possible(replace(found, controller=ga.Cascade(LOOP, period=DT / 2)))
+    np.testing.assert_array_equal(ObserverLoop(found).velocities(p, x[None, :]), ClosedLoop(found).velocities(p, x[None, :]))
+    assert ObserverLoop.possible(found) and not ObserverLoop.possible(found.aged(0.5))
+    assert not ObserverLoop.possible(replace(found, controller=ga.Cascade(LOOP, period=DT / 2)))

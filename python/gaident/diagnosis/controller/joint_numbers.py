@@ -53,7 +53,7 @@ def joint_numbers(found: Selection, compared: Callable[[Selection, Fit], Selecti
     compared: a selection with another model in the place of its own, and its rivals.
     """
     data = found.final.predictor.data.found
-    if data is None or not len(data.moves):
+    if data is None or not len(data.directions):
         return None
     joint = _Joint(found.space)
     best = joint.best(found.final)

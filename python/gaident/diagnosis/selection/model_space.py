@@ -25,7 +25,7 @@ from gaident.estimation.criterion import cost_of, effective_samples
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis, Innovations, Objective, OutputErrors
-from gaident.estimation.prediction import ClosedLoop, CorrectedLoop, OpenLoop, Predictor
+from gaident.estimation.prediction import ClosedLoop, ObserverLoop, OpenLoop, Predictor
 from gaident.estimation.term import Term
 from gaident.policy.table import POLICY, Policy
 
@@ -276,8 +276,8 @@ class ModelSpace:
         if fit.predictor.closed and self.whitens and not self.data.loop_only:
             # Parameters found in closed loop may be a good start for the open loop, whose errors show more.
             predictors.append(OpenLoop(self.data, fit.predictor.own_angle))
-            if CorrectedLoop.possible(self.data) and any(t.multimodal and t.in_coupling for t in fit.parameters.terms):
-                predictors.append(CorrectedLoop(self.data, fit.predictor.own_angle))
+            if ObserverLoop.possible(self.data) and any(t.multimodal and t.in_coupling for t in fit.parameters.terms):
+                predictors.append(ObserverLoop(self.data, fit.predictor.own_angle))
         if not fit.predictor.own_angle and not self.data.angle_logged and any(t.harmonic for t in fit.parameters.terms):
             predictors.append(replace(fit.predictor, own_angle=True))  # type: ignore[type-var]
         best = min((fit, *(self.predicted_by(fit, p) for p in predictors)), key=lambda f: f.bic)
