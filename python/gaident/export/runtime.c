@@ -1,5 +1,5 @@
 /* The gaident runtime: the loop that the simulation steps through. Compared with it, effect by effect.
-   Its arithmetic is the simulation's: fma(a, b, c) is a b + c, rounded once, one instruction where the processor has it. */
+   The same equations, fused as in the simulation: fma(a, b, c) is a b + c, rounded once. The order of its sums differs. */
 #ifndef GAIDENT_RUNTIME_DEFINED
 #define GAIDENT_RUNTIME_DEFINED
 

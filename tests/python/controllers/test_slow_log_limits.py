@@ -15,6 +15,7 @@ import gaident as ga
 from drive_cases import random_case
 from gaident.diagnosis.controller.as_read import outliers_of_the_log
 from gaident.diagnosis.controller.form_findings import loop_of
+from gaident.diagnosis.controller.slow_forms import limited
 from gaident.identification.logged_torque import not_followed
 from loop_cases import loop_kind, loop_noise, loop_plant
 
@@ -24,7 +25,7 @@ SEED = 951000000
 def case(loop: str, every: int, noise: str, *effects: str, seed: int = SEED) -> tuple[Any, Any, Any, Any]:
     """Record, validation record, controller and truth of such a drive."""
     rng = np.random.default_rng([seed, zlib.crc32(" ".join((loop, str(every), *effects)).encode())])
-    plant = loop_plant(loop, every, rng)
+    plant = loop_plant(loop, every, rng, True if "backlash" in effects else None)
     return random_case(seed, effects, loop_kind(loop), loop_noise(noise, seed), True, None, plant, plant.placed)
 
 
@@ -35,6 +36,15 @@ def test_one_limit_goes_before_a_form_of_several_numbers_that_explains_less() ->
     limit = dia.causes[0].parameters["limit"]
     assert [f.effect for f in dia.causes] == ["integrator_clamp"] and dia.verdict == "explained"
     assert abs(limit.value - truth.effects["integrator_clamp"]["limit"]) < 3.0 * limit.std < 0.03 * limit.value
+
+
+@pytest.mark.parametrize("noise", ["white", "encoder"])
+def test_the_flat_top_of_a_swing_is_no_limit_where_the_torque_follows_without(noise: str) -> None:
+    rec, later, controller, truth = case("bare", 2, noise, "backlash", seed=953)
+    assert limited([rec], controller).limit is None and loop_of([rec], controller).findings == ()
+    dia = ga.diagnose(rec, controller, validation=later)
+    assert [f.effect for f in dia.causes] == ["backlash"] and dia.verdict == "explained"
+    assert dia.causes[0].parameters["gap"].value == pytest.approx(truth.effects["backlash"]["gap"], rel=0.05)
 
 
 def test_an_integral_held_at_a_limit_is_open_by_what_it_moves_between_two_lines() -> None:

@@ -284,8 +284,8 @@ def _with_limit(
 ) -> Shown | None:
     """A form that was shown where no limit acts, and the limit; None where there is neither, or the whole torque is no nearer.
 
-    part: of the given controller's rms error over the whole torque, what is left at most. Of a slower log it is also no more than
-    noise of a measured torque.
+    part: of the given controller's rms error over the whole torque, what is left at most. Of a slower log, whose errors are no
+    noise, it is no more than what one number has to leave, nor than noise of a measured torque.
     """
     best, (numbers, filters, cov) = candidates[0], fitted
     at_limit = limited(records, replace(controller_of(best, numbers, filters, given, law.period), period=law.period))
@@ -293,7 +293,8 @@ def _with_limit(
         return None
     before, after = run_error(records, Cascade(given, law.period)), run_error(records, at_limit.controller)
     size = float(np.std(np.concatenate([r.torque for r in records if r.torque is not None])))
-    if not after < part * before or (law.every > 1 and after > POLICY.replay_noise * size):
+    slow = law.every > 1
+    if not after < (min(part, POLICY.each_number) if slow else part) * before or (slow and after > POLICY.replay_noise * size):
         return None
     differs, gains = named(best, numbers, filters, cov, law.period), _gains(candidates)
     if at_limit.limit is not None:

@@ -18,6 +18,7 @@ from gaident.data.record import Record
 from gaident.data.signals.lattice import rounding_step
 from gaident.diagnosis.controller.form_regression import equation_of
 from gaident.identification.logged_stretches import centred, log_of, numbered, plateau_of, unlimited, whitened
+from gaident.identification.logged_torque import comparable, not_followed
 from gaident.models.starts import starts_moving
 from gaident.policy.table import POLICY
 
@@ -71,6 +72,7 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
     """The controller with the plateau of the logged torques as its limit, and the anti-windup that comes closest.
 
     At a given limit it is the given anti-windup, where none of them comes closer by the share that a number has to take away.
+    Where the torques follow without a limit, as far as their log tells, a plateau of theirs is none: the top of a swing is flat.
     """
     filters_unseen = controller.torque_filters and controller.log_every(records[0].dt) > 1
     given = controller.velocity.torque_limit
@@ -81,6 +83,8 @@ def limited(records: Sequence[Record], controller: Cascade) -> Limited:
         best = _closest(records, controller, given)
         closer = run_error(records, best) < POLICY.each_number * run_error(records, controller)
         return Limited(best, None, _gain(records, controller, best)) if closer else Limited(controller, None, 0.0)
+    if all(comparable(r, controller) for r in records) and not not_followed(records, controller):
+        return Limited(controller, None, 0.0)
     parts = [np.abs(before_filters(r.torque, controller, r.dt)) for r in records if r.torque is not None]
     limit = plateau_of(np.concatenate(parts))
     if not np.isfinite(limit) or not limit > 0.0:
