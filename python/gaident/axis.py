@@ -51,6 +51,7 @@ UNITS: dict[str, str] = {
     "N m/rad": "N/m",
     "N m/rad^3": "N/m^3",
     "N m s/rad": "N s/m",
+    "N m s^0.5/rad^0.5": "N s^0.5/m^0.5",
     "N m s^2/rad": "N s^2/m",
     "N m s^2/rad^2": "N s^2/m^2",
     "kg m^2": "kg",

@@ -16,6 +16,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -75,17 +76,25 @@ struct Drive {  // SI units, rad; neutral values
     double zp = 0;
     double wz = 1;
     double zz = 0;
+    double uneven = 0;  // dry friction uneven (1 + uneven_share cos(uneven_order theta + uneven_phase)), N m
+    double uneven_share = 0;
+    double uneven_order = 1;
+    double uneven_phase = 0;
+    double root = 0;        // drag root sqrt|w| sign(w)
+    double hysteretic = 0;  // a Dahl spring beside the shaft, N m/rad, and what it yields at, N m
+    double hysteretic_torque = 1;
     double hum = 0;            // outside the library: torque in time,
     double hum_frequency = 0;  // rad/s
     double hum_phase = 0;
-    double uneven = 0;  // dry friction uneven (1 + depth sin(order theta + phase)),
-    double uneven_depth = 0;
-    double uneven_order = 1;
-    double uneven_phase = 0;
-    double loaded = 0;      // dry friction as a share of the torque that gravity and the load put on the axis
-    double root = 0;        // drag root sqrt|w| sign(w),
-    double hysteretic = 0;  // share of a Bouc-Wen spring in K,
-    double yield = 1;       // and its yield twist, rad
+    double loaded = 0;       // dry friction as a share of the torque that gravity and the load put on the axis
+    double walking = 0;      // dry friction walking (1 + W), W a random walk of walk_size in a second, never below 0,
+    double walk_size = 0;    // 1/s^0.5
+    double walk_number = 0;  // which walk
+    double gain_lost = 0;    // share of the torque that is lost once the motor is warm,
+    double warming = 1;      // s
+    double resolver = 0;     // error of the angle sensor that grows with speed, rad s/rad,
+    double resolver_order = 1;
+    double resolver_phase = 0;
     // end of fields
 };
 
@@ -94,13 +103,36 @@ using State = std::array<double, states>;
 
 double sign(double value) { return static_cast<double>((value > 0) - (value < 0)); }
 
+// A random walk at knots of 10 ms, for 40 s, from a generator of its own: sums of twelve even numbers are nearly normal.
+constexpr double knot = 0.01;
+std::vector<double> walked(const Drive& d) {
+    std::uint64_t number = 0x9E3779B97F4A7C15u + static_cast<std::uint64_t>(d.walk_number);
+    std::vector<double> found(4001);
+    for (std::size_t i = 1; i < found.size(); ++i) {
+        double normal = -6;
+        for (int k = 0; k < 12; ++k) {
+            number = number * 6364136223846793005u + 1442695040888963407u;
+            normal += static_cast<double>(number >> 11) * 0x1p-53;
+        }
+        found[i] = found[i - 1] + d.walk_size * std::sqrt(knot) * normal;
+    }
+    return found;
+}
+double walked_to(const std::vector<double>& walk, double t) {
+    const double last = static_cast<double>(walk.size() - 2), at = std::min(std::max(t / knot, 0.0), last);
+    const auto i = static_cast<std::size_t>(at);
+    return walk[i] + (at - static_cast<double>(i)) * (walk[i + 1] - walk[i]);
+}
+
 // The effects of the shaft at one end of it: their sizes, and the states that they have.
 struct End {
     const Drive& d;
     const Index speed, bristle, bent;
     const bool load;
     const bool dry = d.friction_positive != 0 || d.friction_negative != 0 || d.viscous_positive != 0 || d.viscous_negative != 0 ||
-                     d.stribeck != 0 || d.drifting != 0 || d.uneven != 0 || d.loaded != 0;
+                     d.stribeck != 0 || d.drifting != 0 || d.uneven != 0 || d.loaded != 0 ||
+                     d.walking != 0;
+    const std::vector<double> walk = d.walking != 0 ? walked(d) : std::vector<double>{};
 
     double turned(const State& x) const { return load ? x[angle] - x[twist] : x[angle]; }
 
@@ -110,7 +142,8 @@ struct End {
         double f = way > 0 ? d.friction_positive + d.viscous_positive * fast : d.friction_negative + d.viscous_negative * fast;
         if (d.stribeck != 0) f += d.stribeck * std::exp(-(fast / d.stribeck_velocity) * (fast / d.stribeck_velocity));
         if (d.drifting != 0) f += d.drifting * (1 + d.drift_rate * t);
-        if (d.uneven != 0) f += d.uneven * (1 + d.uneven_depth * std::sin(d.uneven_order * turned(x) + d.uneven_phase));
+        if (d.uneven != 0) f += d.uneven * (1 + d.uneven_share * std::cos(d.uneven_order * turned(x) + d.uneven_phase));
+        if (d.walking != 0) f += d.walking * std::max(1 + walked_to(walk, t), 0.0);
         if (d.loaded != 0) f += d.loaded * std::abs(d.load + d.unbalance * std::sin(turned(x) + d.unbalance_phase));
         return f;
     }
@@ -179,25 +212,29 @@ private:
     Ways regime{};
 
     double rippled(const State& x) const {
-        if (d.ripple == 0) return x[w1];
-        return x[w1] * (1 + d.ripple * d.ripple_order * std::cos(d.ripple_order * x[angle] + d.ripple_phase));
+        if (d.ripple == 0 && d.resolver == 0) return x[w1];
+        const double error = d.resolver * std::abs(x[w1]) * d.resolver_order;
+        return x[w1] * (1 + d.ripple * d.ripple_order * std::cos(d.ripple_order * x[angle] + d.ripple_phase) +
+                        error * std::cos(d.resolver_order * x[angle] + d.resolver_phase));
     }
 
     // Torque of the actuator and what disturbs it.
-    double driving(const State& x) const { return (d.lag > 0 ? x[lagged] : held) + disturbed; }
+    double driving(const State& x, double t) const {
+        const double T = d.lag > 0 ? x[lagged] : held;
+        return disturbed + (d.gain_lost != 0 ? T * (1 - d.gain_lost * (1 - std::exp(-t / d.warming))) : T);
+    }
 
     // What acts on one end without the coupling and without dry friction.
-    double smooth(int end, const State& x, double t) const { return ends[end].smooth(x, t, end == 0 ? driving(x) : 0); }
+    double smooth(int end, const State& x, double t) const { return ends[end].smooth(x, t, end == 0 ? driving(x, t) : 0); }
 
     double coupling(const State& x) const {
         double open = x[twist];
+        const double beside = d.hysteretic * x[hysteresis];
         if (d.gap > 0) {
-            if (std::abs(open) < d.gap / 2) return 0;
+            if (std::abs(open) < d.gap / 2) return beside;
             open -= d.gap / 2 * sign(open);
         }
-        double spring = d.K * open;
-        if (d.hysteretic != 0) spring = d.K * ((1 - d.hysteretic) * open + d.hysteretic * x[hysteresis]);
-        return spring + d.DG * (x[w1] - x[w2]) + d.cubic * open * open * open;
+        return d.K * open + d.DG * (x[w1] - x[w2]) + d.cubic * open * open * open + beside;
     }
 
     // What the resonance's own states add to the torque behind it.
@@ -228,9 +265,8 @@ private:
             dx[w2] = ends[1].dry && way[1] == 0 ? 0 : (tc - d.D2 * x[w2]) / d.J2 + own / d.J2;
             dx[twist] = x[w1] - x[w2];
             if (d.hysteretic != 0) {
-                // z turns at the rate of the twist, less the more it is yielded: Bouc-Wen with n = 2, beta = gamma = 1/2.
-                const double rate = dx[twist], z = x[hysteresis] / d.yield;
-                dx[hysteresis] = rate - 0.5 * (std::abs(rate) * z * std::abs(z) + rate * z * z);
+                const double rate = dx[twist], yielded = d.hysteretic * x[hysteresis] / d.hysteretic_torque;
+                dx[hysteresis] = rate - std::abs(rate) * yielded;
             }
         }
         if (d.lag > 0) dx[lagged] = (held - x[lagged]) / d.lag;

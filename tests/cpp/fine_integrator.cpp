@@ -34,6 +34,7 @@ struct Shaft {  // effects at one end of the shaft
     double lugre_friction_stiffness = 0;
     double lugre_friction_damping = 0;
     double quadratic_drag_coefficient = 0;
+    double square_root_drag_coefficient = 0;
     double load_torque_torque = 0;
     double unbalance_amplitude = 0;
     double unbalance_phase = 0;
@@ -44,6 +45,10 @@ struct Shaft {  // effects at one end of the shaft
     double friction_drift_rate = 0;
     double load_dependent_friction_torque = 0;
     double load_dependent_friction_share = 0;
+    double position_friction_torque = 0;
+    double position_friction_amplitude = 0;
+    double position_friction_order = 1;
+    double position_friction_phase = 0;
     // end of shaft fields
 };
 
@@ -62,6 +67,8 @@ struct Case {  // SI units, rad; neutral values; effect_parameter
     double D = 0;
     double backlash_gap = 0;
     double hardening_stiffness_cubic_stiffness = 0;
+    double hysteretic_coupling_torque = 1;
+    double hysteretic_coupling_stiffness = 0;
     double torque_saturation_limit = inf;
     double torque_dead_band_width = 0;
     double transport_delay_delay = 0;
@@ -106,6 +113,7 @@ public:
     double smooth(double w) {
         const double viscous = w > 0 ? c.asymmetric_friction_viscous_positive : c.asymmetric_friction_viscous_negative;
         double T = c.quadratic_drag_coefficient * w * std::abs(w) + viscous * w;
+        T += std::copysign(c.square_root_drag_coefficient * std::sqrt(std::abs(w)), w);
         if (const double s0 = c.presliding_friction_stiffness; s0 > 0) {
             const double per_zc = s0 / c.presliding_friction_torque;
             const double half = z + 0.5 * h * (w - std::abs(w) * z * per_zc);
@@ -123,11 +131,13 @@ public:
         return T;
     }
 
-    // Dry friction, where the other torques bring the velocity `free`, under what the torques there brake with [N m].
-    double level(double w, double free, double t, double braking) const {
+    // Dry friction at the angle theta, where the other torques bring the velocity `free`, under what those there brake with [N m].
+    double level(double w, double free, double t, double theta, double braking) const {
         double T =
             c.coulomb_friction_torque + c.stribeck_friction_torque + c.friction_drift_torque * (1 + c.friction_drift_rate * t);
         T += c.load_dependent_friction_torque + c.load_dependent_friction_share * std::abs(braking);
+        T += c.position_friction_torque *
+             (1 + c.position_friction_amplitude * std::cos(c.position_friction_order * theta + c.position_friction_phase));
         if (const double more = c.stribeck_friction_static_torque - c.stribeck_friction_torque; more != 0) {
             const double ratio = 0.5 * (w + free) / c.stribeck_friction_stribeck_velocity;
             T += more * std::exp(-ratio * ratio);
@@ -171,26 +181,26 @@ public:
 
     // One fine step under the torque command v, its middle at time t.
     void step(double v, double t) {
-        const double braking = motor.load(angle + 0.5 * h * w);
+        const double middle = angle + 0.5 * h * w, braking = motor.load(middle);
         const double T = resonant(lagged(late(beyond(clip(v, c.torque_saturation_limit), c.torque_dead_band_width)))) - braking;
         const bool two = c.JL > 0;
-        twist += 0.5 * h * (w - wL);
+        bend(0.5 * h * (w - wL));
         const double Tc = two ? coupling() : 0;
         const double damp = 0.5 * h * c.DM / c.JM;
         const double free = ((1 - damp) * w + h / c.JM * (T - Tc - motor.smooth(w))) / (1 + damp);
-        const double next = beyond(free, h / c.JM * motor.level(w, free, t, braking));
+        const double next = beyond(free, h / c.JM * motor.level(w, free, t, middle, braking));
         if (two) {
             const double damp_L = 0.5 * h * c.DL / c.JL;
-            const double braking_load = load.load(angle_load + 0.5 * h * wL);
+            const double middle_L = angle_load + 0.5 * h * wL, braking_load = load.load(middle_L);
             const double pull = Tc - braking_load - load.smooth(wL);
             const double free_L = ((1 - damp_L) * wL + h / c.JL * pull) / (1 + damp_L);
-            const double next_L = beyond(free_L, h / c.JL * load.level(wL, free_L, t, braking_load));
+            const double next_L = beyond(free_L, h / c.JL * load.level(wL, free_L, t, middle_L, braking_load));
             angle_load += 0.5 * h * (wL + next_L);
             wL = next_L;
         }
         angle += 0.5 * h * (w + next);
         w = next;
-        twist += 0.5 * h * (w - wL);
+        bend(0.5 * h * (w - wL));
         const double order = c.velocity_ripple_order, amplitude = c.velocity_ripple_amplitude;
         const double ripple = amplitude != 0 ? amplitude * order * std::cos(order * angle + c.velocity_ripple_phase) : 0;
         filtered += share(h, c.velocity_filter_time_constant) * (w * (1 + ripple) - filtered);
@@ -203,6 +213,7 @@ private:
     const double delay;  // fine steps
     std::vector<double> ring;
     std::size_t k = 0;
+    double wound = 0;  // of the coupling's own bristle
     double w = 0, wL = 0, angle_load = 0, twist = 0, x1 = 0, x2 = 0, lag = 0, filtered = 0, integral = 0, error = 0, command = 0;
 
     // The torque at the middle of the fine step, `delay` steps ago.
@@ -234,10 +245,18 @@ private:
         return (wp / wz) * (wp / wz) * (T + (zz * wz - zp * wp) * (old2 + x2) + (wz * wz - wp * wp) * x1_mean);
     }
 
+    // The twist goes on by dx.
+    void bend(double dx) {
+        const double per_zc = c.hysteretic_coupling_stiffness / c.hysteretic_coupling_torque;
+        const double half = wound + 0.5 * (dx - std::abs(dx) * wound * per_zc);
+        wound += dx - std::abs(dx) * half * per_zc;
+        twist += dx;
+    }
+
     double coupling() const {
         const double half_gap = 0.5 * c.backlash_gap, x = beyond(twist, half_gap);
         const double damping = std::abs(twist) < half_gap ? 0 : c.D * (w - wL);
-        return c.K * x + c.hardening_stiffness_cubic_stiffness * x * x * x + damping;
+        return c.K * x + c.hardening_stiffness_cubic_stiffness * x * x * x + c.hysteretic_coupling_stiffness * wound + damping;
     }
 };
 

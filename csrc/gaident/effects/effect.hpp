@@ -18,10 +18,12 @@
 //   - torque              T' = T - torque(c, theta)              a torque that brakes, at the angle theta [rad]
 //   - law                 law(c, friction)                       once: its part of the friction law that is constant
 //   - level               level(c, t)                            dry friction known by the time t [s] alone [N m]
+//   - level_of_angle      level_of_angle(c, theta)               dry friction known by the angle theta [rad] alone [N m]
 //   - loaded              loaded(c, load)                        dry friction known by what the torque hooks brake with [N m]
 //   - friction            friction(c, s, step)                   what its friction changes in the substep's equation
 //   - after_friction      after_friction(c, s, step, w_next)     and once its velocity is known; may be absent
 //   - coupling            coupling, mean_coupling, loaded_twist  a nonlinear coupling of two masses (mechanism.hpp)
+//   - hysteresis          wound, mean_wound, loaded_twist        a coupling of two masses with a memory (mechanism.hpp)
 //   - sensor              w' = sensor(c, theta, w)               the velocity as it is measured [rad/s]
 //   - sensor_dynamics     y = sensor_dynamics(c, s, w)           the same filtered, once a substep, its output kept as s.output
 //   - reading             y' = reading(c, y)                     the number read from it, once a sample
@@ -75,6 +77,8 @@ enum class Hooks : std::uint32_t {
     later = 1U << 18,
     loaded = 1U << 19,
     load = 1U << 20,
+    level_of_angle = 1U << 21,
+    hysteresis = 1U << 22,
 };
 constexpr Hooks operator|(Hooks a, Hooks b) {
     return static_cast<Hooks>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
@@ -82,6 +86,9 @@ constexpr Hooks operator|(Hooks a, Hooks b) {
 constexpr Hooks operator&(Hooks a, Hooks b) {
     return static_cast<Hooks>(static_cast<std::uint32_t>(a) & static_cast<std::uint32_t>(b));
 }
+
+// Of these an effect of friction has one.
+inline constexpr Hooks dry_hooks = Hooks::law | Hooks::level | Hooks::level_of_angle | Hooks::loaded | Hooks::friction;
 
 inline constexpr double infinite = std::numeric_limits<double>::infinity();
 inline constexpr double any_value = std::numeric_limits<double>::quiet_NaN();

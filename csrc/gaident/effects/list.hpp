@@ -11,13 +11,16 @@
 #include "coupling/backlash.hpp"
 #include "coupling/extra_resonance.hpp"
 #include "coupling/hardening_stiffness.hpp"
+#include "coupling/hysteretic_coupling.hpp"
 #include "friction/asymmetric_friction.hpp"
 #include "friction/coulomb_friction.hpp"
 #include "friction/friction_drift.hpp"
 #include "friction/load_dependent_friction.hpp"
 #include "friction/lugre_friction.hpp"
+#include "friction/position_friction.hpp"
 #include "friction/presliding_friction.hpp"
 #include "friction/quadratic_drag.hpp"
+#include "friction/square_root_drag.hpp"
 #include "friction/stribeck_friction.hpp"
 #include "load/cogging.hpp"
 #include "load/load_torque.hpp"
@@ -38,13 +41,16 @@ using Effects = EffectList<CoulombFriction,        //
                            PreslidingFriction,     //
                            LugreFriction,          //
                            QuadraticDrag,          //
+                           SquareRootDrag,         //
                            LoadTorque,             //
                            Unbalance,              //
                            Cogging,                //
                            FrictionDrift,          //
                            LoadDependentFriction,  //
+                           PositionFriction,       //
                            Backlash,               //
                            HardeningStiffness,     //
+                           HystereticCoupling,     //
                            TorqueSaturation,       //
                            TorqueDeadBand,         //
                            TransportDelay,         //

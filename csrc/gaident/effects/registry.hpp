@@ -114,6 +114,8 @@ concept law = requires(C<E> c, FrictionLaw<double>& sum) { E::law(c, sum); };
 template <class E>
 concept level = requires(C<E> c, double x) { E::level(c, x); };
 template <class E>
+concept level_of_angle = requires(C<E> c, double x) { E::level_of_angle(c, x); };
+template <class E>
 concept loaded = requires(C<E> c, double x) { E::loaded(c, x); };
 template <class E>
 concept friction = requires(C<E> c, S<E> s, FrictionStep<double>& step) { E::friction(c, s, step); };
@@ -124,6 +126,12 @@ template <class E>
 concept coupling = requires(C<E> c, double x) {
     E::coupling(c, x, x, x, x);
     E::mean_coupling(c, x, x, x, x, x);
+    E::loaded_twist(c, x, x, x);
+};
+template <class E>
+concept hysteresis = requires(C<E> c, S<E> s, double x) {
+    E::wound(c, s, x);
+    E::mean_wound(c, s, x);
     E::loaded_twist(c, x, x, x);
 };
 template <class E>
@@ -164,6 +172,7 @@ constexpr Hooks all_of() {
     return if_there(command<E>, Hooks::command) | if_there(controller<E>, Hooks::controller) |
            if_there(actuator<E>, Hooks::actuator) | if_there(actuator_dynamics<E>, Hooks::actuator_dynamics) |
            if_there(torque<E>, Hooks::torque) | if_there(law<E>, Hooks::law) | if_there(level<E>, Hooks::level) |
+           if_there(level_of_angle<E>, Hooks::level_of_angle) | if_there(hysteresis<E>, Hooks::hysteresis) |
            if_there(loaded<E>, Hooks::loaded) | if_there(friction<E>, Hooks::friction) |
            if_there(after_friction<E>, Hooks::after_friction) | if_there(coupling<E>, Hooks::coupling) |
            if_there(sensor<E>, Hooks::sensor) | if_there(sensor_dynamics<E>, Hooks::sensor_dynamics) |
@@ -175,8 +184,8 @@ constexpr Hooks all_of() {
 // Those of which an effect at this place has to have one.
 constexpr Hooks acting_at(Place place) {
     switch (place) {
-        case Place::shaft: return Hooks::torque | Hooks::law | Hooks::level | Hooks::loaded | Hooks::friction | Hooks::load;
-        case Place::coupling: return Hooks::coupling;
+        case Place::shaft: return Hooks::torque | dry_hooks | Hooks::load;
+        case Place::coupling: return Hooks::coupling | Hooks::hysteresis;
         case Place::actuator: return Hooks::actuator | Hooks::actuator_dynamics;
         case Place::controller: return Hooks::command | Hooks::controller;
         case Place::sensor: return Hooks::sensor | Hooks::sensor_dynamics | Hooks::reading;

@@ -38,7 +38,7 @@ public:
         h_ = run.sample_time / run.substeps;
         if constexpr (!is_servo)
             if (continuous) pi_ = ControllerState<R>(run.loop.controller, Clock{h_});
-        dry_ = run.effects.meets(effects_with(Hooks::law | Hooks::level | Hooks::loaded | Hooks::friction)) || own_.friction();
+        dry_ = run.effects.meets(effects_with(dry_hooks)) || own_.friction();
         turning_ = run.effects.meets(effects_that_turn()) || own_.there();
         looking_back_ = run.effects.meets(effects_with(Hooks::tabulate));
         const Beginning<R> start{plant_.velocity(), c_.before, first_command()};
@@ -147,7 +147,8 @@ private:
     }
 
     void begin_at_load() {
-        plant_.correcting = run_.effects.meets(effects_with(Hooks::coupling));
+        plant_.correcting = run_.effects.meets(effects_with(Hooks::coupling | Hooks::hysteresis));
+        plant_.remembering = run_.effects.meets(effects_with(Hooks::hysteresis));
         const Beginning<R> start{plant_.load_velocity(), c_.before, first_command()};
         each_at<Side::load>([&]<class Key, class E>() {
             if (!run_.effects.has<Key>()) return;
@@ -312,9 +313,11 @@ private:
                 if (run_.effects.has<Key>()) add(E::level(c_.template of<Key>(), R(t > 0.0 ? t : 0.0)));
             if constexpr (hook::loaded<E> && side == Side::load)
                 if (run_.effects.has<Key>()) add(E::loaded(c_.template of<Key>(), load_.braking));
+            if constexpr (hook::level_of_angle<E> && side == Side::load)
+                if (run_.effects.has<Key>()) add(E::level_of_angle(c_.template of<Key>(), load_.theta));
         });
         if constexpr (side == Side::motor)
-            if (run_.effects.meets(effects_with(Hooks::loaded))) [[unlikely]]
+            if (run_.effects.meets(effects_with(Hooks::loaded | Hooks::level_of_angle))) [[unlikely]]
                 add(width == 1 ? loaded_level_apart(run_, c_, theta_) : loaded_level(run_, c_, theta_));
         each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
             if constexpr (hook::friction<E>)
@@ -322,10 +325,11 @@ private:
                     E::friction(c_.template of<Key>(), states.template of<Key>(), step);
         });
         const R w_next = velocity_under_friction(step.law, w, step.w_free, step.beta);
+        constexpr EffectSet behind = (side == Side::motor ? effects_with : load_effects_with)(Hooks::after_friction);
+        if (!run_.effects.meets(behind)) return w_next;
         each_at<side>([&]<class Key, class E>() __attribute__((always_inline)) {
             if constexpr (hook::after_friction<E>)
-                if (run_.effects.has<Key>()) [[unlikely]]
-                    E::after_friction(c_.template of<Key>(), states.template of<Key>(), step, w_next);
+                if (run_.effects.has<Key>()) E::after_friction(c_.template of<Key>(), states.template of<Key>(), step, w_next);
         });
         return w_next;
     }
@@ -336,14 +340,14 @@ private:
         R T_load = R(0.0);
         if (load_.turning || run_.effects.meets(load_effects_with(Hooks::torque))) {
             const R at_motor = run_.position.empty() ? fma(w, R(0.5 * h_), angle_) : theta_;
-            const R middle = fnma(w - w_load, R(0.5 * h_), at_motor - (plant_.twist() - load_.twist_at_start));
+            load_.theta = fnma(w - w_load, R(0.5 * h_), at_motor - (plant_.twist() - load_.twist_at_start));
             each_at<Side::load>([&]<class Key, class E>() __attribute__((always_inline)) {
                 if constexpr (hook::torque<E>)
-                    if (run_.effects.has<Key>()) T_load = T_load - E::torque(c_.template of<Key>(), middle);
+                    if (run_.effects.has<Key>()) T_load = T_load - E::torque(c_.template of<Key>(), load_.theta);
             });
         }
         load_.braking = R(0.0) - T_load;
-        plant_.free_velocities(T, T_load, friction_torque_, load_.friction);
+        plant_.free_velocities(T, T_load, friction_torque_, load_.friction, states_);
         const FreeEnd<R> motor{w, plant_.free[0], plant_.beta()}, load{w_load, plant_.free[1], plant_.load_beta()};
         R w_next = motor.w_free, w_next_load = load.w_free;
         if (dry_ && load_.dry) {
@@ -380,17 +384,15 @@ private:
     const EffectConstants<R>& c_;
     Plant plant_;
     Control pi_;
-    double h_;
+    double h_, time_ = 0.0;
     bool dry_, turning_, looking_back_;
-    double time_ = 0.0;
 
     OwnInLoop<R> own_;
     typename Effects::States<R> states_{};  // all zero
     FrictionLaw<R> law_;
     [[no_unique_address]] std::conditional_t<Plant::both_ends, LoadSide<R>, NoLoadSide> load_;
     R angle_, theta_ = R(0.0), theta_middle_;
-    R held_ = R(0.0);
-    R friction_torque_ = R(0.0), per_beta_;
+    R held_ = R(0.0), friction_torque_ = R(0.0), per_beta_;
     [[no_unique_address]] std::conditional_t<is_servo, SampleMean<R>, std::monostate> mean_;
     std::size_t issued_ = 0;
 };

@@ -104,7 +104,7 @@ void two_masses(const EffectModel& model, double h, double sample_time, const De
     const double linear = c.x[2] / sample.scale;
     double x = linear;
     Effects::each_backwards([&]<class E>() {
-        if constexpr (hook::coupling<E>)
+        if constexpr (hook::coupling<E> || hook::hysteresis<E>)
             if (model.effects.has<E>()) x = E::loaded_twist(c.effects.template of<E>(), m.KG, linear, x);
     });
     if (linear != 0.0) c.x[2] = x * step.scale;

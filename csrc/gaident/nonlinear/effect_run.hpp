@@ -62,7 +62,7 @@ struct PastTorques {
     }
 };
 
-// The dry friction that follows from what the effects at the motor's shaft brake with, both in N m.
+// The dry friction at the motor's shaft that follows from the angle, itself or by what the effects there brake with, both in N m.
 template <class R>
 [[gnu::always_inline]] inline R loaded_level(const EffectRun& run, const EffectConstants<R>& c, R theta) {
     const R load = Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
@@ -73,6 +73,8 @@ template <class R>
     return Effects::chain(R(0.0), [&]<class E>(R x) __attribute__((always_inline)) {
         if constexpr (hook::loaded<E>)
             if (run.effects.has<E>()) return x + E::loaded(c.effects.template of<E>(), load);
+        if constexpr (hook::level_of_angle<E>)
+            if (run.effects.has<E>()) return x + E::level_of_angle(c.effects.template of<E>(), theta);
         return x;
     });
 }

@@ -66,10 +66,11 @@ struct LoadSide {
     FrictionLaw<R> law;
     R friction = R(0.0);  // of the substep before [N m]
     R braking = R(0.0);   // what the effects there brake with [N m]
+    R theta = R(0.0);     // in the middle of the substep [rad]
     R twist_at_start;     // rad: the load's angle starts where the motor's does
 
     [[gnu::always_inline]] LoadSide(const EffectRun& run, R twist)
-        : dry(run.effects.meets(load_effects_with(Hooks::law | Hooks::level | Hooks::loaded | Hooks::friction))),
+        : dry(run.effects.meets(load_effects_with(dry_hooks))),
           turning(run.effects.meets(load_effects_that_turn())),
           twist_at_start(twist) {}
 };

@@ -67,6 +67,11 @@ struct ObserverPlant {
 //     mean_coupling(c, K, D, x0, x1, dx)     its mean along a twist that goes evenly from x0 to x1
 //     loaded_twist(c, K, linear, x)          the twist that carries the torque K linear, from that without the effect
 //
+// or, where it remembers the way of the twist in a state s, in the place of the first two
+//
+//     wound(c, s, x)                         its correction at the twist x, to which it takes its state
+//     mean_wound(c, s, x)                    its mean along a twist that goes evenly from there to x
+//
 // and is the identity where all its coefficients are zero, as those of an effect that is not there are: computing it costs less
 // than asking.
 // Each leaves in x is left of the twist to the effects that follow.
@@ -104,27 +109,30 @@ struct TwoMassPlant {
 
     [[gnu::always_inline]] Free without_friction(R T, R friction_before) {
         Free free{{linear(0, T), linear(1, T), linear(2, T)}};
-        correct([&](int i) __attribute__((always_inline)) { return fnma(motor[i], friction_before, free.x[i]); });
+        const auto as_it_is = [](R sum, R) __attribute__((always_inline)) { return sum; };
+        correct([&](int i) __attribute__((always_inline)) { return fnma(motor[i], friction_before, free.x[i]); }, as_it_is, as_it_is);
         for (int i = 0; i < 3; ++i) free.x[i] = fma(coupling[i], correction, free.x[i]);
         return free;
     }
 
-    // The correction; end(i): where w_M, w_L and psi would come to without it.
-    template <class End>
-    [[gnu::always_inline]] void correct(End&& end) {
+    // The correction; end(i): where w_M, w_L and psi would come to without it; wound, mean_wound: (sum, x) with what remembers.
+    template <class End, class Wound, class MeanWound>
+    [[gnu::always_inline]] void correct(End&& end, Wound&& wound, MeanWound&& mean_wound) {
         const R x0 = x[2] * per_scale, dx0 = x[0] - x[1];
         R left0 = x0;
-        const R now = Effects::chain(R(0.0), [&]<class E>(R sum) __attribute__((always_inline)) {
+        const R without = Effects::chain(R(0.0), [&]<class E>(R sum) __attribute__((always_inline)) {
             if constexpr (hook::coupling<E>) return sum + E::coupling(effects.template of<E>(), KG, DG, left0, dx0);
             else return sum;
         });
-        R left1 = fma(coupling[2], now, end(2)) * per_scale;
+        const R now = wound(without, x0), x1 = fma(coupling[2], now, end(2)) * per_scale;
+        R left1 = x1;
         const R dx1 = fma(coupling[0] - coupling[1], now, end(0) - end(1)), dx = (dx0 + dx1) * R(0.5);
         left0 = x0;
-        correction = Effects::chain(R(0.0), [&]<class E>(R sum) __attribute__((always_inline)) {
+        const R mean = Effects::chain(R(0.0), [&]<class E>(R sum) __attribute__((always_inline)) {
             if constexpr (hook::coupling<E>) return sum + E::mean_coupling(effects.template of<E>(), KG, DG, left0, left1, dx);
             else return sum;
         });
+        correction = mean_wound(mean, x1);
     }
 
     [[gnu::always_inline]] void move(const Free& free) {
@@ -146,7 +154,8 @@ struct LoadedTwoMassPlant : TwoMassPlant<R> {
     // unit torque at the motor beside it only the load is driven.
     R load[3];
     R free[3];                // w_M, w_L, psi at the substep's end without friction
-    bool correcting = false;  // whether the coupling is not linear
+    bool correcting = false;   // whether the coupling is not linear,
+    bool remembering = false;  // and remembers the way of its twist
 
     LoadedTwoMassPlant(const EffectConstants<R>& c, int order) : TwoMassPlant<R>(c, order) {
         for (int i = 0; i < 3; ++i) load[i] = motor[i] + coupling[i];
@@ -157,13 +166,32 @@ struct LoadedTwoMassPlant : TwoMassPlant<R> {
     [[gnu::always_inline]] R across() const { return load[0]; }  // of the motor's velocity to a torque at the load
     [[gnu::always_inline]] R back() const { return motor[1]; }   // and the other way
 
-    // T and T_L at motor and load; the friction of the substep before.
-    [[gnu::always_inline]] void free_velocities(R T, R T_load, R friction_before, R load_friction_before) {
+    // T and T_L at motor and load; the friction of the substep before; the states of the effects.
+    template <class States>
+    [[gnu::always_inline]] void free_velocities(R T, R T_load, R friction_before, R load_friction_before, States& states) {
         for (int i = 0; i < 3; ++i) free[i] = fma(load[i], T_load, this->linear(i, T));
         if (!correcting) return;
-        this->correct([&](int i) __attribute__((always_inline)) {
-            return fnma(load[i], load_friction_before, fnma(motor[i], friction_before, free[i]));
-        });
+        const auto with_memory = [&](R sum, auto&& asked) __attribute__((always_inline)) {
+            if (!remembering) return sum;
+            return Effects::chain(sum, [&]<class E>(R before) __attribute__((always_inline)) {
+                if constexpr (hook::hysteresis<E>) return before + asked.template operator()<E>();
+                else return before;
+            });
+        };
+        this->correct(
+            [&](int i) __attribute__((always_inline)) {
+                return fnma(load[i], load_friction_before, fnma(motor[i], friction_before, free[i]));
+            },
+            [&](R sum, R twist) __attribute__((always_inline)) {
+                return with_memory(sum, [&]<class E>() __attribute__((always_inline)) {
+                    return E::wound(this->effects.template of<E>(), states.template of<E>(), twist);
+                });
+            },
+            [&](R sum, R twist) __attribute__((always_inline)) {
+                return with_memory(sum, [&]<class E>() __attribute__((always_inline)) {
+                    return E::mean_wound(this->effects.template of<E>(), states.template of<E>(), twist);
+                });
+            });
         for (int i = 0; i < 3; ++i) free[i] = fma(coupling[i], correction, free[i]);
     }
 

@@ -35,13 +35,15 @@ template <class R>
 // Runs the lanes whose constants are given, with the plant's order known to the compiler where it is a usual one.
 template <class R>
 void run_effects(const EffectRun& run, const EffectConstants<R>& c) {
+    // What a coupling remembers is a state of this plant alone, so that the others' code stays what it was.
+    const bool at_both_ends = run.effects.meets(effects_with(Hooks::load | Hooks::hysteresis));
     if (run.loop.kind == LoopKind::servo) {
-        if (run.effects.meets(effects_with(Hooks::load))) return run_servo_on<R, LoadedTwoMassPlant<R>>(run, c);
+        if (at_both_ends) return run_servo_on<R, LoadedTwoMassPlant<R>>(run, c);
         if (run.two_masses) return run_servo_on<R, TwoMassPlant<R>>(run, c);
         if (run.order == 3) return run_servo_on<R, ObserverPlant<R, 3>>(run, c);
         return run_servo_on<R, ObserverPlant<R, -1>>(run, c);
     }
-    if (run.effects.meets(effects_with(Hooks::load))) return run_loaded_on<R>(run, c);
+    if (at_both_ends) return run_loaded_on<R>(run, c);
     if (run.two_masses) return run_effects_on<R, TwoMassPlant<R>>(run, c);
     switch (run.order) {
         case 1: return run_effects_on<R, ObserverPlant<R, 1>>(run, c);

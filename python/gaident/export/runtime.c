@@ -92,6 +92,18 @@ static void gaident_lugre(const gaident_shaft *k, gaident_shaft_memory *s, doubl
     s->lugre_friction.w_before = f->w;
 }
 
+/* Drag c sqrt(W) at the mean velocity W = A - b sqrt(W) in the direction of motion, a level that is 0 at rest. */
+static void gaident_root(const gaident_shaft *k, gaident_friction *f) {
+    const double speed = fabs(f->w), way = speed > 0.0 ? f->w : f->w_free;
+    const int at = way > 0.0 ? 0 : 1;
+    const double B = 0.5 * f->viscous[at], per = 1.0 / fma(f->beta, fma(f->drag, speed, B), 1.0);
+    const double ahead = fma(-(f->beta * B), speed, fma(-f->beta, f->level[at], way > 0.0 ? f->w_free : -f->w_free)) * per;
+    const double A = 0.5 * (speed + ahead), b = 0.5 * f->beta * k->square_root_drag.coefficient * per;
+    const double drag = A > 0.0 ? k->square_root_drag.coefficient * 2.0 * A / (b + sqrt(fma(b, b, 4.0 * A))) : 0.0;
+    gaident_add_level(f, drag);
+    f->more_at_rest -= drag;
+}
+
 /* w+ of this end of the shaft at w, and w_free without friction; t: time in the middle of the substep h. */
 static double gaident_dry(const gaident_shaft *k, gaident_shaft_memory *s, double h, double w, double w_free, double beta, double t) {
     gaident_friction f = {0.0, 0.0, 0.0, {0.0, 0.0}, {0.0, 0.0}, 0.0, 0.0};
@@ -109,9 +121,14 @@ static double gaident_dry(const gaident_shaft *k, gaident_shaft_memory *s, doubl
         gaident_add_level(&f, k->friction_drift.torque * fmax(fma(k->friction_drift.rate, t, 1.0), 0.0));
     if (k->effects & GAIDENT_LOAD_DEPENDENT_FRICTION)
         gaident_add_level(&f, fma(k->load_dependent_friction.share, fabs(s->braking), k->load_dependent_friction.torque));
+    if (k->effects & GAIDENT_POSITION_FRICTION)
+        gaident_add_level(&f, fma(k->position_friction.change,
+                                  cos(fma(k->position_friction.order, s->theta, k->position_friction.phase)),
+                                  k->position_friction.torque));
     if (k->effects & GAIDENT_STRIBECK_FRICTION) gaident_stribeck(k, s, &f);
     if (k->effects & GAIDENT_PRESLIDING_FRICTION) gaident_presliding(k, s, h, &f);
     if (k->effects & GAIDENT_LUGRE_FRICTION) gaident_lugre(k, s, h, &f);
+    if (k->effects & GAIDENT_SQUARE_ROOT_DRAG) gaident_root(k, &f);
     w_next = gaident_under_friction(&f);
     if (k->effects & GAIDENT_PRESLIDING_FRICTION)
         gaident_move(&s->presliding_friction, &f, w_next, k->presliding_friction.limit);
@@ -129,7 +146,7 @@ static double gaident_braking(const gaident_shaft *k, double theta) {
     return T;
 }
 
-/* -- coupling: what play and hardening add to the linear coupling torque -------------------------------------------------- */
+/* -- coupling: what play, hardening and hysteresis add to the linear coupling torque -------------------------------------------------- */
 
 /* At the twist x and its rate dx. */
 static double gaident_correction(const gaident_drive *k, double x, double dx) {
@@ -147,6 +164,30 @@ static double gaident_mean_correction(const gaident_drive *k, double x0, double 
     const double share = moves ? (c1 - c0) / step : gap > fabs(x0) ? 1.0 : 0.0;
     return -fma(k->stiffness, spring, k->damping * dx * share) +
            0.5 * k->hardening_stiffness.cubic * (b0 * b0 * b0 + b1 * b1 * b1);
+}
+
+/* (a - 1 + e^-a)/a^2, a >= 0 */
+static double gaident_mean_share(double a) {
+    double series = 0.0;
+    int k;
+    if (a > 0.125) return (a - (1.0 - exp(-a))) / (a * a);
+    for (k = 11; k >= 2; --k) series = fma(-a, series, 1.0) / k;
+    return series;
+}
+
+/* The torque of the coupling's bristle at the twist x, to which it has gone evenly; its mean from there to the twist x. */
+static double gaident_wound(const gaident_drive *k, gaident_memory *s, double x) {
+    const double way = x - s->hysteretic_coupling.x, length = fabs(way), a = length * k->hysteretic_coupling.per_break;
+    const double z = s->hysteretic_coupling.z, bent = fma(-(z * k->hysteretic_coupling.per_break), length, way);
+    s->hysteretic_coupling.z = fma(bent, fma(-a, gaident_mean_share(a), 1.0), z);
+    s->hysteretic_coupling.x = x;
+    return k->hysteretic_coupling.stiffness * s->hysteretic_coupling.z;
+}
+
+static double gaident_mean_wound(const gaident_drive *k, const gaident_memory *s, double x) {
+    const double way = x - s->hysteretic_coupling.x, length = fabs(way), z = s->hysteretic_coupling.z;
+    const double bent = fma(-(z * k->hysteretic_coupling.per_break), length, way);
+    return k->hysteretic_coupling.stiffness * fma(bent, gaident_mean_share(length * k->hysteretic_coupling.per_break), z);
 }
 
 /* -- the mechanism over one substep under the torque T -------------------------------------------------------------------- */
@@ -192,10 +233,11 @@ static void gaident_both_dry(const gaident_drive *k, gaident_memory *s, double w
 
 static void gaident_masses(const gaident_drive *k, gaident_memory *s, double T, double t) {
     const double x0 = s->x[2] * k->per_scale, dx0 = s->x[0] - s->x[1];
-    double free[3], end[3], load[3], T_load, now, mean, w_next, w_next_load;
+    double free[3], end[3], load[3], T_load, now, mean, x1, w_next, w_next_load;
     int i;
     for (i = 0; i < 3; ++i) load[i] = k->motor[i] + k->coupling[i];
-    s->at_load.braking = gaident_braking(&k->at_load, fma(0.5 * k->h, s->x[1], s->angle) - x0);
+    s->at_load.theta = fma(0.5 * k->h, s->x[1], s->angle) - x0;
+    s->at_load.braking = gaident_braking(&k->at_load, s->at_load.theta);
     T_load = -s->at_load.braking;
     for (i = 0; i < 3; ++i) {
         free[i] = fma(k->phi[3 * i], s->x[0], fma(k->motor[i], T, s->x[i])) +
@@ -204,8 +246,10 @@ static void gaident_masses(const gaident_drive *k, gaident_memory *s, double T, 
         end[i] = fma(-load[i], s->at_load.friction, fma(-k->motor[i], s->at_motor.friction, free[i]));
     }
     now = gaident_correction(k, x0, dx0);
-    mean = gaident_mean_correction(k, x0, fma(k->coupling[2], now, end[2]) * k->per_scale,
-                                   0.5 * (dx0 + fma(k->coupling[0] - k->coupling[1], now, end[0] - end[1])));
+    if (k->effects & GAIDENT_HYSTERETIC_COUPLING) now += gaident_wound(k, s, x0);
+    x1 = fma(k->coupling[2], now, end[2]) * k->per_scale;
+    mean = gaident_mean_correction(k, x0, x1, 0.5 * (dx0 + fma(k->coupling[0] - k->coupling[1], now, end[0] - end[1])));
+    if (k->effects & GAIDENT_HYSTERETIC_COUPLING) mean += gaident_mean_wound(k, s, x1);
     for (i = 0; i < 3; ++i) free[i] = fma(k->coupling[i], mean, free[i]);
     w_next = free[0];
     w_next_load = free[1];
@@ -289,6 +333,7 @@ static double gaident_effects_step(const gaident_drive *k, gaident_memory *s, do
             s->torque_lag.T = fma(gap, k->torque_lag.decay, T);
             T = fma(gap, k->torque_lag.mean, T);
         }
+        s->at_motor.theta = s->theta;
         s->at_motor.braking = gaident_braking(&k->at_motor, s->theta);
         T -= s->at_motor.braking;
         s->theta = fma(1.5 * k->h, w, s->angle);

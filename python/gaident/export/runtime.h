@@ -30,9 +30,13 @@ enum { /* the effects that act */
     GAIDENT_VELOCITY_QUANTISATION = 1 << 19,
     GAIDENT_LUGRE_FRICTION = 1 << 20,
     GAIDENT_LOAD_DEPENDENT_FRICTION = 1 << 21,
+    GAIDENT_SQUARE_ROOT_DRAG = 1 << 22,
+    GAIDENT_POSITION_FRICTION = 1 << 23,
+    GAIDENT_HYSTERETIC_COUPLING = 1 << 24,
     GAIDENT_DRY = GAIDENT_COULOMB_FRICTION | GAIDENT_STRIBECK_FRICTION | GAIDENT_ASYMMETRIC_FRICTION |
                   GAIDENT_PRESLIDING_FRICTION | GAIDENT_LUGRE_FRICTION | GAIDENT_QUADRATIC_DRAG |
-                  GAIDENT_FRICTION_DRIFT | GAIDENT_LOAD_DEPENDENT_FRICTION
+                  GAIDENT_FRICTION_DRIFT | GAIDENT_LOAD_DEPENDENT_FRICTION | GAIDENT_SQUARE_ROOT_DRAG |
+                  GAIDENT_POSITION_FRICTION
 };
 
 typedef struct { /* what acts at one end of the shaft */
@@ -43,11 +47,13 @@ typedef struct { /* what acts at one end of the shaft */
     struct { double stiffness, per_break, limit; } presliding_friction;
     struct { double torque, static_torque, slowness, stiffness, damping, damping_per_step, limit; } lugre_friction;
     struct { double coefficient; } quadratic_drag;
+    struct { double coefficient; } square_root_drag;
     struct { double load; } load_torque;
     struct { double amplitude, phase; } unbalance;
     struct { double amplitude, order, phase; } cogging;
     struct { double torque, rate; } friction_drift;
     struct { double torque, share; } load_dependent_friction;
+    struct { double torque, change, order, phase; } position_friction;
 } gaident_shaft;
 
 typedef struct {
@@ -67,6 +73,7 @@ typedef struct {
     long effects; /* the others */
     struct { double half_gap; } backlash;
     struct { double cubic; } hardening_stiffness;
+    struct { double stiffness, per_break; } hysteretic_coupling;
     struct { double limit; } torque_saturation;
     struct { double width; } torque_dead_band;
     struct { int length; const int *back; const double *share; } transport_delay; /* torques kept; per substep */
@@ -86,6 +93,7 @@ typedef struct {
 typedef struct {
     double friction; /* of the substep before [N m] */
     double braking;  /* what the torques there brake with in this one [N m] */
+    double theta;    /* the angle there in its middle [rad] */
     struct { double w_before; } stribeck_friction;
     gaident_bristle presliding_friction;
     struct { gaident_bristle bristle; double w_before; } lugre_friction;
@@ -98,6 +106,7 @@ typedef struct {
     double time;             /* s */
     int newest;              /* of the torques on their way */
     gaident_shaft_memory at_motor, at_load;
+    struct { double z, x; } hysteretic_coupling; /* deflection, and the twist to which it belongs [rad] */
     struct { double T; } torque_lag;
     struct { double before; } command_rate_limit;
     struct { double output, w; } velocity_filter;

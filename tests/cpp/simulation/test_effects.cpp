@@ -15,7 +15,7 @@ EffectModel model_with(const Factors<double>& g, Effect e, std::initializer_list
 
 // Whether an effect acts in the coupling of two masses, or is a resonance of its own.
 bool of_a_shaft(const Sizes& s) {
-    return s.effect == effect<Backlash> || s.effect == effect<HardeningStiffness> || s.effect == effect<ExtraResonance>;
+    return s.info().place == Place::coupling || s.info().place == Place::plant;
 }
 
 }  // namespace
@@ -183,7 +183,7 @@ TEST_CASE("what is no drive gives undefined numbers and no crash") {
     CHECK(undefined(model_with(one_mass(), effect<LoadTorque>, {std::nan("")})));
     EffectModel all = model_with(one_mass(), effect<PreslidingFriction>, {-1.0, -2.0});
     for (const Sizes& s : sizes)
-        if (s.effect != effect<Backlash> && s.effect != effect<HardeningStiffness>)
+        if (s.info().place != Place::coupling)
             all = with(all, s.effect, scaled(s.typical, -1e3));
     velocity_of(job, all);
     const EffectModel p0{factors_from_roots(1.0, {}, {}), {}};

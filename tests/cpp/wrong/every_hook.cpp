@@ -12,7 +12,7 @@ struct All {
                                    Hooks::torque | Hooks::law | Hooks::level | Hooks::loaded | Hooks::friction |
                                    Hooks::after_friction | Hooks::coupling | Hooks::sensor | Hooks::sensor_dynamics |
                                    Hooks::reading | Hooks::plant | Hooks::begin | Hooks::substeps | Hooks::possible |
-                                   Hooks::tabulate;
+                                   Hooks::tabulate | Hooks::level_of_angle | Hooks::hysteresis;
     static constexpr Pace pace = Pace::sample;
 
     template <class R>
@@ -51,6 +51,8 @@ struct All {
     template <class R>
     static R level(const Coefficients<R>&, R);
     template <class R>
+    static R level_of_angle(const Coefficients<R>&, R);
+    template <class R>
     static R loaded(const Coefficients<R>&, R);
     template <class R>
     static void friction(const Coefficients<R>&, State<R>&, FrictionStep<R>&);
@@ -60,6 +62,10 @@ struct All {
     static R coupling(const Coefficients<R>&, R, R, R&, R);
     template <class R>
     static R mean_coupling(const Coefficients<R>&, R, R, R&, R&, R);
+    template <class R>
+    static R wound(const Coefficients<R>&, State<R>&, R);
+    template <class R>
+    static R mean_wound(const Coefficients<R>&, const State<R>&, R);
     template <class R>
     static R sensor(const Coefficients<R>&, R, R);
     template <class R>
@@ -103,6 +109,10 @@ struct Level : All {
     static double level();
 };
 static_assert(lacks<Level>(Hooks::level));
+struct LevelOfAngle : All {
+    static double level_of_angle();
+};
+static_assert(lacks<LevelOfAngle>(Hooks::level_of_angle));
 struct Loaded : All {
     static double loaded();
 };
@@ -126,7 +136,15 @@ static_assert(lacks<MeanCoupling>(Hooks::coupling));
 struct LoadedTwist : All {
     static double loaded_twist();
 };
-static_assert(lacks<LoadedTwist>(Hooks::coupling));
+static_assert(lacks<LoadedTwist>(Hooks::coupling | Hooks::hysteresis));
+struct Wound : All {
+    static double wound();
+};
+static_assert(lacks<Wound>(Hooks::hysteresis));
+struct MeanWound : All {
+    static double mean_wound();
+};
+static_assert(lacks<MeanWound>(Hooks::hysteresis));
 struct Sensor : All {
     static double sensor();
 };

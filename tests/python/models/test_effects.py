@@ -23,7 +23,7 @@ from gaident.cli import main
 from gaident.models import FactorCounts, factor_parameters, initial_state, simulate_values
 
 # Typical sizes of each effect on a small servo drive.
-TWO_MASSES = ("backlash", "hardening_stiffness")
+TWO_MASSES = ("backlash", "hardening_stiffness", "hysteretic_coupling")
 BESIDE = {"load_dependent_friction": ("unbalance", "load_torque")}  # in the same run: alone it is Coulomb friction
 CONTROLLER_ONLY = ("integrator_clamp", "command_rate_limit")
 ONE = ga.OneMass(5e-4, 0.005)
