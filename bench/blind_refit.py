@@ -30,8 +30,7 @@ POSITIVE = ("J", "JL", "KG")
 # Parameters that are no size: fitted as logarithms. Of amplitude and phase the two components are fitted, of the rest the values.
 LOGARITHMIC = {"stribeck_velocity", "stiffness", "limit", "frequency", "zero_frequency", "damping", "zero_damping"}
 SCALES = {"torque": 0.02, "static_torque": 0.02, "torque_positive": 0.02, "torque_negative": 0.02, "coefficient": 5e-6,
-          "rate": 0.1, "gap": 2e-3, "width": 0.01, "delay": 3e-4, "time_constant": 3e-4, "share": 0.1,
-          "yield_twist": 0.01}  # fmt: skip
+          "rate": 0.1, "gap": 2e-3, "width": 0.01, "delay": 3e-4, "time_constant": 3e-4, "share": 0.1}  # fmt: skip
 # Without bounds a resonance becomes a lag, and Stribeck friction imitates half of the library.
 BOUNDS = {"damping": 0.3, "zero_damping": 0.3, "stribeck_velocity": 8.0}
 SIGNED = {("load_torque", "torque"), ("friction_drift", "rate"), ("hardening_stiffness", "cubic_stiffness")}
@@ -105,6 +104,8 @@ class Refitted:
         return 1e-3 if effect == "velocity_ripple" else 0.01
 
     def _scale(self, effect: str, name: str) -> float:
+        if effect == "square_root_drag":
+            return 2e-3
         return 2e4 * (self.plant.KG / 55) ** 3 if name == "cubic_stiffness" else SCALES[name]
 
 
@@ -177,6 +178,9 @@ NEAR = {
     "command_rate_limit": ("torque_saturation", "presliding_friction", "velocity_filter", "torque_lag"),
     "velocity_ripple": ("cogging", "unbalance", "velocity_filter", "coulomb_friction"),
     "extra_resonance": ("transport_delay", "torque_lag", "velocity_filter", "hardening_stiffness", "backlash"),
+    "hysteretic_coupling": ("extra_resonance", "hardening_stiffness", "backlash", "torque_lag"),
+    "square_root_drag": ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "quadratic_drag"),
+    "position_friction": ("coulomb_friction", "unbalance", "cogging", "friction_drift"),
 }
 
 
@@ -212,7 +216,7 @@ def rivals(truth: Truth, torque: Array) -> dict[str, list[dict[str, Values]]]:
     }  # fmt: skip
     names = [rival for rival in NEAR[name] if truth.plant.two_masses or rival not in COUPLING]
     # From sizes like the truth's own, or a small effect is not found from afar.
-    size_like = {*SCALES, "cubic_stiffness", "amplitude"} - {"yield_twist"}
+    size_like = {*SCALES, "cubic_stiffness", "amplitude"}
 
     def start(rival: str, values: Values) -> dict[str, Values]:
         if rival in ("command_rate_limit", "torque_saturation", "integrator_clamp"):

@@ -132,6 +132,7 @@ PICTURES: dict[str, Picture] = {
         AGAINST_ANGLE, shaft_of_angle, SLOW, dots=False,
     ),
     "quadratic_drag": Picture({"coefficient": 3e-4}, AGAINST_VELOCITY, shaft_of_velocity, SWING),
+    "square_root_drag": Picture({"coefficient": 0.015}, AGAINST_VELOCITY, shaft_of_velocity, SWING),
     "load_torque": Picture({"torque": 0.08}, AGAINST_VELOCITY, shaft_of_velocity, SWING),
     "unbalance": Picture({"amplitude": 0.08, "phase": 0.5}, AGAINST_ANGLE, shaft_of_angle, levels(25.0, dwell=0.5)),
     "cogging": Picture({"amplitude": 0.06, "order": 6.0, "phase": 0.0}, AGAINST_ANGLE, shaft_of_angle, levels(15.0, dwell=0.3)),
@@ -142,9 +143,15 @@ PICTURES: dict[str, Picture] = {
         {"torque": 0.02, "share": 0.3}, AGAINST_ANGLE, shaft_of_angle, swing(18.0, 0.8),
         beside={"unbalance": {"amplitude": 0.12, "phase": 0.0}},
     ),
+    "position_friction": Picture(
+        {"torque": 0.06, "amplitude": 0.7, "order": 1.0, "phase": 0.0}, AGAINST_ANGLE, shaft_of_angle, swing(18.0, 0.8)
+    ),
     "backlash": Picture({"gap": 0.06}, ("time [s]", ASKED), motor, levels(12.0, -12.0, dwell=0.2), dots=False, masses=2),
     "hardening_stiffness": Picture(
         {"cubic_stiffness": 4e4}, ("time [s]", ASKED), motor, levels(25.0, -25.0, dwell=0.15), dots=False, masses=2
+    ),
+    "hysteretic_coupling": Picture(
+        {"torque": 0.08, "stiffness": 4.0}, ("time [s]", ASKED), motor, levels(12.0, -12.0, dwell=0.2), dots=False, masses=2
     ),
     "torque_saturation": Picture({"limit": 0.25}, AT_ACTUATOR, actuator, STEPS),
     "torque_dead_band": Picture({"width": 0.06}, AT_ACTUATOR, actuator, SWING),

@@ -178,7 +178,7 @@ def _turned(rec: Record, controller: Controller | None, final: Fit) -> Record:
     Where none is logged that is the measured velocity, integrated, or the simulation's own. A pendulum that is simulated with its
     own angle falls to another side sooner or later, whatever is wrong with it.
     """
-    if final.predictor.own_angle or rec.position is not None or not any(t.harmonic == "torque" for t in final.parameters.terms):
+    if final.predictor.own_angle or rec.position is not None or not any(t.turns_with_the_shaft for t in final.parameters.terms):
         return rec
     (turned,) = DataSet.of([rec], controller).turned
     return turned

@@ -73,7 +73,8 @@ class Term:
     family: str = ""
     excludes: frozenset[str] = frozenset()
     beside: frozenset[str] = frozenset()
-    harmonic: str = ""  # "torque" or "velocity": phase and size follow from two columns per order of the angle
+    harmonic: str = ""  # of "torque", "friction" or "velocity": phase and size follow from two columns per order of the angle
+    components: int = 0  # the first of the two coordinates that these columns belong to
     orders: tuple[int, int] = (1, 1)  # lowest and highest order of a harmonic
     neutral: Callable[[float, Scales], tuple[float, ...]] | None = None  # the nested effect of this level as this one
     proportional: bool = False  # its torque is proportional to its one coordinate
@@ -122,6 +123,11 @@ class Term:
     def in_series(self) -> bool:
         """Whether it is linear: a delay, a lag, a filter or a resonance between the torque and the measured velocity."""
         return not (self.domains or self.harmonic or self.in_controller)
+
+    @property
+    def turns_with_the_shaft(self) -> bool:
+        """Whether its torque is a harmonic of the angle."""
+        return self.harmonic in ("torque", "friction")
 
     @property
     def in_coupling(self) -> bool:

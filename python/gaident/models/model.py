@@ -107,7 +107,7 @@ class Model:
         ------
         ModelError
             For an unknown effect, unknown or missing parameters, values outside their physical bounds, and where the model cannot
-            carry it: p = 0; backlash, hardening_stiffness and effects at the load without the structure of two masses (p = 1,
+            carry it: p = 0; a nonlinear coupling and effects at the load without the structure of two masses (p = 1,
             q = 2) or together with extra_resonance.
 
         Examples

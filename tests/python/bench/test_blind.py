@@ -94,8 +94,9 @@ STEP_CLASSES = {
     "dry friction": ("coulomb_friction", "stribeck_friction", "presliding_friction"),
     "friction or dead band": ("torque_dead_band",),
     "limits": ("torque_saturation", "command_rate_limit", "integrator_clamp"),
-    "drag or drift": ("quadratic_drag", "friction_drift"),
-    "shaft": ("hardening_stiffness", "extra_resonance"),
+    "drag or drift": ("quadratic_drag", "friction_drift", "square_root_drag"),
+    "shaft": ("hardening_stiffness", "extra_resonance", "hysteretic_coupling"),
+    "friction or torque once per turn": ("position_friction",),
     "lag or filter": ("torque_lag", "velocity_filter"),
 }
 

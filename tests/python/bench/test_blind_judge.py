@@ -66,10 +66,10 @@ def test_equivalents_must_stand_together() -> None:
 
 
 def test_true_parts_of_the_unknown_are_no_wrong_names() -> None:
-    uneven = {"uneven_friction": {"torque": 0.05, "depth": 0.8}}
-    judged = said(uneven, finding("coulomb_friction"), verdict="partly explained", driver="position")
+    walking = {"random_walk_friction": {"torque": 0.05, "size": 0.6, "number": 1.0}}
+    judged = said(walking, finding("coulomb_friction"), verdict="partly explained", driver="time")
     assert judged.parts == ["coulomb_friction"] and not judged.wrong and not judged.extra
-    assert said({"root_drag": {"coefficient": 1.0}}, finding("coulomb_friction")).wrong == ["coulomb_friction"]
+    assert said({"thermal_gain": {"share": 0.2, "time_constant": 1.0}}, finding("coulomb_friction")).wrong == ["coulomb_friction"]
 
 
 def test_declining() -> None:

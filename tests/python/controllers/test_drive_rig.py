@@ -23,6 +23,7 @@ from drive_cases import (
 )
 from drive_rig import (
     AT_LOAD,
+    COUPLING,
     NOISES,
     OUTSIDE,
     SHAFT,
@@ -135,8 +136,9 @@ def test_static_friction_breaks_away_at_its_own_level() -> None:
     assert ramp[moving - 2] <= 0.07 < ramp[moving - 1]
 
 
-def smooth_motion(plant: Plant, torque: float, f: dict[str, float], t: Array) -> Array:
+def smooth_motion(plant: Plant, torque: float, effect: str, f: dict[str, float], t: Array) -> Array:
     """Motor velocity under a constant torque, by SciPy; `f` names what acts."""
+    shaft = effect in COUPLING
 
     def slope(t: float, x: Array) -> list[float]:
         w, theta, w2, twist, z = x
@@ -146,18 +148,22 @@ def smooth_motion(plant: Plant, torque: float, f: dict[str, float], t: Array) ->
         if "torque_positive" in f:
             q -= f["torque_positive"] + f["viscous_positive"] * w if w > 0 else -f["torque_negative"] + f["viscous_negative"] * w
         if "coefficient" in f:
-            q -= f["coefficient"] * w * abs(w)
-        if "amplitude" in f:
+            q -= f["coefficient"] * np.sign(w) * abs(w) ** (0.5 if effect == "square_root_drag" else 2.0)
+        if effect == "position_friction":
+            q -= f["torque"] * (1 + f["amplitude"] * np.cos(f["order"] * theta + f["phase"])) * np.sign(w)
+        elif "amplitude" in f:
             q -= f["amplitude"] * np.sin(f.get("order", 1.0) * theta + f["phase"])
         if "rate" in f:
             q -= f["torque"] * (1 + f["rate"] * t) * np.sign(w)
-        if "stiffness" in f:
-            q -= f["stiffness"] * z
+        bristle = f.get("stiffness", 0.0) * z
+        q -= 0.0 if shaft else bristle
         beyond = np.sign(twist) * max(abs(twist) - f.get("gap", 0.0) / 2, 0.0)
         spring = plant.KG * beyond + f.get("cubic_stiffness", 0.0) * beyond**3
         if beyond or not f.get("gap"):
             spring += plant.DG * (w - w2)
-        dz = w - f["stiffness"] * abs(w) * z / f["torque"] if "stiffness" in f else 0.0
+        spring += bristle if shaft else 0.0
+        rate = w - w2 if shaft else w
+        dz = rate - abs(rate) * bristle / f["torque"] if "stiffness" in f else 0.0
         load = ((spring - plant.DL * w2) / plant.JL, w - w2) if plant.two_masses else (0.0, 0.0)
         return [(q - plant.D * w - (spring if plant.two_masses else 0)) / plant.J, w, *load, dz]
 
@@ -181,15 +187,18 @@ def smooth_motion(plant: Plant, torque: float, f: dict[str, float], t: Array) ->
         ("presliding_friction", {"torque": 0.05, "stiffness": 3.0}),
         ("backlash", {"gap": 0.01}),
         ("hardening_stiffness", {"cubic_stiffness": 2e4}),
+        ("hysteretic_coupling", {"torque": 0.02, "stiffness": 6.0}),
+        ("square_root_drag", {"coefficient": 6e-3}),
+        ("position_friction", {"torque": 0.05, "amplitude": 0.8, "order": 2.0, "phase": 0.3}),
     ],
 )
 @pytest.mark.parametrize("way", [1, -1])
 def test_effects_agree_with_scipy(effect: str, parameters: dict[str, float], way: int) -> None:
     """From rest in one direction and in the other."""
-    plant = TWO if effect in ("backlash", "hardening_stiffness") else ONE
+    plant = TWO if effect in COUPLING else ONE
     torque = np.full(150, way * 0.2)
     got = run_drive(plant, None, {effect: parameters}, torque=torque).truth
-    expected = smooth_motion(plant, way * 0.2, parameters, np.arange(150) * plant.dt)
+    expected = smooth_motion(plant, way * 0.2, effect, parameters, np.arange(150) * plant.dt)
     size = np.std(expected - run_drive(plant, None, torque=torque).truth)
     assert size > 0.05
     assert np.std(got - expected) < 1e-4 * size

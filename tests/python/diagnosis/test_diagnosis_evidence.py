@@ -290,10 +290,12 @@ def test_a_single_step_says_what_it_cannot_judge() -> None:
     expected = {
         "asymmetric_friction",
         "quadratic_drag",
+        "square_root_drag",
         "friction_drift",
         "load_dependent_friction",
         "backlash",
         "hardening_stiffness",
+        "hysteretic_coupling",
     }
     assert set(found.not_testable) - {"torque_dead_band"} == expected
     assert found.not_testable["asymmetric_friction"] == "the axis turns forwards only"

@@ -27,7 +27,8 @@ EFFECTS = {
     *("coulomb_friction", "stribeck_friction", "asymmetric_friction", "presliding_friction", "quadratic_drag", "load_torque"),
     *("unbalance", "cogging", "friction_drift", "backlash", "hardening_stiffness", "torque_saturation", "torque_dead_band"),
     *("transport_delay", "torque_lag", "integrator_clamp", "command_rate_limit", "velocity_filter", "velocity_ripple"),
-    *("extra_resonance", "lugre_friction", "load_dependent_friction"),
+    *("extra_resonance", "lugre_friction", "load_dependent_friction", "hysteretic_coupling", "square_root_drag"),
+    "position_friction",
 }
 
 

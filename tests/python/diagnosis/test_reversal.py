@@ -14,7 +14,7 @@ JOINT = Plant(J=15.0, D=18.0, kp=300.0, ki=1500.0, dt=1e-3)
 EVERY = 10  # samples of the controller in a line of the log
 GRAVITY = {"unbalance": {"amplitude": 113.0, "phase": -1.57}}
 LOADED = {**GRAVITY, "load_dependent_friction": {"torque": 10.5, "share": 0.07}}
-ROOT = {"root_drag": {"coefficient": 20.0}}
+ROOT = {"square_root_drag": {"coefficient": 20.0}}
 
 
 def joint(effects: Effects, n: int = 3000) -> ga.Record:
@@ -95,6 +95,7 @@ def test_friction_of_one_size_beside_gravity_is_not_seen_to_grow_with_the_load()
     assert not any(f.alternatives for f in dia.causes) and dia.verdict == "explained"
 
 
-def test_a_steep_drag_alone_gets_no_name() -> None:
-    dia = ga.diagnose(joint(ROOT))
-    assert not dia.causes and dia.verdict == "unexplained" and dia.driver == "velocity"
+def test_a_steep_drag_alone_is_no_dry_friction() -> None:
+    (cause,) = ga.diagnose(joint(ROOT)).causes
+    assert cause.effect == "square_root_drag" and not cause.alternatives
+    assert cause.parameters["coefficient"].value == pytest.approx(20.0, rel=0.02)

@@ -22,11 +22,11 @@ CLASSES = (*EQUIVALENT, "load_torque", "asymmetric_friction")
 # What `driver` may say about an effect outside the library, and what such an effect really contains of the library.
 DRIVERS = {
     "torque_hum": ("time",),
-    "uneven_friction": ("position",),
-    "root_drag": ("velocity",),
-    "hysteretic_spring": ("position", "past"),
+    "random_walk_friction": ("time",),
+    "thermal_gain": ("time", "torque"),
+    "resolver_error_of_speed": ("position", "velocity"),
 }
-PARTS = {"uneven_friction": ("coulomb_friction",)}
+PARTS = {"random_walk_friction": ("coulomb_friction",)}
 ANGLES = ("phase",)
 
 

@@ -109,12 +109,15 @@ FIELDS: dict[str, dict[str, str]] = {
         "damping": "lugre_damping",
     },
     "quadratic_drag": {"coefficient": "drag"},
+    "square_root_drag": {"coefficient": "root"},
+    "position_friction": {"torque": "uneven", "amplitude": "uneven_share", "order": "uneven_order", "phase": "uneven_phase"},
     "load_torque": {"torque": "load"},
     "unbalance": {"amplitude": "unbalance", "phase": "unbalance_phase"},
     "cogging": {"amplitude": "cogging", "order": "cogging_order", "phase": "cogging_phase"},
     "friction_drift": {"torque": "drifting", "rate": "drift_rate"},
     "backlash": {"gap": "gap"},
     "hardening_stiffness": {"cubic_stiffness": "cubic"},
+    "hysteretic_coupling": {"torque": "hysteretic_torque", "stiffness": "hysteretic"},
     "torque_saturation": {"limit": "saturation"},
     "torque_dead_band": {"width": "dead_band"},
     "transport_delay": {"delay": "delay"},
@@ -126,9 +129,9 @@ FIELDS: dict[str, dict[str, str]] = {
     "velocity_quantisation": {"step": "quantum"},
     "extra_resonance": {"frequency": "wp", "damping": "zp", "zero_frequency": "wz", "zero_damping": "zz"},
     "torque_hum": {"amplitude": "hum", "frequency": "hum_frequency", "phase": "hum_phase"},
-    "uneven_friction": {"torque": "uneven", "depth": "uneven_depth", "order": "uneven_order", "phase": "uneven_phase"},
-    "root_drag": {"coefficient": "root"},
-    "hysteretic_spring": {"share": "hysteretic", "yield_twist": "yield"},
+    "random_walk_friction": {"torque": "walking", "size": "walk_size", "number": "walk_number"},
+    "thermal_gain": {"share": "gain_lost", "time_constant": "warming"},
+    "resolver_error_of_speed": {"error": "resolver", "order": "resolver_order", "phase": "resolver_phase"},
 }
 FRICTION: dict[str, dict[str, str]] = {
     "coulomb_friction": {"torque": "both"},
@@ -151,9 +154,11 @@ SHAFT = (
     "unbalance",
     "cogging",
     "friction_drift",
+    "square_root_drag",
+    "position_friction",
 )
-OUTSIDE = ("torque_hum", "uneven_friction", "root_drag", "hysteretic_spring")
-COUPLING = ("backlash", "hardening_stiffness", "hysteretic_spring")
+OUTSIDE = ("torque_hum", "random_walk_friction", "thermal_gain", "resolver_error_of_speed")
+COUPLING = ("backlash", "hardening_stiffness", "hysteretic_coupling")
 
 
 @dataclass(frozen=True)

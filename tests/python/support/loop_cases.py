@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 import gaident as ga
-from drive_cases import EFFECTS, command_for, random_plant, stable
+from drive_cases import EFFECTS, LATER, command_for, random_plant, stable
 from drive_rig import Noise, Plant, RanAwayError, between_lines, run_drive
 
 __all__ = ["EVERY", "LOOPS", "industrial_plant", "loop_effects", "loop_kind", "loop_noise", "loop_plant"]
@@ -93,7 +93,7 @@ def loop_kind(loop: str) -> str:
 def loop_effects(loop: str) -> tuple[str, ...]:
     """What can hide in such a loop: no second limit where one acts, no rate limit behind a position controller."""
     without = LIMITS if loop in LIMITED else ("command_rate_limit",) if loop == "position" else ()
-    return tuple(effect for effect in EFFECTS if effect not in without)
+    return tuple(effect for effect in EFFECTS if effect not in (*without, *LATER))
 
 
 def loop_noise(name: str, seed: int) -> Noise | str:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from gaident.diagnosis.library import triggers as t
 from gaident.diagnosis.library.cause import AT_THE_SHAFT, NO_REVERSAL, Cause
-from gaident.diagnosis.library.coordinates import grid, ln, of, positive
-from gaident.diagnosis.library.kinds import linear
+from gaident.diagnosis.library.coordinates import HIGHEST_ORDER, grid, ln, of, positive
+from gaident.diagnosis.library.kinds import FREE, linear
 from gaident.estimation.term import Rows, Scales
 
 __all__ = ["CAUSES"]
@@ -32,6 +32,22 @@ def _asymmetric(z: Matrix) -> Matrix:
 
 def _lugre(z: Matrix) -> Matrix:
     return np.column_stack([z[:, 0], z[:, 0] * (1.0 + z[:, 1]), np.exp(z[:, 2:])])
+
+
+def _of_place(z: Matrix) -> Matrix:
+    """(Tc, Tc a cos(phase), Tc a sin(phase), order) -> (Tc, a, order, phase); no friction is below 0 anywhere."""
+    share = np.hypot(z[:, 1], z[:, 2]) / np.maximum(z[:, 0], 1e-300)
+    return np.column_stack([z[:, 0], np.minimum(share, 1.0), z[:, 3], np.arctan2(z[:, 2], z[:, 1])])
+
+
+def _place_coordinates(p: Mapping[str, float]) -> Vector:
+    change = p["torque"] * p["amplitude"]
+    return np.array([p["torque"], change * np.cos(p["phase"]), change * np.sin(p["phase"]), p["order"]])
+
+
+def _place_steps(s: Scales) -> tuple[float, ...]:
+    order = 0.05 / s.travel if s.period_seen else 0.0  # no decision: rad over the travel
+    return (_steps(s), _steps(s), _steps(s), order)
 
 
 def _ln_stiffness(s: Scales) -> Rows:
@@ -216,6 +232,27 @@ CAUSES: tuple[Cause, ...] = (
         excited_by=("holds up and down", "slow constant speeds"),
         alike={NO_REVERSAL: ("constant torque",)},
     ),
+    Cause(
+        "position_friction",
+        "shaft",
+        _of_place,
+        _place_coordinates,
+        lambda s: [(1e-6 * s.torque, s.torque), (-s.torque, s.torque), (-s.torque, s.torque), (1.0, FREE)],
+        lambda s: [],
+        _place_steps,
+        nested=("coulomb_friction",),
+        family=FRICTION,
+        harmonic="friction",
+        components=1,
+        orders=(1, HIGHEST_ORDER),
+        levels=True,
+        domains=AT_THE_SHAFT,
+        curve=_dry,
+        needs=(t.periodic, t.moves, t.period_of_an_order),
+        unseen=t.orders_beyond,
+        excited_by=("slow constant speeds",),
+        alike={NO_REVERSAL: ("constant torque", "torque n times per turn", "torque once per turn")},
+    ),
     linear(
         "quadratic_drag", "coefficient", lambda s: 0.0, lambda s: s.torque / s.speed**2,
         lambda s: tuple(f * s.torque / s.speed**2 for f in (0.01, 0.05, 0.2)), lambda s: 0.05 * s.torque / s.speed**2,
@@ -223,6 +260,15 @@ CAUSES: tuple[Cause, ...] = (
         curve=lambda w, p: -p["coefficient"] * w * np.abs(w),
         needs=(t.moves, t.several_speeds),
         excited_by=("triangle across zero", "repeated segment", "speeds mixed in time"),
+        alike={NO_REVERSAL: ("torque that grows",)},
+    ),
+    linear(
+        "square_root_drag", "coefficient", lambda s: 0.0, lambda s: s.torque / s.speed**0.5,
+        lambda s: tuple(f * s.torque / s.speed**0.5 for f in (0.01, 0.05, 0.2)), lambda s: 0.05 * s.torque / s.speed**0.5,
+        domains=AT_THE_SHAFT,
+        curve=lambda w, p: -p["coefficient"] * np.sign(w) * np.sqrt(np.abs(w)),
+        needs=(t.moves, t.several_speeds),
+        excited_by=("slow stairs", "triangle across zero", "speeds mixed in time"),
         alike={NO_REVERSAL: ("torque that grows",)},
     ),
 )  # fmt: skip

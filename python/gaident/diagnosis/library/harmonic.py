@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.diagnosis.library import triggers as t
-from gaident.diagnosis.library.cause import AT_THE_SHAFT, Cause
+from gaident.diagnosis.library.cause import AT_THE_SHAFT, NO_REVERSAL, Cause
 from gaident.diagnosis.library.coordinates import HIGHEST_ORDER
 from gaident.diagnosis.library.kinds import harmonic
 
@@ -38,12 +38,14 @@ CAUSES: tuple[Cause, ...] = (
         domains=AT_THE_SHAFT,
         needs=(t.rotary, t.moves, t.part_of_a_turn),
         excited_by=("slow constant speeds", "holds up and down"),
+        alike={NO_REVERSAL: ("torque once per turn",)},
         regressed=_gravity_of_regression,
     ),
     harmonic(
         "cogging", "shaft", 2, True, "torque",
         domains=AT_THE_SHAFT,
         orders=(2, HIGHEST_ORDER),
+        alike={NO_REVERSAL: ("torque n times per turn",)},
         needs=(t.periodic, t.moves, t.period_of_an_order),
         unseen=t.orders_beyond,
         excited_by=("slow constant speeds",),

@@ -12,7 +12,7 @@ from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.library.coordinates import positive
 from gaident.estimation.term import Rows, Scales
 
-__all__ = ["harmonic", "linear", "single"]
+__all__ = ["FREE", "harmonic", "linear", "single"]
 
 FREE = 1e6  # no decision: a bound that nothing reaches;
 """Times the largest torque of the log: a pendulum that swings with little friction has far more torque than drives it."""

@@ -179,6 +179,10 @@ class Moves(SideMoves):
         wanted = [t for t in rows if t.family == simple.family and simple.name in t.nested and t.stands_with(now.effects)]
         level = abs(float(source.x[source.parameters.slot(simple.name)][0]))
         torque = parameters.scales.torque
+        turning = [t for t in wanted if t.harmonic]
+        if turning:  # what of the simple one changes with the angle is linear, and stands beside it
+            test.replace(source, simple.name, Hypothesis(parameters, source.predictor), x, turning)
+            wanted = [t for t in wanted if not t.harmonic]
         for friction in {max(level, LEAST * torque), max(level, MISSED * torque)}:
             scales = replace(parameters.scales, friction=friction)
             bare = Hypothesis(replace(parameters, scales=scales), source.predictor)

@@ -67,7 +67,7 @@ class Screened:
 class _Trial:
     term: Term
     hypothesis: Hypothesis
-    rows: Matrix  # start coordinates; for harmonics the orders
+    rows: Matrix  # start coordinates; of harmonics one for each order, without their two components
     errors: Matrix  # raw errors; for harmonics the two columns of each order, what the error loses per unit
     base: _Base
     onto: tuple[Hypothesis, Vector]  # the model and its x that the coordinates are added to
@@ -146,7 +146,12 @@ class ScoreTest:
             if term.harmonic:
                 orders, columns = self._columns(hypothesis, x, term, base.error)
                 if len(orders):
-                    self.trials.append(_Trial(term, longer, orders[:, None], columns, base, onto, True))
+                    rows = np.zeros((len(orders), term.size))
+                    if term.size > 2:
+                        rows[:, -1] = orders
+                    if instead is not None:
+                        rows[:, 0] = instead[0].x[instead[0].parameters.slot(instead[1])][0]
+                    self.trials.append(_Trial(term, longer, rows, columns, base, onto, True))
                 continue
             rows = np.array(term.starts(parameters.scales))
             if rows.size == 0:
@@ -181,11 +186,16 @@ class ScoreTest:
         if len(orders) == 0:
             return orders, np.zeros((0, len(error)))
         waves = _harmonics(per_period * angle, np.rint(orders / per_period))
-        if term.harmonic == "torque":
-            pairs = np.stack([-waves.imag, -waves.real], axis=1).reshape(-1, len(angle))
+        w = self.objective.measured - error
+        if term.turns_with_the_shaft:
+            parts = [-waves.imag, -waves.real]
+            if term.harmonic == "friction":
+                way = np.sign(w if end is None else end.carried(w[None, :])[0])
+                parts = [-way * waves.real, way * waves.imag]
+            pairs = np.stack(parts, axis=1).reshape(-1, len(angle))
             pairs = pairs if end is None else end.carried(pairs)
             return orders, hypothesis.predictor.torque_response(hypothesis.parameters, x, pairs)
-        w = (self.objective.measured - error) * orders[:, None]
+        w = w * orders[:, None]
         return orders, np.stack([w * waves.real, -w * waves.imag], axis=1).reshape(-1, len(angle))
 
     def _narrow(self, rows: Matrix, base: _Base) -> Matrix:
@@ -343,6 +353,7 @@ def _start_rows(t: _Trial, V: Matrix, rest: Vector, order: NDArray[np.intp]) -> 
 
 
 def _harmonic_start(t: _Trial, V: Matrix, rest: Vector, i: int) -> Vector:
-    z: Vector = np.asarray(np.linalg.lstsq(V[2 * i : 2 * i + 2].T, rest, rcond=None)[0], dtype=np.float64)
-    coordinates: Vector = z if t.term.size == 2 else np.concatenate([z, t.rows[i]])
+    first = t.term.components
+    coordinates: Vector = t.rows[i].copy()
+    coordinates[first : first + 2] = np.linalg.lstsq(V[2 * i : 2 * i + 2].T, rest, rcond=None)[0]
     return t.start(coordinates)
