@@ -76,3 +76,19 @@ def test_it_keeps_all_of_the_controller(name: str) -> None:
     assert differencing(cascade).to_dict() == cascade.to_dict()
     log = ga.Record(T, command=command(False), velocity=np.zeros(600))
     assert np.array_equal(differencing(cascade).torque_of(log), cascade.torque_of(log))
+
+
+@pytest.mark.parametrize("rule", ["trapezoidal", "backward"])
+def test_one_mass_behind_a_current_loop_gets_no_second_one_where_the_rule_was_not_given(rule: str) -> None:
+    """Two masses leave less before whitening, whose zero lies to the right; with its own noise filter one mass and its lag do."""
+    cascade = ga.Cascade(ga.PI(0.12, 6.0, rule=rule), period=2.5e-4)
+    plant = Plant(J=9e-4, D=0.004, kp=0.12, ki=6.0, dt=2.5e-4, cascade=cascade)
+    steps = np.repeat([0.0, 30.0, 80.0, 30.0, -50.0, -90.0, -20.0, 60.0, 0.0], 800)
+    source = np.convolve(steps, np.ones(40) / 40.0, "same")
+    sensor = Noise(white=0.0, encoder=2 * np.pi / 2**17, differenced=True)
+    log = rig(plant, source, {"torque_lag": {"time_constant": 0.2e-3}}, sensor)
+    dia = ga.diagnose(ga.Record(log.dt, command=log.command, velocity=log.velocity, torque=log.torque), ga.PI(0.12, 6.0))
+    inertia = dia.mechanics["inertia"]
+    assert "load_inertia" not in dia.mechanics and abs(inertia.value - 9e-4) < max(4.0 * inertia.std, 1e-3 * 9e-4)
+    assert any("half a sample old" in note for note in map(str, dia.notes))
+    assert {f.effect for f in dia.causes} <= {"integration_rule", "torque_lag", "velocity_filter"}

@@ -183,6 +183,7 @@ def _score(objective: Objective, scales: Scales, model: Model) -> float:
 
     Fitted without the lag, a mechanism bends its resonance to make up for it, and a fit from there does not find the lag. So the
     lag is also fitted to one mass, and the resonance beside it; one beyond what the records show would make up for the age.
+    Each is scored: one that leaves least without a noise filter need not do so with one.
     """
     task = Task(objective, scales, model, (), lambda message: None).under(Innovations())
     space, lag = task.space(), next(t for t in LIBRARY.values() if t.late)  # the same as a lag of the torque, see `EQUIVALENT`
@@ -191,8 +192,8 @@ def _score(objective: Objective, scales: Scales, model: Model) -> float:
     shafts = [ls.fit(objective, hypothesis, x, WHITE, POLICY.short) for hypothesis, x in on_a_shaft(objective, late)]
     seen = POLICY.seen_band * np.pi / task.data.dt
     shafts = [f for f in shafts if swings(f) and is_mechanism(f.parameters, f.x) and resonance(f) < seen]
-    lagging = min((late, _with_lag(task, lag, base), *shafts), key=lambda f: f.cost)
-    return min(space.score(space.refitted(f.hypothesis, f.x)) for f in (base, lagging))
+    lagging = (late, _with_lag(task, lag, base), *shafts)
+    return min(space.score(space.refitted(f.hypothesis, f.x)) for f in (base, *lagging))
 
 
 def _with_lag(task: Task, lag: Term, fit: Fit) -> Fit:
