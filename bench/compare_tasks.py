@@ -14,7 +14,7 @@ import gaident as ga
 from gaident.paper.experiment import rig_of
 from gaident.paper.facts import MECHANISMS, SAMPLES
 from gaident.paper.friction import LEVELS, OTHER_LEVELS
-from gaident.paper.rig import Run, side_by_side
+from gaident.paper.rig import RigRun, side_by_side
 
 Vector = np.ndarray
 
@@ -53,7 +53,7 @@ def rig_tasks() -> list[Task]:
     """Two rigs of the paper: trained on reversing steps, tested on other levels and other noise."""
     train, test = np.repeat(LEVELS, SAMPLES), np.repeat(OTHER_LEVELS, SAMPLES)
     rigs = [rig_of(mechanism) for mechanism in MECHANISMS]
-    made = side_by_side([Run(rig, command, seed) for rig in rigs for command, seed in ((train, 1), (test, 2))])
+    made = side_by_side([RigRun(rig, command, seed) for rig in rigs for command, seed in ((train, 1), (test, 2))])
     return [
         Task(f"rig, {mechanism.words}", made[2 * i], made[2 * i + 1], rigs[i].controller, "rad/s", 1.0, (1, 4, 16))
         for i, mechanism in enumerate(MECHANISMS)

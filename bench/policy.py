@@ -45,7 +45,7 @@ from rows.tables import MEASURED, merged, report, summary
 from rows.watch import Watch, neighbours, watched
 
 from gaident.policy.declared import SHOWN_BY
-from gaident.policy.table import Policy, Row, rows
+from gaident.policy.table import Policy, PolicyRow, rows
 from gaident.policy.trial import decide_by
 
 WATCH = Watch()
@@ -83,7 +83,7 @@ def key_of(case: Any, name: str | None, value: float) -> str:
     return f"{table}/{f'{name}={value:.6g}' if name else 'watched'}/{case.key}"
 
 
-def measured(row: Row, cases: list[Any], out: Path, workers: int, runs: tuple[str, ...] = RUNS) -> dict[str, Any]:
+def measured(row: PolicyRow, cases: list[Any], out: Path, workers: int, runs: tuple[str, ...] = RUNS) -> dict[str, Any]:
     """What a row decides in some cases, of those in the file; first runs those of `runs` that are not there yet."""
     if "watched" in runs:
         _run(out, None, 0.0, cases, workers)

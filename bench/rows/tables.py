@@ -10,7 +10,7 @@ from typing import Any
 
 from rows.watch import STEPS, moved
 
-from gaident.policy.table import Row
+from gaident.policy.table import PolicyRow
 
 MEASURED = Path(__file__).with_name("measured.json")
 HEAD = ["row", "cases", "read in", "no decision changes", "at", "outcomes", "changed", "said", "other", "CPU s"]
@@ -18,7 +18,7 @@ HEAD = ["row", "cases", "read in", "no decision changes", "at", "outcomes", "cha
 Lines = Mapping[str, Mapping[str, Any]]
 
 
-def summary(row: Row, base: Lines, found: Mapping[float, Mapping[str, Mapping[str, Any] | None]]) -> dict[str, Any]:
+def summary(row: PolicyRow, base: Lines, found: Mapping[float, Mapping[str, Mapping[str, Any] | None]]) -> dict[str, Any]:
     """What a row decides: the lines of its cases as the policy is, and those at each other value; None: not run there."""
     turned = {step for line in base.values() for step in line["turned"].get(row.name, [])}
     return {
@@ -48,7 +48,7 @@ def _compared(base: Lines, found: Mapping[str, Mapping[str, Any] | None]) -> dic
     }
 
 
-def _last(row: Row, steps: Sequence[float], turned: set[float]) -> float:
+def _last(row: PolicyRow, steps: Sequence[float], turned: set[float]) -> float:
     """The value at the last of some steps before a decision changes; the row's own where the first changes one."""
     last = row.value
     for step in steps:

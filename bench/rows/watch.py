@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from gaident.policy.table import Policy, Row, rows
+from gaident.policy.table import Policy, PolicyRow, rows
 
 __all__ = ["STEPS", "Watch", "Watched", "moved", "neighbours", "watched"]
 
@@ -31,7 +31,7 @@ STEPS = tuple(s / 4 for s in range(-8, 9) if s)
 Key = tuple[str, float]
 
 
-def moved(row: Row, step: float) -> float | None:
+def moved(row: PolicyRow, step: float) -> float | None:
     """The value of a row after some steps, by its unit; None: there is none.
 
     A number is doubled by a step, a probability taken times ten. Of a share between one half and 1, what is missing to 1 is
@@ -54,7 +54,7 @@ def moved(row: Row, step: float) -> float | None:
     return None if value <= 0.0 or value == row.value else value
 
 
-def neighbours(row: Row) -> tuple[float, float]:
+def neighbours(row: PolicyRow) -> tuple[float, float]:
     """The two values that a row is measured at, below and above its own.
 
     >>> {r.name: neighbours(r) for r in rows() if r.name in ("harm", "plateau", "test_level")}

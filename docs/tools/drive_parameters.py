@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gaident.control.drive_parameters import CONSTANTS, DRIVES, DriveRow, Parameter
+from gaident.control.drive_parameters import CONSTANTS, DRIVES, DriveParameter, DriveRow
 
 PAGE = Path(__file__).resolve().parents[1] / "how-to/drive-parameters.md"
 
@@ -68,7 +68,7 @@ def _drive(name: str, row: DriveRow) -> str:
     )
 
 
-def _line(p: Parameter) -> str:
+def _line(p: DriveParameter) -> str:
     where = " (in a drive.toml: at the top)" if p.name in CONSTANTS else ""
     return f"| `{p.name}` | {p.unit} | {p.meaning}{where} |\n"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import groupby
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gaident.policy.declared import CALIBRATED, EFFORT, SHOWN_BY
-from gaident.policy.table import Row, rows
+from gaident.policy.table import PolicyRow, rows
 
 DOCS = Path(__file__).resolve().parents[1]
 PAGE = DOCS / "theory" / "policy.md"
@@ -133,16 +134,17 @@ Outside of it some comparison changes, which need not change what is said: the c
 | number | cases | seed | on | read in | no decision changes | below | above |
 |---|---|---|---|---|---|---|---|
 {changes}
-Moved either way, {free} change nothing that is said in these cases: they are no finer than a factor of two, or these cases do
-not show them.
+Moved either way, these change nothing that is said in these cases, as they are no finer than a factor of two, or these cases do
+not show them:
+{free}.
 
 {left}
-Not measured, or at another value: {open}.
-"""
+{open}"""
 
 LEFT = """\
 Not run again are {count} runs, for the time that they take: about {minutes} minutes of one processor.
-They belong to {names}.
+They belong to
+{names}.
 Most of these numbers enter a bound, a probability or a fit of nearly every case, so that some comparison changes in nearly every
 one. Where some of its cases were run, these are the first ones, and what they show stands before "not run".
 """
@@ -172,7 +174,7 @@ def _changes() -> str:
         changes="".join(map(_changed, valid)),
         free=_names([name for name in deciding if name in names - moving]),
         left=_left(valid),
-        open=_names([name for name in deciding if name not in names]),
+        open=_open([name for name in deciding if name not in names]),
     )
 
 
@@ -223,7 +225,12 @@ def _at(at: Mapping[str, Any]) -> str:
 
 
 def _names(names: Sequence[str]) -> str:
-    return ", ".join(f"`{name}`" for name in names) or "none"
+    listed = ", ".join(f"`{name}`" for name in names) or "none"
+    return textwrap.fill(listed, 130, break_long_words=False)
+
+
+def _open(names: Sequence[str]) -> str:
+    return f"Not measured, or at another value:\n{_names(names)}.\n" if names else "Every number that decides is measured.\n"
 
 
 def _head() -> str:
@@ -244,7 +251,7 @@ def _head() -> str:
     )
 
 
-def _line(row: Row, *more: str) -> str:
+def _line(row: PolicyRow, *more: str) -> str:
     cells = (f"`{row.name}`", f"{row.value:g}", row.unit, row.source, *more)
     return "| " + " | ".join(c.replace("|", "\\|") for c in cells) + " |\n"
 

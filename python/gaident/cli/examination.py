@@ -14,7 +14,7 @@ from typing import Any
 
 from gaident.version import version as own_version
 
-__all__ = ["Examination", "Library", "examine"]
+__all__ = ["Examination", "UsedLibrary", "examine"]
 
 _REQUIREMENT = re.compile(r"^([\w.-]+)[^;]*(?:;(.*))?$")
 _EXTRA = re.compile(r"extra\s*==\s*['\"]([\w.-]+)['\"]")
@@ -23,7 +23,7 @@ _FOR_DEVELOPERS = {"test", "peers", "compare", "tidy", "docs"}
 
 
 @dataclass(frozen=True)
-class Library:
+class UsedLibrary:
     """A library that this package uses; version None: it is not there. extra: what installs it, "" if it is required."""
 
     name: str
@@ -42,7 +42,7 @@ class Examination:
     processor: str
     instruction_set: str
     threads: int
-    libraries: tuple[Library, ...]
+    libraries: tuple[UsedLibrary, ...]
     self_test: str
     flaws: tuple[str, ...]
 
@@ -94,13 +94,13 @@ def _threads() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _libraries() -> list[Library]:
+def _libraries() -> list[UsedLibrary]:
     """What the package's own metadata names; nothing where it runs from its sources."""
     try:
         requirements = metadata.requires("gaident") or []
     except metadata.PackageNotFoundError:
         return []
-    found: dict[str, Library] = {}
+    found: dict[str, UsedLibrary] = {}
     for requirement in requirements:
         match = _REQUIREMENT.match(requirement)
         if match is None:
@@ -113,18 +113,18 @@ def _libraries() -> list[Library]:
     return sorted(found.values(), key=lambda x: (bool(x.extra), x.extra, x.name))
 
 
-def _library(name: str, extra: str) -> Library:
+def _library(name: str, extra: str) -> UsedLibrary:
     try:
         version = metadata.version(name)
     except metadata.PackageNotFoundError:
-        return Library(name, None, extra, "" if extra else "is not installed")
+        return UsedLibrary(name, None, extra, "" if extra else "is not installed")
     if extra:
-        return Library(name, version, extra)
+        return UsedLibrary(name, version, extra)
     try:
         importlib.import_module(_MODULES.get(name.lower(), name.replace("-", "_")))
     except Exception as error:
-        return Library(name, version, extra, f"cannot be imported ({type(error).__name__}: {error})")
-    return Library(name, version, extra)
+        return UsedLibrary(name, version, extra, f"cannot be imported ({type(error).__name__}: {error})")
+    return UsedLibrary(name, version, extra)
 
 
 def _self_test() -> tuple[str, str, bool]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gaident import _core
 from gaident.checks import known_keys, real_number
 from gaident.control import core
-from gaident.control.controller import Controller, Limiting, Signals
+from gaident.control.controller import Controller, Limiting, LoopSignals
 from gaident.control.drive_parameters import position_gain
 from gaident.control.filtering import filtered, rate_limited
 from gaident.control.filters import Filter, filter_of, filters_of
@@ -273,7 +273,7 @@ class Cascade(Controller):
             return 1
         return multiple_of(self.position_period, dt if self.period is None else self.period, "position_period", "period")
 
-    def line_equation(self, log: Signals, poles: int) -> bool:
+    def line_equation(self, log: LoopSignals, poles: int) -> bool:
         """See `Controller`: with a position controller that samples at each line, and without acceleration feedforward there."""
         source, every = self.command_of(log), self.log_every(log.dt)
         if every == 1 or source is None or self.limited or self.friction_feedforward != 0.0:
@@ -286,7 +286,7 @@ class Cascade(Controller):
             fits = self.acceleration_feedforward == 0.0 or float(source[0]) == 0.0
         return fits and core.is_one_equation(log.dt, self, poles)
 
-    def line_record(self, log: Signals) -> _core.Record:
+    def line_record(self, log: LoopSignals) -> _core.Record:
         """See `Controller`."""
         source, placed = self.command_of(log), self.position is not None
         assert source is not None
@@ -299,7 +299,7 @@ class Cascade(Controller):
         none: dict[str, Any] = dict.fromkeys(FILTERS, ())
         return replace(self, period=None, position_period=None, delay=0.0, **none)
 
-    def asked(self, log: Signals) -> Vector:
+    def asked(self, log: LoopSignals) -> Vector:
         """See `Controller`: behind position controller and command filters."""
         source = self.command_of(log)
         assert source is not None
@@ -307,19 +307,19 @@ class Cascade(Controller):
         if self.position is not None:
             assert log.position is not None
             every, fed = self.position_every(log.dt), self.ticks(log.dt, source, log.position).velocity_feedforward
-            made = self.position.gain * (source - log.position) + (fed if len(fed) else 0.0)
+            made = self.position.gain * (source - log.position) + (fed[:: self.log_every(log.dt)] if len(fed) else 0.0)
             command = np.repeat(made[::every], every)[: len(source)]
         for one in self.command_filters:
             digital = one.digital(period)
             command = filtered(np.array(digital.b), np.array(digital.a), command[None, :], [len(command)])[0]
         return command
 
-    def replayable(self, log: Signals) -> bool:
+    def replayable(self, log: LoopSignals) -> bool:
         """See `Controller`."""
         read = self.position is None or log.position is not None
         return read and self.command_of(log) is not None and self.log_every(log.dt) == 1
 
-    def torque_of(self, log: Signals, also: Limiting | None = None) -> Vector:
+    def torque_of(self, log: LoopSignals, also: Limiting | None = None) -> Vector:
         """See `Controller`."""
         source, dt = self.command_of(log), log.dt
         assert source is not None

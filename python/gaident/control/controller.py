@@ -16,12 +16,12 @@ from gaident.control.ticks import Ticks
 from gaident.control.unknown import unknown_in
 from gaident.errors import ControllerError, SettingsError
 
-__all__ = ["Controller", "Gains", "Limiting", "Signals", "checked_controller"]
+__all__ = ["Controller", "VelocityGains", "Limiting", "LoopSignals", "checked_controller"]
 
 Vector = NDArray[np.float64]
 
 
-class Signals(Protocol):
+class LoopSignals(Protocol):
     """What a log holds of a controller's signals; a `gaident.Record` is one."""
 
     @property
@@ -36,7 +36,7 @@ class Signals(Protocol):
     def position(self) -> Vector | None: ...
 
 
-class Gains(Protocol):
+class VelocityGains(Protocol):
     """Gains of a velocity controller, and its limits."""
 
     @property
@@ -76,7 +76,7 @@ class Controller(ABC):
 
     @property
     @abstractmethod
-    def gains(self) -> Gains:
+    def gains(self) -> VelocityGains:
         """kp, ki and the limits of the velocity controller."""
 
     @property
@@ -130,7 +130,7 @@ class Controller(ABC):
         """This controller, and the same with other interpolations of its command between the lines of a log, dt [s] apart."""
         return (self,)
 
-    def command_of(self, log: Signals) -> Vector | None:
+    def command_of(self, log: LoopSignals) -> Vector | None:
         """The signal that drives it (n,): velocity command [rad/s] or position command [rad]; None where it is not logged."""
         signal: Vector | None = getattr(log, self.driven_by)
         return signal
@@ -146,7 +146,7 @@ class Controller(ABC):
         """
         return self if self.one_equation or self.log_every(dt) > 1 else None
 
-    def line_equation(self, log: Signals, poles: int) -> bool:
+    def line_equation(self, log: LoopSignals, poles: int) -> bool:
         """Whether one difference equation takes a log that starts at rest from line to line, although it samples faster.
 
         poles: of the plant beside it. Its commands are logged, and controller and plant together are linear and of an order that
@@ -154,7 +154,7 @@ class Controller(ABC):
         """
         return False
 
-    def line_record(self, log: Signals) -> _core.Record:
+    def line_record(self, log: LoopSignals) -> _core.Record:
         """The core's record of that equation; the log has a `line_equation`."""
         raise ControllerError(f"controller is {self!r}: it has a sample for each line of the log and no equation between them")
 
@@ -163,15 +163,15 @@ class Controller(ABC):
         return self
 
     @abstractmethod
-    def asked(self, log: Signals) -> Vector:
+    def asked(self, log: LoopSignals) -> Vector:
         """The velocity command that reaches its velocity controller (n,) [rad/s]. The log is `replayable`."""
 
     @abstractmethod
-    def replayable(self, log: Signals) -> bool:
+    def replayable(self, log: LoopSignals) -> bool:
         """Whether the log holds every signal that it makes its torque of, at each of its samples."""
 
     @abstractmethod
-    def torque_of(self, log: Signals, also: Limiting | None = None) -> Vector:
+    def torque_of(self, log: LoopSignals, also: Limiting | None = None) -> Vector:
         """The torque [N m] (n,) that it makes of the measured signals, from rest; `also`: with further limits.
 
         The log is `replayable`.

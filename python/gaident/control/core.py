@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident import _core
-from gaident.control.controller import Controller, Gains
+from gaident.control.controller import Controller, VelocityGains
 from gaident.control.ticks import Ticks, of_lines, straight_part
 from gaident.control.unknown import known
 
@@ -47,7 +47,7 @@ def clock(dt: float) -> _core.Clock:
     return _core.Clock(period=dt)
 
 
-def core_controller(controller: Gains) -> _core.Controller:
+def core_controller(controller: VelocityGains) -> _core.Controller:
     """The core's controller; ControllerError where a gain is None."""
     known(controller)
     torque, integrator = controller.limits
@@ -164,6 +164,6 @@ def recurrence(
     return _core.recurrence(model, clock(dt), loop(controller, dt), substeps, top_speed)
 
 
-def held_torque(error: Vector, controller: Gains, newest: float, before: float, rule: str, integral: float) -> Vector:
+def held_torque(error: Vector, controller: VelocityGains, newest: float, before: float, rule: str, integral: float) -> Vector:
     """Torque [N m] of a PI whose integrator does not wind up; it adds newest e(n) + before e(n-1)."""
     return _core.held_torque(error, core_controller(controller), newest, before, rule, integral)

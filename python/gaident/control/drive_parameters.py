@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from gaident.checks import known_keys, one_of, real_number
 from gaident.errors import ControllerError
 
-__all__ = ["CONSTANTS", "DRIVES", "DriveRow", "Parameter", "drive_row", "kp_and_ki", "position_gain"]
+__all__ = ["CONSTANTS", "DRIVES", "DriveRow", "DriveParameter", "drive_row", "kp_and_ki", "position_gain"]
 
 Values = Mapping[str, float]
 
 
 @dataclass(frozen=True)
-class Parameter:
+class DriveParameter:
     """A parameter of a drive: its name here, its unit, and what the drive calls it."""
 
     name: str
@@ -43,17 +43,19 @@ class DriveRow:
     """
 
     title: str
-    velocity: tuple[Parameter, ...]
+    velocity: tuple[DriveParameter, ...]
     kp: Formula
     ki: Formula
     loop: str
     sources: tuple[str, ...]
-    position: tuple[Parameter, ...] = ()
+    position: tuple[DriveParameter, ...] = ()
     position_gain: Formula | None = None
     none_at_zero: str = ""  # the time whose value 0 switches the integral off, where a source says so
 
 
-TORQUE_CONSTANT = Parameter("torque_constant", "N m/A", "of the motor, for the ampere (peak or rms) in which the drive counts")
+TORQUE_CONSTANT = DriveParameter(
+    "torque_constant", "N m/A", "of the motor, for the ampere (peak or rms) in which the drive counts"
+)
 CONSTANTS = (TORQUE_CONSTANT.name,)
 """Parameters that are the motor's and not of a drive; a drive file gives them above its first section."""
 
@@ -63,8 +65,8 @@ DRIVES: dict[str, DriveRow] = {
     "sinamics": DriveRow(
         title="Siemens SINAMICS S, servo control",
         velocity=(
-            Parameter("p1460", "N m s/rad", "speed controller P gain"),
-            Parameter("p1462", "ms", "speed controller integral time Tn"),
+            DriveParameter("p1460", "N m s/rad", "speed controller P gain"),
+            DriveParameter("p1462", "ms", "speed controller integral time Tn"),
         ),
         kp=Formula("p1460", lambda v: v["p1460"]),
         ki=Formula("p1460 / (p1462 * 1e-3)", lambda v: v["p1460"] / (v["p1462"] * 1e-3)),
@@ -74,8 +76,8 @@ DRIVES: dict[str, DriveRow] = {
     "el72xx": DriveRow(
         title="Beckhoff EL72xx, EP72xx (TwinCAT servo terminals)",
         velocity=(
-            Parameter("velocity_loop_proportional_gain", "mA/(rad/s)", "2002:15 or 8010:15 Velocity loop proportional gain"),
-            Parameter("velocity_loop_integral_time", "0.1 ms", "2002:14 or 8010:14 Velocity loop integral time (Tn)"),
+            DriveParameter("velocity_loop_proportional_gain", "mA/(rad/s)", "2002:15 or 8010:15 Velocity loop proportional gain"),
+            DriveParameter("velocity_loop_integral_time", "0.1 ms", "2002:14 or 8010:14 Velocity loop integral time (Tn)"),
             TORQUE_CONSTANT,
         ),
         kp=Formula(
@@ -90,7 +92,9 @@ DRIVES: dict[str, DriveRow] = {
         ),
         loop="PI with the integral action time Tn",
         position=(
-            Parameter("position_loop_proportional_gain", "(rad/s)/rad", "2002:17 or 8010:17 Position loop proportional gain"),
+            DriveParameter(
+                "position_loop_proportional_gain", "(rad/s)/rad", "2002:17 or 8010:17 Position loop proportional gain"
+            ),
         ),
         position_gain=Formula("position_loop_proportional_gain", lambda v: v["position_loop_proportional_gain"]),
         sources=(
@@ -101,13 +105,13 @@ DRIVES: dict[str, DriveRow] = {
     "ax5000": DriveRow(
         title="Beckhoff AX5000, gain in N m (P-0-0010 bit 15 set)",
         velocity=(
-            Parameter("s_0_0100", "N m/(rad/s)", "S-0-0100 Velocity loop proportional gain"),
-            Parameter("s_0_0101", "ms", "S-0-0101 Velocity loop integral action time; 0: no integral"),
+            DriveParameter("s_0_0100", "N m/(rad/s)", "S-0-0100 Velocity loop proportional gain"),
+            DriveParameter("s_0_0101", "ms", "S-0-0101 Velocity loop integral action time; 0: no integral"),
         ),
         kp=Formula("s_0_0100", lambda v: v["s_0_0100"]),
         ki=Formula("s_0_0100 / (s_0_0101 * 1e-3)", lambda v: v["s_0_0100"] / (v["s_0_0101"] * 1e-3)),
         loop="PI with the integral action time",
-        position=(Parameter("s_0_0104", "1000/min", "S-0-0104 Position loop Kv-factor"),),
+        position=(DriveParameter("s_0_0104", "1000/min", "S-0-0104 Position loop Kv-factor"),),
         position_gain=Formula("s_0_0104 * 1000 / 60", lambda v: v["s_0_0104"] * 1000 / 60),
         none_at_zero="s_0_0101",
         sources=(
@@ -119,8 +123,8 @@ DRIVES: dict[str, DriveRow] = {
     "ax8000": DriveRow(
         title="Beckhoff AX8000, AMP8000 (scaling 3005:09 in N m)",
         velocity=(
-            Parameter("velocity_control_proportional_gain", "N m/(rad/s)", "3140:01 Velocity control proportional gain"),
-            Parameter("velocity_control_integral_action_time", "s", "3140:02 Velocity control integral action time"),
+            DriveParameter("velocity_control_proportional_gain", "N m/(rad/s)", "3140:01 Velocity control proportional gain"),
+            DriveParameter("velocity_control_integral_action_time", "s", "3140:02 Velocity control integral action time"),
         ),
         kp=Formula("velocity_control_proportional_gain", lambda v: v["velocity_control_proportional_gain"]),
         ki=Formula(
@@ -128,7 +132,7 @@ DRIVES: dict[str, DriveRow] = {
             lambda v: v["velocity_control_proportional_gain"] / v["velocity_control_integral_action_time"],
         ),
         loop="PI: gain factor Kp, integral action time Tn",
-        position=(Parameter("position_control_proportional_gain", "1/s", "30C0:01 Position control proportional gain"),),
+        position=(DriveParameter("position_control_proportional_gain", "1/s", "30C0:01 Position control proportional gain"),),
         position_gain=Formula("position_control_proportional_gain", lambda v: v["position_control_proportional_gain"]),
         sources=(
             "https://infosys.beckhoff.com/content/1033/ax8xxx_object/18798255883.html",
@@ -140,10 +144,12 @@ DRIVES: dict[str, DriveRow] = {
     "sigma": DriveRow(
         title="Yaskawa Sigma-II",
         velocity=(
-            Parameter("pn100", "Hz", "Pn100 Speed loop gain Kv"),
-            Parameter("pn101", "0.01 ms", "Pn101 Speed loop integral time constant Ti; a panel that shows 20.00 ms means 2000"),
-            Parameter("pn103", "%", "Pn103 Inertia ratio, load over rotor, as set in the drive"),
-            Parameter("rotor_inertia", "kg m^2", "of the servomotor"),
+            DriveParameter("pn100", "Hz", "Pn100 Speed loop gain Kv"),
+            DriveParameter(
+                "pn101", "0.01 ms", "Pn101 Speed loop integral time constant Ti; a panel that shows 20.00 ms means 2000"
+            ),
+            DriveParameter("pn103", "%", "Pn103 Inertia ratio, load over rotor, as set in the drive"),
+            DriveParameter("rotor_inertia", "kg m^2", "of the servomotor"),
         ),
         kp=Formula(
             "2 * pi * pn100 * rotor_inertia * (1 + pn103 / 100)",
@@ -162,8 +168,8 @@ DRIVES: dict[str, DriveRow] = {
     "epos2": DriveRow(
         title="maxon EPOS2",
         velocity=(
-            Parameter("speed_regulator_p_gain", "20 uA/(rad/s)", "0x60F9-01 Speed Regulator P-Gain"),
-            Parameter("speed_regulator_i_gain", "5 mA/s/(rad/s)", "0x60F9-02 Speed Regulator I-Gain"),
+            DriveParameter("speed_regulator_p_gain", "20 uA/(rad/s)", "0x60F9-01 Speed Regulator P-Gain"),
+            DriveParameter("speed_regulator_i_gain", "5 mA/s/(rad/s)", "0x60F9-02 Speed Regulator I-Gain"),
             TORQUE_CONSTANT,
         ),
         kp=Formula(
@@ -180,13 +186,13 @@ DRIVES: dict[str, DriveRow] = {
     "odrive": DriveRow(
         title="ODrive, firmware with gains in N m",
         velocity=(
-            Parameter("vel_gain", "N m/(turn/s)", "controller.config.vel_gain"),
-            Parameter("vel_integrator_gain", "N m/(turn/s s)", "controller.config.vel_integrator_gain"),
+            DriveParameter("vel_gain", "N m/(turn/s)", "controller.config.vel_gain"),
+            DriveParameter("vel_integrator_gain", "N m/(turn/s s)", "controller.config.vel_integrator_gain"),
         ),
         kp=Formula("vel_gain / (2 * pi)", lambda v: v["vel_gain"] / _PER_TURN),
         ki=Formula("vel_integrator_gain / (2 * pi)", lambda v: v["vel_integrator_gain"] / _PER_TURN),
         loop='PI; the torque takes the integral of the errors before it (rule="forward"); at the limit the integral decays',
-        position=(Parameter("pos_gain", "(turn/s)/turn", "controller.config.pos_gain"),),
+        position=(DriveParameter("pos_gain", "(turn/s)/turn", "controller.config.pos_gain"),),
         position_gain=Formula("pos_gain", lambda v: v["pos_gain"]),
         sources=(
             "https://github.com/odriverobotics/ODrive/blob/029ab55229dbefccd87314be7482815e2ccb0c1f/Firmware/odrive-interface.yaml",
@@ -197,15 +203,15 @@ DRIVES: dict[str, DriveRow] = {
     "simplefoc": DriveRow(
         title="SimpleFOC, torque control by current",
         velocity=(
-            Parameter("pid_velocity_p", "A/(rad/s)", "motor.PID_velocity.P, with PID_velocity.D = 0"),
-            Parameter("pid_velocity_i", "A/rad", "motor.PID_velocity.I"),
+            DriveParameter("pid_velocity_p", "A/(rad/s)", "motor.PID_velocity.P, with PID_velocity.D = 0"),
+            DriveParameter("pid_velocity_i", "A/rad", "motor.PID_velocity.I"),
             TORQUE_CONSTANT,
         ),
         kp=Formula("pid_velocity_p * torque_constant", lambda v: v["pid_velocity_p"] * v["torque_constant"]),
         ki=Formula("pid_velocity_i * torque_constant", lambda v: v["pid_velocity_i"] * v["torque_constant"]),
         loop='P + I/s, the integral takes the newest error (rule="backward"); where the output is limited, so is the integral. '
         "In voltage mode without the phase's resistance the output is a voltage and no torque",
-        position=(Parameter("p_angle_p", "(rad/s)/rad", "motor.P_angle.P"),),
+        position=(DriveParameter("p_angle_p", "(rad/s)/rad", "motor.P_angle.P"),),
         position_gain=Formula("p_angle_p", lambda v: v["p_angle_p"]),
         sources=(
             "https://docs.simplefoc.com/library_units",
@@ -216,10 +222,10 @@ DRIVES: dict[str, DriveRow] = {
     "vesc": DriveRow(
         title="VESC, speed control",
         velocity=(
-            Parameter("s_pid_kp", "1/(20 erpm)", "Speed PID Kp, with Kd = 0"),
-            Parameter("s_pid_ki", "1/(20 erpm s)", "Speed PID Ki"),
-            Parameter("l_current_max", "A", "Motor current max, times its scale"),
-            Parameter("pole_pairs", "1", "of the motor: erpm = rpm * pole_pairs"),
+            DriveParameter("s_pid_kp", "1/(20 erpm)", "Speed PID Kp, with Kd = 0"),
+            DriveParameter("s_pid_ki", "1/(20 erpm s)", "Speed PID Ki"),
+            DriveParameter("l_current_max", "A", "Motor current max, times its scale"),
+            DriveParameter("pole_pairs", "1", "of the motor: erpm = rpm * pole_pairs"),
             TORQUE_CONSTANT,
         ),
         kp=Formula(
@@ -272,7 +278,7 @@ def drive_row(drive: str) -> DriveRow:
 
 
 def _values(
-    drive: str, needed: tuple[Parameter, ...], given: Mapping[str, object], may_be_zero: tuple[str, ...] = ()
+    drive: str, needed: tuple[DriveParameter, ...], given: Mapping[str, object], may_be_zero: tuple[str, ...] = ()
 ) -> dict[str, float]:
     known_keys(given, f"the drive {drive!r}", [p.name for p in needed], (), ControllerError)
     missing = [f"{p.name} [{p.unit}] ({p.meaning})" for p in needed if p.name not in given]

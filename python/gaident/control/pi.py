@@ -14,7 +14,7 @@ from gaident import _core
 from gaident.arguments import NO_CONTROLLER, arg
 from gaident.checks import known_keys, one_of, real_number
 from gaident.control import core
-from gaident.control.controller import Controller, Limiting, Signals, checked_controller
+from gaident.control.controller import Controller, Limiting, LoopSignals, checked_controller
 from gaident.control.drive_parameters import kp_and_ki
 from gaident.control.filtering import rate_limited
 from gaident.control.pi_torque import pi_torque
@@ -176,6 +176,11 @@ class PI(Controller):
         return self.rule == "trapezoidal" and self.command_weight == 1.0 and self.anti_windup == "none"
 
     @property
+    def winding_up(self) -> PI:
+        """The same without an anti-windup."""
+        return replace(self, anti_windup="none", tracking_time=None)
+
+    @property
     def one_equation(self) -> bool:
         """See `Controller`."""
         return self.bare
@@ -215,16 +220,16 @@ class PI(Controller):
         """1: it runs at the log's sample time."""
         return 1
 
-    def asked(self, log: Signals) -> Vector:
+    def asked(self, log: LoopSignals) -> Vector:
         """The log's velocity command [rad/s]."""
         assert log.command is not None
         return log.command
 
-    def replayable(self, log: Signals) -> bool:
+    def replayable(self, log: LoopSignals) -> bool:
         """See `Controller`."""
         return log.command is not None
 
-    def torque_of(self, log: Signals, also: Limiting | None = None) -> Vector:
+    def torque_of(self, log: LoopSignals, also: Limiting | None = None) -> Vector:
         """See `Controller`."""
         command, limited = self.asked(log), self
         if also is not None:
@@ -237,7 +242,7 @@ class PI(Controller):
     def with_limits(self, torque: float | None, integrator: float | None) -> PI:
         """See `Controller`; without a torque limit there is nothing for an anti-windup to act at."""
         torque, integrator = (None if x is None or math.isinf(x) else x for x in (torque, integrator))
-        limited = replace(self, anti_windup="none", tracking_time=None) if torque is None else self
+        limited = self.winding_up if torque is None else self
         return replace(limited, torque_limit=torque, integrator_limit=integrator)
 
     def ticks(self, dt: float, command: Vector, position: Vector | None) -> Ticks:

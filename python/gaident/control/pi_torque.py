@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gaident.axis import say
 from gaident.control import core
-from gaident.control.controller import Gains
+from gaident.control.controller import VelocityGains
 from gaident.control.filtering import clamped_sum
 from gaident.control.unknown import known
 
@@ -21,7 +21,7 @@ __all__ = ["HOLDS", "held_torque", "pi_block", "pi_torque"]
 Vector = NDArray[np.float64]
 
 
-def pi_torque(command: Vector, velocity: Vector, dt: float, controller: Gains, initial_integral: float = 0.0) -> Vector:
+def pi_torque(command: Vector, velocity: Vector, dt: float, controller: VelocityGains, initial_integral: float = 0.0) -> Vector:
     """The torque [N m], shape (n,), that `controller` makes of command and measured velocity [rad/s], shape (n,) each.
 
     initial_integral: what the integrator held before sample 0 [N m]. Both loops of `PI` share this rule.
@@ -29,7 +29,7 @@ def pi_torque(command: Vector, velocity: Vector, dt: float, controller: Gains, i
     return pi_block(command - velocity, dt, controller, 0.0, initial_integral)[0]
 
 
-def pi_block(e: Vector, dt: float, controller: Gains, last: float, integral: float) -> tuple[Vector, float]:
+def pi_block(e: Vector, dt: float, controller: VelocityGains, last: float, integral: float) -> tuple[Vector, float]:
     """(torque, integral after it) [N m] for a block of errors [rad/s], with the last error and the integral before it."""
     known(controller)
     half = 0.5 * controller.ki * dt
@@ -51,7 +51,13 @@ HOLDS = {
 
 
 def held_torque(
-    command: Vector, velocity: Vector, dt: float, controller: Gains, rule: str, initial_integral: float = 0.0, share: float = 0.0
+    command: Vector,
+    velocity: Vector,
+    dt: float,
+    controller: VelocityGains,
+    rule: str,
+    initial_integral: float = 0.0,
+    share: float = 0.0,
 ) -> Vector:
     """`pi_torque` of a controller with a torque limit U whose integrator does not wind up there, by a rule of `HOLDS`:
 

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from gaident.data.record import CHANNELS, Record
 from gaident.data.signals.arrays import MINIMUM_SAMPLES, channel, positive_number
 from gaident.data.signals.decimation import low_passed
-from gaident.data.signals.lags import Fit, coarse_lags, refine
+from gaident.data.signals.lags import LagFit, coarse_lags, refine
 from gaident.errors import RecordError
 from gaident.estimation.criterion import gained
 from gaident.policy.table import POLICY
@@ -215,7 +215,7 @@ def _best(
     within: tuple[float, float] | None,
     max_rate: float,
     names: tuple[str, str],
-) -> Fit:
+) -> LagFit:
     """The fit of the best offset. Raises RecordError where none is, or where another one is as good."""
     starts = coarse_lags(x, dt, y, their_dt, within, max_rate)
     tried = [refine(x, dt, y, their_dt, offset, rate, _WIDER * max_rate) for offset, rate in starts]
@@ -245,7 +245,7 @@ def _result(
     theirs: dict[str, NDArray[np.float64]],
     their_dt: float,
     take: Sequence[str] | None,
-    fit: Fit,
+    fit: LagFit,
     seen: bool,
 ) -> Alignment:
     from scipy.interpolate import PchipInterpolator

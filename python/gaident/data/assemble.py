@@ -13,7 +13,7 @@ from gaident.axis import Text, say
 from gaident.data.clock import axis_of, clock_of, common_clock, part_of, second_of
 from gaident.data.column_score import LEAST, spoken_for
 from gaident.data.counters import Counters
-from gaident.data.formats.table import Column, Table
+from gaident.data.formats.table import Column, LogTable
 from gaident.data.record import CHANNELS, Record
 from gaident.data.signals.arrays import MINIMUM_SAMPLES
 from gaident.data.signals.conditioning import differentiate, low_pass
@@ -36,7 +36,7 @@ AS_THE_DRIVE = (
 )
 
 
-def assemble(table: Table, wanted: Wanted, stem: str) -> Record:
+def assemble(table: LogTable, wanted: Wanted, stem: str) -> Record:
     """The Record that `wanted` describes, from `table`; `stem` names it if the user did not.
 
     The rows come block by block, so that a log longer than memory can be decimated on its way in.
@@ -90,7 +90,7 @@ def _placed_alone(values: Mapping[str, NDArray[np.float64]]) -> bool:
     )
 
 
-def _torque_kind(table: Table, wanted: Wanted, column: Column | None) -> str:
+def _torque_kind(table: LogTable, wanted: Wanted, column: Column | None) -> str:
     """What the torque is: as the user says, else as its column's name does."""
     if wanted.torque_is is None:
         return COMMANDED if column is None else kind_of_torque((column.key, *column.names)) or COMMANDED
@@ -113,7 +113,7 @@ def _known_by_name(kind: str, wanted: Wanted) -> list[Text]:
     return [say(text)]
 
 
-def _unnamed_torque(table: Table, wanted: Wanted, named: dict[str, Column]) -> list[str]:
+def _unnamed_torque(table: LogTable, wanted: Wanted, named: dict[str, Column]) -> list[str]:
     """What to say of columns that may be the torque where none is read; nothing where the user says that there is none."""
     if "torque" in named or not ELECTRICAL.isdisjoint(named) or "torque" in (wanted.columns or {}):
         return []
@@ -133,7 +133,7 @@ def _unnamed_torque(table: Table, wanted: Wanted, named: dict[str, Column]) -> l
     ]
 
 
-def _slow_clock(table: Table, wanted: Wanted, named: dict[str, Column], dt: float) -> list[str]:
+def _slow_clock(table: LogTable, wanted: Wanted, named: dict[str, Column], dt: float) -> list[str]:
     """What to say of a time column without a unit whose steps, taken as seconds, are long ones: it may count milliseconds."""
     if wanted.dt is not None or wanted.resample is not None or "time" in wanted.units:
         return []
@@ -150,7 +150,7 @@ _Values = dict[str, NDArray[np.float64]]
 
 
 def _block_by_block(
-    table: Table, wanted: Wanted, named: dict[str, Column], scales: dict[str, float], counters: Counters
+    table: LogTable, wanted: Wanted, named: dict[str, Column], scales: dict[str, float], counters: Counters
 ) -> tuple[float, _Values]:
     """(dt [s], channel -> values in SI) of a log with one even time axis."""
     time = common_clock(table, wanted, named)
@@ -187,7 +187,7 @@ def _block_by_block(
     return dt * factor, {channel: decimator.finish() for channel, decimator in decimators.items()}
 
 
-def _stated(table: Table, named: Mapping[str, Column]) -> float:
+def _stated(table: LogTable, named: Mapping[str, Column]) -> float:
     """The sample time that the file states for these columns [s]."""
     periods = [column.period for column in named.values() if column.period is not None]
     if not periods:
@@ -196,7 +196,7 @@ def _stated(table: Table, named: Mapping[str, Column]) -> float:
 
 
 def _on_even_axis(
-    table: Table, wanted: Wanted, named: dict[str, Column], scales: dict[str, float], counters: Counters
+    table: LogTable, wanted: Wanted, named: dict[str, Column], scales: dict[str, float], counters: Counters
 ) -> tuple[float, _Values]:
     """(dt [s], channel -> values in SI), each channel interpolated from time stamps of its own."""
     assert wanted.resample is not None
@@ -221,7 +221,7 @@ def _on_even_axis(
     return dt * factor, even
 
 
-def channels_of(table: Table, wanted: Wanted) -> dict[str, Column]:
+def channels_of(table: LogTable, wanted: Wanted) -> dict[str, Column]:
     """Channel -> column, complete enough for a Record; time is not among them."""
     if len(table.columns) == 1 and wanted.measured:
         hint = "" if table.form == "DataFrame" else f"; if other columns were not recognised, give {arg('delimiter')}"
@@ -250,7 +250,7 @@ def channels_of(table: Table, wanted: Wanted) -> dict[str, Column]:
     return found
 
 
-def _say_missing(table: Table, wanted: Wanted, channel: str, what: str) -> str:
+def _say_missing(table: LogTable, wanted: Wanted, channel: str, what: str) -> str:
     guess = ", or let gaident init write down what the log shows" if wanted.columns is None and table.form != "DataFrame" else ""
     return (
         f"{table.path}: no column is named for {what}; {table.said()}; "
@@ -258,7 +258,7 @@ def _say_missing(table: Table, wanted: Wanted, channel: str, what: str) -> str:
     )
 
 
-def _scale(table: Table, wanted: Wanted, channel: str, column: Column) -> float:
+def _scale(table: LogTable, wanted: Wanted, channel: str, column: Column) -> float:
     """Factor to SI at the motor: the unit's, and the gear's where the channel was measured behind it."""
     size = si_factor(table, wanted, channel, column)
     if channel not in wanted.load_side:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from gaident.arguments import arg
-from gaident.data.formats.table import Column, Table
+from gaident.data.formats.table import Column, LogTable
 from gaident.data.timeaxis import TimeAxis, stamp_unit, time_column
 from gaident.data.wanted import Wanted, si_factor
 from gaident.errors import ReadError
@@ -15,7 +15,7 @@ from gaident.errors import ReadError
 __all__ = ["axis_of", "clock_of", "common_clock", "part_of", "second_of"]
 
 
-def clock_of(table: Table, wanted: Wanted, column: Column) -> Column | None:
+def clock_of(table: LogTable, wanted: Wanted, column: Column) -> Column | None:
     """The time column of one channel: the one named, its own, one that is called so; None: the file states its period."""
     columns = wanted.columns or {}
     address = columns.get("time")
@@ -33,7 +33,7 @@ def clock_of(table: Table, wanted: Wanted, column: Column) -> Column | None:
     return found
 
 
-def common_clock(table: Table, wanted: Wanted, named: Mapping[str, Column]) -> Column | None:
+def common_clock(table: LogTable, wanted: Wanted, named: Mapping[str, Column]) -> Column | None:
     """The column named for time; else the channels' own; else one that is called so; else None."""
     columns = wanted.columns or {}
     if "time" in columns:
@@ -63,7 +63,7 @@ def common_clock(table: Table, wanted: Wanted, named: Mapping[str, Column]) -> C
     return column
 
 
-def _refuse_two_clocks(table: Table, clocks: list[Column]) -> None:
+def _refuse_two_clocks(table: LogTable, clocks: list[Column]) -> None:
     """Raises where the channels' time columns differ: equal ones are one clock that was printed twice."""
     if len({len(clock.values) for clock in clocks}) == 1 and table.batches is None:
         first = clocks[0].whole()
@@ -76,7 +76,7 @@ def _refuse_two_clocks(table: Table, clocks: list[Column]) -> None:
     )
 
 
-def axis_of(block: Table, wanted: Wanted, time: Column | None) -> TimeAxis | None:
+def axis_of(block: LogTable, wanted: Wanted, time: Column | None) -> TimeAxis | None:
     """What checks the time column; None where there is none, or where it need not be looked at."""
     if time is None:
         return None
@@ -91,7 +91,7 @@ def axis_of(block: Table, wanted: Wanted, time: Column | None) -> TimeAxis | Non
     return None
 
 
-def second_of(block: Table, wanted: Wanted, time: Column) -> float:
+def second_of(block: LogTable, wanted: Wanted, time: Column) -> float:
     """What one unit of the time column is in s; where nothing says it, what its first value suggests."""
     if "time" in wanted.units or time.unit is not None:
         return si_factor(block, wanted, "time", time)
@@ -99,6 +99,6 @@ def second_of(block: Table, wanted: Wanted, time: Column) -> float:
     return stamp_unit(float(values[0])) if len(values) and values.dtype.kind in "iuf" else 1.0
 
 
-def part_of(block: Table, column: Column) -> Column:
+def part_of(block: LogTable, column: Column) -> Column:
     """The column's part in a block."""
     return next(part for part in block.columns if part.key == column.key)

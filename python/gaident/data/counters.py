@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.formats.table import Column, Table
+from gaident.data.formats.table import Column, LogTable
 from gaident.data.signals.wraps import Unwrapper, overflow
 from gaident.data.wanted import Wanted
 from gaident.errors import ReadError
@@ -20,12 +20,12 @@ Vector = NDArray[np.float64]
 class Counters:
     """Looks at the channels as they are read, in the log's own units."""
 
-    def __init__(self, table: Table, wanted: Wanted, named: Mapping[str, Column]) -> None:
+    def __init__(self, table: LogTable, wanted: Wanted, named: Mapping[str, Column]) -> None:
         turn = wanted.constants.counts_per_turn
         self._position = Unwrapper([] if turn is None else [turn])
         self._column = named.get("position")
 
-    def passed(self, block: Table, channel: str, values: Vector) -> Vector:
+    def passed(self, block: LogTable, channel: str, values: Vector) -> Vector:
         """The values, those of a position continued where they wrap. Raises ReadError for an integer that overflowed."""
         there = np.isfinite(values)  # cells are blank where topics have times of their own
         if not there.all():

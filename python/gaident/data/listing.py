@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.formats.delimited import TextOptions
-from gaident.data.formats.table import Column, Table
+from gaident.data.formats.table import Column, LogTable
 from gaident.data.formats.units import factor
 from gaident.data.readers import open_log
 from gaident.data.timeaxis import TimeAxis, stamp_unit, time_column
@@ -197,7 +197,7 @@ class _Gathered:
         self.irregular = ""
         self.even, self.first, self.rise = True, 0.0, 0.0  # as far as seen: rises by the same from value to value
 
-    def push(self, block: Table, column: Column) -> None:
+    def push(self, block: LogTable, column: Column) -> None:
         values = column.whole().astype(np.float64, copy=False)
         finite = values[np.isfinite(values)]
         self._look_for_time(values)
@@ -220,7 +220,7 @@ class _Gathered:
         expected = self.first + self.rise * (self.samples + np.arange(len(values)))
         self.even = self.rise > 0.0 and bool(np.all(np.abs(values - expected) <= POLICY.even_rise * self.rise))
 
-    def _pass_time(self, block: Table, values: NDArray[np.float64]) -> None:
+    def _pass_time(self, block: LogTable, values: NDArray[np.float64]) -> None:
         if not len(values):
             return
         try:
@@ -231,13 +231,13 @@ class _Gathered:
         except ReadError as error:
             self.irregular = error.fault or str(error)
 
-    def step(self, table: Table) -> float | None:
+    def step(self, table: LogTable) -> float | None:
         """The sample time of this time column [s]; None where it is irregular."""
         if self.axis is None or self.irregular or self.samples < 2:
             return None
         return self.axis.sample_time(table)
 
-    def info(self, table: Table, clock: _Gathered | None) -> ColumnInfo:
+    def info(self, table: LogTable, clock: _Gathered | None) -> ColumnInfo:
         column = self.column
         step = clock.step(table) if clock is not None and clock.is_time and clock.samples == self.samples else None
         notes = [self.bad, self.irregular if self.irregular and not self.bad else ""]

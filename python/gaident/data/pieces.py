@@ -17,7 +17,7 @@ from gaident.data.assemble import assemble, channels_of
 from gaident.data.clock import clock_of, common_clock, second_of
 from gaident.data.formats.delimited import TextOptions
 from gaident.data.formats.frames import is_frame
-from gaident.data.formats.table import Column, Table
+from gaident.data.formats.table import Column, LogTable
 from gaident.data.readers import open_log
 from gaident.data.record import Record
 from gaident.data.signals.arrays import MINIMUM_SAMPLES
@@ -140,7 +140,7 @@ def _keys(named: Mapping[str, Column]) -> dict[str, str]:
     return {channel: column.key for channel, column in named.items()}
 
 
-def _clocks(table: Table, wanted: Wanted, named: Mapping[str, Column]) -> dict[str, Column | None]:
+def _clocks(table: LogTable, wanted: Wanted, named: Mapping[str, Column]) -> dict[str, Column | None]:
     """The column with the time stamps of each channel; None: lines of one sample time."""
     if wanted.resample is not None:
         return {channel: clock_of(table, wanted, column) for channel, column in named.items()}
@@ -148,7 +148,7 @@ def _clocks(table: Table, wanted: Wanted, named: Mapping[str, Column]) -> dict[s
     return dict.fromkeys(named, common)
 
 
-def _whole(table: Table, column: Column) -> Column:
+def _whole(table: LogTable, column: Column) -> Column:
     """The column with all its values in memory."""
     if table.batches is None:
         return replace(column, values=column.whole())
@@ -158,7 +158,7 @@ def _whole(table: Table, column: Column) -> Column:
     return replace(column, values=np.concatenate([b.whole() for b in blocks]), bad=bad)
 
 
-def _stamps(table: Table, wanted: Wanted, whole: Mapping[str, Column], clock: Column | None, key: str) -> Vector:
+def _stamps(table: LogTable, wanted: Wanted, whole: Mapping[str, Column], clock: Column | None, key: str) -> Vector:
     """The time of each row [s]."""
     if clock is None or (wanted.dt is not None and wanted.columns is not None and wanted.columns.get("time", "") is None):
         step = wanted.dt or whole[key].period or 0.0
@@ -188,14 +188,14 @@ def _spans(stamps: Sequence[Vector], asked: Span, pieces: bool) -> list[Span]:
 
 
 def _part(
-    table: Table,
+    table: LogTable,
     whole: Mapping[str, Column],
     stamps: Mapping[str, Vector],
     clocks: Mapping[str, Column | None],
     named: Mapping[str, Column],
     span: Span,
     wanted: Wanted,
-) -> Table | None:
+) -> LogTable | None:
     """The rows of a span as a table of their own; None where they are too few for a record, decimated as it is wanted."""
     rows: dict[str, slice] = {}
     for channel, column in named.items():

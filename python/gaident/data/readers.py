@@ -21,7 +21,7 @@ from gaident.data.formats.frames import frame_table, is_frame, open_parquet
 from gaident.data.formats.hdf import open_hdf
 from gaident.data.formats.instruments import open_mdf, open_tdms
 from gaident.data.formats.sinumerik import open_sinumerik
-from gaident.data.formats.table import Column, Table
+from gaident.data.formats.table import Column, LogTable
 from gaident.data.formats.time_names import time_and_unit
 from gaident.data.record import Record
 from gaident.data.wanted import wanted_of
@@ -42,7 +42,7 @@ class Reader:
     name: str
     extensions: tuple[str, ...]
     begins: tuple[bytes, ...]
-    open: Callable[[str, Path, TextOptions, ExitStack], Table]
+    open: Callable[[str, Path, TextOptions, ExitStack], LogTable]
 
 
 READERS = (
@@ -272,7 +272,7 @@ def read_columns(
 
 
 @contextmanager
-def open_log(source: str | os.PathLike[str] | Any, options: TextOptions) -> Iterator[Table]:
+def open_log(source: str | os.PathLike[str] | Any, options: TextOptions) -> Iterator[LogTable]:
     """The columns of a log file or a DataFrame; what stays in the file can be read until the context ends."""
     with ExitStack() as stack:
         if is_frame(source):

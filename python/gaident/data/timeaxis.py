@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import NO_TIME, arg
-from gaident.data.formats.table import Column, Table
+from gaident.data.formats.table import Column, LogTable
 from gaident.data.formats.time_names import TIME_NAMES
 from gaident.errors import ReadError
 from gaident.policy.table import POLICY
@@ -36,7 +36,7 @@ class TimeAxis:
         self.column, self.second, self.given, self.strict = column, second, given, strict
         self.count, self.start, self.last, self.step, self.rounding = 0, 0.0, 0.0, 0.0, 0.0
 
-    def push(self, table: Table, t: NDArray[np.float64]) -> None:
+    def push(self, table: LogTable, t: NDArray[np.float64]) -> None:
         """The time stamps of the rows of `table`. Raises ReadError with line, jump and remedy."""
         if t.size == 0:
             return
@@ -53,7 +53,7 @@ class TimeAxis:
         if self.strict:
             self._check(table, whole, shift)
 
-    def sample_time(self, table: Table) -> float:
+    def sample_time(self, table: LogTable) -> float:
         """dt [s]: (t(n-1) - t(0)) / (n - 1)."""
         if self.count < 2:
             raise ReadError.at(table.path, f"time column {self.column.key!r} has {self.count} value", "give a longer log")
@@ -61,7 +61,7 @@ class TimeAxis:
         mean = (self.last - self.start) / (self.count - 1) * self.second
         return float(f"{mean:.12g}")
 
-    def _check(self, table: Table, t: NDArray[np.float64], shift: int) -> None:
+    def _check(self, table: LogTable, t: NDArray[np.float64], shift: int) -> None:
         steps = np.diff(t)
         median = float(np.median(steps))
         if median <= 0.0:
@@ -93,7 +93,7 @@ class TimeAxis:
         self.step = usual
 
 
-def _check_given(table: Table, column: Column, found: float, second: float, dt: float) -> None:
+def _check_given(table: LogTable, column: Column, found: float, second: float, dt: float) -> None:
     """Raise ReadError where the dt that the user gave [s] and the steps that were found [s] differ by more than 1 %."""
     if abs(found - dt) <= POLICY.clock_jitter * dt:
         return
@@ -124,7 +124,7 @@ def stamp_unit(first: float) -> float:
     return next((size for low, high, size in _EPOCHS if low < first < high), 1.0)
 
 
-def time_column(table: Table, strict: bool = True) -> Column | None:
+def time_column(table: LogTable, strict: bool = True) -> Column | None:
     """The column that is called as time is: in SI's language, ROS's or German. None if there is none.
 
     Two that are called time are one too many: strict, a ReadError; else None.
@@ -151,7 +151,7 @@ def _bare(name: str) -> str:
     return name.casefold().strip("%/ ")
 
 
-def _too_coarse(table: Table, column: Column, printed: float) -> None:
+def _too_coarse(table: LogTable, column: Column, printed: float) -> None:
     raise ReadError.at(
         table.path,
         f"time column {column.key!r} is printed in steps of {printed:g}, too coarse to tell the sample time",
@@ -159,7 +159,7 @@ def _too_coarse(table: Table, column: Column, printed: float) -> None:
     )
 
 
-def _refuse(table: Table, column: Column, t: NDArray[np.float64], step: int, dt: float, shift: int) -> None:
+def _refuse(table: LogTable, column: Column, t: NDArray[np.float64], step: int, dt: float, shift: int) -> None:
     usual = float(np.median(np.diff(t)))
     bridged = t[step + 1] - t[step] <= POLICY.pause * usual
     even = (

@@ -9,7 +9,7 @@ from typing import Any
 
 from gaident.arguments import arg
 from gaident.checks import one_of
-from gaident.data.formats.table import Column, Table
+from gaident.data.formats.table import Column, LogTable
 from gaident.data.formats.units import QUANTITIES, Constants, factor, is_any_unit
 from gaident.data.record import CHANNELS
 from gaident.data.signals.arrays import positive_number
@@ -110,7 +110,7 @@ def wanted_of(
     ).check()
 
 
-def si_factor(table: Table, wanted: Wanted, quantity: str, column: Column) -> float:
+def si_factor(table: LogTable, wanted: Wanted, quantity: str, column: Column) -> float:
     """Factor to SI: the user's unit before the file's."""
     if quantity in wanted.units:
         return factor(quantity, wanted.units[quantity], wanted.constants)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.arguments import arg
-from gaident.data.formats.table import Table
+from gaident.data.formats.table import LogTable
 from gaident.data.torque_kind import MEASURED
 from gaident.data.wanted import Wanted
 from gaident.data.winding import Winding
@@ -23,7 +23,7 @@ ELECTRICAL = frozenset({"voltage", "current"})
 """Columns that are no channel of a record, but make its torque."""
 
 
-def torque_of_winding(table: Table, wanted: Wanted, values: Mapping[str, Vector], dt: float) -> tuple[Vector, str, str]:
+def torque_of_winding(table: LogTable, wanted: Wanted, values: Mapping[str, Vector], dt: float) -> tuple[Vector, str, str]:
     """(torque [N m], what it is, note) from voltage [V], current [A] and velocity [rad/s]; the note is "" where nothing was
     estimated. Raises ReadError."""
     known, current, voltage = wanted.constants, values.get("current"), values.get("voltage")

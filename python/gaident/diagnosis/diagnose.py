@@ -12,6 +12,7 @@ from gaident.axis import say
 from gaident.control.controller import Controller, checked_controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
+from gaident.diagnosis.controller.as_read import outliers_of_the_log
 from gaident.diagnosis.controller.driving import Driving, driving_of
 from gaident.diagnosis.controller.form_findings import loop_of
 from gaident.diagnosis.note import Note
@@ -107,9 +108,10 @@ def diagnose(
 
     # A sum that several threads share is rounded otherwise with each number of them, and a search follows the last digit.
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
+        given, lines = outliers_of_the_log(given, checked_controller(controller))
         asked = loop_of(given, checked_controller(controller))
         driven = torque_driven(given, asked.controller)
-    kept = () if validation is None else records_of(validation, "validation")
+    kept = () if validation is None else outliers_of_the_log(records_of(validation, "validation"), asked.controller)[0]
     records, held = driven.records, torque_driven(kept, asked.controller).records if kept else ()
     checked(records, held, driven.loop, identification, bootstrap, seed, progress, axis, pitch)
     origin = {r.digest: whole for r, whole in zip((*records, *held), (*given, *kept), strict=True)}
@@ -118,6 +120,7 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.01, "replaying the controller")
         driving = driving_of(records, held, asked, driven, origin)
+        driving = replace(driving, outliers={r.digest: hit for r, hit in zip(given, lines, strict=True)})
         note(0.02, "identifying the linear model")
 
         def searched(driving: Driving, idn: Identification | None = None) -> Work:

@@ -12,7 +12,8 @@ from gaident.axis import Text, say
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.check import checked as by_second_method
-from gaident.diagnosis.controller.controller_place import as_read, controller_findings
+from gaident.diagnosis.controller.as_read import as_read
+from gaident.diagnosis.controller.controller_place import controller_findings
 from gaident.diagnosis.controller.driving import Driving
 from gaident.diagnosis.controller.joint_numbers import joint_numbers
 from gaident.diagnosis.experiments.candidates import candidates, loop_notes
@@ -87,7 +88,8 @@ class Work:
         self.notes: list[Text] = list(self.driving.logged.notes)
         if self.controller is None or self.pi is not None:
             self.notes += open_loop_notes(self.records, self.pi)
-        hit = [left_out(r, self.idn.model, self.pi) for r in self.records]
+        of_log = (self.driving.outliers_in(r) for r in self.records)
+        hit = [np.union1d(left_out(r, self.idn.model, self.pi), h) for r, h in zip(self.records, of_log, strict=True)]
         clean = [cleaned(r, h) for r, h in zip(self.records, hit, strict=True)]
         self.hit, self.clean = hit, tuple(clean)
         self.step = quantisation(self.records)
@@ -243,12 +245,18 @@ class Work:
             self.notes = said
             self.take(instead)
 
+    def _spoiled(self) -> int:
+        """Samples that stand in the log alone, or that the model that was found does not follow either."""
+        of_log = np.concatenate([np.isin(np.arange(len(r)), self.driving.outliers_in(r)) for r in self.records])
+        measured = np.concatenate([r.velocity for r in self.records])
+        error = self.objective.error(self.final) + measured - self.data.velocity
+        return int(of_log.sum()) + unexplained(measured, error, np.maximum(self.objective.weight, of_log))
+
     def report(self, seed: int) -> Diagnosis:
         """Everything the user sees."""
         self.note(0.9, "measuring the gain")
         gains, driver, causes, estimates, offset, mechanics, model, check = self.judged()
-        spoiled = unexplained(self.data.velocity, self.objective.error(self.final), self.objective.weight)
-        findings = findings_of_the_record(spoiled, sum(len(r) for r in self.records), self.step)
+        findings = findings_of_the_record(self._spoiled(), sum(len(r) for r in self.records), self.step)
         findings += [replace(f, gain=gains.of(f.effect)) for f in self.controller_steps]
         for effect in causes:
             gain, rivals = self.rivals[effect]

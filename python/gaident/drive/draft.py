@@ -72,9 +72,9 @@ def _together(drafts: Mapping[str, _Draft]) -> DriveDraft:
     fill = list(first.fill)
     channels: dict[str, str] = {}
     for name, d in drafts.items():
-        d.fill = []
+        above = len(d.fill)  # what stands in the part of all axes was written by the first
         parts += [f"[axes.{name}]", *d.of_axis(), "", *d.sections(), ""]
-        fill += [f"axes.{name}: {line}" for line in d.fill]
+        fill += [f"axes.{name}: {line}" for line in d.fill[above:]]
         channels |= {f"{name}.{channel}": column.name for channel, column in d.guess.channels.items()}
     return DriveDraft("\n".join(parts), tuple(fill), channels, None, tuple(drafts))
 

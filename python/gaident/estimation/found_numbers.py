@@ -10,10 +10,15 @@ With E the slopes of the whitened errors v over z, J over x, and P what takes ou
 
 That is the covariance of both together, of which this is the part of x. z is moved in the directions in which it is independent,
 by one deviation: what no slope shows, as a filter that is hardly known, counts as it is.
+
+z is found by steps of Gauss and Newton, after each of which x is fitted again (variable projection, Golub and Pereyra 1973):
+
+    (E P E' + s^2 C^-1) dz = -(E P v + s^2 C^-1 (z - z_0)),   the second part of each sum only where a torque showed z_0
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -26,12 +31,13 @@ from gaident.data.record import Record
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, effective_samples, gained
 from gaident.estimation.dataset import DataSet, torque_in
-from gaident.estimation.objective import LOST, Fit, Innovations, Objective
-from gaident.estimation.projection import WORST, project_out
+from gaident.estimation.noise_model import NoiseFilter
+from gaident.estimation.objective import LOST, Fit, Hypothesis, Innovations, Objective
+from gaident.estimation.projection import WORST, inverse_of, project_out
 from gaident.models.drive_torque import driven_by, torque_of
 from gaident.policy.table import POLICY
 
-__all__ = ["covariance_of_numbers", "moved", "of_controller", "refined", "variance_of", "worth"]
+__all__ = ["covariance_of_numbers", "moved", "numbers_in", "of_controller", "refined", "slopes", "variance_of", "worth"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -82,7 +88,7 @@ def of_controller(objective: Objective, fit: Fit) -> Matrix:
     if not len(seen):
         return part
     if fit.predictor.data.found is not None:
-        E = _changes(objective, fit, v)
+        E = _changes(objective, fit.hypothesis, fit.x, fit.noise, v)
         S = _answers(J[seen], E)
         part[np.ix_(seen, seen)] = S @ _spread(objective, fit, v, J, E) @ S.T
     others = [f.x - fit.x for age in fit.predictor.data.other_ages if (f := _of_age(objective, fit, age)) is not None]
@@ -94,27 +100,32 @@ def of_controller(objective: Objective, fit: Fit) -> Matrix:
 
 def covariance_of_numbers(objective: Objective, fit: Fit) -> Matrix:
     """The covariance of the numbers themselves (k, k)."""
-    found = _found(fit)
-    v, J, E = _slopes(objective, fit)
+    found = numbers_in(fit.hypothesis)
+    v, J, E = slopes(objective, fit.hypothesis, fit.x, fit.noise)
     spread = _spread(objective, fit, v, J, E)
     return np.asarray(found.moves.T @ spread @ found.moves)
 
 
-def refined(objective: Objective, fit: Fit, data: DataSet | None = None) -> Fit:
+def refined(
+    objective: Objective,
+    fit: Fit,
+    data: DataSet | None = None,
+    noise: NoiseFilter | None = None,
+    too_far: Callable[[Fit], bool] | None = None,
+) -> Fit:
     """The fit with the numbers of the controller moved to where the errors of the model, and the torque, have them.
 
-    data: other ones than those of the fit.
+    data, noise: other ones than those of the fit. too_far: whether a model is not followed, where its cost falls slowly.
     """
-    here = _under(objective, _joined(data or fit.predictor.data), fit)
+    here = _under(objective, _joined(data or fit.predictor.data), fit, noise)
     for _ in range(STEPS):
-        v, J, E = _slopes(objective, here)
-        found = _found(here)
+        v, J, E = slopes(objective, here.hypothesis, here.x, here.noise)
+        found = numbers_in(here.hypothesis)
         s2, rest = variance_of(objective, here, v), project_out(J, E)
         A, b = rest @ rest.T, rest @ v
         if found.covariance is not None:
             A, b = A + s2 * np.eye(len(A)), b + s2 * found.deviations_off
-        size = np.sqrt(np.maximum(np.diag(A), SMALLEST))
-        step = -(np.linalg.pinv(A / np.outer(size, size), rcond=1e-12, hermitian=True) @ (b / size)) / size
+        step = -inverse_of(A) @ b
         for part in (1.0, 0.3, 0.1):  # no decision: of a step
             to = moved(here.predictor.data, part * step @ found.moves)
             trial = here if to is None else _under(objective, to, here)
@@ -125,6 +136,8 @@ def refined(objective: Objective, fit: Fit, data: DataSet | None = None) -> Fit:
             break
         here = trial
         if ls.negligible(objective, fall, here.cost):
+            break
+        if too_far is not None and fall < POLICY.slow_fall * here.cost and too_far(here):
             break
     return here
 
@@ -138,14 +151,14 @@ def worth(objective: Objective, fit: Fit) -> float:
     return float(off @ off) + cost_of(len(found.moves), objective.information)
 
 
-def _under(objective: Objective, data: DataSet, fit: Fit) -> Fit:
-    """The model fitted over other data."""
-    return ls.fit(objective, fit.hypothesis.over(data), fit.x, fit.noise, POLICY.usual)
+def _under(objective: Objective, data: DataSet, fit: Fit, noise: NoiseFilter | None = None) -> Fit:
+    """The model fitted over other data; noise: another filter than that of the fit."""
+    return ls.fit(objective, fit.hypothesis.over(data), fit.x, fit.noise if noise is None else noise, POLICY.usual)
 
 
-def _found(fit: Fit) -> FoundNumbers:
-    """The numbers of a fit over data that have some."""
-    found = fit.predictor.data.found
+def numbers_in(hypothesis: Hypothesis) -> FoundNumbers:
+    """The numbers of the controller in the data of a model."""
+    found = hypothesis.predictor.data.found
     assert found is not None
     return found
 
@@ -154,27 +167,25 @@ def _cost(fit: Fit, variance: float) -> float:
     """s^2 V(x, z)."""
     if fit.cost >= WORST:
         return WORST
-    off = _found(fit).deviations_off
+    off = numbers_in(fit.hypothesis).deviations_off
     return float(fit.cost + variance * (off @ off))
 
 
-def _slopes(objective: Objective, fit: Fit) -> tuple[Vector, Matrix, Matrix]:
+def slopes(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter) -> tuple[Vector, Matrix, Matrix]:
     """(whitened errors v, their slopes J over x, their change E with each move of the controller's numbers)."""
-    v, J = objective.linearised(fit.hypothesis, fit.x, fit.noise)
-    return v, J, _changes(objective, fit, v)
+    v, J = objective.linearised(hypothesis, x, noise)
+    return v, J, _changes(objective, hypothesis, x, noise, v)
 
 
-def _changes(objective: Objective, fit: Fit, v: Vector) -> Matrix:
+def _changes(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, v: Vector) -> Matrix:
     """(m, samples): how the whitened errors change with each move of the controller's numbers."""
-    moves = _found(fit).moves
-    return np.array([_moved(objective, fit, v, by) for by in moves]).reshape(len(moves), len(v))
+    moves = numbers_in(hypothesis).moves
+    return np.array([_change(objective, hypothesis, x, noise, v, by) for by in moves]).reshape(len(moves), len(v))
 
 
 def _answers(J: Matrix, E: Matrix) -> Matrix:
     """(k, m): how the coordinates with the slopes J (k, samples) move where the errors change by E (m, samples)."""
-    sizes = np.sqrt(np.einsum("ij,ij->i", J, J))
-    unit = J / sizes[:, None]
-    return np.asarray(-(np.linalg.pinv(unit @ unit.T, rcond=1e-12, hermitian=True) @ (unit @ E.T)) / sizes[:, None])
+    return np.asarray(-inverse_of(J @ J.T) @ (J @ E.T))
 
 
 def _of_age(objective: Objective, fit: Fit, age: float) -> Fit | None:
@@ -189,29 +200,34 @@ def _of_age(objective: Objective, fit: Fit, age: float) -> Fit | None:
     return None if data.loop_follows and more > POLICY.rival_margin else other
 
 
-def _moved(objective: Objective, fit: Fit, v: Vector, by: Vector) -> Vector:
-    """How the whitened errors change where the numbers of the controller are moved, one way or the other: the larger change."""
+def _change(objective: Objective, hypothesis: Hypothesis, x: Vector, noise: NoiseFilter, v: Vector, by: Vector) -> Vector:
+    """How the whitened errors change where the numbers of the controller are moved.
+
+    By a deviation one way or the other, the larger change; by the step of a difference the first way that the numbers can go.
+    """
+    found = numbers_in(hypothesis)
     rows = [np.zeros(len(v))]
     for sign in (1.0, -1.0):
-        data = moved(fit.predictor.data, sign * by)
+        data = moved(hypothesis.predictor.data, sign * by)
         if data is None:
             continue
-        driven = fit.hypothesis.over(data)
-        E = objective.errors(driven, fit.x[None, :])
+        driven = hypothesis.over(data)
+        E = objective.errors(driven, x[None, :])
         if float(np.abs(E).max()) < LOST:
-            row = objective.whitened(E, fit.noise, objective.inertias(driven, fit.x[None, :]))[0] - v
+            row = objective.whitened(E, noise, objective.inertias(driven, x[None, :]))[0] - v
             rows.append(sign * row)
+            if found.covariance is None and np.array_equal(numbers_in(driven).at, found.at + sign * by):
+                break
     return max(rows, key=lambda row: float(row @ row))
 
 
 def _spread(objective: Objective, fit: Fit, v: Vector, J: Matrix, E: Matrix) -> Matrix:
     """M along the moves."""
-    found = _found(fit)
+    found = numbers_in(fit.hypothesis)
     if not found.joint or not len(E):
         return np.eye(len(E))
     rest = project_out(J, E)
     inner = rest @ rest.T / max(variance_of(objective, fit, v), SMALLEST)
     if found.covariance is not None:
         inner = inner + np.eye(len(E))
-    size = np.sqrt(np.maximum(np.diag(inner), SMALLEST))
-    return np.asarray(np.linalg.pinv(inner / np.outer(size, size), rcond=1e-12, hermitian=True) / np.outer(size, size))
+    return inverse_of(inner)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["orthonormal_rows", "project_out", "slopes", "sums_of_squares"]
+__all__ = ["inverse_of", "orthonormal_rows", "project_out", "slopes", "sums_of_squares"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 WORST = 1e100  # no decision: the cost of a model that diverges, which none reaches
 """The cost of a model that diverges."""
+
+RANK = 1e-12  # no decision: of the largest eigenvalue, what a Gram matrix is exact to
 
 
 def sums_of_squares(V: Matrix) -> Vector:
@@ -37,6 +39,19 @@ def project_out(J: Matrix, V: Matrix) -> Matrix:
     """Rows of V without what the rows of J can explain."""
     basis = orthonormal_rows(J)
     return np.asarray(V - (V @ basis.T) @ basis)
+
+
+def inverse_of(A: Matrix, sizes: Vector | None = None) -> Matrix:
+    """The pseudo-inverse of a Gram matrix A (k, k) of columns that have different units.
+
+    D^-1 (D^-1 A D^-1)^+ D^-1,   D = diag(sizes), None: the lengths sqrt(A_ii) of the columns
+
+    A size of 0 counts as 1.
+    """
+    lengths = np.sqrt(np.maximum(np.diag(A), 0.0)) if sizes is None else sizes
+    lengths = np.where(lengths == 0.0, 1.0, lengths)
+    scale = np.outer(lengths, lengths)
+    return np.asarray(np.linalg.pinv(A / scale, rcond=RANK, hermitian=True) / scale)
 
 
 def slopes(V: Matrix, h: Vector) -> Matrix:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from gaident.estimation.found_numbers import of_controller, variance_of
 from gaident.estimation.least_squares import fit as fitted
 from gaident.estimation.objective import Fit, Objective
+from gaident.estimation.projection import inverse_of
 from gaident.models.effects import row_of
 from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
@@ -78,9 +79,7 @@ def _at_one_point(objective: Objective, fit: Fit) -> Matrix:
     for i in moved:
         cov[i, i] = np.inf
     if seen:
-        rows = J[seen] / sizes[seen][:, None]
-        small = variance_of(objective, fit, v) * np.linalg.pinv(rows @ rows.T, rcond=1e-12, hermitian=True)
-        cov[np.ix_(seen, seen)] = small / np.outer(sizes[seen], sizes[seen])
+        cov[np.ix_(seen, seen)] = variance_of(objective, fit, v) * inverse_of(J[seen] @ J[seen].T)
     return cov
 
 

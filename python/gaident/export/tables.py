@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from math import nan
 from typing import Any
 
-from gaident.results.estimate import of_axis
+from gaident.results.diagnosis import Diagnosis
+from gaident.results.estimate import Estimate, of_axis
+from gaident.results.identification import Identification
 
 __all__ = ["diagnosis_table", "identification_table"]
 
@@ -19,10 +21,11 @@ def _pandas() -> Any:
     return pandas
 
 
-def identification_table(idn: Any) -> Any:
+def identification_table(idn: Identification) -> Any:
     """One row per parameter, those of the mechanics behind those of the model; see `Identification.to_pandas`.
 
     at_bound: of the mechanics, whether any parameter that they follow from sits at a bound of its search range.
+    of_controller: 0, as the deviations of an identification are those under the controller that it uses.
     """
     rows = [{"of": "model", "parameter": name, **asdict(e)} for name, e in idn.parameters.items()]
     drive = idn.mechanics
@@ -30,13 +33,12 @@ def identification_table(idn: Any) -> Any:
         bound = any(e.at_bound for e in idn.parameters.values())  # it follows from all of them
         for name, unit in drive.UNITS.items():
             value, std = getattr(drive, name), drive.std.get(name, nan)
-            estimate = {"value": value, "std": std, "unit": unit, "at_bound": bound, "identifiable": std < abs(value)}
-            rows.append({"of": "mechanics", "parameter": name, **estimate})
-    columns = ["of", "parameter", "value", "std", "unit", "at_bound", "identifiable"]
+            rows.append({"of": "mechanics", "parameter": name, **asdict(Estimate(value, std, unit, bound, std < abs(value)))})
+    columns = ["of", "parameter", *(f.name for f in fields(Estimate))]
     return _pandas().DataFrame(rows, columns=columns).set_index(["of", "parameter"])
 
 
-def diagnosis_table(dia: Any) -> Any:
+def diagnosis_table(dia: Diagnosis) -> Any:
     """One row per parameter of each finding; see `Diagnosis.to_pandas`."""
     rows = []
     for order, finding in enumerate(dia.findings, 1):
@@ -59,6 +61,6 @@ def diagnosis_table(dia: Any) -> Any:
                     "evidence": finding.evidence,
                 }
             )
-    columns = [*("order", "effect", "parameter", "value", "std", "unit", "at_bound", "identifiable", "named", "alternatives"),
+    columns = [*("order", "effect", "parameter"), *(f.name for f in fields(Estimate)), *("named", "alternatives"),
                *("gain", "delta_bic", "p_value", "is_noise", "place", "sides", "evidence")]  # fmt: skip
     return _pandas().DataFrame(rows, columns=columns).set_index(["effect", "parameter"])

@@ -77,7 +77,7 @@ def plateau_of(size: Vector) -> float:
 
 
 def unlimited(pi: PI) -> PI:
-    return replace(pi, torque_limit=None, integrator_limit=None, anti_windup="none", tracking_time=None)
+    return replace(pi.winding_up, torque_limit=None, integrator_limit=None)
 
 
 def numbered(parts: Sequence[NDArray[np.intp]]) -> NDArray[np.intp]:

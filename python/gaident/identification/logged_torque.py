@@ -6,6 +6,9 @@ What the velocity did between the lines is lost: d is compared with what other i
     a straight line instead of a cubic spline, and that spline with white noise between the lines, as large as that at the lines,
 
 which the integrator adds up: all three without their correlation from line to line, rho (Cochrane and Orcutt 1949).
+An anti-windup at a limit decides at samples between the lines, too, whether the integral moves. So the integral behind a limit is
+open by what it moves in a line where the torque comes to its limit, and in one where it leaves it, 2 ki dt |e|, and what is
+compared lies between limits.
 
 Where it does not follow, one number of the controller at a time is estimated from the same signals, as one that is not known
 (`corrected`). Identification and diagnosis use what comes out. No plant is involved.
@@ -73,7 +76,7 @@ def comparable(rec: Record, controller: Controller) -> bool:
 def _off(rec: Record, controller: Controller) -> float:
     """Rms of logged minus made torque [N m], where that is more than the velocity between the lines can make; or 0."""
     cascade = cascade_of(controller)
-    log = log_of(rec, len(rec), cascade, whole=True)
+    log = log_of(rec, len(rec), cascade, whole=cascade.velocity.anti_windup == "none")
     made = log.made(cascade)
     left = log.torque - made
     others = [one.made(cascade, straight) - made for one, straight in _others(log, rec)]
@@ -90,7 +93,24 @@ def _off(rec: Record, controller: Controller) -> float:
         rms(left, rho) <= max(POLICY.interpolation * possible, POLICY.undecided_ratio * measured)
         or off <= POLICY.negligible * size
     )
-    return 0.0 if follows else off
+    return (
+        0.0
+        if follows and _as_before_a_limit(log, cascade.asked(rec) - rec.velocity, cascade, left, POLICY.interpolation * possible)
+        else off
+    )
+
+
+def _as_before_a_limit(log: Log, error: Vector, cascade: Cascade, left: Vector, possible: float) -> bool:
+    """Whether what is left (n,) [N m] behind each limit is what it was before, but for what the integral moves at its ends.
+
+    error: what the integrator reads at the lines [rad/s].
+    """
+    before = np.flatnonzero((log.stretch[:-1] >= 0) & (log.stretch[1:] < 0))
+    after = np.flatnonzero((log.stretch[:-1] < 0) & (log.stretch[1:] >= 0)) + 1
+    pairs = list(zip(before, after[after > before.min(initial=len(left))], strict=False))  # the last limit may have no end
+    ki = cascade.velocity.ki or 0.0
+    open_by = [2.0 * ki * log.dt * float(np.abs(error[a : b + 1]).max()) for a, b in pairs]
+    return all(abs(left[b] - left[a]) <= by + possible for (a, b), by in zip(pairs, open_by, strict=True))
 
 
 def noise_between(rec: Record, count: int, every: int) -> Vector:

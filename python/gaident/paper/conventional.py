@@ -17,10 +17,10 @@ from gaident.models.discrete import Discrete
 from gaident.models.mechanics import Mechanics, mechanics_from_model
 from gaident.paper.experiment import rig_of
 from gaident.paper.facts import STEP, Mechanism
-from gaident.paper.rig import NO_FRICTION, Friction, Rig, Run, side_by_side
+from gaident.paper.rig import NO_FRICTION, Friction, Rig, RigRun, side_by_side
 from gaident.results.settings import Settings
 
-__all__ = ["METHODS", "Comparison", "Method", "compare"]
+__all__ = ["METHODS", "MethodComparison", "Method", "compare"]
 
 Vector = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class Method:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class MethodComparison:
     """One mechanism, with or without friction in the rig. truth: alpha, beta of the rig's linear part; mechanics likewise."""
 
     mechanism: Mechanism
@@ -75,15 +75,17 @@ class Comparison:
         return next(m for m in self.methods if m.key == key)
 
 
-def compare(mechanism: Mechanism, frictions: Sequence[Friction], seeds: int, seed: int, workers: int | None) -> list[Comparison]:
+def compare(
+    mechanism: Mechanism, frictions: Sequence[Friction], seeds: int, seed: int, workers: int | None
+) -> list[MethodComparison]:
     """The methods with each friction in the rig. Every rig runs with the same noise seeds, all side by side."""
     command, title = m_sequence(REGISTER, AMPLITUDE, HOLD), f"M-sequence, {mechanism.title}"
     rigs = [rig_of(mechanism, friction) for friction in frictions]
-    records = side_by_side([Run(rig, command, seed + k, title) for rig in rigs for k in range(seeds)])
+    records = side_by_side([RigRun(rig, command, seed + k, title) for rig in rigs for k in range(seeds)])
     return [_compared(mechanism, rig, records[i * seeds : (i + 1) * seeds], seed, workers) for i, rig in enumerate(rigs)]
 
 
-def _compared(mechanism: Mechanism, rig: Rig, records: Sequence[Record], seed: int, workers: int | None) -> Comparison:
+def _compared(mechanism: Mechanism, rig: Rig, records: Sequence[Record], seed: int, workers: int | None) -> MethodComparison:
     """All methods on the same records of the rig."""
     controller, model = rig.controller, mechanism.sheet.model()
     settings = Settings(initial_state="rest")
@@ -115,7 +117,7 @@ def _compared(mechanism: Mechanism, rig: Rig, records: Sequence[Record], seed: i
         return Method(key, np.array(rows), np.array(values), sum(m is not None and m.physical for m in known))
 
     truth = model.discrete(rig.dt, controller)
-    return Comparison(
+    return MethodComparison(
         mechanism,
         rig.friction,
         np.r_[truth.alpha, truth.beta],
@@ -125,7 +127,9 @@ def _compared(mechanism: Mechanism, rig: Rig, records: Sequence[Record], seed: i
     )
 
 
-def both(mechanism: Mechanism, friction: Friction, seeds: int, seed: int, workers: int | None) -> tuple[Comparison, Comparison]:
+def both(
+    mechanism: Mechanism, friction: Friction, seeds: int, seed: int, workers: int | None
+) -> tuple[MethodComparison, MethodComparison]:
     """(without friction: what noise alone does, with friction: what the linear form does)."""
     without, with_ = compare(mechanism, (NO_FRICTION, friction), seeds, seed, workers)
     return without, with_

@@ -19,7 +19,7 @@ from gaident.identification.identify import identify
 from gaident.models.search_space import SearchSpace
 from gaident.models.simulate import simulate
 from gaident.paper.facts import DT, ERROR_WEIGHT, ORDER_WEIGHT, SAMPLES, STEP, Mechanism
-from gaident.paper.rig import Friction, Rig, Run, side_by_side
+from gaident.paper.rig import Friction, Rig, RigRun, side_by_side
 from gaident.results.identification import Identification
 from gaident.results.settings import Settings
 
@@ -96,8 +96,8 @@ def step_test(mechanism: Mechanism, trials: int, seed: int, workers: int | None,
     scaled = replace(rig, controller=mechanism.scaled_controller("sampled"))
     rec, other = side_by_side(
         [
-            Run(rig, command, seed, f"step, {mechanism.title}"),
-            Run(scaled, command, seed, f"step with the loop gain of Table V, {mechanism.title}"),
+            RigRun(rig, command, seed, f"step, {mechanism.title}"),
+            RigRun(scaled, command, seed, f"step with the loop gain of Table V, {mechanism.title}"),
         ]
     )
     model = mechanism.sheet.model()

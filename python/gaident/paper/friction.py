@@ -11,7 +11,7 @@ from gaident.diagnosis.diagnose import diagnose
 from gaident.models.mechanics import Mechanics, mechanics_from_model
 from gaident.paper.experiment import rig_of
 from gaident.paper.facts import SAMPLES, STEP, Mechanism
-from gaident.paper.rig import Friction, Run, side_by_side
+from gaident.paper.rig import Friction, RigRun, side_by_side
 from gaident.results.diagnosis import Diagnosis
 
 __all__ = ["FrictionTest", "friction_test"]
@@ -45,8 +45,8 @@ def friction_test(mechanism: Mechanism, step: Record, seed: int) -> FrictionTest
     rig = rig_of(mechanism)
     reversals, others = side_by_side(
         [
-            Run(rig, np.repeat(LEVELS, SAMPLES), seed + 1, f"reversals, {mechanism.title}"),
-            Run(rig, np.repeat(OTHER_LEVELS, SAMPLES), seed + 2, f"other reversals, {mechanism.title}"),
+            RigRun(rig, np.repeat(LEVELS, SAMPLES), seed + 1, f"reversals, {mechanism.title}"),
+            RigRun(rig, np.repeat(OTHER_LEVELS, SAMPLES), seed + 2, f"other reversals, {mechanism.title}"),
         ]
     )
     alone = diagnose(step, rig.controller, seed=seed)

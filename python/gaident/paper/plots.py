@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.record import Record
-from gaident.paper.conventional import Comparison
+from gaident.paper.conventional import MethodComparison
 from gaident.paper.experiment import StepTest
 from gaident.show.draw import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, line, new_figure, tidy
 
@@ -128,7 +128,7 @@ def plot_friction(rec: Record, linear: Vector, extended: Vector, law: tuple[Vect
     return fig
 
 
-def plot_bias(comparisons: Sequence[Comparison], titles: Sequence[str]) -> Figure:
+def plot_bias(comparisons: Sequence[MethodComparison], titles: Sequence[str]) -> Figure:
     """Deviation of the mechanical parameters from the truth [%], by method: mean over the seeds, bars of two spreads."""
     fig = new_figure(9.0, 3.4)
     axes = fig.subplots(1, len(comparisons), sharey=True, squeeze=False)[0]

@@ -13,7 +13,7 @@ import numpy as np
 from gaident.errors import SettingsError
 from gaident.models.mechanics import Mechanics
 from gaident.paper.checks import IdentifiedMechanics, NominalCheck, TableV, identified_mechanics, nominal_check, table_v
-from gaident.paper.conventional import Comparison, both
+from gaident.paper.conventional import MethodComparison, both
 from gaident.paper.experiment import FRICTION, Engine, StepTest, step_test
 from gaident.paper.facts import MECHANISMS, TRIALS, Mechanism
 from gaident.paper.friction import FrictionTest, friction_test
@@ -34,7 +34,7 @@ class Part:
     identified: IdentifiedMechanics
     table_v: TableV
     step: StepTest
-    comparisons: tuple[Comparison, Comparison]
+    comparisons: tuple[MethodComparison, MethodComparison]
     friction: FrictionTest
 
 

@@ -23,7 +23,7 @@ from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.models.mechanics import OneMass, TwoMass
 
-__all__ = ["Friction", "Rig", "Run", "integrate", "side_by_side"]
+__all__ = ["Friction", "Rig", "RigRun", "integrate", "side_by_side"]
 
 Vector = NDArray[np.float64]
 SUBSTEPS = 20
@@ -62,7 +62,7 @@ class Rig:
 
     def records(self, command: Vector, seeds: Sequence[int], name: str = "") -> list[Record]:
         """One run from rest per seed of the noise."""
-        return side_by_side([Run(self, command, seed, name) for seed in seeds])
+        return side_by_side([RigRun(self, command, seed, name) for seed in seeds])
 
     def _constants(self) -> tuple[float, float, float, float, float]:
         """(J_M, D_M, J_L, D_L, K_G); without a load arm the load is there but not coupled."""
@@ -72,7 +72,7 @@ class Rig:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class RigRun:
     """One run of a rig from rest."""
 
     rig: Rig
@@ -81,7 +81,7 @@ class Run:
     name: str = ""
 
 
-def side_by_side(runs: Sequence[Run]) -> list[Record]:
+def side_by_side(runs: Sequence[RigRun]) -> list[Record]:
     """The record of each run, all integrated at once; their commands have the same length."""
     noise = np.column_stack([r.rig.noise * np.random.default_rng(r.seed).standard_normal(len(r.command)) for r in runs])
     velocity, torque = integrate([r.rig for r in runs], np.column_stack([r.command for r in runs]), noise)

@@ -49,7 +49,7 @@ from gaident.policy.declared import (
     record,
 )
 
-__all__ = ["POLICY", "Policy", "Row", "rows"]
+__all__ = ["POLICY", "Policy", "PolicyRow", "rows"]
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,9 @@ class Policy:
         "least part that a cause explains of what a free function does; drag by friction 0.87, a joint's friction 0.946",
         DRIVES,
     )
-    class_stands: float = cause(0.5, "1", "the same for effects that no record tells apart: HSM150 in one direction", SHORT_MOVES)
+    class_stands: float = cause(
+        0.5, "1", "the same for effects that no record tells apart, of which each alone explains less", SHORT_MOVES
+    )
     jump_deviations: float = cause(
         4.0,
         "1",
@@ -369,7 +371,7 @@ class Policy:
     draws: int = effort(200, "1", "of the bootstrap of an interval")
 
 
-class Row(NamedTuple):
+class PolicyRow(NamedTuple):
     """One number of the policy."""
 
     name: str
@@ -381,13 +383,13 @@ class Row(NamedTuple):
     group: str
 
 
-def rows() -> tuple[Row, ...]:
+def rows() -> tuple[PolicyRow, ...]:
     """The whole table. What decides is measured by a command: its calibration, or else `python bench/policy.py` and its name."""
     found = []
     for f in fields(Policy):
         told = f.metadata
         command = told["command"] or (f"python bench/policy.py {f.name}" if told["cases"] else "")
-        found.append(Row(f.name, f.default, told["unit"], told["source"], told["cases"], command, told["group"]))  # type: ignore[arg-type]
+        found.append(PolicyRow(f.name, f.default, told["unit"], told["source"], told["cases"], command, told["group"]))  # type: ignore[arg-type]
     return tuple(found)
 
 

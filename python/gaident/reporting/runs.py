@@ -23,14 +23,14 @@ from gaident.models.model import Model
 from gaident.models.simulate import run
 from gaident.results.diagnosis import Diagnosis
 from gaident.results.identification import Identification
-from gaident.show.report.views import Run
+from gaident.show.report.views import RecordView
 
 __all__ = ["run_of"]
 
 Vector = NDArray[np.float64]
 
 
-def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
+def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
     """One record and what the models make of it."""
     loop = bare_pi(result.controller)
     linear: Model = result.model.linear if isinstance(result, Diagnosis) else result.model
@@ -59,7 +59,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> Run:
         dhat, std = missing.dhat, float(np.median(missing.std))
     except GaidentError as error:
         notes.append(say("The missing {torque} cannot be worked out: {}", message_of(error)))
-    return Run(
+    return RecordView(
         name=rec.name,
         digest=digest,
         used=used,

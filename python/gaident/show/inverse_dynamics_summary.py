@@ -3,63 +3,15 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
-from typing import Protocol
 
 from gaident.axis import identifier_words, said, velocity_unit, word
-from gaident.results.estimate import Estimate
+from gaident.results.inverse_dynamics import InverseDynamics
 from gaident.show.wording import WIDTH, number, table, with_std
 
 __all__ = ["inverse_dynamics_summary"]
 
 
-class Regression(Protocol):
-    """What is shown of an `InverseDynamics`, which stands in a higher room."""
-
-    @property
-    def parameters(self) -> Mapping[str, Estimate]: ...
-
-    @property
-    def axis(self) -> str: ...
-
-    @property
-    def cutoff_hz(self) -> float: ...
-
-    @property
-    def order(self) -> int: ...
-
-    @property
-    def decimation(self) -> int: ...
-
-    @property
-    def slowest(self) -> float: ...
-
-    @property
-    def samples(self) -> int: ...
-
-    @property
-    def effective_samples(self) -> float: ...
-
-    @property
-    def noise_share(self) -> float: ...
-
-    @property
-    def force_error(self) -> float: ...
-
-    @property
-    def force_error_held_out(self) -> float: ...
-
-    @property
-    def held_out(self) -> str: ...
-
-    @property
-    def rivals(self) -> tuple[tuple[tuple[str, ...], float], ...]: ...
-
-    @property
-    def not_tried(self) -> tuple[str, ...]: ...
-
-
-def inverse_dynamics_summary(found: Regression) -> str:
+def inverse_dynamics_summary(found: InverseDynamics) -> str:
     """Parameters, errors, filter, rivals and what was not tried."""
     sections = [_parameters(found), _errors(found), _method(found), _choice(found)]
     return "\n\n".join("\n".join(lines) for lines in sections if lines)
@@ -69,7 +21,7 @@ def _wrapped(text: str, axis: str) -> list[str]:
     return textwrap.wrap(said(text, axis), WIDTH, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
 
 
-def _parameters(found: Regression) -> list[str]:
+def _parameters(found: InverseDynamics) -> list[str]:
     rows = [
         (
             identifier_words(name, found.axis),
@@ -82,14 +34,14 @@ def _parameters(found: Regression) -> list[str]:
     return ["Inverse-dynamics regression", *table(rows)]
 
 
-def _errors(found: Regression) -> list[str]:
+def _errors(found: InverseDynamics) -> list[str]:
     rows = [("in-sample", f"{number(100.0 * found.force_error, 3)} %")]
     held_out = number(100.0 * found.force_error_held_out, 3)
     rows.append((f"on {found.held_out}", "" if held_out == "-" else f"{held_out} %"))
     return [f"Relative {word('torque', found.axis)} error", *table(rows)]
 
 
-def _method(found: Regression) -> list[str]:
+def _method(found: InverseDynamics) -> list[str]:
     slowest = f"{number(found.slowest, 2)} {velocity_unit(found.axis)}"
     still = (
         f"Samples up to {slowest} are standstill and left out." if found.slowest > 0.0 else "No sample is left out as standstill."
@@ -102,7 +54,7 @@ def _method(found: Regression) -> list[str]:
     return ["How", *_wrapped(text, found.axis)]
 
 
-def _choice(found: Regression) -> list[str]:
+def _choice(found: InverseDynamics) -> list[str]:
     lines = []
     for terms, worse in found.rivals:
         listed = ", ".join(identifier_words(name, found.axis) for name in terms)

@@ -79,7 +79,7 @@ def test_a_forgotten_sample_time_of_the_controller_is_found() -> None:
     """The whole cascade, every fourth sample of which was logged, and nobody said so."""
     shown = period_shown([log()], replace(TRUE, period=None))
     assert shown is not None and shown.controller == TRUE
-    assert "samples 4 times for each line" in shown.note
+    assert "samples about 4 times for each line" in shown.note
     assert period_shown([log()], TRUE) is None is period_shown([log()], None)
     assert period_shown([log()], replace(TWO_WRONG, period=None)) is None  # another number is wrong: no clock mends that
     dia = ga.diagnose(log(), replace(TRUE, period=None))

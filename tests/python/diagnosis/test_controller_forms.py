@@ -191,6 +191,19 @@ def test_an_anti_windup_that_was_not_given_is_found_at_a_given_limit(windup: str
         assert any("anti-windup 'hold'" in str(note) for note in loop.notes) == (windup == "hold")
 
 
+@pytest.mark.parametrize(("windup", "said"), [("none", "without its anti-windup"), ("hold", "the integrator is held")])
+@pytest.mark.parametrize("timed", [True, False])
+def test_another_anti_windup_than_the_given_one_is_found_at_a_given_limit(windup: str, said: str, timed: bool) -> None:
+    wrong = ga.PI(KP, KI, torque_limit=0.6, anti_windup="tracking", tracking_time=5e-3)
+    true = ga.Cascade(ga.PI(KP, KI, torque_limit=0.6, anti_windup=windup), T)
+    rec = slower(noise=0.005, torque_limit=0.6, windup=windup)
+    assert limited([rec], ga.Cascade(wrong, T)).controller == true
+    dia = ga.diagnose(rec, controller=ga.Cascade(wrong, T) if timed else wrong)
+    assert (dia.verdict, dia.findings, dia.controller) == ("adequate", (), true)
+    notes = " ".join(map(str, dia.notes))
+    assert said in notes and "torque saturation" not in notes
+
+
 def test_a_slower_log_whose_torque_no_form_makes_names_none() -> None:
     rec = slower()
     assert rec.torque is not None
@@ -324,5 +337,5 @@ def test_a_form_shows_the_sample_time_that_nobody_gave(every: int) -> None:
         at_its_rate = loop_of([log(torque_filters=[dip()])], GIVEN)
     assert [f.effect for f in loop.findings] == ["torque_filter"]
     assert isinstance(loop.controller, ga.Cascade) and loop.controller.period == pytest.approx(T)
-    assert f"samples {every} times for each line" in loop.period_notes[0]
+    assert f"samples about {every} times for each line" in loop.period_notes[0]
     assert at_its_rate.period_notes == () and at_its_rate.controller == GIVEN

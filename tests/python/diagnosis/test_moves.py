@@ -76,6 +76,7 @@ LEVEL = toy("level", [(0.5,)], family="friction", levels=True)
 GENERAL = toy("general", [(0.5, 0.3)], family="friction", levels=True, nested=("level",), neutral=lambda level, s: (level, 0.0))
 DEEP = toy("deep", [(0.5, 0.3, 0.1)], family="friction", levels=True, nested=("level", "general"))
 GAP = toy("gap", [(0.5,)], place="coupling", excludes=frozenset({"resonance"}))
+IMPACTS = replace(GAP, multimodal=True)
 RESONANCE = toy("resonance", [(60.0, 0.1, 50.0, 0.1)], place="plant", resonates=True, excludes=frozenset({"gap"}))
 RESONANCE = replace(RESONANCE, limits=lambda s: [(1.0, 500.0), (0.0, 2.0)] * 2, steps=lambda s: (5.0, 0.1) * 2)
 LIMIT = toy("limit", [(0.5,)], place="controller", limiting=lambda p: Limiting())
@@ -127,6 +128,17 @@ class Toy:
 
     def torque_response(self, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
         return np.zeros_like(torques)
+
+
+@dataclass(frozen=True)
+class HalfFollowed(Toy):
+    """A loop that follows half of the drift, where `CorrectedLoop` may be used."""
+
+    closed: bool = True
+    possible = staticmethod(prediction.CorrectedLoop.possible)
+
+    def velocities(self, parameters: Parameterisation, X: Matrix) -> Matrix:
+        return super().velocities(parameters, X) - 0.5 * DRIFT
 
 
 @pytest.fixture(autouse=True)
@@ -668,6 +680,33 @@ def test_valleys_are_searched_beside_a_linear_model() -> None:
     (found,) = bench.space.valleys(bench.fit())
     assert found.effects == ("valley",) and found.x[-1] == pytest.approx(0.52, abs=2e-3)
     assert replace(bench.space, allowed=(A, B)).valleys(bench.fit()) == []
+
+
+def half_drifting(term: Term, age: float = 0.0, plain: bool = False) -> Fit:
+    """A model of two masses in its loop, over a record with half of the drift, under the predictor that says most."""
+    bench = Bench({"gap": (0.4,)}, masses=2, extra=0.5 * DRIFT, loop=True, plain=plain)
+    data = bench.data.aged(age)
+    space = replace(bench.space, objective=replace(bench.space.objective, data=data))
+    return space.under_best_predictor(space.refitted(bench.fit(term, closed=True).hypothesis.over(data), np.ones(7)))
+
+
+def test_a_gap_is_also_fitted_where_a_share_of_the_controller_holds_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model_space, "CorrectedLoop", HalfFollowed)
+    best = half_drifting(IMPACTS)
+    assert isinstance(best.predictor, HalfFollowed)
+    assert best.x[-1] == pytest.approx(0.4, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("term", "age", "plain"),
+    [(IMPACTS, 0.5, False), (GAP, 0.0, False), (IMPACTS, 0.0, True)],
+    ids=["the velocity is older than the controller's", "no impacts", "output errors"],
+)
+def test_elsewhere_no_share_of_the_controller_holds_a_model(
+    monkeypatch: pytest.MonkeyPatch, term: Term, age: float, plain: bool
+) -> None:
+    monkeypatch.setattr(model_space, "CorrectedLoop", HalfFollowed)
+    assert type(half_drifting(term, age=age, plain=plain).predictor) is Toy
 
 
 # The bootstrap.

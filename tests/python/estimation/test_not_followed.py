@@ -118,10 +118,12 @@ class Searches:
     plain: tuple[int, float]
     older: dict[int, tuple[int, float]]
     asked: list[tuple[bool, int]] = field(default_factory=list)
+    ages: list[tuple[float, tuple[float, ...]]] = field(default_factory=list)
 
     def __call__(self, objective: Objective, most: int) -> Any:
         aged = objective.data.age > 0.0
         self.asked.append((aged, most))
+        self.ages.append((objective.data.age, objective.data.other_ages))
         effects, score = self.older[most] if aged else self.plain
         parameters = SimpleNamespace(terms=[SimpleNamespace(in_series=True)] * effects)
         final = SimpleNamespace(effects=("lag",) * effects, parameters=parameters, score=score)
@@ -143,3 +145,22 @@ def test_a_search_with_an_encoders_age_is_made_whole_only_where_fewer_effects_ma
         found, notes = sensor_age.searched(objective, scales, model, search)
         assert search.asked == [(False, 4), (True, 0), *[(True, 4)] * whole]
         assert bool(notes) is taken and len(found.final.effects) == (0 if taken else 1)
+
+
+@pytest.mark.parametrize(("logged", "follows", "every"), [(True, False, 1), (True, True, 1), (False, False, 1), (True, False, 2)])
+def test_a_logged_torque_that_does_not_follow_from_its_controller_may_go_on_between_the_lines(
+    monkeypatch: pytest.MonkeyPatch, logged: bool, follows: bool, every: int
+) -> None:
+    """Half a line ahead of its velocity is then an age that each search counts beside its own; else it is none."""
+    _, objective, _ = setting(1.0)
+    data = objective.data
+    read = tuple(r.with_channels(torque=r.velocity if logged else None) for r in data.records)
+    period = ga.Cascade(GAINS, period=DT / every) if every > 1 else GAINS
+    data = replace(data, read=read, controller=period, loop_follows=follows)
+    for name, found in (("_ahead", None), ("encoder_lines", 0), ("encoder_step", 0.01), ("_score_beside", 9.0)):
+        monkeypatch.setattr(sensor_age, name, lambda *arguments, found=found: found)
+    search = Searches((1, 0.0), {0: (0, 5.0)})
+    model = ga.OneMass(J=3e-4, D=2e-3).model()
+    sensor_age.searched(Objective(data, objective.weight), scales_of(objective.data), model, search)
+    ahead = (-0.5,) if logged and not follows and every == 1 else ()
+    assert search.ages == [(0.0, ahead), (0.5 / every, (0.0, *ahead))]

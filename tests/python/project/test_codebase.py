@@ -330,6 +330,12 @@ def test_files_stay_readable() -> None:
     assert not long, f"over 400 lines: {long}"
 
 
+def test_one_class_has_one_name() -> None:
+    trees = [ast.parse(f.read_text()) for f in sources(PACKAGE, ".py")]
+    named = Counter(node.name for tree in trees for node in tree.body if isinstance(node, ast.ClassDef))
+    assert not {name for name, count in named.items() if count > 1}
+
+
 def test_pages_that_are_cited_are_there() -> None:
     """A page's name with its folder, or that of a page at the top or beside the file; no page that only its author has."""
     page = re.compile(r"(?<![\w/.*-])((?:[\w.-]+/)*[\w-]+\.md)\b")

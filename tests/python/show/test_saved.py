@@ -144,10 +144,16 @@ def test_tables(diagnosis: ga.Diagnosis, monkeypatch: pytest.MonkeyPatch) -> Non
     assert not table["at_bound"].any()
     held = replace(idn, parameters={**idn.parameters, "gain": replace(gain, at_bound=True)})
     assert held.to_pandas().loc["mechanics", "at_bound"].all()  # what follows from a bound is no better
-    found = diagnosis.to_pandas()
     finding = diagnosis.causes[0]
+    torque = replace(finding.parameters["torque"], of_controller=0.5 * finding.parameters["torque"].std)
+    finding = replace(finding, parameters={**finding.parameters, "torque": torque})
+    diagnosis = replace(diagnosis, findings=tuple(finding if f.effect == finding.effect else f for f in diagnosis.findings))
+    found = diagnosis.to_pandas()
+    told = {"value", "std", "unit", "at_bound", "identifiable", "of_controller"}
+    assert told <= set(found.columns) and set(table.columns) == told
     row = found.loc[(finding.effect, "torque")]
-    assert row["value"] == finding.parameters["torque"].value and row["unit"] == "N m" and row["order"] == 1
+    assert row["value"] == torque.value and row["unit"] == "N m" and row["order"] == 1
+    assert row["of_controller"] == torque.of_controller
     assert len(found) == sum(len(f.parameters) for f in diagnosis.findings) and row["evidence"] == finding.evidence
     monkeypatch.setitem(sys.modules, "pandas", None)
     for result in (idn, diagnosis):

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from gaident.data.formats.mat import DamagedError, variables
 from gaident.data.formats.stored import Matrix, array_table
-from gaident.data.formats.table import Stored, Table, first_line
+from gaident.data.formats.table import LogTable, Stored, first_line
 from gaident.errors import ReadError
 
 __all__ = ["read_mat", "read_npz"]
 
 
-def read_mat(path: str, raw: bytes) -> Table:
+def read_mat(path: str, raw: bytes) -> LogTable:
     """Numeric variables of a MAT file of version 5 or 4; fields of a 1 x 1 struct are named `log.speed`."""
     try:
         content = variables(raw)
@@ -37,7 +37,7 @@ def read_mat(path: str, raw: bytes) -> Table:
     return array_table(path, arrays, others)
 
 
-def read_npz(path: str, raw: bytes) -> Table:
+def read_npz(path: str, raw: bytes) -> LogTable:
     """Numeric arrays of an NPZ file; nothing pickled is ever loaded."""
     arrays: dict[str, NDArray[Any] | Stored | Matrix] = {}
     others: list[str] = []

@@ -15,7 +15,7 @@ from gaident.data.formats.cells import ROWS, numbers_of
 from gaident.data.formats.dialect import Dialect, detect
 from gaident.data.formats.exports import END_MARK, refined, scope_layout
 from gaident.data.formats.header import COMMENT, Header, find_header
-from gaident.data.formats.table import Column, Table, first_line
+from gaident.data.formats.table import Column, LogTable, first_line
 from gaident.data.formats.text import Line, check_text, encoding_of, lines_of
 from gaident.errors import ReadError
 
@@ -75,7 +75,7 @@ class _Layout:
         """Lines that end with a separator have a last column of nothing."""
         return self.dialect.empty and self.header.headings[-1].key == f"#{self.dialect.width - 1}"
 
-    def table(self, path: str, numbers: Sequence[int], body: Sequence[str]) -> Table:
+    def table(self, path: str, numbers: Sequence[int], body: Sequence[str]) -> LogTable:
         """The columns of these rows; `numbers`: their line numbers."""
         values, bad = numbers_of(path, numbers, body, self.dialect, self.trailing)
         headings = self.header.headings[: self.dialect.width - self.trailing]
@@ -84,10 +84,10 @@ class _Layout:
             columns = _without_tail(columns)
         cells = self.dialect.width - self.trailing
         unused = f"the header has {self.header.unused} names, the rows have {cells} cells" if self.header.unused else ""
-        return Table(path, tuple(columns), lines=numbers, form="text", remark=unused)
+        return LogTable(path, tuple(columns), lines=numbers, form="text", remark=unused)
 
 
-def open_text(path: str, file: Path, options: TextOptions) -> Table:
+def open_text(path: str, file: Path, options: TextOptions) -> LogTable:
     """The table in a text file, whatever its dialect; a long one is read when its blocks are asked for.
 
     Raises ReadError with the line and the remedy.
@@ -105,7 +105,7 @@ def open_text(path: str, file: Path, options: TextOptions) -> Table:
     layout, lines = _layout(path, text.replace("\r\n", "\n").replace("\r", "\n").split("\n")[:-1], options)
     sample = layout.table(path, *zip(*lines[:1], strict=True))
 
-    def batches(columns: Sequence[Column]) -> Iterator[Table]:
+    def batches(columns: Sequence[Column]) -> Iterator[LogTable]:
         keys = {column.key for column in columns}
         for numbers, body in _blocks(path, file, encoding, layout.start):
             block = layout.table(path, numbers, body)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.formats.stored import library, midnight, seconds_since, unique_keys
-from gaident.data.formats.table import BLOCK, Column, Table, first_line
+from gaident.data.formats.table import BLOCK, Column, LogTable, first_line
 from gaident.data.formats.unit_names import unit_of
 from gaident.errors import ReadError
 
@@ -21,7 +21,7 @@ __all__ = ["frame_table", "is_frame", "open_parquet"]
 _BUFFER = 1 << 18  # no decision: bytes per column that are read ahead; work
 
 
-def open_parquet(path: str, file: Path, stack: ExitStack) -> Table:
+def open_parquet(path: str, file: Path, stack: ExitStack) -> LogTable:
     """Numeric columns of a Parquet file, read block by block; a field's metadata `unit` or `units` is its unit."""
     parquet = library("pyarrow.parquet", "parquet", path, "a Parquet file")
     try:
@@ -48,19 +48,19 @@ def open_parquet(path: str, file: Path, stack: ExitStack) -> Table:
 
     origins: dict[str, Any] = {}  # midnight of each column of dates
 
-    def batches(wanted: Sequence[Column]) -> Iterator[Table]:
+    def batches(wanted: Sequence[Column]) -> Iterator[LogTable]:
         first = 0
         try:
             for batch in opened.iter_batches(BLOCK, columns=[column.key for column in wanted]):
                 values = [_column(column, batch.column(column.key).to_numpy(zero_copy_only=False), origins) for column in wanted]
-                yield Table(path, tuple(values), first=first)
+                yield LogTable(path, tuple(values), first=first)
                 first += batch.num_rows
         except ReadError:
             raise
         except Exception as error:
             raise ReadError(f"{path}: damaged ({first_line(error)}); copy it again") from None
 
-    return Table(path, tuple(columns), others=tuple(others), batches=batches, form="Parquet")
+    return LogTable(path, tuple(columns), others=tuple(others), batches=batches, form="Parquet")
 
 
 def _is_plain(kind: Any) -> bool:
@@ -76,7 +76,7 @@ def is_frame(source: object) -> bool:
     return all(hasattr(source, name) for name in ("columns", "index", "iloc"))
 
 
-def frame_table(frame: Any) -> Table:
+def frame_table(frame: Any) -> LogTable:
     """The columns of a pandas DataFrame, in its order; last its index, unless that only counts.
 
     Dates and time differences become seconds; what is no number is NaN, and refused where a channel needs it.
@@ -92,7 +92,7 @@ def frame_table(frame: Any) -> Table:
         name = name if name not in {column.key for column in filled} else f"{name} (index)"
         aliases = ("time",) if np.asarray(index).dtype.kind in "mM" else ()
         filled.append(_column(Column(name, np.zeros(0), aliases), _plain(index)))
-    return Table("DataFrame", tuple(filled), form="DataFrame")
+    return LogTable("DataFrame", tuple(filled), form="DataFrame")
 
 
 def _plain(series: Any) -> NDArray[Any]:

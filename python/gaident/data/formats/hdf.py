@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.formats.stored import Matrix, array_table, library
-from gaident.data.formats.table import Stored, Table, first_line
+from gaident.data.formats.table import LogTable, Stored, first_line
 from gaident.errors import ReadError
 
 __all__ = ["open_hdf"]
@@ -18,7 +18,7 @@ __all__ = ["open_hdf"]
 _UNIT_KEYS = ("units", "unit", "Unit", "Units", "UNIT")
 
 
-def open_hdf(path: str, file: Path, stack: ExitStack) -> Table:
+def open_hdf(path: str, file: Path, stack: ExitStack) -> LogTable:
     """Numeric datasets of an HDF5 file, named by their path (`run1/speed`), fields of compound ones too.
 
     In a MAT file of version 7.3 they are named as MATLAB does (`log.speed`), and what MATLAB stores column by column

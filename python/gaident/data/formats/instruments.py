@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.formats.stored import library, midnight, seconds_since, unique_keys
-from gaident.data.formats.table import Column, Stored, Table, first_line
+from gaident.data.formats.table import Column, LogTable, Stored, first_line
 from gaident.errors import ReadError
 
 __all__ = ["open_mdf", "open_tdms"]
 
 
-def open_tdms(path: str, file: Path, stack: ExitStack) -> Table:
+def open_tdms(path: str, file: Path, stack: ExitStack) -> LogTable:
     """Channels of a TDMS file, by name (by `group/channel` where several groups have one); read when asked for.
 
     The waveform properties wf_increment (sample time) and unit_string are taken over.
@@ -61,7 +61,7 @@ def _tdms_column(path: str, channel: Any, key: str, long: str) -> Column:
     return Column(key, stored, names, "s" if stamps else unit, period=period)
 
 
-def open_mdf(path: str, file: Path, stack: ExitStack) -> Table:
+def open_mdf(path: str, file: Path, stack: ExitStack) -> LogTable:
     """Channels of an MDF file of version 3 or 4, each with the master of its group as clock; read when asked for.
 
     A file that was cut short is refused, and one whose channels lie outside their records, which asammdf would read all the
@@ -138,8 +138,8 @@ def _mdf_reader(mdf: Any, group: int, index: int, is_master: bool) -> Any:
     return rows
 
 
-def _table(path: str, columns: list[Column], others: list[str], form: str) -> Table:
+def _table(path: str, columns: list[Column], others: list[str], form: str) -> LogTable:
     if not columns:
         rest = f" (only {', '.join(others)})" if others else ""
         raise ReadError(f"{path}: the file holds no channels of numbers{rest}; give a log with measured channels")
-    return Table(path, tuple(columns), others=tuple(others), form=form)
+    return LogTable(path, tuple(columns), others=tuple(others), form=form)

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.data.formats.delimited import TextOptions
-from gaident.data.formats.table import Column, Table, first_line
+from gaident.data.formats.table import Column, LogTable, first_line
 from gaident.errors import ReadError
 
 __all__ = ["open_sinumerik"]
@@ -66,7 +66,7 @@ class _Signal:
         return start, np.array(self.values)[np.maximum.accumulate(samples)]
 
 
-def open_sinumerik(path: str, file: Path, options: TextOptions, stack: ExitStack) -> Table:
+def open_sinumerik(path: str, file: Path, options: TextOptions, stack: ExitStack) -> LogTable:
     """The signals of a trace by their addresses, descriptions and numbers (`f6`) as other names, and a time for each rate.
 
     Raises ReadError for another XML file, several recordings in one file, and one that has lost points.
@@ -112,7 +112,7 @@ class _Trace:
                     )
             element.clear()
 
-    def table(self) -> Table:
+    def table(self) -> LogTable:
         written = [signal for signal in self.signals.values() if signal.times]
         if not written:
             raise ReadError(f"{self.path}: the trace holds no records; record it again")
@@ -129,7 +129,7 @@ class _Trace:
             for (start, interval, count), name in clocks.items()
         ]
         silent = tuple(signal.name for signal in self.signals.values() if not signal.times)
-        return Table(self.path, (*times, *columns), others=silent)
+        return LogTable(self.path, (*times, *columns), others=silent)
 
 
 def _number(path: str, text: str, what: str) -> float:

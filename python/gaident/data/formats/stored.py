@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gaident.data.formats.table import Column, Stored, Table
+from gaident.data.formats.table import Column, LogTable, Stored
 from gaident.data.formats.unit_names import unit_of
 from gaident.errors import ReadError
 
@@ -40,7 +40,7 @@ def array_table(
     others: list[str],
     units: Mapping[str, str] | None = None,
     form: str = "",
-) -> Table:
+) -> LogTable:
     """The table of named arrays, one- and two-dimensional. Raises ReadError where there are none."""
     if not arrays:
         rest = f" (only {', '.join(others)})" if others else ""
@@ -59,7 +59,7 @@ def array_table(
             columns += [Column(f"{name}[:,{k}]", array[:, k], (), units.get(name)) for k in range(min(cols, _LISTED_COLUMNS))]
         else:
             columns += [Column(f"{name}[{k},:]", array[k, :], (), units.get(name)) for k in range(min(rows, _LISTED_COLUMNS))]
-    return Table(path, tuple(columns), matrices=matrices, others=tuple(others), form=form)
+    return LogTable(path, tuple(columns), matrices=matrices, others=tuple(others), form=form)
 
 
 def _last_part(name: str) -> tuple[str, ...]:

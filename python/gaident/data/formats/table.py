@@ -15,7 +15,7 @@ from gaident.arguments import arg
 from gaident.data.signals.arrays import first_not_finite
 from gaident.errors import ReadError
 
-__all__ = ["BLOCK", "Column", "Stored", "Table", "first_line"]
+__all__ = ["BLOCK", "Column", "Stored", "LogTable", "first_line"]
 
 BLOCK = 1 << 16  # no decision: work; values of a block
 """Rows that are held at once of a log that is read block by block."""
@@ -84,7 +84,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class LogTable:
     """All columns of one file.
 
     path      named in every message
@@ -105,7 +105,7 @@ class Table:
     matrices: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     others: tuple[str, ...] = ()
     first: int = 0
-    batches: Callable[[Sequence[Column]], Iterator[Table]] | None = None
+    batches: Callable[[Sequence[Column]], Iterator[LogTable]] | None = None
     form: str = ""
     remark: str = ""
 
@@ -113,7 +113,7 @@ class Table:
         """Where a row stands, for messages."""
         return f"index {self.first + row}" if self.lines is None else f"line {self.lines[row]}"
 
-    def blocks(self, columns: Sequence[Column], rows: int = BLOCK) -> Iterator[Table]:
+    def blocks(self, columns: Sequence[Column], rows: int = BLOCK) -> Iterator[LogTable]:
         """The rows of some columns of this table, block after block, each a table of just these columns.
 
         What is in memory anyway comes as one block. Columns that are still in the file must be of one length.

@@ -12,7 +12,7 @@ from gaident.data.signals.decimation import low_passed
 from gaident.estimation.criterion import effective_samples
 from gaident.policy.table import POLICY
 
-__all__ = ["Fit", "coarse_lags", "refine"]
+__all__ = ["LagFit", "coarse_lags", "refine"]
 
 Vector = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ _RATES = 31  # no decision: work
 
 
 @dataclass(frozen=True)
-class Fit:
+class LagFit:
     """offset t0 [s], rate rho, with standard deviations std = (of t0, of rho); see alignment.py.
 
     centre       [s] middle of the samples used, on the second clock; centre_std [s]: of the time axis there
@@ -42,7 +42,7 @@ class Fit:
     width: float
     independent: float
 
-    def with_rate_std(self, value: float) -> Fit:
+    def with_rate_std(self, value: float) -> LagFit:
         """The fit of a rate taken to be 0, with the uncertainty that this hides."""
         return replace(self, std=(float(np.hypot(self.std[0], value * self.centre)), value))
 
@@ -122,7 +122,7 @@ def _peaks(strong: Vector) -> NDArray[np.intp]:
 
 def refine(
     x: Vector, dt: float, y: Vector, their_dt: float, offset: float, rate: float, max_rate: float, free_rate: bool = True
-) -> Fit | None:
+) -> LagFit | None:
     """Least squares in offset, rate, scale and zero, from where the correlation led.
 
     None where the logs do not overlap. The offset stays within the width of the correlation's peak, the rate below max_rate.
@@ -182,7 +182,7 @@ def refine(
     offset_std = float(np.sqrt(to_start @ cov[:k, :k] @ to_start))
     variance = float(e @ e) / max(float(((z - z.mean()) ** 2).sum()), 1e-300)
     correlation = float(np.sqrt(max(0.0, 1.0 - variance)))
-    return Fit(
+    return LagFit(
         at - (1.0 + rho) * centre, rho, (offset_std, rate_std), centre, float(np.sqrt(cov[0, 0])), gain,
         max(variance, 1e-12), correlation, width, independent,
     )  # fmt: skip

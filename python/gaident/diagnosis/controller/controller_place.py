@@ -29,7 +29,7 @@ from gaident.policy.table import POLICY
 from gaident.results.estimate import Estimate
 from gaident.results.finding import Finding
 
-__all__ = ["AsLogged", "AtController", "as_logged", "as_read", "controller_findings"]
+__all__ = ["AsLogged", "AtController", "as_logged", "controller_findings"]
 
 Vector = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
 GRID = 25  # no decision: values from which a search for a limit starts
 
 
-@dataclass
+@dataclass(frozen=True)
 class AtController:
     """Which effects of the controller need no plant any more, and those that are there, with parameters.
 
@@ -121,23 +121,6 @@ def _gains_finding(records: Sequence[Record], shown: PI, off: Sequence[Replay]) 
     return Finding(name, {} if alone else gains, (), fall, gain, None, off[0].sentence, place="controller")
 
 
-def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: Controller | None) -> tuple[Record, ...]:
-    """The records as the controller read them: cleaned of outliers only where the logged torque follows better from that."""
-    if controller is None or any(r.torque is None or not controller.replayable(r) for r in recorded):
-        return tuple(cleaned)
-    pairs = [
-        (r, c) if r is c else min((r, c), (c, r), key=lambda pair: _replay_error(pair[0], controller))
-        for r, c in zip(recorded, cleaned, strict=True)
-    ]
-    return tuple(best for best, _ in pairs)
-
-
-def _replay_error(rec: Record, controller: Controller) -> float:
-    """Mean square of logged minus replayed torque [(N m)^2]."""
-    assert rec.torque is not None
-    return float(np.mean((rec.torque - controller.torque_of(rec)) ** 2))
-
-
 def controller_findings(data: DataSet, scales: Scales) -> tuple[list[Finding], AtController, list[Text]]:
     """(findings, what is decided, notes). Without a logged torque nothing is decided here."""
     controller = data.controller
@@ -179,14 +162,17 @@ def controller_findings(data: DataSet, scales: Scales) -> tuple[list[Finding], A
             np.sqrt(cost / n),
         )
         finding = _finding(effect, name, Estimate(value, std, unit), before, cost, floor, n, text)
-        at = AtController(_decided(), {effect: {name: value}})
-        limits = controller.limits
-        if effect == OF_SETTING["integrator_limit"]:
-            at.controller = controller.with_limits(limits[0], value)
-        elif effect == OF_SETTING["torque_limit"]:
-            at.controller = controller.with_limits(value, limits[1])
-        return [finding], at, []
+        limited = _with_limit(controller, effect, value)
+        return [finding], AtController(_decided(), {effect: {name: value}}, limited), []
     return [], AtController(_decided(), follows=data.loop is None), notes  # where no loop is simulated, none is wrong
+
+
+def _with_limit(controller: Controller, effect: str, value: float) -> Controller | None:
+    """The controller with the limit that an effect at its place is; None where the effect is no limit of its own."""
+    torque, integrator = controller.limits
+    if effect == OF_SETTING["integrator_limit"]:
+        return controller.with_limits(torque, value)
+    return controller.with_limits(value, integrator) if effect == OF_SETTING["torque_limit"] else None
 
 
 def _decided() -> tuple[str, ...]:
@@ -215,10 +201,10 @@ def _limit_findings(
     assert given is not None
     n, before, after = len(plain), float(plain @ plain), _left_with(data, shown)
     held = any(r.cause == "anti_windup" for r in off)
-    at = AtController((*_decided(), *(OF_SETTING[s] for s in SHOWN)), controller=shown, follows=not held)
     if not held and shown.limits[1] == given.limits[1]:
         notes = []  # the finding says it all
-    findings = []
+    findings: list[Finding] = []
+    effects: dict[str, dict[str, float]] = {}
     if shown.kp != given.kp and shown.ki == given.ki:  # as trapezoidal: kp + ki dt/2, or kp - ki dt/2
         gain = gained(_left_with(data, replace(shown, kp=given.kp)), max(after, floor), n, 1)
         findings.append(Finding("integration_rule", {}, (), 0.0, gain, None, off[0].sentence, place="controller"))
@@ -226,7 +212,7 @@ def _limit_findings(
         effect, value, was = OF_SETTING[setting], getattr(shown, setting), getattr(given, setting)
         if value is None or value == was:
             continue
-        at.effects[effect] = {"limit": value}
+        effects[effect] = {"limit": value}
         text = say("{} The limit is the {}; no model of the plant is involved.", off[0].sentence, words)
         std = max(*(r.resolution for r in off), float(np.sqrt(after / n)))
         findings.append(_finding(effect, "limit", Estimate(value, std, "N m"), before, after, floor, n, text))
@@ -238,7 +224,8 @@ def _limit_findings(
                 "does not, and says nothing about the mechanics there."
             )
         )
-    return findings, at, notes
+    decided = (*_decided(), *(OF_SETTING[s] for s in SHOWN))
+    return findings, AtController(decided, effects, shown, follows=not held), notes
 
 
 def _left_with(data: DataSet, controller: PI) -> float:

@@ -42,6 +42,7 @@ class Driving:
     limited: whether a limit of the controller, which was not given either, makes the torques follow.
     regained_from: the PI that was given, where records without a torque show other gains. lag: behind which a measured torque was
     logged; the records then hold the one before it. found: the controller's numbers that the records show.
+    outliers: digest of a record as given -> lines whose velocity stands in the log alone, interpolated here.
     """
 
     moved: Aligned
@@ -55,6 +56,7 @@ class Driving:
     regained_from: PI | None = None
     lag: Lag | None = None
     found: FoundNumbers | None = None
+    outliers: Mapping[str, NDArray[np.intp]] = field(default_factory=dict)
 
     def regained(self, other: OtherGains) -> Driving:
         """The same under other gains, which command and velocity show where no torque is logged; a finding says so."""
@@ -108,6 +110,11 @@ class Driving:
     def in_doubt(self) -> bool:
         """Whether the logged torque follows neither from the given controller nor from a form of it, nor from a limit more."""
         return bool(self.doubts) and not self.limited and not any(f.place == "controller" for f in self.findings)
+
+    def outliers_in(self, rec: Record) -> NDArray[np.intp]:
+        """Lines of one of the records that drive a model, whose velocity stood in the log alone."""
+        lines = self.outliers.get(self.moved.given[rec.digest].digest, np.zeros(0, dtype=np.intp))
+        return lines[lines < len(rec)]
 
     @property
     def read(self) -> tuple[Record, ...]:

@@ -22,7 +22,7 @@ __all__ = [
     "KP_R",
     "KP_W",
     "WEIGHTS",
-    "Candidate",
+    "FormCandidate",
     "Form",
     "controller_of",
     "found_of",
@@ -95,7 +95,7 @@ class Form:
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class FormCandidate:
     """A form with the filters of a shape; free: its free numbers; count of them; criterion: the less the better."""
 
     form: Form
@@ -110,7 +110,7 @@ class Candidate:
 
 
 def named(
-    best: Candidate, numbers: Vector, filters: Vector, cov: Matrix, period: float
+    best: FormCandidate, numbers: Vector, filters: Vector, cov: Matrix, period: float
 ) -> dict[str, dict[str, tuple[float, float]]]:
     """Name of what differs -> parameter -> (value, standard deviation), in the units of `Cascade`."""
     std = np.sqrt(np.maximum(np.diag(cov), 0.0))
@@ -142,7 +142,7 @@ def _of_logarithm(logarithm: float, std: float, unit: float) -> tuple[float, flo
     return (value := float(np.exp(logarithm)) * unit), value * float(std)
 
 
-def controller_of(best: Candidate, numbers: Vector, filters: Vector, given: PI, period: float) -> Cascade:
+def controller_of(best: FormCandidate, numbers: Vector, filters: Vector, given: PI, period: float) -> Cascade:
     """The controller of a form with these numbers."""
     kp, kp_b, ki = (max(float(x), 0.0) for x in numbers[:FIRST_FEED])
     pi = PI(
@@ -158,7 +158,7 @@ def controller_of(best: Candidate, numbers: Vector, filters: Vector, given: PI, 
 
 
 def found_of(
-    best: Candidate, fitted: tuple[Vector, Vector, Matrix], given: PI, whole: Cascade, period: float, slow: bool
+    best: FormCandidate, fitted: tuple[Vector, Vector, Matrix], given: PI, whole: Cascade, period: float, slow: bool
 ) -> FoundNumbers:
     """The numbers of a form with their covariance; whole: the controller, with what is no number of the form.
 

@@ -15,6 +15,7 @@ from gaident.control.pi import PI, bare_pi
 from gaident.control.simplest import simplest
 from gaident.data.record import Record
 from gaident.diagnosis.controller.forms import Shown, form_shown
+from gaident.diagnosis.controller.limit_not_given import left_by_a_limit
 from gaident.diagnosis.controller.period_shown import FASTER, Period, period_shown
 from gaident.diagnosis.controller.replay import replay
 from gaident.diagnosis.controller.slow_forms import run_error
@@ -139,7 +140,7 @@ def _formed(records: Sequence[Record], given: Controller | None) -> Period | Non
     every = min(close, key=lambda n: (len(close[n].numbers), close[n].rms))
     text = (
         "The logged {torque} follows from no form of this controller at the log's rate as from the one below, where that "
-        "samples {} times for each line: {:.4g} ms is taken for its sample time. Where that is not it, give period (s)."
+        "samples about {} times for each line: {:.4g} ms is taken for its sample time. Where that is not it, give period (s)."
     )
     return Period(Cascade(pi, period=dt / every), say(text, every, 1e3 * dt / every))
 
@@ -150,12 +151,13 @@ def _loop_of(records: Sequence[Record], given: Controller | None) -> Loop:
     numbers = replace(numbers, controller=simplest(numbers.controller, (r.dt for r in records)))
     as_given = Loop(numbers.controller, numbers, (), (), numbers.estimates, found=numbers.found)
     pi, every = _alone(numbers.controller, records)
+    dt = records[0].dt
     if pi is None or every == 1 or any(r.torque is None or r.command is None for r in records):
         return as_given
     unknown = {f"velocity.{name}": name for name in ("kp", "ki")}
     shown = form_shown(records, pi, tuple(unknown[n] for n in numbers.estimates if n in unknown), every)
-    if shown is None:
-        return replace(as_given, numbers=numbers.trusted())
+    if shown is None or (not numbers.estimates and left_by_a_limit(records, Cascade(pi, dt / every)) < shown.rms):
+        return replace(as_given, numbers=numbers.trusted())  # or a single limit, which the simulated loop shows, explains more
     estimates = {f"velocity.{name}": e for name, e in _estimates(shown.estimated).items()}
     known = replace(numbers, doubt="")
     return Loop(shown.controller, known, findings_of(shown), notes_of(shown, records), estimates, found=shown.found)

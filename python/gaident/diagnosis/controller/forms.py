@@ -31,8 +31,8 @@ from gaident.diagnosis.controller.form import (
     KP_R,
     KP_W,
     WEIGHTS,
-    Candidate,
     Form,
+    FormCandidate,
     controller_of,
     found_of,
     named,
@@ -54,6 +54,7 @@ from gaident.diagnosis.controller.replay_causes import white_noise
 from gaident.diagnosis.controller.slow_forms import limited, run_error, too_fast
 from gaident.diagnosis.library.settings import OF_SETTING
 from gaident.estimation.criterion import bic, cost_of
+from gaident.estimation.projection import inverse_of
 from gaident.models.drive_torque import made_by
 from gaident.policy.table import POLICY
 
@@ -122,9 +123,9 @@ def _form_of(records: Sequence[Record], given: PI, unknown: tuple[str, ...], law
     return shown or _shown_quietly(records, law, given, floor, unknown)
 
 
-def _compared(law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> list[Candidate]:
+def _compared(law: Law, given: PI, floor: float, unknown: tuple[str, ...]) -> list[FormCandidate]:
     """Every form with every set of filters that is needed, the best first."""
-    candidates: list[Candidate] = []
+    candidates: list[FormCandidate] = []
     followed: int | None = None
     for places in FILTER_SETS if law.every == 1 else FILTER_SETS_OF_ONE:
         if followed is not None and len(places) > followed:
@@ -158,7 +159,7 @@ def _forms(given: PI, unknown: tuple[str, ...]) -> Iterator[Form]:
         yield Form(rule, free, weight, feed, starts, unknown)
 
 
-def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[str, ...]) -> Iterator[Candidate]:
+def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[str, ...]) -> Iterator[FormCandidate]:
     """Every form with these filters: one small least squares each, linear in the filters' numbers around those of `shape`."""
     table = law.columns(shape.places, shape.numbers)
     around = np.column_stack([table, _slopes(law, shape), law.logged])
@@ -180,7 +181,7 @@ def _candidates(law: Law, shape: Shape, given: PI, floor: float, unknown: tuple[
             continue
         k = M.shape[1]
         criterion = bic(max(left / n, floor**2), n, 0) + _price(law, k, form.chosen)
-        yield Candidate(form, shape, free, k, float(criterion))
+        yield FormCandidate(form, shape, free, k, float(criterion))
 
 
 def _price(law: Law, count: int, chosen: int) -> float:
@@ -199,7 +200,7 @@ def _slopes(law: Law, shape: Shape) -> Matrix:
     return np.array(slopes).reshape(len(slopes), len(law.logged)).T
 
 
-def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[Candidate]) -> Shown | None:
+def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[FormCandidate]) -> Shown | None:
     """The best candidate fitted and run as a whole on every sample; None where the torque does not follow from it."""
     best = candidates[0]
     numbers, filters, cov = _fitted(law, best, given)
@@ -229,7 +230,9 @@ def _shown(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[
     )
 
 
-def _shown_slowly(records: Sequence[Record], law: Law, given: PI, candidates: Sequence[Candidate], floor: float) -> Shown | None:
+def _shown_slowly(
+    records: Sequence[Record], law: Law, given: PI, candidates: Sequence[FormCandidate], floor: float
+) -> Shown | None:
     """The same of a log with fewer lines: None where it leaves more than another velocity between them could make."""
     negligible = POLICY.negligible * float(np.abs(law.torque).max())
     # Where the given controller leaves no more, no other one is looked for; only a setting without a number of its own.
@@ -275,7 +278,7 @@ def _with_limit(
     records: Sequence[Record],
     law: Law,
     given: PI,
-    candidates: Sequence[Candidate],
+    candidates: Sequence[FormCandidate],
     fitted: tuple[Vector, Vector, Matrix],
     part: float = POLICY.better_reason,
 ) -> Shown | None:
@@ -309,20 +312,20 @@ def _with_limit(
     )
 
 
-def _gains(candidates: Sequence[Candidate]) -> dict[str, float]:
+def _gains(candidates: Sequence[FormCandidate]) -> dict[str, float]:
     best = candidates[0]
     without = {name: [c.criterion for c in candidates if name not in c.names] for name in best.names}
     return {name: min(others) - best.criterion if others else np.inf for name, others in without.items()}
 
 
-def _rivals(candidates: Sequence[Candidate]) -> tuple[tuple[str, ...], ...]:
+def _rivals(candidates: Sequence[FormCandidate]) -> tuple[tuple[str, ...], ...]:
     close = [
         c for c in candidates if c.criterion - candidates[0].criterion < POLICY.rival_margin and c.count <= candidates[0].count
     ]
     return tuple(dict.fromkeys(c.names for c in close if c.names and set(c.names) != set(candidates[0].names)))
 
 
-def _estimated(best: Candidate, numbers: Vector, cov: Matrix) -> dict[str, tuple[float, float]]:
+def _estimated(best: FormCandidate, numbers: Vector, cov: Matrix) -> dict[str, tuple[float, float]]:
     return {name: (float(numbers[at]), float(np.sqrt(cov[at, at]))) for name, at in GAINS.items() if name in best.form.unknown}
 
 
@@ -330,7 +333,7 @@ def _rms(parts: Sequence[Vector]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
 
 
-def _fitted(law: Law, best: Candidate, given: PI) -> tuple[Vector, Vector, Matrix]:
+def _fitted(law: Law, best: FormCandidate, given: PI) -> tuple[Vector, Vector, Matrix]:
     """(P, filters' numbers, covariance of both) of a form, by least squares on the replay itself."""
     from scipy.optimize import least_squares
 
@@ -366,7 +369,7 @@ def _fitted(law: Law, best: Candidate, given: PI) -> tuple[Vector, Vector, Matri
     sizes = np.linalg.norm(J, axis=0)
     sizes[sizes == 0.0] = 1.0
     variance = max(float(np.mean((size * off(x)) ** 2)), (ROUNDING * float(np.abs(law.logged).max())) ** 2)
-    spread = variance * np.linalg.pinv((J / sizes).T @ (J / sizes), rcond=1e-12) / np.outer(sizes, sizes)
+    spread = variance * inverse_of(J.T @ J)
     here = np.linalg.lstsq(J / sizes, law.logged - table @ coefficients, rcond=1e-12)[0] / sizes
     for other in law.others:  # where the numbers would be by what is not known between the lines
         columns = other.columns(shape.places, x[m:])

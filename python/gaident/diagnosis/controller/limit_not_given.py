@@ -16,7 +16,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.slow_forms import run_error
 from gaident.policy.table import POLICY
 
-__all__ = ["by_a_limit"]
+__all__ = ["by_a_limit", "left_by_a_limit"]
 
 SEARCHED = (1e-3, 40)  # no decision: of the largest value, where a limit is looked for from, and starts of that search
 
@@ -27,6 +27,11 @@ def by_a_limit(records: Sequence[Record], controller: Controller) -> bool:
     Then the loop is the drive's but for that, and a simulation of it shows the limit. As in a replay at each sample, it leaves at
     most `replay_left` of the squared error.
     """
+    return left_by_a_limit(records, controller) ** 2 < POLICY.replay_left * run_error(records, cascade_of(controller)) ** 2
+
+
+def left_by_a_limit(records: Sequence[Record], controller: Controller) -> float:
+    """Root mean square of logged minus made torque [N m] with the better of the two limits."""
     cascade = cascade_of(controller)
     torque = max(float(np.abs(r.torque).max()) for r in records if r.torque is not None)
 
@@ -37,11 +42,10 @@ def by_a_limit(records: Sequence[Record], controller: Controller) -> bool:
         slow = [r.with_channels(command=rate_limited(command, limit, r.dt, 0.0)) for r, command in asked]
         return run_error(slow, cascade)
 
-    most = POLICY.replay_left * run_error(records, cascade) ** 2
     asked = [(r, r.command) for r in records if r.command is not None and cascade.position is None]
     slope = max((float(np.abs(np.diff(command, prepend=0.0)).max()) / r.dt for r, command in asked), default=0.0)
     searches = ((clamped, torque), (followed, slope))
-    return any(top > 0.0 and _least(error, top) ** 2 < most for error, top in searches)
+    return min(_least(error, top) for error, top in searches if top > 0.0)
 
 
 def _least(error: Callable[[float], float], top: float) -> float:

@@ -44,13 +44,16 @@ def other_form(records: Sequence[Record], held: Sequence[Record], given: Control
     found = bare if shown is None else replace(shown.controller, delay=cascade.delay)
     if not_followed(records, found):
         return None
-    findings = () if shown is None else tuple(f for f in findings_of(shown) if _differs(f.effect, found, cascade))
+    if shown is not None:
+        shown = replace(shown, numbers={name: x for name, x in shown.numbers.items() if _differs(name, found, cascade)})
+    findings = () if shown is None else findings_of(shown)
     words = (
         "The logged {torque} does not follow from the given controller, but from one with the same gains{}{}: this one is used."
     )
     absent = _left_out(found, cascade)
     without = say(" without its {}", joined(", ", [Text(name) for name in absent])) if absent else ""
-    beside = "" if shown is None else say("{} with {}", " and" if absent else "", parts_of(shown))
+    added = shown is not None and (shown.numbers or found.velocity.anti_windup not in ("none", cascade.velocity.anti_windup))
+    beside = say("{} with {}", " and" if absent else "", parts_of(shown)) if shown is not None and added else ""
     notes = (say(words, without, beside), *(() if shown is None else notes_of(shown, records)[1:]))
     driven, later = (tuple(driven_by(r, found) for r in part) for part in (records, held))
     numbers = None if shown is None else shown.found.then(lambda one: replace(cascade_of(one), delay=cascade.delay))
@@ -73,8 +76,10 @@ def _differs(name: str, found: Cascade, given: Cascade) -> bool:
 
 
 def _left_out(found: Cascade, given: Cascade) -> list[str]:
-    """Filters of the given controller where the found one has none, in words of the findings."""
-    return [name.replace("_", " ") for place, name in FILTER_NAMES.items() if getattr(given, place) and not getattr(found, place)]
+    """What the given controller has and the found one has not, in words of the findings."""
+    filters = [place for place in FILTER_NAMES if getattr(given, place) and not getattr(found, place)]
+    windup = found.velocity.anti_windup == "none" != given.velocity.anti_windup
+    return [*(FILTER_NAMES[place].replace("_", " ") for place in filters), *(["anti-windup"] if windup else [])]
 
 
 def _same_filters(found: Sequence[Filter], given: Sequence[Filter]) -> bool:

@@ -2,8 +2,9 @@
 
 A controller that is faster than the log makes another torque of the same lines than one at the log's rate: by its filters,
 by what its integrator adds up between the lines, by what an anti-windup keeps at a limit.
-Each of r = 2, 4, 8, 16 samples to a line is tried, with the plateau of the torque as a limit where it shows one. Such a
-controller is the drive's where it leaves less than the share `each_number` of what one at the log's rate leaves.
+Each of r = 2, 4, 8, 16 samples to a line is tried, and one that lies between is taken for its neighbour, with the plateau
+of the torque as a limit where it shows one.
+Such a controller is the drive's where it leaves less than the share `each_number` of what one at the log's rate leaves.
 What the velocity did between the lines is lost and adds up in the integral, so that two are compared by how much of what they
 leave changes from line to line, where no limit acts; two that are alike in it, up to the share `same_clock`, are told apart by
 the motion.
@@ -39,7 +40,7 @@ from gaident.policy.table import POLICY
 
 __all__ = ["FASTER", "Period", "period_shown"]
 
-FASTER = (2, 4, 8, 16)  # no decision: those that are tried; what lies between, 5 or 10, is taken for its neighbour
+FASTER = (2, 4, 8, 16)  # no decision: a grid of octaves; what is taken is said to be about so many
 UNLIKE = ("", "torque_limit", "anti_windup")  # what a replay at the log's rate may say: any other reason explains the torque
 
 
@@ -81,7 +82,7 @@ def period_shown(records: Sequence[Record], given: Controller | None) -> Period 
     sure = (told and near < POLICY.near_age / every) or (alone and follows)
     text = (
         "The logged {torque} does not follow from this controller at the log's rate (rms {:.2g} {N m}). It follows better where "
-        "it samples {} times for each line (rms {:.2g} {N m}){}"
+        "it samples about {} times for each line (rms {:.2g} {N m}){}"
     )
     used = say(": {:.4g} ms is taken for its sample time. Where that is not it, give period (s).", 1e3 * dt / every)
     asked = say("; if it does, give its sample time, period = {:.4g} (s).", dt / every)
@@ -99,6 +100,7 @@ def _step_error(records: Sequence[Record], controller: Cascade) -> float:
     """Root mean square of the change of logged minus made torque from line to line [N m], where no limit acts.
 
     What the velocity did between the lines adds up in the integral, so that the difference itself says little.
+    Infinite where a limit acts nearly everywhere: nothing is compared then.
     """
     changes = []
     for rec in records:
@@ -106,7 +108,8 @@ def _step_error(records: Sequence[Record], controller: Cascade) -> float:
         made = log.made(controller)
         free = np.maximum(np.abs(log.torque), np.abs(made)) < POLICY.at_limit * controller.velocity.limits[0]
         changes.append(np.diff(log.torque - made)[free[1:] & free[:-1]])
-    return float(np.sqrt(np.mean(np.concatenate(changes) ** 2)))
+    together = np.concatenate(changes)
+    return float(np.sqrt(np.mean(together**2))) if len(together) else np.inf
 
 
 def _lag(records: Sequence[Record], controller: Cascade) -> float:

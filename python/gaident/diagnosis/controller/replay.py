@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gaident.arguments import TORQUE
 from gaident.axis import Text, say
 from gaident.control.cascade import cascade_of
-from gaident.control.controller import Controller, Gains
+from gaident.control.controller import Controller, VelocityGains
 from gaident.control.pi import PI, bare_pi
 from gaident.data.record import Record
 from gaident.data.signals.lattice import digits_step, lattice_step, rounding_step
@@ -165,7 +165,7 @@ def velocity_steps(records: Sequence[Record]) -> tuple[tuple[float, ...], ...]:
     return (fine,) if np.allclose(fine, coarse, rtol=ROUNDING, atol=0.0) else (fine, coarse)
 
 
-def tolerance_of(rec: Record, command: Vector, controller: Gains, logged: Vector, step: float) -> float:
+def tolerance_of(rec: Record, command: Vector, controller: VelocityGains, logged: Vector, step: float) -> float:
     """By how much a torque that follows may be off [N m]: see `Allowed`."""
     return Allowed.of(rec, command, controller, logged, step).torque
 
@@ -191,7 +191,7 @@ class Allowed:
     jump: float
 
     @classmethod
-    def of(cls, rec: Record, command: Vector, controller: Gains, logged: Vector, step: float) -> Allowed:
+    def of(cls, rec: Record, command: Vector, controller: VelocityGains, logged: Vector, step: float) -> Allowed:
         own = POLICY.replay_steps * rounding_step(logged) + ROUNDING * float(np.abs(logged).max())
         at_once, drift = _of_signals(rec, command, controller, step)
         sample = controller.ki * rec.dt * (step + _of_command(command, step))
@@ -220,7 +220,7 @@ def _of_command(command: Vector, step: float) -> float:
     return min(step, rounding_step(command))
 
 
-def _of_signals(rec: Record, command: Vector, controller: Gains, q_w: float) -> tuple[float, float]:
+def _of_signals(rec: Record, command: Vector, controller: VelocityGains, q_w: float) -> tuple[float, float]:
     """What rounded decimals make of P part, at most, and integral, as deviation [N m]."""
     q_r = _of_command(command, q_w)
     held = np.diff(np.flatnonzero(np.concatenate([[True], np.diff(command) != 0.0, [True]])))

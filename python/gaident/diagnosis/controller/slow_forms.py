@@ -124,7 +124,7 @@ def before_filters(torque: Vector, controller: Cascade, period: float) -> Vector
 
 
 def _schemes(controller: Cascade, limit: float) -> Iterator[Cascade]:
-    pi = replace(controller.velocity, torque_limit=limit)
+    pi = replace(controller.velocity.winding_up, torque_limit=limit)
     yield replace(controller, velocity=pi)
     yield replace(controller, velocity=replace(pi, anti_windup="hold"))
     for time in TIMES:

@@ -19,7 +19,7 @@ from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.data.torque_kind import MEASURED
 from gaident.diagnosis.library.terms import LIBRARY, not_testable, one_sided
-from gaident.diagnosis.library.triggers import Motion, Motions
+from gaident.diagnosis.library.triggers import Motions, SeenMotion
 from gaident.errors import RecordError
 from gaident.estimation.regression.sensor_lag import velocity_lag
 from gaident.models.drive_torque import torque_of
@@ -143,7 +143,7 @@ def position_of(rec: Record) -> Vector:
     return np.concatenate([[0.0], np.cumsum(0.5 * rec.dt * (w[1:] + w[:-1]))])
 
 
-def _motion(rec: Record, controller: Controller | None, top: float) -> Motion:
+def _motion(rec: Record, controller: Controller | None, top: float) -> SeenMotion:
     w = rec.velocity
     u = torque_of(rec, bare_pi(controller))
     floor = max(POLICY.above_noise * noise_std(w), POLICY.negligible * top, TINY)
@@ -156,7 +156,7 @@ def _motion(rec: Record, controller: Controller | None, top: float) -> Motion:
     torque_floor = max(POLICY.above_noise * noise_std(u), POLICY.still * float(np.abs(u).max()), TINY)
     repeated = any(abs(a - b) < POLICY.apart * top for a in early for b in late if a)
     shape = moving, tuple(held), tuple(jumps), repeated
-    return Motion(rec.dt, w, smooth, u, position, command, floor, torque_floor, *shape, rec.torque is not None)
+    return SeenMotion(rec.dt, w, smooth, u, position, command, floor, torque_floor, *shape, rec.torque is not None)
 
 
 def _smoothed(x: Vector, width: int) -> Vector:

@@ -24,6 +24,7 @@ from gaident.control.filtering import recursion
 from gaident.control.pi import PI
 from gaident.data.record import Record
 from gaident.errors import ModelError, RecordError
+from gaident.estimation.projection import inverse_of
 from gaident.estimation.state_space import Discretised, discretised, steady_covariance
 from gaident.models.drive_torque import torque_of
 from gaident.models.model import Model
@@ -177,11 +178,8 @@ class _Filter:
         head = min(samples, self.memory)
         seen = self.powers(self.H, head)
         columns = np.hstack([seen.real, -seen.imag])
-        sizes = np.tile(np.linalg.norm(seen, axis=0), 2)
-        sizes[sizes == 0.0] = 1.0
-        scaled = columns / sizes
-        gram = scaled.T @ scaled
-        return columns, np.linalg.pinv(gram, rcond=1e-12, hermitian=True) / np.outer(sizes, sizes)
+        # The sizes are those of the complex columns: the imaginary part of a real one is rounding.
+        return columns, inverse_of(columns.T @ columns, np.tile(np.linalg.norm(seen, axis=0), 2))
 
     def powers(self, row: NDArray[np.complex128], samples: int) -> NDArray[np.complex128]:
         """row L^n, n = 0.. (samples, m+1)."""

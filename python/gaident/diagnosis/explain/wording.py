@@ -156,10 +156,15 @@ def or_other_form(words: Text) -> Text:
 
 def closer_numbers(torque: FoundNumbers, model: FoundNumbers) -> Text:
     """What is said where the model of the axis moved the numbers of the controller that its torque had shown."""
-    text = "The model of the axis shows the controller's numbers closer than the {torque} alone: they were moved{}."
-    off = float(np.abs(model.deviations_off).max(initial=0.0))
-    by = say(" by up to {:.1f} of the deviations with which that shows them", off) if torque.covariance is not None else ""
-    return say(text, by)
+    if torque.covariance is None:  # no torque is logged
+        return Text(
+            "The model of the axis with its causes shows the controller's numbers closer than the one without: they were moved."
+        )
+    text = (
+        "The model of the axis shows the controller's numbers closer than the {torque} alone: they were moved by up to {:.1f} of "
+        "the deviations with which that shows them."
+    )
+    return say(text, float(np.abs(model.deviations_off).max(initial=0.0)))
 
 
 def of_the_controller(mechanics: Mapping[str, Estimate]) -> list[Text]:

@@ -18,13 +18,13 @@ from gaident.diagnosis.library.coordinates import HIGHEST_ORDER
 from gaident.models.model import Model
 from gaident.policy.table import POLICY
 
-__all__ = ["Motion", "Motions"]
+__all__ = ["SeenMotion", "Motions"]
 
 Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class SeenMotion:
     """One record as the triggers see it; arrays of shape (n,).
 
     velocity as measured and smooth [rad/s], torque [N m], position [rad], command [rad/s] or None; floors: what is taken for
@@ -54,7 +54,7 @@ class Motions:
     period: with which returns what is tied to the place [rad, m]; None: not known.
     """
 
-    records: tuple[Motion, ...]
+    records: tuple[SeenMotion, ...]
     controller: Controller | None = None
     model: Model | None = None
     axis: str = "rotary"
@@ -143,7 +143,7 @@ def speeds_mixed_in_time(s: Motions) -> Text | None:
     return None
 
 
-def _monotone(m: Motion, apart: float) -> bool:
+def _monotone(m: SeenMotion, apart: float) -> bool:
     """Nothing is repeated, and the speeds held while moving only rise or only fall with time."""
     steps = np.diff([abs(v) for v in m.held if v])
     return not m.repeated and bool(np.all(steps > -apart) or np.all(steps < apart))
@@ -258,7 +258,7 @@ def integral_beyond(s: Motions) -> Text | None:
     return say("a clamp above {:.3g} {N m} would not have shown: {}", integral, why)
 
 
-def _integral(m: Motion, controller: Controller) -> float:
+def _integral(m: SeenMotion, controller: Controller) -> float:
     """Highest |u - kp (r - w)| [N m] of a bare PI while its limit does not cut its torque u; 0 without a command."""
     if m.command is None or not controller.one_equation:
         return 0.0
@@ -295,6 +295,6 @@ def orders_beyond(s: Motions) -> Text | None:
     return joined("; ", parts) if parts and least <= HIGHEST_ORDER else None
 
 
-def _slowest_held(m: Motion) -> float:
+def _slowest_held(m: SeenMotion) -> float:
     """Least speed held while moving [rad/s]; 0 where none is held."""
     return min((abs(v) for v in m.held if v), default=0.0)

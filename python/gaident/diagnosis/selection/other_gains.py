@@ -24,11 +24,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.axis import Text, joined, say, unit_text
-from gaident.control.found import FoundNumbers
+from gaident.control.found import STEP, FoundNumbers
 from gaident.control.pi import PI
 from gaident.diagnosis.selection.moves import Moves
 from gaident.diagnosis.selection.select import Selection
-from gaident.diagnosis.selection.under_controller import STEP, UnderController, out_of_reach
+from gaident.diagnosis.selection.under_controller import UnderController, out_of_reach
 from gaident.estimation import least_squares as ls
 from gaident.estimation.criterion import cost_of, gained
 from gaident.estimation.noise_model import WHITE

@@ -27,7 +27,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 
-class Parameter(NamedTuple):
+class Coefficient(NamedTuple):
     name: str
     rotary: str  # unit
     linear: str
@@ -38,18 +38,18 @@ class TorqueTerm:
     """One term: `columns(motion, sign)` gives an array (n,) for each coefficient."""
 
     columns: Callable[[Motion, Vector], list[Vector]]
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[Coefficient, ...]
 
 
-INERTIA = Parameter("inertia", "kg m^2", "kg")
+INERTIA = Coefficient("inertia", "kg m^2", "kg")
 
 
-def _viscous(name: str) -> Parameter:
-    return Parameter(name, "N m s/rad", "N s/m")
+def _viscous(name: str) -> Coefficient:
+    return Coefficient(name, "N m s/rad", "N s/m")
 
 
-def _force(name: str) -> Parameter:
-    return Parameter(name, "N m", "N")
+def _force(name: str) -> Coefficient:
+    return Coefficient(name, "N m", "N")
 
 
 TERMS: dict[str, TorqueTerm] = {
@@ -67,16 +67,16 @@ TERMS: dict[str, TorqueTerm] = {
     "offset": TorqueTerm(lambda m, _: [np.ones_like(m.velocity)], (_force("offset"),)),
     "gravity": TorqueTerm(
         lambda m, _: [np.sin(m.position), np.cos(m.position)],
-        (_force("gravity_amplitude"), Parameter("gravity_phase", "rad", "rad")),
+        (_force("gravity_amplitude"), Coefficient("gravity_phase", "rad", "rad")),
     ),
-    "spring": TorqueTerm(lambda m, _: [m.position], (Parameter("spring", "N m/rad", "N/m"),)),
+    "spring": TorqueTerm(lambda m, _: [m.position], (Coefficient("spring", "N m/rad", "N/m"),)),
 }
 
 STEEP_DRAG = "steep_drag"
 """A drag cbrt(w) that no choice of terms holds: beside it a jump at the reversal is dry friction (`reversal.py`)."""
 
 COLUMNS: dict[str, TorqueTerm] = TERMS | {
-    STEEP_DRAG: TorqueTerm(lambda m, _: [np.cbrt(m.velocity)], (Parameter("steep_drag", "N m (s/rad)^(1/3)", "N (s/m)^(1/3)"),))
+    STEEP_DRAG: TorqueTerm(lambda m, _: [np.cbrt(m.velocity)], (Coefficient("steep_drag", "N m (s/rad)^(1/3)", "N (s/m)^(1/3)"),))
 }
 """The terms that a user can ask for, and those of tests."""
 

@@ -11,7 +11,7 @@ from gaident.axis import unit, velocity_unit, word
 from gaident.show.chart import BINS, Chart, Panel, Trace, series
 from gaident.show.diagnosis_charts import error_panel, missing_label, missing_orders, std_band, velocity_panel
 from gaident.show.diagnosis_numbers import over_period, smoothed
-from gaident.show.report.views import Run, Vector
+from gaident.show.report.views import RecordView, Vector
 from gaident.show.wording import number
 
 __all__ = [
@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 
-def run_chart(run: Run, noise: float, key: str, axis: str) -> Chart:
+def run_chart(run: RecordView, noise: float, key: str, axis: str) -> Chart:
     """Measured against simulated velocity, below it what is left, below that the torque."""
     kind = word("torque", axis)
     text = "Error: measured minus simulated. Drag (or use the figure's buttons) to zoom all panels, double-click to come back."
@@ -43,7 +43,7 @@ def run_chart(run: Run, noise: float, key: str, axis: str) -> Chart:
     return Chart(key, "time [s]", tuple(panels), text + depth(run), link=key, height=590 if len(panels) > 2 else 480, shared=True)
 
 
-def depth(run: Run) -> str:
+def depth(run: RecordView) -> str:
     """How far zooming shows more."""
     n = len(run.time)
     if n <= 4 * BINS:
@@ -55,7 +55,7 @@ def depth(run: Run) -> str:
     )
 
 
-def missing_over_place(run: Run, dhat: Vector, axis: str) -> tuple[Chart, ...]:
+def missing_over_place(run: RecordView, dhat: Vector, axis: str) -> tuple[Chart, ...]:
     """Lines per turn, and the mean over one turn (linear: over the travel)."""
     rotary = axis == "rotary"
     period = math.tau if rotary else float(np.ptp(run.position)) or 1.0
@@ -71,7 +71,7 @@ def missing_over_place(run: Run, dhat: Vector, axis: str) -> tuple[Chart, ...]:
     return tuple(charts)
 
 
-def missing_over_time(run: Run, dhat: Vector, key: str, axis: str) -> Chart:
+def missing_over_time(run: RecordView, dhat: Vector, key: str, axis: str) -> Chart:
     """The missing torque as it comes, and its mean over a hundredth of the record."""
     slow = smoothed(dhat, max(3, len(dhat) // 100))
     traces = (
@@ -93,7 +93,7 @@ def missing_over_time(run: Run, dhat: Vector, key: str, axis: str) -> Chart:
     )
 
 
-def held_out_chart(run: Run, noise: float, key: str, axis: str) -> Chart:
+def held_out_chart(run: RecordView, noise: float, key: str, axis: str) -> Chart:
     """What both models miss of data that were held out."""
     first = run.held_from or 0
     t = run.time[first:]
@@ -117,7 +117,7 @@ def command_chart(command: Vector, dt: float, axis: str) -> Chart:
     return Chart("next-command", "time [s]", (panel,), "The velocity command of the next experiment.", height=260, shared=True)
 
 
-def _errors(run: Run) -> tuple[Vector, Vector | None]:
+def _errors(run: RecordView) -> tuple[Vector, Vector | None]:
     """Measured minus simulated velocity [rad/s] of the linear and of the extended model."""
     return run.measured - run.linear, None if run.extended is None else run.measured - run.extended
 

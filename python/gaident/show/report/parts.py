@@ -15,7 +15,7 @@ from gaident.show.diagnosis_charts import missing_over_velocity, missing_reversa
 from gaident.show.draw import picture
 from gaident.show.html import Html, Row, joined, number, png_uri, table, tag, typeset
 from gaident.show.report import charts
-from gaident.show.report.views import Run, View
+from gaident.show.report.views import RecordView, View
 from gaident.show.response_plots import response_chart
 from gaident.show.units import Scales, in_units
 from gaident.show.wording import with_std
@@ -181,7 +181,7 @@ def response_part(view: View, drawn: Charts) -> Html:
     return needs_record(view, "The frequency response needs the record.")
 
 
-def records_table(runs: Sequence[Run], digests: Sequence[str], validation: Sequence[str]) -> Html:
+def records_table(runs: Sequence[RecordView], digests: Sequence[str], validation: Sequence[str]) -> Html:
     """Which data this is about: names where they are at hand, hashes always."""
     rows: list[Row] = [_record_row(r) for r in runs]
     known = {r.digest for r in runs}
@@ -190,7 +190,7 @@ def records_table(runs: Sequence[Run], digests: Sequence[str], validation: Seque
     return table(("record", "used", "samples", "dt [ms]", "duration [s]", "SHA-256 of the data"), [rows])
 
 
-def _record_row(run: Run) -> Row:
+def _record_row(run: RecordView) -> Row:
     n, dt = len(run.time), run.dt
     return (run.name or "unnamed", run.used, str(n), number(1e3 * dt), number(n * dt, 3), _hash(run.digest))
 
@@ -209,7 +209,7 @@ def roots_table(roots: Sequence[tuple[str, complex, str]]) -> Html:
     return table(("", "[rad/s]", "frequency [Hz]", "damping ratio", ""), [rows])
 
 
-def title_of(runs: Sequence[Run]) -> str:
+def title_of(runs: Sequence[RecordView]) -> str:
     """The names of the fitted records, as far as they fit."""
     names = [r.name for r in runs if r.name]
     # no decision: how many names are listed

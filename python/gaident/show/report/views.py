@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from gaident.results.frequency import Responses
 from gaident.show.units import Scales
 
-__all__ = ["Curve", "Run", "Vector", "View"]
+__all__ = ["Curve", "RecordView", "Vector", "View"]
 
 Vector = NDArray[np.float64]
 Curve = tuple[Vector, Vector, str]
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class RecordView:
     """One record and what the models make of it; arrays (n,), None where it is not there.
 
     name and digest of the record; used: "fitted", "held out" or "new" (not the record of this result).
@@ -59,7 +59,7 @@ class View:
     and drew the page -> version. axis: "rotary" or "linear". scales: to the user's units. about: what stands below the title.
     """
 
-    runs: tuple[Run, ...] = ()
+    runs: tuple[RecordView, ...] = ()
     curve: Curve | None = None
     response: Responses | None = None
     no_response: str = ""
@@ -69,11 +69,11 @@ class View:
     about: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def fitted(self) -> tuple[Run, ...]:
+    def fitted(self) -> tuple[RecordView, ...]:
         """The records that parameters were fitted to; where none of them is at hand, those that are."""
         return tuple(r for r in self.runs if r.used == "fitted") or self.runs
 
     @property
-    def longest(self) -> Run | None:
+    def longest(self) -> RecordView | None:
         """The longest of the fitted ones: what is wrong is shown on it."""
         return max(self.fitted, key=lambda r: len(r.time), default=None)

@@ -1,0 +1,87 @@
+"""The records as their controller read them: an outlier of the log alone is no part of what the controller answers.
+
+Where a torque is logged it tells which: an outlier that the controller read is answered by its torque.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gaident.control.cascade import Cascade, cascade_of
+from gaident.control.controller import Controller
+from gaident.data.record import Record
+from gaident.diagnosis.controller.slow_forms import run_error
+from gaident.diagnosis.records.hygiene import cleaned, outliers
+from gaident.identification.logged_stretches import log_of
+from gaident.identification.logged_torque import comparable
+from gaident.models.starts import noise_std
+
+__all__ = ["as_read", "outliers_of_the_log"]
+
+Lines = NDArray[np.intp]
+Vector = NDArray[np.float64]
+
+STEP = 1e-6  # no decision: of the highest speed, of a difference
+
+
+def as_read(recorded: Sequence[Record], cleaned: Sequence[Record], controller: Controller | None) -> tuple[Record, ...]:
+    """The records as the controller read them: cleaned of outliers only where the logged torque follows better from that."""
+    if controller is None or any(r.torque is None or not controller.replayable(r) for r in recorded):
+        return tuple(cleaned)
+    pairs = [
+        (r, c) if r is c else min((r, c), (c, r), key=lambda pair: _replay_error(pair[0], controller))
+        for r, c in zip(recorded, cleaned, strict=True)
+    ]
+    return tuple(best for best, _ in pairs)
+
+
+def _replay_error(rec: Record, controller: Controller) -> float:
+    """Mean square of logged minus replayed torque [(N m)^2]."""
+    assert rec.torque is not None
+    return float(np.mean((rec.torque - controller.torque_of(rec)) ** 2))
+
+
+def outliers_of_the_log(records: Sequence[Record], controller: Controller | None) -> tuple[tuple[Record, ...], tuple[Lines, ...]]:
+    """(the records with what their controller read in the place of outliers, the lines of these), of slow logs.
+
+    Where a log is slower than its controller, a velocity that is smooth between the lines spreads an outlier over its neighbours,
+    in the torque that drives a model, too.
+    """
+    found = [_of_the_log(r, controller) for r in records]
+    return tuple(r for r, _ in found), tuple(lines for _, lines in found)
+
+
+def _of_the_log(rec: Record, controller: Controller | None) -> tuple[Record, Lines]:
+    none = np.zeros(0, dtype=np.intp)
+    if controller is None or controller.unknown or controller.loop != "sampled" or not comparable(rec, controller):
+        return rec, none
+    lines, cascade = outliers(rec.velocity), cascade_of(controller)
+    if not len(lines):
+        return rec, none
+    without = _answered(cleaned(rec, lines), lines, cascade)
+    return (without, lines) if run_error([without], cascade) < run_error([rec], cascade) else (rec, none)
+
+
+def _answered(rec: Record, lines: Lines, cascade: Cascade) -> Record:
+    """The record with the velocities at these lines [rad/s] that the logged torque answers, by least squares.
+
+        torque - made(w) = sum over lines k of x_k d made/d w_k,   w_k + x_k
+
+    Interpolated ones lack the noise that the controller read. Fitted is what changes from line to line: the velocity between the
+    lines, which is lost, adds up in the integral.
+    """
+
+    def made(velocity: Vector) -> Vector:
+        return log_of(rec.with_channels(velocity=velocity), len(rec), cascade, True).made(cascade)
+
+    w = rec.velocity
+    before, step = made(w), max(noise_std(w), STEP * float(np.abs(w).max()))
+    columns = np.array([made(w + step * (np.arange(len(w)) == k)) - before for k in lines]).T / step
+    assert rec.torque is not None
+    x, *_ = np.linalg.lstsq(np.diff(columns, axis=0), np.diff(rec.torque - before), rcond=None)
+    moved = w.copy()
+    moved[lines] += x
+    return rec.with_channels(velocity=moved)
