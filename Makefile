@@ -86,7 +86,7 @@ real: .venv/.tested ## measured drives diagnosed and fitted (GAIDENT_DATA); fail
 embedded: ## the search in a drive, on two emulated Cortex-M boards, and the recurrences on ARM64, compared bit for bit (docs/dsp.md)
 	@csrc/embedded/tools.sh
 	@$(MAKE) --no-print-directory -f csrc/embedded/embedded.mk OUT=build/embedded
-	@if csrc/embedded/tools.sh arm64; then $(MAKE) --no-print-directory -f csrc/embedded/arm64.mk OUT=build/embedded; \
+	@if csrc/embedded/tools.sh arm64; then $(MAKE) --no-print-directory --jobs=$(JOBS) -f csrc/embedded/arm64.mk OUT=build/embedded; \
 		else echo "ARM64 left out: its tools do not install here" >&2; fi
 
 tidy: .venv/.tidied ## repair and format the Python and C++ sources

@@ -225,6 +225,7 @@ struct KernelSource {
     // How many registers run side by side. One alone waits for its own chain from sample to sample, so none stays alone that need not,
     // and registers of different orders share a loop of the larger one. Two hide most of that chain, three all of it up to the order
     // whose states and coefficients fit the registers.
+    // Where a fused operation is a call of a function, none is spent on the zeros of a smaller order: pairs only, each of one group.
     template <int inputs>
     static constexpr int three_up_to = inputs == 0 ? 4 : 2;
 
@@ -240,7 +241,8 @@ struct KernelSource {
         };
         for (int r = 0; r < registers;) {
             const int left = registers - r;
-            const bool three = left == 3 || (left > 4 && largest(r, 3) <= three_up_to<inputs>);
+            const bool three =
+                Lanes<T, per_register, Isa>::Fused::there && (left == 3 || (left > 4 && largest(r, 3) <= three_up_to<inputs>));
             const int s = three ? 3 : std::min(left, 2), order = largest(r, s);
             by_order<8>(order, [&](auto N) {
                 using Form = SideBySide<T, W, N, inputs>;
