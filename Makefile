@@ -83,9 +83,11 @@ real: .venv/.tested ## measured drives diagnosed and fitted (GAIDENT_DATA); fail
 	@rm -f build/real.jsonl
 	$(BIN)/python bench/real.py --check --workers $(JOBS) --out build/real.jsonl
 
-embedded: ## the search in a drive: built for two emulated Cortex-M boards, run there, compared bit for bit (docs/dsp.md)
+embedded: ## the search in a drive, on two emulated Cortex-M boards, and the recurrences on ARM64, compared bit for bit (docs/dsp.md)
 	@csrc/embedded/tools.sh
 	@$(MAKE) --no-print-directory -f csrc/embedded/embedded.mk OUT=build/embedded
+	@if csrc/embedded/tools.sh arm64; then $(MAKE) --no-print-directory --jobs=$(JOBS) -f csrc/embedded/arm64.mk OUT=build/embedded; \
+		else echo "ARM64 left out: its tools do not install here" >&2; fi
 
 tidy: .venv/.tidied ## repair and format the Python and C++ sources
 	$(BIN)/ruff check --fix-only .

@@ -38,7 +38,7 @@ typedef struct {
 
 typedef struct {
     gaident_loop loop;
-    uint64_t seed;       /* the same seed gives the same run, here and on the desk */
+    uint64_t seed;       /* the same seed gives the same run, here and on the host */
     double crossover;    /* rate per pair, 0..1; the paper: 0.9 */
     double mutation;     /* rate per bit, 1e-6..1; the paper: 0.01 */
     int tournament;      /* contestants; the paper does not say, 2 */

@@ -1,12 +1,20 @@
 #!/bin/sh
 # What `make embedded` needs: looks for it, installs it where this is Debian and we are root or may become so, and otherwise says how.
+#
+#     tools.sh          for the drive's processors
+#     tools.sh arm64    for ARM64
+#
 # Exit code 0: everything is there.
-packages="gcc-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm"
-
-have() {
-    command -v qemu-system-arm && command -v arm-none-eabi-g++ &&
-        echo '#include <concepts>' | arm-none-eabi-g++ -std=c++20 -ffreestanding -fsyntax-only -x c++ -
-} >/dev/null 2>&1
+if [ "${1:-}" = arm64 ]; then
+    packages="g++-aarch64-linux-gnu qemu-user-static"
+    have() { command -v qemu-aarch64-static && command -v aarch64-linux-gnu-g++; } >/dev/null 2>&1
+else
+    packages="gcc-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm"
+    have() {
+        command -v qemu-system-arm && command -v arm-none-eabi-g++ &&
+            echo '#include <concepts>' | arm-none-eabi-g++ -std=c++20 -ffreestanding -fsyntax-only -x c++ -
+    } >/dev/null 2>&1
+fi
 
 have && exit 0
 if command -v apt-get >/dev/null 2>&1; then

@@ -1,5 +1,5 @@
 /* gaident.h from C99, on the build machine: identifies the record on standard input, refuses what it must, and spoils on demand. Run by
- * test_drive_arithmetic.py, which knows the desk's run.
+ * test_drive_arithmetic.py, which knows the host's run.
  *
  *     in     kp ki sample_time peak, then command and velocity of every sample, as hexadecimal floats
  *     out    p q K fitness generation, as hexadecimal floats; exit code: the line where a check failed */

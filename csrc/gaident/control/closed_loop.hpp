@@ -8,6 +8,7 @@
 #pragma once
 
 #include "controller.hpp"
+#include "../numeric/unrolled.hpp"
 
 #include <type_traits>
 
@@ -49,7 +50,8 @@ template <class R, int N, bool driven = true, class C = R, class X = R>
         else return sum;
     };
     const R y = with_input(x[0], 0);
-    for (int i = 0; i + 1 < n; ++i) x[i] = fnma(a[i], y, with_input(x[i] + x[i + 1], i + 1));
+    constexpr int before_last = N < 1 ? N : N - 1;
+    unrolled<before_last>(n - 1, [&](int i) [[gnu::always_inline]] { x[i] = fnma(a[i], y, with_input(x[i] + x[i + 1], i + 1)); });
     if (n > 0) x[n - 1] = fnma(a[n - 1], y, with_input(x[n - 1], n));
     return y;
 }
@@ -60,7 +62,9 @@ template <class R, int N>
     const int n = N >= 0 ? N : order;
     const auto with_inputs = [&](const R& sum, int i) [[gnu::always_inline]] { return fma(c[i], s, fma(b[i], r, sum)); };
     const R y = with_inputs(x[0], 0);
-    for (int i = 0; i + 1 < n; ++i) x[i] = fnma(a[i], y, with_inputs(x[i] + x[i + 1], i + 1));
+    constexpr int before_last = N < 1 ? N : N - 1;
+    unrolled<before_last>(n - 1,
+                          [&](int i) [[gnu::always_inline]] { x[i] = fnma(a[i], y, with_inputs(x[i] + x[i + 1], i + 1)); });
     if (n > 0) x[n - 1] = fnma(a[n - 1], y, with_inputs(x[n - 1], n));
     return y;
 }

@@ -17,7 +17,6 @@ public:
     FlushDenormals(const FlushDenormals&) = delete;
     FlushDenormals& operator=(const FlushDenormals&) = delete;
 
-private:
     // The processor's control word of floating-point arithmetic, and its bits that flush denormals.
 #if defined(__SSE2__)
     using Control = unsigned;
@@ -49,6 +48,7 @@ private:
     static void set_control(Control) {}
 #endif
 
+private:
     Control saved_;
 };
 

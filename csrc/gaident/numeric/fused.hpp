@@ -3,7 +3,8 @@
 //     fma(a, b, c) = a b + c,    fnma(a, b, c) = c - a b.
 //
 // Written out, and never the compiler's choice (the build forbids contraction), so that every instruction set gives the same bits: the
-// processor's own instruction where the source is compiled for one that has it, else the C library's function, which is exact and slow.
+// processor's own instruction where the source is compiled for one that has it, else the C library's function, which takes that
+// instruction where the processor has it, and is exact and slow where not.
 // Where c is what the step before has left, it takes part last: one operation from one sample to the next, not two.
 //
 // A number that has no such operation (a drive's arithmetic: numeric/c30.hpp, numeric/fixed.hpp) multiplies and adds.
@@ -13,15 +14,78 @@
 
 #if defined(__FMA__)
 #include <immintrin.h>
+#elif defined(__SSE2__)
+#include "denormals.hpp"
+
+#include <bit>
+#include <cstdint>
+#include <limits>
 #elif defined(__aarch64__)
 #include <arm_neon.h>
 #endif
 
 namespace gaident {
 
-[[gnu::always_inline]] inline double fma(double a, double b, double c) { return __builtin_fma(a, b, c); }
+namespace detail {
+
+#if defined(__SSE2__) && !defined(__FMA__)
+// The C library's function without the instruction splits its operands and adds up what is lost. Where denormals are flushed
+// (FlushDenormals) some of these parts are, and from 1e-291 down its results are wrong; the instruction flushes operands and result and
+// nothing in between. So the parts are computed with denormals, and operands and result are flushed here.
+// (The function for floats computes in double, whose parts are no denormals.)
+[[gnu::noinline]] inline double fma_between_flushes(double a, double b, double c) {
+    constexpr double least = std::numeric_limits<double>::min();
+    const unsigned before = FlushDenormals::control();
+    const bool flushed = (before & FlushDenormals::flush) != 0;
+    const auto flush = [flushed](double& x) {  // by its bits: whatever the control word says
+        const bool small = (std::bit_cast<std::uint64_t>(x) & 0x7ff0'0000'0000'0000) == 0;
+        if (flushed && small) x = __builtin_copysign(0.0, x);
+    };
+    const auto call = [](double x, double y, double z) {
+        asm volatile("" : "+x"(x), "+x"(y), "+x"(z));  // the call stays between the two settings of the control word
+        double r = __builtin_fma(x, y, z);
+        asm volatile("" : "+x"(r));
+        return r;
+    };
+    flush(a), flush(b), flush(c);
+    FlushDenormals::set_control(before & ~FlushDenormals::flush);
+    double r = call(a, b, c);
+    // The instruction flushes what is below the least normal number after rounding to 53 bits. A denormal has fewer, and may have been
+    // rounded up to that number: seen at twice the size. Then the lesser factor is far from the largest number.
+    if (flushed && __builtin_fabs(r) == least) {
+        const bool first = __builtin_fabs(a) < __builtin_fabs(b);
+        if (__builtin_fabs(call(first ? 2.0 * a : a, first ? b : 2.0 * b, 2.0 * c)) < 2.0 * least) r = __builtin_copysign(0.0, r);
+    }
+    FlushDenormals::set_control(before);
+    flush(r);
+    return r;
+}
+
+// Whether the library goes without the instruction is asked of the library itself, by two products that then go wrong.
+inline bool library_goes_without() {
+    const auto right = [](double x, double y, double z, double expected) {
+        volatile double in[] = {x, y, z}, out;
+        const FlushDenormals flush;
+        out = __builtin_fma(in[0], in[1], in[2]);
+        return out == expected;
+    };
+    return !right(-0x1.2245bd5fbb686p+2, 0x1.0561d8057935cp-998, -0x1.78833635915bdp-977, -0x1.78835b4192c9ep-977) ||
+           !right(0x1p-1030, 0x1p+1000, 0.0, 0.0);
+}
+inline const bool without_instruction = library_goes_without();
+
+[[gnu::always_inline]] inline double fused(double a, double b, double c) {
+    return without_instruction ? fma_between_flushes(a, b, c) : __builtin_fma(a, b, c);
+}
+#else
+[[gnu::always_inline]] inline double fused(double a, double b, double c) { return __builtin_fma(a, b, c); }
+#endif
+
+}  // namespace detail
+
+[[gnu::always_inline]] inline double fma(double a, double b, double c) { return detail::fused(a, b, c); }
 [[gnu::always_inline]] inline float fma(float a, float b, float c) { return __builtin_fmaf(a, b, c); }
-[[gnu::always_inline]] inline double fnma(double a, double b, double c) { return __builtin_fma(-a, b, c); }
+[[gnu::always_inline]] inline double fnma(double a, double b, double c) { return detail::fused(-a, b, c); }
 [[gnu::always_inline]] inline float fnma(float a, float b, float c) { return __builtin_fmaf(-a, b, c); }
 
 namespace detail {

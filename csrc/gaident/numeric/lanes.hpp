@@ -24,7 +24,7 @@ struct Lanes {
     [[gnu::always_inline]] inline explicit Lanes(double x) : Lanes(all(static_cast<T>(x))) {}
 
     [[gnu::always_inline]] static inline Lanes all(T x) {
-        return each([x](int) { return Register{} + x; });
+        return each([x](int) { return x - Register{}; });  // which is x, also where x is -0: one load into every lane
     }
     [[gnu::always_inline]] static inline Lanes load(const T* p) {
         return each([p](int i) {

@@ -1,7 +1,7 @@
 // The paper's search (Table II) with all its memory inside the object: no heap, no libm, no exceptions, sizes known when
 // compiled.
 // What runs in a drive, in slices, while the drive does its work; the random words are drawn in the order of breeder.hpp, so the
-// same seed gives the run that the desk makes.
+// same seed gives the run that the host makes.
 //
 //     StaticSearch(setup)         once
 //     feed(command, velocity)     sample by sample, until it says that the record is full

@@ -1,7 +1,14 @@
 // One rounding instead of two: what it is, that every instruction set has it, and what it is worth.
 #include "check.hpp"
 #include "drive_bench.hpp"
+#include "gaident/numeric/denormals.hpp"
 #include "gaident/numeric/elementary.hpp"
+
+#include <bit>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
 
 namespace gaident {  // where fma is these
 
@@ -42,6 +49,18 @@ static_assert(Arithmetic<Once> && Arithmetic<Wide>);
 struct Baseline {
     static constexpr int register_bytes = 16;
 };
+
+#if defined(__x86_64__)
+// The processor's instruction itself, whatever the C library takes for its function.
+__attribute__((target("fma"))) double instruction(double a, double b, double c) {
+    return _mm_cvtsd_f64(_mm_fmadd_sd(_mm_set_sd(a), _mm_set_sd(b), _mm_set_sd(c)));
+}
+
+// Zeros with their signs; a NaN is a NaN.
+bool same_bits(double a, double b) {
+    return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b) || (a != a && b != b);
+}
+#endif
 
 // max |y - x| / max |x|, y(n) of the same equation in R and x in the wide number.
 template <class R>
@@ -104,6 +123,65 @@ TEST_CASE("fused: lanes, and one candidate in the code of an instruction set, gi
         }
     }
 }
+
+#if defined(__x86_64__)
+// The build runs this a second time with the C library's function without the instruction (fused_without_instruction).
+TEST_CASE("fused: near the smallest numbers, denormals flushed or not, the bits are the instruction's") {
+    if (__builtin_cpu_supports("fma") == 0) return;  // nothing to compare with
+    using L = Lanes<double, 8, Baseline>;
+    Random random(23);
+    const auto number = [&](int exponent) {
+        return std::ldexp((random.below(2) == 0 ? 1.0 : -1.0) * (1.0 + random.uniform()), exponent);
+    };
+    const double least = 0x1p-1022;
+    for (const bool flushed : {true, false}) {
+        int compared = 0, wrong = 0, zeros = 0;
+        const auto compare = [&](double a, double b, double c) {
+            volatile double in[] = {a, b, c};
+            volatile double plus, minus, exact_plus, exact_minus, in_lanes;  // volatile: computed where denormals are flushed
+            const auto compute = [&] {
+                double lanes[8];
+                plus = fma(in[0], in[1], in[2]);
+                minus = fnma(in[0], in[1], in[2]);
+                fma(L::all(in[0]), L::all(in[1]), L::all(in[2])).store(lanes);
+                in_lanes = lanes[7];
+                exact_plus = instruction(in[0], in[1], in[2]);
+                exact_minus = instruction(-in[0], in[1], in[2]);
+            };
+            if (flushed) {
+                const FlushDenormals flush;
+                compute();
+            } else compute();
+            ++compared;
+            if (exact_plus == 0.0) ++zeros;
+            if (!same_bits(plus, exact_plus) || !same_bits(minus, exact_minus) || !same_bits(in_lanes, exact_plus)) ++wrong;
+        };
+        for (int repeat = 0; repeat < 200000; ++repeat) {
+            // the product's and the sum's exponents up to 60 apart, from beyond the smallest denormal to 1e-280
+            const int of_sum = -1080 + static_cast<int>(random.below(150)), of_a = -1040 + static_cast<int>(random.below(1080));
+            const int of_b = std::clamp(of_sum + static_cast<int>(random.below(120)) - 60 - of_a, -1074, 1000);
+            const double a = number(of_a), b = number(of_b), c = number(of_sum);
+            compare(a, b, c);
+            if (repeat % 8 == 0) compare(a, b, -a * b);  // what is left is the product's rounding
+            if (repeat % 8 == 1) compare(a, b, 0.0);
+        }
+        // around half a unit of 53 bits, and of a denormal, below the smallest normal number
+        for (const double sign : {1.0, -1.0})
+            for (int k = 1; k <= 64; ++k)
+                for (const int e : {-100, -540, -900}) {
+                    compare(std::ldexp(-sign * k, -1080 - e), std::ldexp(1.0, e), sign * least);
+                    compare(sign * (1.0 - k * 0x1p-53), least, 0.0);
+                }
+        const double kept[] = {0.0, -0.0, HUGE_VAL, -HUGE_VAL, NAN, least, 0x1p-1074, 1.0, -0x1.fffffffffffffp+1023};
+        for (const double a : kept)
+            for (const double b : kept)
+                for (const double c : kept) compare(a, b, c);
+        std::printf("denormals %s: %d of %d differ; %d are zero\n", flushed ? "flushed" : "kept", wrong, compared, zeros);
+        CHECK(wrong == 0);
+        CHECK(zeros > 1000);
+    }
+}
+#endif
 
 // The same coefficients and equation in double and in 64 bits of fraction: what is left is rounding.
 TEST_CASE("fused: the recurrence is at least as exact as with two roundings") {

@@ -1,4 +1,4 @@
-// The search that runs in a drive, against the desk's.
+// The search that runs in a drive, against the host's.
 #include "check.hpp"
 #include "drive_bench.hpp"
 #include "fixed_bound.hpp"
@@ -73,7 +73,7 @@ std::array<Bench, 2> records() {
     return {Bench(two_mass()), Bench(driven)};
 }
 
-Trial desk(const Bench& bench, const char* mirror, int generations, std::uint64_t seed) {
+Trial host(const Bench& bench, const char* mirror, int generations, std::uint64_t seed) {
     PlantSettings s;
     s.generations = generations;
     s.mirror = mirror;
@@ -88,19 +88,19 @@ bool same(const Trial& a, const Trial& b) {
 
 }  // namespace
 
-TEST_CASE("static search: in double the desk's run, bit for bit; settling and driven records") {
+TEST_CASE("static search: in double the host's run, bit for bit; settling and driven records") {
     for (const Bench& bench : records()) {
-        CHECK(same(run<Plain<double>>(bench, 60, 4), desk(bench, "", 60, 4)));
-        CHECK(same(run<Plain<double>>(bench, 60, 4), desk(bench, "drive_double", 60, 4)));
+        CHECK(same(run<Plain<double>>(bench, 60, 4), host(bench, "", 60, 4)));
+        CHECK(same(run<Plain<double>>(bench, 60, 4), host(bench, "drive_double", 60, 4)));
     }
 }
 
-TEST_CASE("static search: in a drive's arithmetic the run of its mirror on the desk, bit for bit") {
+TEST_CASE("static search: in a drive's arithmetic the run of its mirror on the host, bit for bit") {
     for (const Bench& bench : records()) {
-        CHECK(same(run<Plain<float>>(bench, 30, 4), desk(bench, "drive_float", 30, 4)));
-        CHECK(same(run<Plain<C30Word, C30>>(bench, 30, 4), desk(bench, "c30", 30, 4)));
-        CHECK(same(run<FixedPoint<2>>(bench, 30, 4), desk(bench, "fixed", 30, 4)));
-        CHECK(!same(run<Plain<float>>(bench, 30, 4), desk(bench, "c30", 30, 4)));
+        CHECK(same(run<Plain<float>>(bench, 30, 4), host(bench, "drive_float", 30, 4)));
+        CHECK(same(run<Plain<C30Word, C30>>(bench, 30, 4), host(bench, "c30", 30, 4)));
+        CHECK(same(run<FixedPoint<2>>(bench, 30, 4), host(bench, "fixed", 30, 4)));
+        CHECK(!same(run<Plain<float>>(bench, 30, 4), host(bench, "c30", 30, 4)));
     }
 }
 

@@ -4,10 +4,13 @@
 #include "../../plant/held.hpp"
 #include "../../numeric/lanes.hpp"
 #include "../../numeric/single.hpp"
+#include "../../numeric/unrolled.hpp"
 #include "../../control/loop.hpp"
 #include "../../control/servo_equation.hpp"
 #include "kernels.hpp"
 #include "products.hpp"
+
+#include <algorithm>
 
 namespace gaident {
 
@@ -134,47 +137,54 @@ struct KernelSource {
         }
     };
 
-    // Squared errors of S registers of candidates of one order side by side, from register `first` of the array of groups on:
-    // while one waits for the sample before, the others compute.
+    // Squared errors of S registers of candidates side by side, from register `first` of the array of groups on: while one waits for the
+    // sample before, the others compute.
+    // `order` is the largest of theirs; a register of a smaller one has zeros above its own.
     // `inputs`: 0, outputs being deviations from rest; 1; or 2, the command and its part that goes straight.
     template <class T, int W, int N, int inputs>
     struct SideBySide {
         using L = Lanes<T, static_cast<int>(Isa::register_bytes / sizeof(T)), Isa>;
         static constexpr int per_group = W / L::per_register, capacity = room_for(N);
         template <int S>
-        static void errors(Group<T, W>* groups, int first, const T* input, const T* straight, const T* output, std::size_t n,
-                           T* sums) {
+        static void errors(Group<T, W>* groups, int first, int order, const T* input, const T* straight, const T* output,
+                           std::size_t n, T* sums) {
             constexpr bool driven = inputs > 0;
-            const int order = N >= 0 ? N : groups[first / per_group].order;
             L a[S][capacity], b[S][capacity + 1], x[S][capacity], sum[S];
             [[maybe_unused]] L c[inputs == 2 ? S : 1][inputs == 2 ? capacity + 1 : 1];
-            const auto row = [&](auto& rows, int s, int i) { return rows[i] + (first + s) % per_group * L::per_register; };
-            for (int s = 0; s < S; ++s) {
+            const auto lanes = [&](auto& rows, int s, int i) { return rows[i] + (first + s) % per_group * L::per_register; };
+            [[maybe_unused]] constexpr int inputs_known = N < 0 ? N : N + 1;
+            unrolled<S>(S, [&](int s) [[gnu::always_inline]] {
                 Group<T, W>& g = groups[(first + s) / per_group];
-                for (int i = 0; i < order; ++i) a[s][i] = L::load(row(g.a, s, i));
-                for (int i = 0; i < order; ++i) x[s][i] = L::load(row(g.x, s, i));
-                if (order == 0) x[s][0] = L(0.0);
+                const auto row = [&](auto& rows, int i, int size)
+                                     [[gnu::always_inline]] { return i < size ? L::load(lanes(rows, s, i)) : L(0.0); };
+                x[s][0] = L(0.0);  // of order 0
+                unrolled<N>(order, [&](int i) [[gnu::always_inline]] {
+                    a[s][i] = row(g.a, i, g.order);
+                    x[s][i] = row(g.x, i, g.order);
+                });
                 if constexpr (driven)
-                    for (int i = 0; i <= order; ++i) b[s][i] = L::load(row(g.b, s, i));
+                    unrolled<inputs_known>(order + 1, [&](int i) [[gnu::always_inline]] { b[s][i] = row(g.b, i, g.order + 1); });
                 if constexpr (inputs == 2)
-                    for (int i = 0; i <= order; ++i) c[s][i] = L::load(row(g.c, s, i));
+                    unrolled<inputs_known>(order + 1, [&](int i) [[gnu::always_inline]] { c[s][i] = row(g.c, i, g.order + 1); });
                 sum[s] = L(0.0);
-            }
+            });
             for (std::size_t i = 0; i < n; ++i) {
                 const L wanted = L::all(output[i]), r = driven ? L::all(input[i]) : L(0.0);
-                for (int s = 0; s < S; ++s) {
+                unrolled<S>(S, [&](int s) [[gnu::always_inline]] {
                     L e;
                     if constexpr (inputs == 2)
                         e = wanted - recurrence_step<L, N>(order, a[s], b[s], c[s], x[s], r, L::all(straight[i]));
                     else e = wanted - recurrence_step<L, N, driven>(order, a[s], b[s], x[s], r);
                     sum[s] = fma(e, e, sum[s]);
-                }
+                });
             }
-            for (int s = 0; s < S; ++s) {
+            unrolled<S>(S, [&](int s) [[gnu::always_inline]] {
                 Group<T, W>& g = groups[(first + s) / per_group];
-                for (int i = 0; i < order; ++i) x[s][i].store(row(g.x, s, i));
+                unrolled<N>(order, [&](int i) [[gnu::always_inline]] {
+                    if (i < g.order) x[s][i].store(lanes(g.x, s, i));
+                });
                 sum[s].store(sums + (first + s) * L::per_register);
-            }
+            });
         }
     };
 
@@ -212,21 +222,33 @@ struct KernelSource {
         }
     };
 
+    // How many registers run side by side. One alone waits for its own chain from sample to sample, so none stays alone that need not,
+    // and registers of different orders share a loop of the larger one. Two hide most of that chain, three all of it up to the order
+    // whose states and coefficients fit the registers.
+    // Where a fused operation is a call of a function, none is spent on the zeros of a smaller order: pairs only, each of one group.
+    template <int inputs>
+    static constexpr int three_up_to = inputs == 0 ? 4 : 2;
+
     template <class T, int W, int inputs>
     static void side_by_side(Group<T, W>* groups, int lanes, const T* input, const T* straight, const T* output, std::size_t n,
                              T* sums) {
         constexpr int per_register = static_cast<int>(Isa::register_bytes / sizeof(T));
         const int registers = (lanes + per_register - 1) / per_register;
-        const auto order = [&](int r) { return groups[r * per_register / W].order; };
+        const auto largest = [&](int r, int count) {
+            int order = 0;
+            for (int k = r; k < r + count; ++k) order = std::max(order, groups[k * per_register / W].order);
+            return order;
+        };
         for (int r = 0; r < registers;) {
-            int same = 1;  // registers of one order from here on
-            while (r + same < registers && order(r + same) == order(r)) ++same;
-            const int s = same <= 3 ? same : (same == 4 ? 2 : Isa::side_by_side);  // none stays alone that need not
-            by_order<8>(order(r), [&](auto N) {
+            const int left = registers - r;
+            const bool three =
+                Lanes<T, per_register, Isa>::Fused::there && (left == 3 || (left > 4 && largest(r, 3) <= three_up_to<inputs>));
+            const int s = three ? 3 : std::min(left, 2), order = largest(r, s);
+            by_order<8>(order, [&](auto N) {
                 using Form = SideBySide<T, W, N, inputs>;
-                if (s == 3) Form::template errors<3>(groups, r, input, straight, output, n, sums);
-                else if (s == 2) Form::template errors<2>(groups, r, input, straight, output, n, sums);
-                else Form::template errors<1>(groups, r, input, straight, output, n, sums);
+                if (s == 3) Form::template errors<3>(groups, r, order, input, straight, output, n, sums);
+                else if (s == 2) Form::template errors<2>(groups, r, order, input, straight, output, n, sums);
+                else Form::template errors<1>(groups, r, order, input, straight, output, n, sums);
             });
             r += s;
         }

@@ -5,7 +5,6 @@ namespace gaident {
 namespace {
 struct Isa_avx2 {
     static constexpr int register_bytes = 32;
-    static constexpr int side_by_side = 3;
 };
 }  // namespace
 

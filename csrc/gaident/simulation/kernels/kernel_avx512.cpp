@@ -5,7 +5,6 @@ namespace gaident {
 namespace {
 struct Isa_avx512 {
     static constexpr int register_bytes = 64;
-    static constexpr int side_by_side = 3;
 };
 }  // namespace
 

@@ -5,7 +5,6 @@ namespace gaident {
 namespace {
 struct Isa_baseline {
     static constexpr int register_bytes = 16;
-    static constexpr int side_by_side = 2;
 };
 }  // namespace
 
