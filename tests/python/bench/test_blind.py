@@ -108,9 +108,13 @@ def test_on_a_single_step_no_wrong_name(members: tuple[str, ...]) -> None:
         assert not judged.wrong, judged
 
 
-# Outside the library and named nevertheless, as the effect of it that is nearest: known misses.
-MISNAMED = {"random_walk_friction": "a drift of friction", "resolver_error_of_speed": "a ripple of the sensor"}
-MISSES = {name: pytest.mark.xfail(reason=f"called {near}, and explained by it", strict=True) for name, near in MISNAMED.items()}
+# Outside the library and named nevertheless, as the effect of it that is nearest, or with another driver: known misses.
+KNOWN = {
+    "random_walk_friction": "called a drift of friction, and explained by it",
+    "resolver_error_of_speed": "called a ripple of the sensor, and explained by it",
+    "thermal_gain": "no name, but what is left is said to depend on the command, which the torque follows",
+}
+MISSES = {name: pytest.mark.xfail(reason=reason, strict=True) for name, reason in KNOWN.items()}
 
 
 @pytest.mark.parametrize("effect", [pytest.param(name, marks=MISSES.get(name, ())) for name in OUTSIDE])

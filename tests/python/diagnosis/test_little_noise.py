@@ -26,17 +26,18 @@ def test_two_causes_are_found_however_little_noise_there_is(noise: float) -> Non
     assert sizes["coulomb_friction"] == pytest.approx(0.05, rel=0.05) and sizes["unbalance"] == pytest.approx(0.03, rel=0.05)
 
 
-def test_three_causes_are_found_without_a_torque_where_output_errors_decide() -> None:
-    """Friction, gravity and a steep drag in the closed loop, which shows the unbalance little.
+def test_what_whitened_errors_find_is_offered_to_output_errors_before_these_decide() -> None:
+    """A drag is not tried beside a friction, of whose family it is, and leaves far more than noise, so that output errors decide.
 
-    With hardly any noise the model of all three leaves more than that, so that output errors decide.
+    The torque is not logged, and the closed loop shows the unbalance so little that their own search ends with friction alone, at
+    four times the error of the free run. Whitened errors find the unbalance; judged by output errors it is better by 58 units.
     """
-    causes = "coulomb_friction", "unbalance", "square_root_drag"
-    rec, _, controller, truth = random_case(600100, causes, "move", Noise(white=1e-6), torque_logged=False)
+    causes = "coulomb_friction", "unbalance"
+    rec, _, controller, truth = random_case(600100, (*causes, "square_root_drag"), "move", Noise(white=1e-6), torque_logged=False)
     dia = ga.diagnose(rec[:1500], controller)
-    assert {f.effect for f in dia.causes} == {*causes} and dia.verdict == "partly explained"
+    assert tuple(f.effect for f in dia.causes) == causes and dia.verdict == "partly explained"
     assert any("least output error" in note for note in dia.notes), "output errors decide"
-    assert dia.after.rmse < 1e-3 * dia.before.rmse
-    (unbalance,) = (f.parameters for f in dia.causes if f.effect == "unbalance")
+    assert dia.after.rmse < 0.2 * dia.before.rmse
+    unbalance = dia.causes[1].parameters
     for name, value in truth.effects["unbalance"].items():
-        assert unbalance[name].value == pytest.approx(value, rel=1e-3)
+        assert abs(unbalance[name].value - value) < 3.0 * unbalance[name].std

@@ -249,7 +249,6 @@ def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.ra
         },
         "quadratic_drag": {"coefficient": 1.5e-5 * factor},
         "square_root_drag": {"coefficient": 0.05 / np.sqrt(80) * factor},
-        "position_friction": {"torque": 0.05 * factor, "amplitude": 0.8, "order": float(rng.choice([1, 2, 3])), "phase": phase},
         "load_torque": {"torque": 0.03 * factor * sign},
         "unbalance": {"amplitude": 0.05 * factor, "phase": phase},
         "cogging": {"amplitude": 0.03 * factor, "order": float(rng.choice([4, 6, 12, 18])), "phase": phase},
@@ -269,11 +268,12 @@ def draw_effect(name: str, factor: float, plant: Plant, samples: int, rng: np.ra
         "velocity_quantisation": {"step": 0.63 * factor},
         "outliers": {"fraction": max(3, round(0.002 * factor * samples)) / samples},
         "torque_hum": {"amplitude": 0.03 * factor, "frequency": 2 * np.pi * float(rng.uniform(10, 50)), "phase": phase},
+        "position_friction": {"torque": 0.05 * factor, "amplitude": 0.8, "order": float(rng.choice([1, 2, 3])), "phase": phase},
         # A torque of friction, beside a shaft that has as much stiffness as the element, from half of it to twice as much.
         "hysteretic_coupling": {"torque": 0.04 * factor, "stiffness": 0.4 * factor * plant.KG},
-        "random_walk_friction": {"torque": 0.05 * factor, "size": 0.6, "number": float(rng.integers(1, 1 << 30))},
+        "random_walk_friction": {"torque": 0.05 * factor, "size": 0.6, "number": float(round(1e8 * phase))},
         "thermal_gain": {"share": min(0.6, 0.25 * factor), "time_constant": 0.5 * samples * plant.dt},
-        "resolver_error_of_speed": {"error": 1.5e-4 * factor, "order": float(rng.choice([1, 2, 4])), "phase": phase},
+        "resolver_error_of_speed": {"error": 1.5e-4 * factor, "order": float(2 ** (round(1e8 * phase) % 3)), "phase": phase},
     }
     return drawn[name]
 
