@@ -21,6 +21,8 @@ from gaident.policy.table import POLICY
 __all__ = ["Explanation", "control_error", "explain", "rounded_command", "white_noise"]
 
 Vector = NDArray[np.float64]
+
+ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
 Allows: TypeAlias = Callable[[Vector, tuple[float, float], int], bool]
 """Whether what is off [N m] under limits of torque and integrator, from a sample on, is no more than rounding."""
 
@@ -140,7 +142,7 @@ def _limits(case: _Case) -> Iterator[Explanation]:
             alike = _trapezoidal(limited, share, case.dt)
             torque = case.torque(alike)
             acting = _acting(torque, limit)
-            if share and acting < POLICY.plateau:  # the log's largest torque may have another reason
+            if (share and acting < POLICY.plateau) or not _cuts(case, torque, share):  # the largest torque has another reason
                 continue
             sentence = say("It does with {}a {torque} limit of {:.4g} {N m}, which acts at {} samples.", words, limit, acting)
             yield Explanation(torque, "torque_limit", limit, sentence, controller=alike)
@@ -182,6 +184,14 @@ def _trapezoidal(controller: PI, share: float, dt: float) -> PI:
     return replace(controller, kp=max(controller.kp + share * controller.ki * dt, 0.0))
 
 
+def _cuts(case: _Case, torque: Vector, share: float) -> bool:
+    """Whether a limited torque comes closer than that of the same rule of integration without this limit, which is not exact."""
+    without = case.logged - case.torque(_trapezoidal(case.controller, share, case.dt))
+    if float(np.abs(without).max()) <= ROUNDING * float(np.abs(case.logged).max()):
+        return False
+    return float(np.sum((case.logged - torque) ** 2)) < POLICY.better_reason**2 * float(np.sum(without**2))
+
+
 def _acting(torque: Vector, limit: float) -> int:
     return int(np.sum(np.abs(torque) >= POLICY.at_limit * limit))
 
@@ -196,7 +206,7 @@ def _held(case: _Case) -> Iterator[Explanation]:
             for rule, words in HOLDS.items():
                 torque = held_torque(case.command, case.velocity, case.dt, limited, rule, share=share)
                 acting = _acting(torque, limit)
-                if acting < POLICY.plateau:
+                if acting < POLICY.plateau or not _cuts(case, torque, share):
                     continue
                 held = "It does with {}{} (anti-windup): the limit of {:.4g} {N m} acts at {} samples."
                 sentence = say(held, integral, words, limit, acting)
