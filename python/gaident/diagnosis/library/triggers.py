@@ -164,6 +164,16 @@ def period_of_an_order(s: Motions) -> Text | None:
     return None
 
 
+def period_both_ways(s: Motions) -> Text | None:
+    """It passes most of a period forwards and backwards: what opposes the motion there is told from what acts either way."""
+    wanted = POLICY.seen_turn * (s.period or TURN)
+    ways = [sum(float(np.sum(np.maximum(sign * m.smooth, 0.0))) * m.dt for m in s.records) for sign in (1.0, -1.0)]
+    if min(ways) < wanted:
+        way = "forwards" if ways[0] < ways[1] else "backwards"
+        return say("the axis {turns} less than {:.2g} of a period {}", POLICY.seen_turn, way)
+    return None
+
+
 def _per_turn(s: Motions) -> float:
     """Order 1 of what returns with every period [1/turn]."""
     return TURN / (s.period or TURN)
