@@ -293,6 +293,7 @@ def test_a_single_step_says_what_it_cannot_judge() -> None:
         "square_root_drag",
         "friction_drift",
         "load_dependent_friction",
+        "position_friction",
         "backlash",
         "hardening_stiffness",
         "hysteretic_coupling",
