@@ -62,7 +62,7 @@ def kernel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Kernel]:
 
 
 def test_a_notebook_shows_progress_results_and_figures(kernel: Kernel) -> None:
-    shown = kernel.run("with ga.progress() as shown:\n    idn = ga.identify(rec, ctl, trials=20, progress=shown)")
+    shown = kernel.run("with ga.progress() as shown:\n    idn = ga.identify(rec, ctl, trials=1000, progress=shown)")  # some 2 s
     (first, opened), *updates = shown
     assert first == "display_data" and {kind for kind, _ in updates} == {"update_display_data"}
     assert len({content["transient"]["display_id"] for _, content in shown}) == 1  # in place
