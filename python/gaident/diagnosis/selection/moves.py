@@ -281,7 +281,11 @@ class Moves(SideMoves):
         if fit.parameters.held:
             hypothesis, x = released(fit)
             return [self.continued(hypothesis, fit, x, self.policy.long)]
-        if fit.parameters.masses == 1 or not fit.effects or any(t.needs_two_masses or t.resonates for t in fit.parameters.terms):
+        return self.demoted(fit) if fit.effects else []
+
+    def demoted(self, fit: Fit) -> list[Fit]:
+        """Two masses with their effects, or with none, as one mass with these, where none acts on the shaft or is another one."""
+        if fit.parameters.masses == 1 or any(t.needs_two_masses or t.resonates for t in fit.parameters.terms):
             return []
         hypothesis, x = as_one_mass(fit)
         return [self.continued(hypothesis, fit, x, self.policy.long)]

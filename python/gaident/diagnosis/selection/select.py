@@ -315,7 +315,9 @@ def _on_all_samples(task: Task, outline: _Found, note: Callable[[str], None]) ->
     final = reduced_by(final, _reductions(space), space.prefers, space.score)
     note(f"looking beyond {words(final.effects) or 'the linear model'}, at all samples")
     # What acts within a step of the coarse grid, it can only show as a resonance: all samples are asked without that one first.
-    without = [_beam(space).run([space.without(final, t.name)]) for t in final.parameters.terms if t.resonates]
+    without = [space.without(final, t.name) for t in final.parameters.terms if t.resonates]
+    without += space.demoted(final) if resonance(final) * outline.space.data.dt > 1.0 else []
+    without = [_beam(space).run([f]) for f in without]
     final = _beam(space).run([final]) if not without or space.score(final) < space.score(without[0]) else without[0]
     test = specification(space, task, final) if space.whitens else outline.specification
     return _Found(space, base, base, test).of(final)
