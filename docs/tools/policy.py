@@ -26,8 +26,12 @@ A number that decides about a model stands in the policy and nowhere else, and a
 What each one is for, the pages [estimation](estimation.md), [search](search.md), [identification](../identification.md) and
 [diagnosis](../diagnosis.md) say.
 
-Other numbers decide nothing: the tolerance of a solver, the step of a difference, the start of a fit.
-They stand where they are used, with a name and the remark `no decision`, which says why.
+What bounds the work of a search or a fit (iterations, starts, points of a grid, samples that are looked at) is its last group,
+[effort](#effort).
+
+Other numbers decide nothing and bound no search: the tolerance of a solver, the step of a difference, the start of a fit, the
+size of a block in memory.
+They stand where they are used, with a name or the remark `no decision`, which says why.
 The bounds and starts of each effect's parameters stand in the effect's row of `diagnosis/library/`.
 The core (`csrc/gaident`) decides about no model, but into how many substeps it cuts a sample (`substeps_for` in
 `nonlinear/effect_prepare.cpp`) sets how exact a simulation is: [what was measured](../effects.md#how-exact-it-is).
@@ -103,7 +107,8 @@ DECIDING = """\
 EFFORTS = """\
 ## Effort
 
-Budgets: more of these may find more, and changes no decision about what was found.
+Budgets of a search or a fit: more of these may find more, and changes no decision about what was found.
+So no command measures one of them.
 
 | number | value | unit | what it is |
 |---|---|---|---|

@@ -27,7 +27,7 @@ __all__ = [
     "torque_kind",
 ]
 
-HASH_BLOCK = 1 << 18  # no decision: work; values of a block
+HASH_BLOCK = 1 << 18  # no decision: memory; values of a block
 
 
 def sample_time(dt: object) -> float:

@@ -15,7 +15,7 @@ __all__ = ["SLOW_STEP", "TimeAxis", "stamp_unit", "time_column"]
 
 SLOW_STEP = 0.5  # no decision: what is asked and said; s, longer steps of a column without a unit may be milliseconds
 
-_BLOCK = 64  # no decision: work; stamps of a block
+_BLOCK = 64  # no decision: memory; stamps of a block
 _DIGITS = 16  # no decision: decimals of a double
 _SINGLE_PRINTED = 6e-9  # no decision: rounding
 """Relative error of a single-precision number printed with its nine digits."""

@@ -36,7 +36,6 @@ FIRST_CAUSE = Text(
     "This was the quick search, which stops at the first cause: whether there is another one was not looked for, and another one "
     "would change these values. The whole search tells."
 )
-ROUNDS = 3  # no decision: work; searches under gains that the one before has shown
 
 
 def diagnose(
@@ -160,7 +159,7 @@ def diagnose(
                 else:
                     work.refused(form)
             given_work = work
-            for _ in range(ROUNDS):
+            for _ in range(POLICY.rounds):
                 other = work.other_gains(given_work)
                 if other is None:
                     break

@@ -60,7 +60,7 @@ def with_content(listing: Listing, guess: Guess, values: Mapping[str, NDArray[np
     moving = [c for c in listing.columns if c.samples > 20 and c.lowest != c.highest and not c.note and not c.rises_evenly]
     longest = max((c.samples for c in moving), default=0)
     candidates = {c.name: values[c.name] for c in moving if c.samples == longest and c.name not in taken and c.name in values}
-    pair = position_and_velocity(candidates, 1.0) if len(candidates) <= 30 else None  # no decision: work; pairs of columns
+    pair = position_and_velocity(candidates, 1.0) if len(candidates) <= POLICY.paired_columns else None
     if pair is None or ("position" in guess.channels and pair[0] != guess.channels["position"].name):
         return guess
     by_name = {c.name: c for c in listing.columns}

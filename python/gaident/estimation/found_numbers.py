@@ -42,7 +42,6 @@ __all__ = ["covariance_of_numbers", "moved", "numbers_in", "of_controller", "ref
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-STEPS = 12  # no decision: work, of Gauss and Newton
 SMALLEST = 1e-300  # no decision: no division by 0
 
 
@@ -118,7 +117,7 @@ def refined(
     data, noise: other ones than those of the fit. too_far: whether a model is not followed, where its cost falls slowly.
     """
     here = _under(objective, _joined(data or fit.predictor.data), fit, noise)
-    for _ in range(STEPS):
+    for _ in range(POLICY.usual):
         v, J, E = slopes(objective, here.hypothesis, here.x, here.noise)
         found = numbers_in(here.hypothesis)
         s2, rest = variance_of(objective, here, v), project_out(J, E)

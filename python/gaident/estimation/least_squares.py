@@ -150,8 +150,8 @@ def evolved(objective: Objective, found: Fit, generations: int) -> Fit:
         return np.log(objective.costs(hypothesis, X, WHITE))
 
     best = differential_evolution(
-        costs, list(zip(low, high, strict=True)), popsize=6, maxiter=generations, x0=start, rng=0, vectorized=True,
-        updating="deferred", polish=False, tol=1e-4, mutation=(0.4, 0.9), recombination=0.9,
+        costs, list(zip(low, high, strict=True)), popsize=POLICY.population, maxiter=generations, x0=start, rng=0,
+        vectorized=True, updating="deferred", polish=False, tol=1e-4, mutation=(0.4, 0.9), recombination=0.9,
     )  # fmt: skip
     x = found.x.copy()
     x[moved] = best.x

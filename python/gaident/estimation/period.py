@@ -33,8 +33,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 TERMS = ("inertia", "viscous_by_direction", "coulomb_by_direction")
-FINER = 4.0  # no decision: lengths that are tried for each that the travel tells apart
-AT_ONCE = 1 << 21  # no decision: work; numbers of a block of waves
+AT_ONCE = 1 << 21  # no decision: memory; numbers of a block of waves
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +91,7 @@ def period_of_place(records: Sequence[Record]) -> float | None:
     if not low < high or not left.power > 0.0:
         return None
     waves = np.linspace(low, high, POLICY.lengths)
-    waves = waves[:: max(int(POLICY.lengths / (FINER * travel * (high - low))), 1)]
+    waves = waves[:: max(int(POLICY.lengths / (POLICY.finer * travel * (high - low))), 1)]
     at = float(waves[int(np.argmax(left.worth(places, waves)))])
     beside = left.beside(places, at)
     if not _counts(left, beside, len(waves)):
@@ -100,11 +99,11 @@ def period_of_place(records: Sequence[Record]) -> float | None:
     samples = effective_samples(*beside.errors)
     times = [r.time for r in rows]
     longest = max(float(np.ptp(t)) for t in times)
-    frequencies = np.arange(1.0, FINER * band * longest) / (FINER * longest)  # Hz
+    frequencies = np.arange(1.0, POLICY.finer * band * longest) / (POLICY.finer * longest)  # Hz
     hum = left.power - float(left.worth(times, frequencies).max(initial=0.0))
     if gained(hum, beside.power, samples) < POLICY.rival_margin:
         return None
-    wave, std = _refined(left, places, at, 1.0 / (FINER * travel), samples)
+    wave, std = _refined(left, places, at, 1.0 / (POLICY.finer * travel), samples)
     whole = _whole(beside, places, wave, travel)
     return _round(whole / wave, whole * std / wave**2)
 

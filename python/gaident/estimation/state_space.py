@@ -38,7 +38,7 @@ class Discretised:
     @property
     def first_response(self) -> float:
         x, largest = self.B, abs(self.D)
-        for _ in range(3):
+        for _ in range(3):  # no decision: samples of a response
             largest = max(largest, abs(float((self.C @ x).real)))
             x = self.A @ x
         return largest
@@ -119,7 +119,7 @@ def steady_covariances(A: Complex, H: Complex, Q: Complex) -> Complex:
     converged = np.zeros(len(A), dtype=bool)
     out = np.full_like(A, np.nan)
     with np.errstate(all="ignore"):
-        for _ in range(60):
+        for _ in range(60):  # no decision: of a solver, which ends by its tolerance
             before, inverse = a.conj().swapaxes(1, 2), _inverses(eye + g @ p)
             after = inverse @ a
             step = before @ p @ after

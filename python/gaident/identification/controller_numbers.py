@@ -41,15 +41,10 @@ __all__ = ["Numbers", "with_estimates"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-LONGEST = 1 << 13  # no decision: work; lines of all records that the numbers are fitted to
-ROUNDS = 3  # no decision: effort; fits, each with the correlation that the one before left
-STARTS = 8  # no decision: effort; best points of the grid, from which a search starts
-MOST_STARTS = 500  # no decision: effort; points of the grid
 BOUNDED = ("kp", "ki", "command_weight")  # no controller has one below 0
 GAINS = (*BOUNDED, "acceleration_feedforward", "friction_feedforward")
 """Linear in the torque; the others are searched by their logarithm, but a numerator's damping and a share."""
 LOGARITHMIC = ("gain", "time_constant", "frequency", "denominator_damping")
-FIRST, WHOLE = 12, 60  # no decision: effort; evaluations of a search from the grid, and of the best of them
 STEP = 1e-5  # no decision: of a number, for a slope
 ROUNDING = 1e-12  # no decision: of the torque's deviation, what a sum is exact to
 
@@ -212,7 +207,7 @@ class _Fit:
         self.given = controller
         self.unknown = unknown
         self.fields = [field_of(name) for name in unknown]
-        share = max(LONGEST // len(records), 1)
+        share = max(POLICY.searched_samples // len(records), 1)
         cascade = cascade_of(controller)
         self.period = records[0].dt / cascade.log_every(records[0].dt)
         self.whole = whole
@@ -237,13 +232,13 @@ class _Fit:
         off = self.free(rho)
         enough = ROUNDING * float(np.sum(self.logged[self.used] ** 2))
         tried: list[tuple[float, tuple[float, ...]]] = []
-        for _, point in grid[:STARTS]:
-            tried.append(self.searched(off, np.array(point), low, high, FIRST))
+        for _, point in grid[: POLICY.best_points]:
+            tried.append(self.searched(off, np.array(point), low, high, POLICY.usual))
             if min(tried)[0] <= enough:
                 break
         best = np.array(min(tried)[1])
-        for _ in range(ROUNDS):
-            best = np.array(self.searched(self.free(rho), best, low, high, WHOLE)[1])
+        for _ in range(POLICY.rounds):
+            best = np.array(self.searched(self.free(rho), best, low, high, POLICY.final)[1])
             rho = correlation(self.left(best), self.stretch)
         return self._judged(best, rho, low, high)
 
@@ -288,8 +283,8 @@ class _Fit:
         """Points of the grid of what is not linear, each with the gains of a linear least squares."""
         lists = [grid_of(field, self.period) if field not in GAINS else [np.nan] for field in self.fields]
         points = list(product(*lists))
-        if len(points) > MOST_STARTS:
-            points = [points[i] for i in np.random.default_rng(0).permutation(len(points))[:MOST_STARTS]]
+        if len(points) > POLICY.grid_points:
+            points = [points[i] for i in np.random.default_rng(0).permutation(len(points))[: POLICY.grid_points]]
         return [self._linear_start(np.array(point)) for point in points]
 
     def _linear_start(self, x: Vector) -> Vector:

@@ -45,10 +45,7 @@ __all__ = ["identify"]
 Vector = NDArray[np.float64]
 ProgressCallback = Callable[[float, str], None]
 
-FINAL_ITERATIONS = 60  # no decision: effort
 FINAL_TOLERANCE = 1e-9  # no decision: of a solver
-WHOLE_ITERATIONS = 30  # no decision: effort; of a fit found on a part of a long record
-REACH = math.log(2.0)  # no decision: effort; units of BIC per sample: twice the error of the best, and none wins on all samples
 
 
 def identify(
@@ -263,7 +260,7 @@ class _Work:
         noise = selection.noise_of(self.searched, min(candidates, key=lambda c: c.cost), self.search_lengths)
         scores = selection.scored(self.searched, candidates, noise, self.search_lengths, self.ranges, self.workers)
         best = min(c.bic for c in scores)
-        near = [c.bic <= best + REACH * sum(self.search_lengths) for c in scores]
+        near = [c.bic <= best + POLICY.part_reach * sum(self.search_lengths) for c in scores]
         return [c for c, n in zip(candidates, near, strict=True) if n], [
             c for c, n in zip(candidates, near, strict=True) if not n
         ]
@@ -272,7 +269,7 @@ class _Work:
         """Fits of the parts, fitted to all samples; the start states of the whole records are other ones."""
         starts = [(*c.as_start()[:3], np.zeros(0)) for c in candidates]  # no decision: the first numbers of a start
         tolerance = selection.tolerance(self.samples)
-        fits = self.experiment.refine(starts, self.ranges, [], WHOLE_ITERATIONS, self.workers, tolerance)
+        fits = self.experiment.refine(starts, self.ranges, [], POLICY.whole_record, self.workers, tolerance)
         return [Candidate(f) for f in fits if f.cost < 1e300]
 
     def scored(self, candidates: list[Candidate], noise: Autoregression) -> list[Candidate]:
@@ -296,7 +293,7 @@ class _Work:
 
     def refined(self, c: Candidate) -> Candidate:
         """The local fit taken to the end."""
-        done = self.experiment.go_on([c.fit], self.ranges, [], FINAL_ITERATIONS, FINAL_TOLERANCE, 1)[0]
+        done = self.experiment.go_on([c.fit], self.ranges, [], POLICY.final, FINAL_TOLERANCE, 1)[0]
         best = Candidate(done if done.cost <= c.cost else c.fit, c.bic)
         # Once more without a step, from the roots in the order of Model: the core reports bounds in the order of its factors.
         return Candidate(self.experiment.refine([best.as_start()], self.ranges, [], 0, 1)[0], c.bic)
@@ -387,7 +384,7 @@ class _Work:
         )
 
 
-def _spread(records: Sequence[Record], block: int = 1 << 18) -> float:  # no decision: samples of a block, for memory
+def _spread(records: Sequence[Record], block: int = 1 << 18) -> float:  # no decision: memory; samples of a block
     """Sum of squares of the velocity about its mean, a block at a time."""
     mean = sum(float(r.velocity.sum()) for r in records) / sum(len(r) for r in records)
     parts = (r.velocity[i : i + block] - mean for r in records for i in range(0, len(r), block))

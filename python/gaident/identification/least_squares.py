@@ -33,11 +33,11 @@ from gaident.models.factors import FactorCounts, factor_parameters
 from gaident.models.held_torque import held_torque
 from gaident.models.mechanics import Mechanics, mechanics_from_model
 from gaident.models.model import Model
+from gaident.policy.table import POLICY
 
 __all__ = ["LeastSquares", "least_squares"]
 
 Vector = NDArray[np.float64]
-ROUNDS = 50  # no decision: effort
 CONVERGED = 1e-9  # no decision: of a solver
 
 
@@ -200,7 +200,7 @@ def _iterate(source: Vector, y: Vector, N: int, instruments: bool, whitening: bo
     theta, covariance, noise_std = _solve(phi, phi, y[N:])
     if not (instruments or whitening):
         return theta, covariance, noise_std, 1, True
-    for rounds in range(2, ROUNDS + 1):
+    for rounds in range(2, POLICY.regressions + 1):
         before, polynomial = theta, _stabilised(theta[N + 1 :])
         one = np.ones(1)
         r, w = (_from_rest(one, polynomial, x) for x in (source, y)) if whitening else (source, y)
@@ -210,7 +210,7 @@ def _iterate(source: Vector, y: Vector, N: int, instruments: bool, whitening: bo
         theta, covariance, noise_std = _solve(phi, z, w[N:])
         if np.linalg.norm(theta - before) <= CONVERGED * np.linalg.norm(theta):
             return theta, covariance, noise_std, rounds, True
-    return theta, covariance, noise_std, ROUNDS, False
+    return theta, covariance, noise_std, POLICY.regressions, False
 
 
 def _solve(phi: Vector, z: Vector, y: Vector) -> tuple[Vector, Vector, float]:

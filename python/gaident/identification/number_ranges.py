@@ -5,22 +5,26 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["SMALLEST", "grid_of", "inverse", "off_bound", "range_of"]
+from gaident.policy.table import POLICY
+
+__all__ = ["FREQUENCIES", "SMALLEST", "TIME_CONSTANTS", "grid_of", "inverse", "off_bound", "range_of"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 SMALLEST = 1e-300  # no decision: no division by 0, and a controller of two gains of 0 is none
+TIME_CONSTANTS = np.geomspace(0.3, 100.0, POLICY.grid)  # no decision: a start; controller periods
+FREQUENCIES = np.geomspace(2e-3, 0.4, POLICY.notches)  # no decision: a start; of the controller's sampling frequency
 
 
 def grid_of(field: str, period: float) -> list[float]:
     """Starts of a number, as the search moves it."""
     grids = {
-        "time_constant": np.log(np.geomspace(0.3, 100.0, 8) * period),  # no decision: starts
-        "frequency": np.log(np.geomspace(2e-3, 0.4, 14) / period),
+        "time_constant": np.log(TIME_CONSTANTS * period),
+        "frequency": np.log(FREQUENCIES / period),
         "numerator_damping": np.array([0.1, 0.4]),
         "denominator_damping": np.log(np.array([0.7, 1.5])),
-        "gain": np.log(np.geomspace(1.0, 300.0, 8)),
+        "gain": np.log(np.geomspace(1.0, 300.0, POLICY.grid)),
         "velocity_feedforward": np.array([0.0, 1.0]),
     }
     return list(grids[field])

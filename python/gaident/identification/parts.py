@@ -13,23 +13,18 @@ from numpy.typing import NDArray
 
 from gaident.control.pi import PI
 from gaident.data.record import Record
+from gaident.policy.table import POLICY
 
 __all__ = ["search_parts"]
-
-LEAST = 8192  # no decision: effort; samples that a search looks at, at least
-MOST = 65536  # no decision: effort, samples
-SHARE = 64  # no decision: effort; of longer records one sample in so many
-WINDOW = 4096  # no decision: effort; shortest window, samples
-BLOCKS = 8  # no decision: effort; a window may begin at every eighth of its length
 
 
 def search_parts(records: Sequence[Record], controller: PI | None, moving: Sequence[bool]) -> list[tuple[Record, bool]]:
     """(part of a record, whether it starts in motion) for the search; records of no more than twice the part are taken whole."""
     total = sum(len(r) for r in records)
-    budget = min(max(LEAST, total // SHARE), MOST)
+    budget = min(max(POLICY.searched_samples, total // POLICY.searched_share), POLICY.most_samples)
     if total <= 2 * budget:
         return list(zip(records, moving, strict=True))
-    length = max(WINDOW, budget // len(records))
+    length = max(POLICY.searched_samples // 2, budget // len(records))
     windows = [_window(r, controller, m, length) for r, m in zip(records, moving, strict=True)]
     parts: list[tuple[Record, bool]] = []
     taken = 0
@@ -47,19 +42,19 @@ def _window(rec: Record, controller: PI | None, moving: bool, length: int) -> tu
 
     Excitation: changes of the input and spread of the velocity, each relative to the most in this record. A start at rest needs
     no unknown state and is taken already for half of the most. Records are ranked by the variance of the velocity in their
-    window.
+    window. A window begins at a whole number of its `grid` equal blocks.
     """
     source = rec.torque if controller is None else rec.command
     assert source is not None  # checked on entry to identify()
     if len(rec) <= length:
         return float(np.var(rec.velocity)), 0, len(rec)
-    block = length // BLOCKS
+    block = length // POLICY.grid
     edges = range(0, len(rec) - block + 1, block)
     changes = np.array([np.sum(np.diff(source[a : a + block + 1]) ** 2) for a in edges])
     sums = np.array([np.sum(rec.velocity[a : a + block]) for a in edges])
     squares = np.array([np.sum(rec.velocity[a : a + block] ** 2) for a in edges])
-    over = [np.convolve(x, np.ones(BLOCKS), "valid") for x in (changes, sums, squares)]
-    spread = np.maximum(over[2] - over[1] ** 2 / (block * BLOCKS), 0.0)
+    over = [np.convolve(x, np.ones(POLICY.grid), "valid") for x in (changes, sums, squares)]
+    spread = np.maximum(over[2] - over[1] ** 2 / (block * POLICY.grid), 0.0)
     score = _relative(over[0]) + _relative(spread)
     best = int(np.argmax(score))
     if not moving and score[0] >= 0.5 * score[best]:  # no decision: which part of a record is searched first

@@ -26,8 +26,6 @@ from gaident.policy.table import POLICY
 
 __all__ = ["Candidate", "is_chain", "noise_of", "scored", "smallest_close", "smallest_mechanism", "tolerance"]
 
-WHITE_ITERATIONS = 8  # no decision: effort, of a fit that is whitened again
-
 
 @dataclass(frozen=True)
 class Candidate:
@@ -107,7 +105,7 @@ def scored(
     count = sum(lengths)
     if noise.order > 0:
         fits = [c.fit for c in candidates]
-        whitened = experiment.go_on(fits, ranges, noise.phi, WHITE_ITERATIONS, tolerance(count), workers)
+        whitened = experiment.go_on(fits, ranges, noise.phi, POLICY.whitened_again, tolerance(count), workers)
         costs = [w.cost for w in whitened]
         count -= noise.order * len(lengths)  # the first samples of each record, whose past is missing
     found = []

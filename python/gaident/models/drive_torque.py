@@ -202,7 +202,7 @@ def torque_of(rec: Record, controller: PI | None) -> Vector:
     return np.concatenate([u for _, u, _ in torque_blocks(rec, controller)])
 
 
-# no decision: samples of a block, for memory
+# no decision: memory; samples of a block
 def torque_blocks(rec: Record, controller: PI | None, length: int = 1 << 18) -> Iterator[tuple[int, Vector, Vector]]:
     """(first sample, torque [N m], velocity [rad/s]) a block at a time: of a long record no copy is made."""
     if rec.torque is None and (controller is None or rec.command is None):

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gaident.errors import ModelError
+from gaident.policy.table import POLICY
 
 __all__ = ["OWN", "PLACES", "Function", "Own", "Parameter", "Signals", "checked", "starts"]
 
@@ -141,7 +142,7 @@ OWN: dict[str, Own] = {}
 """The registered effects, in the order of their registration."""
 
 
-def starts(p: Parameter, count: int = 5) -> tuple[float, ...]:  # no decision: starts of a search
+def starts(p: Parameter, count: int = POLICY.own_values) -> tuple[float, ...]:
     """Where a search begins: as given, or spread between the bounds, the neutral value left out."""
     if p.starts:
         return p.starts
@@ -150,7 +151,7 @@ def starts(p: Parameter, count: int = 5) -> tuple[float, ...]:  # no decision: s
         return tuple(p.lowest * (p.highest / p.lowest) ** share for share in shares)
     span = p.highest - p.lowest
     values = [p.lowest + span * share for share in shares]
-    # no decision: starts of a search
+    # no decision: a start
     kept = tuple(v for v in values if abs(v - p.neutral) > 0.01 * span or math.isnan(p.neutral))
     return kept or (p.lowest + 0.75 * span,)
 

@@ -117,7 +117,7 @@ def polynomial_roots(coefficients: Sequence[float] | NDArray[np.float64]) -> NDA
     found: list[complex] = []
     for root in roots[roots.imag >= 0.0]:
         value = np.polyval(scaled, root)
-        for _ in range(3):
+        for _ in range(3):  # no decision: of a solver, whose steps are quadratic
             gradient = np.polyval(slope, root)
             if value == 0.0 or gradient == 0.0:
                 break

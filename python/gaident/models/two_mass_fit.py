@@ -80,7 +80,7 @@ def least_squares_phi(c: Vector, whitening: Matrix) -> Vector:
     size = phi_scales(phi)
     residual = whitening @ (coefficients_of_phi(phi) - c)
     damping = 1e-6  # no decision: the start of a solver
-    for _ in range(200):
+    for _ in range(200):  # no decision: of a solver, which ends by its tolerance
         J = whitening @ jacobian_of_phi(phi) * size
         augmented = np.vstack([J, np.diag(np.sqrt(damping) * np.linalg.norm(J, axis=0))])
         step = np.linalg.lstsq(augmented, -np.concatenate([residual, np.zeros(5)]), rcond=None)[0]

@@ -1,14 +1,23 @@
 """The policy: every number by which gaident decides about a model, with unit, source, and the command that measures it.
 
 A decision is never made by a number that stands elsewhere: `tests/python/project/test_policy.py` looks for such numbers.
-What other modules keep are numbers that decide nothing (the step of a difference, the tolerance of a solver, the start of a fit):
-a name in capitals, marked by a comment `# no decision: why`.
 
 Numbers that follow from records without effects are calibrated: `python bench/blind.py --calibrate` writes them into
 `calibrated.json`, which is read here. The others are set by hand, for the reason that their row gives.
 
-Effort is the last group: budgets of iterations, starts and models. More of it may find more, and changes no decision about what
-was found.
+Effort is the last group (`effort.py`): what bounds the work of a search or a fit, such as iterations, starts, points of a grid,
+samples that are looked at. More of it may find more, and changes no decision about what was found.
+
+Other modules keep numbers that decide nothing and bound no search, each with a name in capitals or a comment
+`# no decision: why`:
+
+- "a start": a value from which one fit begins, or the ends of a grid of them; how many there are is effort.
+  The bounds and starts of an effect's parameters stand in its row of the library.
+- "of a solver", "the step of a difference", "rounding": what makes an equation's solution exact. A solver ends by its tolerance,
+  and more steps of it change nothing.
+- "memory": the size of a block in which something is read or computed. Any other size gives the same result.
+- "a grid", orders and lags: the models, or frequencies of a test, among which a criterion chooses.
+- Formulas, units, formats of files, what an argument may be, how something is printed or drawn.
 """
 
 from __future__ import annotations
@@ -40,7 +49,6 @@ from gaident.policy.declared import (
     calibrated,
     cause,
     check,
-    effort,
     gain,
     linear,
     loop,
@@ -48,13 +56,14 @@ from gaident.policy.declared import (
     reading,
     record,
 )
+from gaident.policy.effort import Effort
 
-__all__ = ["POLICY", "Policy", "PolicyRow", "rows"]
+__all__ = ["POLICY", "Decisions", "Policy", "PolicyRow", "rows"]
 
 
 @dataclass(frozen=True)
-class Policy:
-    """See the module; `rows()` lists all with unit, source and command."""
+class Decisions:
+    """The numbers that decide, in the order of the questions that they answer."""
 
     # Is the gain enough? One criterion: BIC and a penalty for each effect, which stands for the number of candidates tried.
     effect_penalty: float = calibrated(
@@ -348,27 +357,10 @@ class Policy:
         2.0, "1", "standard deviations below 0, from which a mass or damping is said to be negative; nearer has no sign", SUCCESS
     )
 
-    # Effort: budgets.
-    beam_width: int = effort(3, "1", "models that are carried on side by side")
-    beam_reach: float = effort(4.0, "penalties", "how far behind the best a model is carried on")
-    hope: float = effort(0.5, "1", "of what is asked for, that a linearised gain has to promise to be worth a fit")
-    slow_fall: float = effort(0.1, "1", "of the cost: a fit that is far behind is left where a step brings less than this")
-    screened: int = effort(6, "1", "candidates that each ranking of the score test sends into a short fit")
-    finished: int = effort(5, "1", "of these, how many are fitted to the end")
-    starts: int = effort(3, "1", "best ones of a list (starts, candidates, frequencies, rivals) that are followed up")
-    swaps: int = effort(2, "1", "times that a better rival may take an effect's place")
-    glance: int = effort(3, "iterations", "of a fit that only ranks candidates")
-    short: int = effort(6, "iterations", "of a fit whose neighbourhood is known, or that is one of many")
-    usual: int = effort(12, "iterations", "of a fit of a model that is a step away")
-    long: int = effort(20, "iterations", "of a fit from a start that may be far away")
-    evolution: int = effort(50, "generations", "of a global search beside stops and impacts")
-    enough_samples: int = effort(3500, "samples", "of a search on a coarser grid")
-    proposed_samples: int = effort(4000, "samples", "of a proposed record at least, where the diagnosed one is shorter")
-    commands: int = effort(4, "1", "of the menu of experiments, on which rivals are fitted, not only linearised")
-    head: int = effort(200, "samples", "from whose velocity the start of a model in motion is fitted")
-    lengths: int = effort(1 << 14, "1", "tried, with which a force of a linear axis may return, where no pitch is given")
-    pitch_parts: int = effort(6, "1", "of a pitch at most, of which the strongest wave of a force may be one")
-    draws: int = effort(200, "1", "of the bootstrap of an interval")
+
+@dataclass(frozen=True)
+class Policy(Effort, Decisions):
+    """The whole table: first what decides, then effort. `rows()` lists all with unit, source and command."""
 
 
 class PolicyRow(NamedTuple):

@@ -128,7 +128,7 @@ def test_a_model_that_is_too_far_behind_is_left_where_its_cost_falls_slowly(
     assert simulations(*near, too_far) < followed
     assert len(asked) == 1 and asked[0] > (1.0 - POLICY.slow_fall) * near[1].cost
     ended = refined(*far_off, too_far=too_far)
-    monkeypatch.setattr(found_numbers, "STEPS", 1)
+    monkeypatch.setattr(found_numbers, "POLICY", replace(POLICY, usual=1))
     one_step = refined(*far_off)
     assert one_step.cost < (1.0 - POLICY.slow_fall) * far_off[1].cost
     assert asked[1:] == [ended.cost] and ended.cost < one_step.cost, "its first step brings more, and is no reason"

@@ -23,6 +23,7 @@ MARK = "# no decision: "
 # them. Free are these, what only guards a division or stands for no limit, and 2 pi; a 2 is a count, a 2.0 is a factor.
 FREE = (-1, 0, 1, 2)
 BOUNDS = {"max", "min", "maximum", "minimum", "clip"}
+STEPS = {"max_nfev", "maxiter", "popsize"}
 FITS = {"fit", "fitted", "refitted", "continued", "reestimated", "evolved", "start"}
 TABLES = {
     **dict.fromkeys(
@@ -105,6 +106,9 @@ def numbers_inside(text: str) -> list[str]:
         elif isinstance(node, ast.Call):
             name = getattr(node.func, "attr", getattr(node.func, "id", ""))
             parts = bounded(node) or [a for a in node.args if isinstance(a, ast.Constant) and name in FITS]
+            parts += [k.value for k in node.keywords if k.arg in STEPS]
+        elif isinstance(node, ast.For) and isinstance(node.target, ast.Name) and node.target.id == "_":
+            parts = [node.iter]  # so many times the same, as the iterations of a fit
         elif isinstance(node, (ast.FunctionDef, ast.Lambda)):
             parts = [*node.args.defaults, *(d for d in node.args.kw_defaults if d is not None)]
             found += local_numbers(node) if isinstance(node, ast.FunctionDef) else []
@@ -285,6 +289,14 @@ def test_no_number_without_a_name_decides() -> None:
     assert not found, f"a number that decides is a row of policy/table.py, others have a name and '{MARK}why': {', '.join(found)}"
 
 
+def test_what_bounds_the_work_of_a_search_is_a_row_of_effort() -> None:
+    """No remark excuses a number as effort: what may stand outside, policy/table.py says."""
+    said = re.compile(re.escape(MARK) + r".*\b(effort|work|starts of|iterations|rounds)\b")
+    assert said.search(f"ROUNDS = 3{'  '}{MARK}effort; fits") and not said.search(f"X = 3{'  '}{MARK}a start")
+    found = [f"{module}: {line.strip()}" for module, text in modules().items() for line in text.splitlines() if said.search(line)]
+    assert not found, f"what bounds the work of a search or a fit is a row of policy/effort.py: {', '.join(found)}"
+
+
 def test_what_counts_as_a_number_of_its_own() -> None:
     text = (
         "import numpy as np\nLIMIT = 0.3\nA, B = -1, 2.0 * np.pi\n_GRID = 2.0 ** np.arange(3)\nLEVEL: float = 1e-3\n"
@@ -303,6 +315,9 @@ def test_what_counts_as_a_number_of_its_own() -> None:
         ("np.clip(x, -0.5, 0.7)", ["0.5", "0.7"]),
         ("costs[:3]", ["3"]),
         ("ls.fit(objective, x, 8)", ["8"]),
+        ("least_squares(f, x, max_nfev=40)", ["40"]),
+        ("for _ in range(50): ...", ["50"]),
+        ("for k in range(50): ...", []),
         ("lambda x, most=7: x", ["7"]),
         ("def f(x, *, most=7): ...", ["7"]),
         ("x < 2.0 * floor", ["2.0"]),

@@ -16,7 +16,7 @@ from gaident.errors import SettingsError
 
 __all__ = ["columns_command", "init_command"]
 
-_LOOKED_INTO = 1 << 26  # no decision: bytes of a log whose values `init` compares, too; work
+_LOOKED_INTO = 1 << 26  # no decision: memory; bytes of a log whose values `init` compares, too
 
 
 def columns_command(args: argparse.Namespace) -> None:

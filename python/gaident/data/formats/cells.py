@@ -12,7 +12,7 @@ from gaident.errors import ReadError
 
 __all__ = ["ROWS", "numbers_of"]
 
-ROWS = 8192  # no decision: work; lines read at once
+ROWS = 8192  # no decision: memory; lines read at once
 """Lines of a text that are parsed at once."""
 
 _Bad = dict[int, tuple[int, str]]

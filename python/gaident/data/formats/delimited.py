@@ -21,10 +21,10 @@ from gaident.errors import ReadError
 
 __all__ = ["WHOLE", "TextOptions", "open_text"]
 
-WHOLE = 1 << 25  # no decision: work; bytes
+WHOLE = 1 << 25  # no decision: memory; bytes
 """Bytes of a text that is held in memory as it is; longer ones are read block by block."""
 
-_HEAD = 1 << 18  # no decision: work; bytes
+_HEAD = 1 << 18  # no decision: memory; bytes
 _WORDS = {"tab": "\t", "space": " ", "comma": ",", "semicolon": ";", "pipe": "|", "\\t": "\t"}
 
 

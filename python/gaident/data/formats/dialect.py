@@ -23,7 +23,7 @@ _NUMBER = {
     # A digit must follow the comma, so that the separator in '1, 2' is none.
     ",": re.compile(rf"[+-]?(?:\d+(?:,\d+)?|,\d+){_EXPONENT}|{_SPECIAL}", re.IGNORECASE),
 }
-_SAMPLED = 200  # no decision: work; lines looked at
+_SAMPLED = 200  # no decision: lines that tell the spelling of a file
 _LEADING_ZERO = re.compile(r"0\d+")
 
 

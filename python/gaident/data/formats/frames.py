@@ -18,7 +18,7 @@ from gaident.errors import ReadError
 
 __all__ = ["frame_table", "is_frame", "open_parquet"]
 
-_BUFFER = 1 << 18  # no decision: bytes per column that are read ahead; work
+_BUFFER = 1 << 18  # no decision: memory; bytes per column that are read ahead
 
 
 def open_parquet(path: str, file: Path, stack: ExitStack) -> LogTable:

@@ -17,7 +17,7 @@ from gaident.errors import ReadError
 
 __all__ = ["BLOCK", "Column", "Stored", "LogTable", "first_line"]
 
-BLOCK = 1 << 16  # no decision: work; values of a block
+BLOCK = 1 << 16  # no decision: memory; values of a block
 """Rows that are held at once of a log that is read block by block."""
 
 _NUMBER_SIGN = re.compile(r"#\s*(\d+)")

@@ -16,10 +16,6 @@ __all__ = ["LagFit", "coarse_lags", "refine"]
 
 Vector = NDArray[np.float64]
 
-_LONGEST = 1 << 15  # no decision: samples of the coarse search; work
-_CANDIDATES = 4  # no decision: work
-_RATES = 31  # no decision: work
-
 
 @dataclass(frozen=True)
 class LagFit:
@@ -52,11 +48,11 @@ def coarse_lags(
 ) -> Iterator[tuple[float, float]]:
     """(offset [s], rate) of the highest peaks of the correlation, both signals on one grid, over a range of rates."""
     duration = min(len(x) * dt, len(y) * their_dt)
-    grid = max(dt, their_dt, max(len(x) * dt, len(y) * their_dt) / _LONGEST)
+    grid = max(dt, their_dt, max(len(x) * dt, len(y) * their_dt) / POLICY.aligned_samples)
     a = _on_grid(x, dt, grid)
     width = max(_half_width(a) * grid, grid)
     steps = int(np.ceil(max_rate * duration / width))
-    rates = np.linspace(-max_rate, max_rate, min(2 * steps, _RATES - 1) + 1) if steps else np.zeros(1)
+    rates = np.linspace(-max_rate, max_rate, min(2 * steps, POLICY.clock_rates - 1) + 1) if steps else np.zeros(1)
     peaks: list[tuple[float, float, float]] = []
     for rate in rates:
         b = _on_grid(y, their_dt * (1.0 + rate), grid)
@@ -73,7 +69,7 @@ def coarse_lags(
     for _, offset, rate in peaks:
         if all(abs(offset - other) > width for other, _ in chosen):
             chosen.append((offset, rate))
-        if len(chosen) == _CANDIDATES:
+        if len(chosen) == POLICY.lag_peaks:
             break
     yield from chosen
 
@@ -117,7 +113,7 @@ def _peaks(strong: Vector) -> NDArray[np.intp]:
     """The highest local maxima, ends included."""
     padded = np.concatenate([[-1.0], strong, [-1.0]])
     local = np.flatnonzero((padded[1:-1] >= padded[:-2]) & (padded[1:-1] > padded[2:]))
-    return local[np.argsort(strong[local])[::-1][: 4 * _CANDIDATES]]
+    return local[np.argsort(strong[local])[::-1][: 4 * POLICY.lag_peaks]]
 
 
 def refine(

@@ -40,7 +40,6 @@ SHOWN = {
 }
 """Limits of a PI that a log may show -> what shows them."""
 ROUNDING = 1e-9  # no decision: of the largest torque, what a sum is exact to
-GRID = 25  # no decision: values from which a search for a limit starts
 
 
 @dataclass(frozen=True)
@@ -257,7 +256,7 @@ def _fitted(data: DataSet, scales: Scales, term: Term) -> tuple[float, float]:
         e = data.replayed_error({term: np.array([np.exp(z)])})
         return float(e @ e)
 
-    grid = np.linspace(low, high, GRID)
+    grid = np.linspace(low, high, POLICY.limits)
     costs = [cost(z) for z in grid]
     k = int(np.argmin(costs))
     bracket = (grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)])

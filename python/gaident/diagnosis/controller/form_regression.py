@@ -26,6 +26,7 @@ from gaident.data.record import Record
 from gaident.diagnosis.controller.replay import rounding_of
 from gaident.identification.logged_stretches import centred, correlation_of, log_of, numbered, whitened
 from gaident.identification.logged_torque import noise_between
+from gaident.identification.number_ranges import FREQUENCIES, TIME_CONSTANTS
 from gaident.policy.table import POLICY
 
 __all__ = [
@@ -49,7 +50,6 @@ Place: TypeAlias = tuple[str, type[LowPass] | type[Notch]]
 """(argument of `Cascade`, kind of filter)."""
 
 STEP = 1e-5  # no decision: of a filter's number, for a slope
-LONGEST = 1 << 13  # no decision: work; samples that a form is fitted to; all of them decide whether it follows
 PLACES: tuple[Place, ...] = (
     ("torque_filters", LowPass),
     ("torque_filters", Notch),
@@ -62,8 +62,7 @@ FILTER_SETS_OF_ONE = FILTER_SETS[: 1 + len(PLACES)]
 """What a slower log is searched for: between its lines two filters look like one."""
 
 # Starts of the search: a low pass in samples, a notch as share of the sampling frequency, and its dampings.
-TAUS = np.geomspace(0.3, 100.0, 8)  # no decision: starts of a search
-NOTCHES = tuple(product(np.geomspace(2e-3, 0.4, 14), ((0.1, 0.7), (0.3, 1.5))))
+NOTCHES = tuple(product(FREQUENCIES, ((0.1, 0.7), (0.3, 1.5))))
 BOUNDS = {
     LowPass: ((np.log(0.05),), (np.log(1e5),)),
     Notch: ((np.log(1e-4), 0.0, np.log(5e-3)), (np.log(0.495), 5.0, np.log(10.0))),
@@ -175,7 +174,7 @@ def law_of(records: Sequence[Record], given: PI, every: int = 1, steps: tuple[fl
     given: its torque limit and gains. steps: that the velocities of each record are rounded to [rad/s], where every is 1, or
     nothing. None where a signal or too much is missing.
     """
-    share = max(LONGEST // len(records), 1)
+    share = max(POLICY.searched_samples // len(records), 1)
     parts = [rec[:share] for rec in records]
     if any(r.command is None or r.torque is None for r in parts):
         return None
@@ -305,7 +304,9 @@ def fitted_shape(law: Law, places: tuple[Place, ...], enough: float) -> Shape:
     followed_up = POLICY.starts if len(places) == 1 else 1  # the grid of two filters is fine enough
     for k in np.argsort(costs, kind="stable")[:followed_up]:
         inside = np.clip(grid[k], low + 1e-9, high - 1e-9)
-        found = least_squares(lambda x: off(x) / size, inside, bounds=(low, high), xtol=1e-12, ftol=1e-6, gtol=1e-15, max_nfev=40)
+        found = least_squares(
+            lambda x: off(x) / size, inside, bounds=(low, high), xtol=1e-12, ftol=1e-6, gtol=1e-15, max_nfev=POLICY.filter_fit
+        )
         shape = _solved(law, places, found.x)
         if best is None or shape.rms < best.rms:
             best = shape
@@ -324,7 +325,7 @@ def bounds_of(places: Sequence[Place]) -> tuple[Vector, Vector]:
 
 def _starts(kind: type[LowPass] | type[Notch]) -> list[Vector]:
     if kind is LowPass:
-        return [np.array([np.log(tau)]) for tau in TAUS]
+        return [np.array([np.log(tau)]) for tau in TIME_CONSTANTS]
     return [np.array([np.log(f), zn, np.log(zd)]) for f, (zn, zd) in NOTCHES]
 
 

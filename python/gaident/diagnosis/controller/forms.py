@@ -355,7 +355,9 @@ def _fitted(law: Law, best: FormCandidate, given: PI) -> tuple[Vector, Vector, M
         )
         start = np.clip(start, low + INSIDE, high - INSIDE)
         x = start
-        found = least_squares(off, start, bounds=(low, high), x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-15, max_nfev=60)
+        found = least_squares(
+            off, start, bounds=(low, high), x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-15, max_nfev=POLICY.final
+        )
         x = found.x if np.sum(found.fun**2) <= np.sum(off(start) ** 2) else start
     # A weight of exactly 0 was chosen; how well the log shows it is the deviation of a free one.
     wide = (

@@ -18,7 +18,7 @@ from gaident.policy.table import POLICY
 
 __all__ = ["by_a_limit", "left_by_a_limit"]
 
-SEARCHED = (1e-3, 40)  # no decision: of the largest value, where a limit is looked for from, and starts of that search
+LOWEST = 1e-3  # no decision: a start; of the largest value, from where a limit is looked for
 
 
 def by_a_limit(records: Sequence[Record], controller: Controller) -> bool:
@@ -52,7 +52,7 @@ def _least(error: Callable[[float], float], top: float) -> float:
     """The least error of a limit up to `top`: the best of a grid, and the minimum beside it."""
     from scipy.optimize import minimize_scalar
 
-    grid = np.linspace(np.log(SEARCHED[0] * top), np.log(top), SEARCHED[1])
+    grid = np.linspace(np.log(LOWEST * top), np.log(top), POLICY.limits_not_given)
     values = [error(float(np.exp(x))) for x in grid]
     best = int(np.argmin(values))
     low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]

@@ -39,7 +39,6 @@ __all__ = ["Aligned", "aligned"]
 
 Vector = NDArray[np.float64]
 
-LONGEST = 1 << 16  # no decision: work; samples that the law is fitted to
 SHARES = (0.0, 0.5, -0.5)  # no decision: the rules that exist
 """Of ki dt, by which the newest error counts more than half: trapezoidal and rectangular integrals."""
 
@@ -123,7 +122,7 @@ def _shift_of_law(rec: Record, controller: PI) -> tuple[int, int]:
     that of the fewest channels.
     """
     assert rec.command is not None and rec.torque is not None
-    r, w, u = (x[:LONGEST] for x in (rec.command, rec.velocity, rec.torque))
+    r, w, u = (x[: POLICY.most_samples] for x in (rec.command, rec.velocity, rec.torque))
     farthest = POLICY.log_late
     inner = slice(farthest, len(u) - farthest)
     within = np.abs(u[inner]) < POLICY.at_limit * float(np.abs(u).max())

@@ -27,7 +27,7 @@ __all__ = ["Limited", "limited", "run_error", "too_fast"]
 Vector = NDArray[np.float64]
 
 ROUNDING = 1e-9  # no decision: of a torque, what a sum is exact to
-TIMES = np.geomspace(0.3e-3, 0.3, 16)  # no decision: starts; s, tracking times
+TIMES = np.geomspace(0.3e-3, 0.3, POLICY.tracking_times)  # no decision: a start; s
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,6 @@ __all__ = ["propose"]
 
 Vector = NDArray[np.float64]
 
-TRIES = 4  # no decision: work; how often a command is made smaller
 ROOM = 0.9  # no decision: of the torque, what a smaller command is made for
 RAMP = 0.6  # no decision: of the torque, what the ramps of a path ask for
 
@@ -96,7 +95,7 @@ class _Bench:
     def within(self, item: MenuItem, fit: Fit, torque: float) -> MenuItem | None:
         """The item, made smaller until the loop asks for no more than this torque [N m]; None where none is small enough."""
         model, free = fit.parameters.model(fit.x), self.controller.with_limits(None, None)
-        for _ in range(TRIES):
+        for _ in range(POLICY.smaller_commands):
             with np.errstate(over="ignore", invalid="ignore"):
                 most = float(np.abs(run(model, self._asked(item), free).torque).max())
             if most <= torque:

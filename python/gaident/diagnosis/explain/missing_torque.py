@@ -28,13 +28,13 @@ from gaident.estimation.projection import inverse_of
 from gaident.estimation.state_space import Discretised, discretised, steady_covariance
 from gaident.models.drive_torque import torque_of
 from gaident.models.model import Model
+from gaident.policy.table import POLICY
 
 __all__ = ["MissingTorque", "missing_torque"]
 
 Vector = NDArray[np.float64]
 
 FORGETS = 1e-3, 0.9998  # no decision: slowest pole of the filter, between which its memory is reckoned
-TUNED_ON = 30_000  # no decision: samples of a longer record on which noise and walk are chosen
 LEAST_NOISE = 1e-5  # no decision: of the velocity's range; a log smoothed beyond that would make any torque of its last digits
 DECADES = (-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0)  # no decision: a grid
 """Of walk per sample over the noise, seen at the velocity after one sample."""
@@ -88,7 +88,7 @@ def missing_torque(
             raise ModelError(f"{name} is {value!r}: give one number > 0, or None to have it chosen")
     loop = "sampled" if controller is None else controller.loop
     plant = discretised(model, rec.dt, loop)
-    tuned = slice(0, TUNED_ON)
+    tuned = slice(0, POLICY.tuned_samples)
     if walk is not None:
         walk *= float(np.sqrt(rec.dt))
     if noise is None or walk is None:

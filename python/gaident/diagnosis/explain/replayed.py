@@ -9,10 +9,10 @@ from gaident.control.controller import Controller
 from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.controller.replay import Replay, replay
+from gaident.policy.table import POLICY
 
 __all__ = ["replay_notes"]
 
-REPLAYED = 1 << 18  # no decision: samples of a log on which the controller is run again; work
 UNITS = {"kp": "N m s/rad", "ki": "N m/rad", "torque_limit": "N m"}
 
 
@@ -26,7 +26,8 @@ def replay_notes(records: Sequence[Record], controller: Controller | None) -> li
         return []
     found = []
     for rec in records:
-        if rec.torque is not None and (said := replay(rec[:REPLAYED] if len(rec) > REPLAYED else rec, loop)).follows is False:
+        part = rec[: POLICY.replayed_samples] if len(rec) > POLICY.replayed_samples else rec
+        if rec.torque is not None and (said := replay(part, loop)).follows is False:
             found.append(say("{}{}{}", f"{rec.name}: " if len(records) > 1 else "", said.sentence, _instead(said, loop)))
     return found
 

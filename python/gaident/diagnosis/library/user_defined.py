@@ -12,13 +12,13 @@ from gaident.diagnosis.library.cause import Cause
 from gaident.diagnosis.library.sides import at_load, at_motor, name_of
 from gaident.models.effects import Row, table
 from gaident.models.own_effects import starts
+from gaident.policy.table import POLICY
 
 __all__ = ["Library"]
 
 Matrix = NDArray[np.float64]
 
 STEP = 0.05  # no decision: of the range between the bounds: what makes a difference
-MOST_STARTS = 64  # no decision: starts of a fit, as many as the built-in effects have at most
 
 
 class Library(Mapping[str, Cause]):
@@ -76,9 +76,9 @@ def _term(row: Row) -> Cause:
 
     limits = [(along(i, p.lowest), along(i, p.highest)) for i, p in enumerate(row.parameters)]
     # Fewer values of each parameter, the more there are.
-    count = next(n for n in (5, 4, 3, 2, 1) if n ** len(row.parameters) <= MOST_STARTS or n == 1)
+    count = next(n for n in range(POLICY.own_values, 0, -1) if n ** len(row.parameters) <= POLICY.own_starts or n == 1)
     axes = [[along(i, v) for v in starts(p, count)] for i, p in enumerate(row.parameters)]
-    rows = list(itertools.islice(itertools.product(*axes), MOST_STARTS))
+    rows = list(itertools.islice(itertools.product(*axes), POLICY.own_starts))
     steps = tuple(1.0 if p.logarithmic else STEP * (p.highest - p.lowest) for p in row.parameters)
 
     return Cause(

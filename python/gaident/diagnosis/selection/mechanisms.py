@@ -40,7 +40,7 @@ __all__ = [
 ]
 
 Vector = NDArray[np.float64]
-SHAFTS, SHAFT_RATIOS, SHAFT_DAMPING = 48, (0.6, 0.75, 0.87), 0.05  # no decision: a grid; zeros below the poles, as on a shaft
+SHAFT_RATIOS, SHAFT_DAMPING = (0.6, 0.75, 0.87), 0.05  # no decision: a start; zeros below the poles, as on a shaft
 SLOWEST_SHAFT, SHAFT_SPAN, HIGHEST_SHAFT = 8.0, 0.02, 0.9  # no decision: its ends, in half periods, of the highest, of Nyquist's
 AT_BOUND = 0.999  # no decision: of a bound, what a fit that ends there has
 Matrix = NDArray[np.float64]
@@ -164,7 +164,7 @@ def _shaft_frequencies(one: Fit) -> Vector:
     """Resonances of the grid [rad/s]."""
     s = one.parameters.scales
     highest = HIGHEST_SHAFT * np.pi / s.dt
-    return np.geomspace(max(SLOWEST_SHAFT * np.pi / s.duration, SHAFT_SPAN * highest), highest, SHAFTS)
+    return np.geomspace(max(SLOWEST_SHAFT * np.pi / s.duration, SHAFT_SPAN * highest), highest, POLICY.resonances)
 
 
 def _helpful(objective: Objective, one: Fit, rows: Matrix) -> tuple[Hypothesis, Matrix]:

@@ -41,8 +41,7 @@ __all__ = ["Screened", "ScoreTest"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-RESONANCES, DAMPING = 48, 0.05  # no decision: a grid; steps of 8 %, each seen within its half-width of 5 %
-PROMISING = 2  # no decision: frequencies for each noise filter that are simulated
+DAMPING = 0.05  # no decision: a start
 ROOM = 8  # no decision: samples for each direction that is taken out before a noise filter is fitted
 FURTHEST = 2.0  # no decision: times the way to a start, where the next one stands
 
@@ -200,14 +199,14 @@ class ScoreTest:
 
     def _narrow(self, rows: Matrix, base: _Base) -> Matrix:
         """Resonances between those of some start rows that lower the error most, before whitening and beside noise of its own."""
-        poles = np.exp(np.linspace(rows[:, 0].min(), rows[:, 0].max(), RESONANCES))
+        poles = np.exp(np.linspace(rows[:, 0].min(), rows[:, 0].max(), POLICY.resonances))
         columns, own = self._resonating(poles, base), self.objective.noise_of(base.error, base.hypothesis.predictor.closed)
         found = []
         for noise in {f.key: f for f in (WHITE, own)}.values():
             filtered_base = self._filtered(base, noise)
             V = self.objective.whitened(columns, noise)
             V -= (V @ filtered_base.basis.T) @ filtered_base.basis
-            for i in np.argsort(_pair_worth(V, filtered_base.rest))[::-1][:PROMISING]:
+            for i in np.argsort(_pair_worth(V, filtered_base.rest))[::-1][: POLICY.promising]:
                 c1, c0 = np.linalg.lstsq(V[2 * i : 2 * i + 2].T, filtered_base.rest, rcond=None)[0]
                 wz = poles[i] * np.sqrt(np.clip(1.0 + c0, 0.25, 4.0))  # no decision: a start, no further than an octave
                 found.append((np.log(poles[i]), DAMPING, np.log(wz), poles[i] * (DAMPING + 0.5 * c1) / wz))

@@ -47,7 +47,6 @@ Matrix = NDArray[np.float64]
 
 NYQUIST = 0.95  # no decision: of the Nyquist frequency, the highest notch
 SLOWEST = 0.1  # no decision: of the record's duration, the longest time constant and the longest period of a notch
-GRID = 6  # no decision: starts of a frequency or a time constant
 DAMPING = (0.05, 2.0)  # no decision: denominators of notches that drives have
 
 
@@ -121,9 +120,11 @@ TIME_CONSTANT = _Number(
     "time_constant",
     "s",
     lambda dt, duration: (0.1 * dt, SLOWEST * duration),
-    lambda dt, duration: np.geomspace(0.5 * dt, 0.1 * SLOWEST * duration, GRID),
+    lambda dt, duration: np.geomspace(0.5 * dt, 0.1 * SLOWEST * duration, POLICY.form_starts),
 )
-FREQUENCY = _Number("frequency", "Hz", _band, lambda dt, duration: np.geomspace(*_band(dt, duration), 2 * GRID + 1)[1:-1])
+FREQUENCY = _Number(
+    "frequency", "Hz", _band, lambda dt, duration: np.geomspace(*_band(dt, duration), 2 * POLICY.form_starts + 1)[1:-1]
+)
 OF_ZEROS = _Number("numerator_damping", "1", lambda dt, duration: (0.0, 1.0), lambda dt, duration: (0.1,), logarithm=False)
 OF_POLES = _Number("denominator_damping", "1", lambda dt, duration: DAMPING, lambda dt, duration: (0.7,))
 

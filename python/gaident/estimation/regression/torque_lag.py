@@ -31,9 +31,6 @@ __all__ = ["TorqueLag", "torque_lag"]
 
 Vector = NDArray[np.float64]
 
-LONGEST = 1 << 17  # no decision: work
-"""Samples that are looked at."""
-
 
 @dataclass(frozen=True)
 class TorqueLag:
@@ -50,7 +47,7 @@ def torque_lag(rec: Record, cutoff_hz: float | None = None) -> TorqueLag | None:
     cutoff_hz: of the filter, at most; None: that of the regression. What swings above it is no rigid axis."""
     if rec.torque is None:
         return None
-    rec = rec[:LONGEST]
+    rec = rec[: POLICY.lag_samples]
     assert rec.torque is not None
     cutoff = min(cutoff_of(rec, ORDER), np.inf if cutoff_hz is None else cutoff_hz)
     factor = decimation_of(None, cutoff, rec.dt)

@@ -1,0 +1,87 @@
+"""Effort: budgets that bound the work of a search or a fit, with unit and what each is for. The last group of the policy.
+
+More of these may find more, and changes no decision about what was found. So no command measures a row of its own.
+Searches and fits that need the same effort share a row.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from gaident.policy.declared import effort
+
+__all__ = ["Effort"]
+
+
+@dataclass(frozen=True)
+class Effort:
+    """See the module; `gaident.policy.table.rows()` lists these rows behind those that decide."""
+
+    # How many models are carried on, and how far behind the best.
+    beam_width: int = effort(3, "1", "models that are carried on side by side")
+    beam_reach: float = effort(4.0, "penalties", "how far behind the best a model is carried on")
+    part_reach: float = effort(
+        math.log(2.0),
+        "BIC units per sample",
+        "how far behind the best structure on a part of the records one is fitted to all of them: twice its error power",
+    )
+    hope: float = effort(0.5, "1", "of what is asked for, that a linearised gain has to promise to be worth a fit")
+    slow_fall: float = effort(0.1, "1", "of the cost: a fit that is far behind is left where a step brings less than this")
+    screened: int = effort(6, "1", "candidates that each ranking of the score test sends into a short fit")
+    finished: int = effort(5, "1", "of these, how many are fitted to the end")
+    swaps: int = effort(2, "1", "times that a better rival may take an effect's place")
+    rounds: int = effort(3, "1", "times that a search is made again under what the one before has shown: gains, a correlation")
+    commands: int = effort(4, "1", "of the menu of experiments, on which rivals are fitted, not only linearised")
+    smaller_commands: int = effort(4, "1", "times that a proposed command is made smaller, until it keeps the torque limit")
+    paired_columns: int = effort(30, "1", "columns of a log at most, whose pairs are tried as position and velocity")
+
+    # Iterations of a fit.
+    glance: int = effort(3, "iterations", "of a fit that only ranks candidates")
+    short: int = effort(6, "iterations", "of a fit whose neighbourhood is known, or that is one of many")
+    whitened_again: int = effort(8, "iterations", "of a fit of a linear structure that is whitened again, to compare structures")
+    usual: int = effort(12, "iterations", "of a fit of a model, or of a controller's numbers, that is a step away")
+    long: int = effort(20, "iterations", "of a fit from a start that may be far away")
+    whole_record: int = effort(30, "iterations", "of a fit to all samples that starts from the fit to a part of them")
+    filter_fit: int = effort(40, "iterations", "of a fit of a controller's filters from a point of a grid")
+    final: int = effort(60, "iterations", "of the last fit, of the model or of the controller, whose numbers are told")
+    regressions: int = effort(50, "regressions", "of a discrete model, each filtered by the noise model of the one before")
+    evolution: int = effort(50, "generations", "of a global search beside stops and impacts")
+    population: int = effort(6, "1", "members of that search for each number that it moves")
+
+    # Starts and points of a grid.
+    starts: int = effort(3, "1", "best ones of a list (starts, candidates, frequencies, rivals) that are followed up")
+    promising: int = effort(2, "1", "frequencies of a resonance that are simulated, for each noise filter")
+    lag_peaks: int = effort(4, "1", "peaks of the correlation of two logs, from which their offset is fitted")
+    best_points: int = effort(8, "1", "points of the grid of a controller's numbers, from which a fit starts")
+    grid: int = effort(8, "1", "values of a filter's time constant or a position gain; blocks of a window, which is moved by one")
+    form_starts: int = effort(6, "1", "values of a number of an unlogged controller, of a notch's frequency 2 n - 1 of them")
+    notches: int = effort(14, "1", "values of a notch's frequency")
+    tracking_times: int = effort(16, "1", "values of an anti-windup's tracking time")
+    limits: int = effort(25, "1", "values of a limit in the given controller, tried on its logged torque")
+    limits_not_given: int = effort(40, "1", "values of an integral's limit, or of a command's slope, that was not given")
+    resonances: int = effort(48, "1", "frequencies of a resonance, 8 % apart: at most 4 % off, within half the width of a peak")
+    clock_rates: int = effort(31, "1", "rates of one log's clock against another's")
+    grid_points: int = effort(500, "1", "points of a grid of a controller's numbers, drawn from it where it has more")
+    own_values: int = effort(5, "1", "values of a parameter of a user-defined effect")
+    own_starts: int = effort(64, "1", "starts of a user-defined effect, as many as built-in effects have at most")
+    lengths: int = effort(1 << 14, "1", "tried, with which a force of a linear axis may return, where no pitch is given")
+    finer: float = effort(4.0, "1", "lengths that are tried for each that the travel tells apart")
+    pitch_parts: int = effort(6, "1", "of a pitch at most, of which the strongest wave of a force may be one")
+    draws: int = effort(200, "1", "of the bootstrap of an interval")
+
+    # Samples that are looked at.
+    searched_samples: int = effort(
+        1 << 13, "samples", "of all records in which a model, or a controller's numbers, are searched; a window has half of them"
+    )
+    searched_share: int = effort(64, "1", "samples of long records, of which a model is searched in one")
+    most_samples: int = effort(
+        1 << 16, "samples", "in which a model is searched at most, or to which a law of the torque is fitted"
+    )
+    aligned_samples: int = effort(1 << 15, "samples", "of two logs, by which their offset is looked for at first")
+    lag_samples: int = effort(1 << 17, "samples", "of a record, from which the lag of its torque is estimated")
+    replayed_samples: int = effort(1 << 18, "samples", "of a record, on which an identification replays the controller")
+    tuned_samples: int = effort(30_000, "samples", "of a record, to which noise and walk of a missing torque are fitted")
+    enough_samples: int = effort(3500, "samples", "of a search on a coarser grid")
+    proposed_samples: int = effort(4000, "samples", "of a proposed record at least, where the diagnosed one is shorter")
+    head: int = effort(200, "samples", "from whose velocity the start of a model in motion is fitted")
