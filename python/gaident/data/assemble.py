@@ -76,8 +76,8 @@ def assemble(table: LogTable, wanted: Wanted, stem: str) -> Record:
             values["torque"], kind, note = torque_of_winding(table, wanted, values, dt)
             said += [note] if note else []
         name = stem if wanted.name is None else wanted.name
-        held = {channel: values.get(channel) for channel in CHANNELS}
-        rec = Record(dt, name=name, torque_is=kind, notes=(*counters.notes(), *said), **held)
+        channels = {channel: values.get(channel) for channel in CHANNELS}
+        rec = Record(dt, name=name, torque_is=kind, notes=(*counters.notes(), *said), **channels)
         return rec.shifted(**wanted.shift) if wanted.shift else rec
     except RecordError as error:
         raise RecordError(f"{table.path}: {error.marked}") from None
@@ -171,13 +171,13 @@ def _block_by_block(
     axis: TimeAxis | None = None
     count = 0
     for block in table.blocks(list({column.key: column for column in columns}.values())):
-        held = {ch: counters.passed(block, ch, block.numbers(part_of(block, c), ch)) for ch, c in named.items()}
-        count += len(next(iter(held.values())))
+        channels = {ch: counters.passed(block, ch, block.numbers(part_of(block, c), ch)) for ch, c in named.items()}
+        count += len(next(iter(channels.values())))
         if axis is None:
             axis = axis_of(block, wanted, time)
         if axis is not None and time is not None:
             axis.push(block, block.numbers(part_of(block, time), "time"))
-        for channel, values in held.items():
+        for channel, values in channels.items():
             decimators[channel].push(values if scales[channel] == 1.0 else values * scales[channel])
     if count < MINIMUM_SAMPLES:
         raise RecordError(

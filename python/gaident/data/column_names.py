@@ -88,8 +88,8 @@ def _one(name: str) -> NameSays:
 
 def _kind(words: Iterable[str]) -> str:
     """ "commanded", "measured" or "": the actual set point is a set point."""
-    held = set(words)
-    return "commanded" if held & COMMAND_WORDS else "measured" if held & MEASURED_WORDS else ""
+    there = set(words)
+    return "commanded" if there & COMMAND_WORDS else "measured" if there & MEASURED_WORDS else ""
 
 
 def _quantities(words: list[str], letters: bool, said: bool) -> dict[str, int]:

@@ -172,8 +172,8 @@ class Record:
         """
         for key in changed:
             one_of(key, "with_channels: the channel", CHANNELS, RecordError)
-        held = {key: getattr(self, key) for key in CHANNELS}
-        channels = held | {key: None if values is None else channel(values, key) for key, values in changed.items()}
+        old = {key: getattr(self, key) for key in CHANNELS}
+        channels = old | {key: None if values is None else channel(values, key) for key, values in changed.items()}
         if channels["velocity"] is None or all(channels[key] is None for key in ("command", "torque", "position_command")):
             listed = ", ".join(f"{key}=None" for key, values in changed.items() if values is None)
             raise RecordError(
@@ -341,9 +341,9 @@ class Record:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON: dt, name, torque_is, and the channels as lists, None for those that are not there."""
-        held = {key: None if (v := getattr(self, key)) is None else v.tolist() for key in CHANNELS}
+        channels = {key: None if (v := getattr(self, key)) is None else v.tolist() for key in CHANNELS}
         about = {"name": self.name, "dt": self.dt, "torque_is": self.torque_is, "notes": list(self.notes)}
-        return {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **about, **held}
+        return {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **about, **channels}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Record:
@@ -384,8 +384,8 @@ class Record:
     def __repr__(self) -> str:
         label = f"{self.name!r}, " if self.name else ""
         kind = {"torque": " (measured)"} if self.torque_is == MEASURED else {}
-        held = ", ".join(f"{key} {v.min() + 0.0:.4g}..{v.max() + 0.0:.4g}{kind.get(key, '')}" for key, v in self.channels())
-        return f"Record({label}{len(self)} samples, dt={self.dt:.6g} s, {self.duration:.4g} s; {held})"
+        channels = ", ".join(f"{key} {v.min() + 0.0:.4g}..{v.max() + 0.0:.4g}{kind.get(key, '')}" for key, v in self.channels())
+        return f"Record({label}{len(self)} samples, dt={self.dt:.6g} s, {self.duration:.4g} s; {channels})"
 
     def _repr_html_(self) -> str:
         html: str = provided("record_html")(self)
@@ -396,5 +396,5 @@ class Record:
         return _rebuilt, (type(self), {field.name: getattr(self, field.name) for field in fields(self)})
 
 
-def _rebuilt(kind: type[Record], held: dict[str, Any]) -> Record:
-    return kind(**held)
+def _rebuilt(kind: type[Record], state: dict[str, Any]) -> Record:
+    return kind(**state)

@@ -36,9 +36,9 @@ def kind_of_torque(names: Iterable[str]) -> str | None:
 
 def kind_of_column(names: Iterable[str]) -> str | None:
     """The same for any column: None where its name speaks of no torque and no current."""
-    held = tuple(names)
-    words = {word for name in held for word in _split(name)}
-    return kind_of_torque(held) if words & QUANTITY_WORDS["torque"].keys() and not words & FOREIGN_WORDS else None
+    all_names = tuple(names)
+    words = {word for name in all_names for word in _split(name)}
+    return kind_of_torque(all_names) if words & QUANTITY_WORDS["torque"].keys() and not words & FOREIGN_WORDS else None
 
 
 def _split(name: str) -> list[str]:

@@ -125,16 +125,16 @@ def diagnose(
         asked = loop_of(given, checked_controller(controller))
         driven = torque_driven(given, asked.controller)
     kept = () if validation is None else outliers_of_the_log(records_of(validation, "validation"), asked.controller)[0]
-    records, held = driven.records, torque_driven(kept, asked.controller).records if kept else ()
-    checked(records, held, driven.loop, identification, bootstrap, seed, progress, axis, pitch)
-    origin = {r.digest: whole for r, whole in zip((*records, *held), (*given, *kept), strict=True)}
-    records, held = in_order(records), in_order(held)
+    records, validating = driven.records, torque_driven(kept, asked.controller).records if kept else ()
+    checked(records, validating, driven.loop, identification, bootstrap, seed, progress, axis, pitch)
+    origin = {r.digest: whole for r, whole in zip((*records, *validating), (*given, *kept), strict=True)}
+    records, validating = in_order(records), in_order(validating)
     noise_std, asked_accuracy = noise_std_of(noise), accuracy_of(accuracy)
     if not isinstance(quick, bool):
         raise SettingsError(f"quick is {quick!r}: give True or False")
     with threadpool_limits(1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         note(0.01, "replaying the controller, and looking for its form where it does not fit")
-        driving = driving_of(records, held, asked, driven, origin)
+        driving = driving_of(records, validating, asked, driven, origin)
         driving = replace(driving, outliers={r.digest: hit for r, hit in zip(given, lines, strict=True)})
         note(0.02, "identifying the linear model")
 
@@ -144,7 +144,7 @@ def diagnose(
             if idn is None:
                 idn = identify(list(here.records), pi, seed=seed)
                 note.identified()
-            work = Work(here.records, here.held, driving, idn, noise_std, note, axis, pitch, most)
+            work = Work(here.records, here.validation, driving, idn, noise_std, note, axis, pitch, most)
             work.search()
             return work
 

@@ -35,7 +35,7 @@ __all__ = [
     "Gains",
     "closed_over",
     "free_run_errors",
-    "held_from",
+    "held_out_from",
     "interval_of_fall",
     "measured_gains",
     "with_effects",
@@ -79,7 +79,7 @@ class Gains:
 
 def measured_gains(
     records: Sequence[Record],
-    held: Sequence[Record],
+    validation: Sequence[Record],
     controller: Controller | None,
     linear: Model,
     final: Fit,
@@ -88,13 +88,13 @@ def measured_gains(
     at_controller: dict[str, dict[str, float]],
 ) -> Gains:
     """Errors of the linear model, of each stage and of the extended model, closed over the controller where they can be."""
-    loop = closed_over(controller, (*records, *held))
+    loop = closed_over(controller, (*records, *validation))
     controller = objective.data.older(loop)
     part: tuple[int, ...] | None
-    if held:
-        scored, words, part = [(r, 0) for r in held], "validation records", None
+    if validation:
+        scored, words, part = [(r, 0) for r in validation], "validation records", None
     elif all(len(r) >= POLICY.least_held for r in records):
-        scored = [(r, held_from(r)) for r in records]
+        scored = [(r, held_out_from(r)) for r in records]
         part = tuple(first for _, first in scored)
         by_time = all(first == int(POLICY.fitted_share * len(r)) for r, first in scored)
         words = f"the last 30 % of {'the record' if by_time else 'its path'}, parameters fitted to the first 70 %"
@@ -188,7 +188,7 @@ def _without(found: Fit, effect: str, objective: Objective) -> Fit:
     return fit(objective, found.hypothesis.without(effect), found.parameters.removed(found.x, effect), found.noise, POLICY.usual)
 
 
-def held_from(rec: Record) -> int:
+def held_out_from(rec: Record) -> int:
     """The first sample that is held out: of the last 30 % of the time or, where these hardly move, of the path."""
     at = int(POLICY.fitted_share * len(rec))
     before, after = (float(np.sqrt(np.mean(w**2))) for w in (rec.velocity[:at], rec.velocity[at:]))
@@ -248,12 +248,12 @@ def free_run_errors(
 def start_state(model: Model, rec: Record, controller: Controller | None, read: Controller | None = None) -> Vector | None:
     """Initial state of the model at the record's start; None where it starts from rest, or moves and the loop has limits.
 
-    At rest the integrator may hold a load's torque, which the logged torque shows. In motion a model with effects is not linear
+    At rest the integral may be a load's torque, which the logged torque shows. In motion a model with effects is not linear
     in its state: two steps of Gauss and Newton over the record's head, from the first velocity.
     """
     loop = read or controller
-    if controller is not None and loop is not None and (held := stored_torque(rec, loop)):
-        return np.append(np.zeros(model.mechanism.order), held)
+    if controller is not None and loop is not None and (stored := stored_torque(rec, loop)):
+        return np.append(np.zeros(model.mechanism.order), stored)
     pi = bare_pi(loop)
     if not starts_moving(rec, pi) or (controller is not None and (controller.limited or model.effects)):
         return None

@@ -1,6 +1,6 @@
 """The mechanical parameters of the linear part of an extended model, with standard deviations.
 
-One mass: J = 1/|K|, D = a/|K|, and k = c/|K| of a spring that holds it.
+One mass: J = 1/|K|, D = a/|K|, and k = c/|K| of a spring to the ground.
 Two masses, motor and load on a damped shaft, with the numerator s^2 + f1 s + f0 and
 
     (s + a)(s^2 + e1 s + e0) = s^3 + (a + e1) s^2 + (e0 + a e1) s + a e0
@@ -96,7 +96,7 @@ def base_shift(before: Fit, after: Fit) -> dict[str, tuple[float, float]]:
     """Base parameters and mechanics before (the linear fit) and after (with the effects); none of mechanisms of two kinds."""
     if before.parameters.kind != after.parameters.kind:
         return {}
-    if after.parameters.held:
+    if after.parameters.on_a_spring:
         return moved(before, after)
     names = ("gain", "pole", "pole_pair_e1", "pole_pair_e0", "zero_pair_e1", "zero_pair_e0")
     pair = [fit.parameters.base_values(fit.x[None, :])[0] for fit in (before, after)]

@@ -74,7 +74,7 @@ class Work:
     """One diagnosis on its way."""
 
     records: tuple[Record, ...]
-    held: tuple[Record, ...]
+    validation: tuple[Record, ...]
     driving: Driving
     idn: Identification
     noise: float | None
@@ -161,7 +161,7 @@ class Work:
             return
         self.take(found)
         self.driving = self.driving.refound(numbers, covariance_of_numbers(self.under, self.estimate))
-        self.controller, (self.records, self.held) = self.driving.controller, self.driving.driven
+        self.controller, (self.records, self.validation) = self.driving.controller, self.driving.driven
         self.clean = tuple(cleaned(r, h) for r, h in zip(self.records, self.hit, strict=True))
         others = [f for f in self.controller_steps if f.effect not in {g.effect for g in self.driving.findings}]
         self.controller_steps = [*others, *self.driving.findings]
@@ -286,9 +286,9 @@ class Work:
             shown = driver if self.left.gains[driver] > self.left.needed else None
             self.notes.append(closest(dropped, shown, bool(real)))
         self.notes += (*of_the_controller(mechanics), *check.notes)
-        if self.final.parameters.held and any(LIBRARY[e].constant for e in self.final.effects):
+        if self.final.parameters.on_a_spring and any(LIBRARY[e].constant for e in self.final.effects):
             self.notes.append(
-                Text("The axis is held by a spring: its tension where the record starts is part of the constant load.")
+                Text("The axis is on a spring to the ground: its tension where the record starts is part of the constant load.")
             )
         ambiguous = [f for f in real if f.alternatives]
         proposal = None
@@ -329,13 +329,13 @@ class Work:
             simulations=self.objective.counter.simulations,
             samples=sum(self.data.lengths),
             digests=tuple(r.digest for r in self.records),
-            validation_digests=tuple(r.digest for r in self.held),
+            validation_digests=tuple(r.digest for r in self.validation),
             torque_logged=self.data.torque_logged,
             loop_follows=self.follows,
             version=version(),
             axis=self.axis,
             records=self.records,
-            validation_records=self.held,
+            validation_records=self.validation,
         )
 
     def _accepted_gains(self) -> Gains:
@@ -343,7 +343,7 @@ class Work:
         while True:
             gains = measured_gains(
                 self.clean,
-                self.held,
+                self.validation,
                 self.controller,
                 self.idn.model,
                 self.estimate,

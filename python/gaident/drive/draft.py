@@ -116,11 +116,11 @@ class _Draft:
 
     def _compare_velocity(self) -> None:
         """The unit of the velocity by comparison with the position, where the log does not say it."""
-        held = self.guess.channels
-        if self.dt is None or not {"velocity", "position"} <= held.keys() or self.units["velocity"] is not None:
+        channels = self.guess.channels
+        if self.dt is None or not {"velocity", "position"} <= channels.keys() or self.units["velocity"] is not None:
             return
         size = _factor("position", self.units["position"])
-        position, velocity = (self.values.get(held[channel].name) for channel in ("position", "velocity"))
+        position, velocity = (self.values.get(channels[channel].name) for channel in ("position", "velocity"))
         if size is None or position is None or velocity is None or len(position) != len(velocity):
             return
         found = unit_from_position(velocity, position * size, self.dt, self.axis == "linear")
@@ -129,11 +129,11 @@ class _Draft:
 
     def _compare_command(self) -> None:
         """The unit of the command by comparison with the velocity, which follows it."""
-        held = self.guess.channels
-        if not {"velocity", "command"} <= held.keys() or self.units["command"] is not None:
+        channels = self.guess.channels
+        if not {"velocity", "command"} <= channels.keys() or self.units["command"] is not None:
             return
         size = _factor("velocity", self.units["velocity"] or self.compared.get("velocity", (None, ""))[0])
-        command, velocity = (self.values.get(held[channel].name) for channel in ("command", "velocity"))
+        command, velocity = (self.values.get(channels[channel].name) for channel in ("command", "velocity"))
         if size is None or command is None or velocity is None or len(command) != len(velocity):
             return
         if not (np.isfinite(command).all() and np.isfinite(velocity).all()):

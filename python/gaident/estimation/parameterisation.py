@@ -1,11 +1,11 @@
 """The parameters of an extended model as one vector, and back.
 
     one mass      x = [ln K, a | effects | start states]                  G(s) = K / (s + a)
-    held by a spring  [ln K, a, c | effects | start states]               G(s) = K s / (s^2 + a s + c)
+    on a spring       [ln K, a, c | effects | start states]               G(s) = K s / (s^2 + a s + c)
     two masses        [ln K, a, e1, e0, f1, f0 | effects | start states]  G(s) = K (s^2 + f1 s + f0) / ((s + a) (s^2 + e1 s + e0))
 
 K = 1/J is positive by construction: whatever the start, no fit can end at a negative inertia.
-Below its resonance an axis that a spring or gravity holds answers as if it had one.
+Below its resonance an axis on a spring or under gravity answers as if it had one.
 c = k/J, k the stiffness of a spring between the axis and the ground.
 a, c, e1, e0, f1, f0 in units of their own size, so that a step of 1 is large and one of 1e-4 small for every entry. Pairs pass
 smoothly from complex to real roots.
@@ -83,7 +83,7 @@ class Parameterisation:
 
     @classmethod
     def of(cls, model: Model, scales: Scales, moving: Sequence[bool]) -> Parameterisation:
-        """That of a linear model of one mass, one that a spring holds, or two (effects are added by `extended`).
+        """That of a linear model of one mass, one mass on a spring, or two (effects are added by `extended`).
 
         Its scales are those given, as the model describes them.
         """
@@ -100,14 +100,14 @@ class Parameterisation:
         return cls(masses, tuple(float(u) for u in units), (), starts, described(scales, model))
 
     @property
-    def held(self) -> bool:
-        """Whether a spring between the one mass and the ground holds it."""
+    def on_a_spring(self) -> bool:
+        """Whether a spring is between the one mass and the ground."""
         return len(self.units) == 2
 
     @property
     def kind(self) -> str:
         """The mechanism in words; two fits of the same kind have the same base parameters."""
-        return "two masses" if self.masses == 2 else "one mass, held by a spring" if self.held else "one mass"
+        return "two masses" if self.masses == 2 else "one mass on a spring" if self.on_a_spring else "one mass"
 
     @cached_property
     def effects(self) -> tuple[str, ...]:
@@ -130,7 +130,7 @@ class Parameterisation:
     def structure(self) -> FactorCounts:
         """The linear part as the core takes it: one real pole, and a pair of poles and of zeros for two masses; a spring makes
         it a pair of poles, and a zero at 0."""
-        if self.held:
+        if self.on_a_spring:
             return FactorCounts(0, 1, 1, 0)
         return FactorCounts(1, 0, 0, 0) if self.masses == 1 else FactorCounts(1, 1, 0, 1)
 
@@ -186,7 +186,7 @@ class Parameterisation:
     def base_values(self, X: Matrix) -> Matrix:
         """Rows [K, a, ...] of rows of x."""
         values = np.empty((len(X), self.base))
-        values[:, 0] = np.exp(np.minimum(np.maximum(X[:, 0], -300.0), 300.0))  # no decision: what a double holds
+        values[:, 0] = np.exp(np.minimum(np.maximum(X[:, 0], -300.0), 300.0))  # no decision: what a double can be
         np.multiply(X[:, 1 : self.base], self._units, out=values[:, 1:])
         return values
 
@@ -205,9 +205,9 @@ class Parameterisation:
     def values(self, X: Matrix, left_out: Sequence[str] = ()) -> tuple[tuple[str, ...], Matrix]:
         """(effects in the order of the table, rows of base parameters and theirs) for `simulate_values`."""
         shown = [t for t in self._ordered if t.name not in left_out]
-        if not shown and not self.held:
+        if not shown and not self.on_a_spring:
             return (), self.base_values(X)
-        zero = [np.zeros((len(X), 1))] if self.held else []
+        zero = [np.zeros((len(X), 1))] if self.on_a_spring else []
         parts = [self.base_values(X), *zero, *(t.natural(X[:, self.slot(t.name)]) for t in shown)]
         return tuple(t.name for t in shown), np.concatenate(parts, axis=1)
 
@@ -227,18 +227,18 @@ class Parameterisation:
             own = np.array([np.convolve(s, np.poly(r).real) for s, r in zip(own, roots, strict=True)])
         return own
 
-    def standing(self, count: int, held: float) -> Matrix | None:
-        """So many rows of start states in a loop whose integrator held a torque [N m] at standstill; None where it held none."""
-        if held == 0.0:
+    def standing(self, count: int, stored: float) -> Matrix | None:
+        """So many rows of start states in a loop whose integral is a torque [N m] at standstill; None where it is 0."""
+        if stored == 0.0:
             return None
         s = self.structure
         own = s.real_poles + 2 * s.pole_pairs + sum(2 for t in self.terms if t.poles is not None)
-        return np.concatenate([np.zeros((count, own)), np.full((count, 1), held)], axis=1)
+        return np.concatenate([np.zeros((count, own)), np.full((count, 1), stored)], axis=1)
 
     def linear(self, x: Vector) -> Model:
         """The linear mechanism of one x."""
         values = self.base_values(x[None, :])[0]
-        if self.held:
+        if self.on_a_spring:
             return Model(float(values[0]), quadratic_roots(float(values[1]), float(values[2])), [0.0])
         poles = [complex(-values[1])]
         zeros: list[complex] = []

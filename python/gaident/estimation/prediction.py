@@ -134,7 +134,7 @@ class ClosedLoop:
         steps = substeps(data, parameters.terms)
         records = data.records if self.own_angle else data.turned
         loaded = data.loaded(records, data.loop)
-        starts = [parameters.standing(len(X), held) for held in data.stored]
+        starts = [parameters.standing(len(X), stored) for stored in data.stored]
         return _side_by_side(
             [
                 r.velocities(parameters.structure, names, values, initial_states=start, substeps=steps)
@@ -288,5 +288,5 @@ def coupling_response(data: DataSet, parameters: Parameterisation, x: Vector, to
 
 
 def _second_order(data: DataSet, rows: Matrix, gain: float, zeros: tuple[float, ...], e1: float, e0: float) -> Matrix:
-    held = Model(1.0, quadratic_roots(max(e1, 0.0), abs(e0)), zeros).discrete(data.dt)
-    return filtered(gain * held.alpha, np.append(1.0, -held.beta), rows, data.lengths)
+    behind_hold = Model(1.0, quadratic_roots(max(e1, 0.0), abs(e0)), zeros).discrete(data.dt)
+    return filtered(gain * behind_hold.alpha, np.append(1.0, -behind_hold.beta), rows, data.lengths)

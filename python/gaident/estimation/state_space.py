@@ -70,8 +70,8 @@ def discretised(model: Model, dt: float, loop: str = "sampled") -> Discretised:
     if loop != "continuous":
         both = np.zeros((m + 1, m + 1), dtype=np.complex128)
         both[:m, :m], both[:m, m] = A * dt, B * dt
-        held = expm(both)
-        return Discretised(held[:m, :m], held[:m, m], C, 0.0)
+        transition = expm(both)
+        return Discretised(transition[:m, :m], transition[:m, m], C, 0.0)
     half = np.linalg.inv(np.eye(m) - 0.5 * dt * A)
     D += float((C @ half @ B).real) * 0.5 * dt
     return Discretised(half @ (np.eye(m) + 0.5 * dt * A), dt * (half @ B), C @ half, D)

@@ -126,8 +126,8 @@ def _sampled(chain: Transfer, dt: float) -> tuple[Matrix, Matrix, Matrix, Matrix
     f = max(samples - d, 0.0)
     f = f if f > 1e-9 else 0.0
     late, G0 = over(1.0 - f)
-    early, held = over(f)
-    G1 = late @ held
+    early, G_early = over(f)
+    G1 = late @ G_early
     waiting = d + (f > 0.0)
     F, G, H = np.zeros((n + waiting, n + waiting)), np.zeros((n + waiting, 1)), np.zeros((1, n + waiting))
     F[:n, :n] = late @ early

@@ -73,7 +73,7 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
             # The torque is a replay, which a limit inside the controller spoils; its sign is the one at which the loop stands.
             found = [abs(k) for k in (rigid, steps / energy) if np.isfinite(k) and k != 0.0]
     if not found:
-        found = _held_gain(records, controller)
+        found = _gain_on_a_spring(records, controller)
     if not found:
         raise SpaceError(
             "the velocity falls when the torque rises: reverse the sign of one of them (for example by a unit of -1)"
@@ -90,8 +90,8 @@ def derive_space(records: Sequence[Record], controller: PI | None) -> SearchSpac
     )
 
 
-def _held_gain(records: Sequence[Record], controller: PI | None) -> list[float]:
-    """[K] of an axis that a spring or gravity holds, [] where the records show no such thing.
+def _gain_on_a_spring(records: Sequence[Record], controller: PI | None) -> list[float]:
+    """[K] of an axis on a spring or under gravity, [] where the records show no such thing.
 
         w = K int u dt - a int w dt - c int theta dt + b_0 + b_1 t,   K > 0 and c > 0
 

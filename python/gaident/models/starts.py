@@ -66,8 +66,8 @@ def constant_beside(off: NDArray[np.float64], size: float) -> float:
     """
     if len(off) < POLICY.least_rows:
         return 0.0
-    held = float(np.mean(off))
-    return held if abs(held) > max(POLICY.above_noise * float(np.std(off)), POLICY.negligible * size) else 0.0
+    mean = float(np.mean(off))
+    return mean if abs(mean) > max(POLICY.above_noise * float(np.std(off)), POLICY.negligible * size) else 0.0
 
 
 def doubtful_start(rec: Record, controller: Controller | None) -> Text | None:

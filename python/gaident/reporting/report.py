@@ -121,8 +121,8 @@ def report_page(
     given = {rec.digest: rec for rec in (*_records(records, (), "records"), *_records(validation, (), "validation"))}
     shown = []
     for name, one in named.items():
-        held = one.validation_digests if isinstance(one, Diagnosis) else ()
-        own, kept = ([given[d] for d in digests if d in given] or None for digests in (one.digests, held))
+        validation_digests = one.validation_digests if isinstance(one, Diagnosis) else ()
+        own, kept = ([given[d] for d in digests if d in given] or None for digests in (one.digests, validation_digests))
         shown.append((name, one, whole(view_of(one, own, kept, axis))))
     return page_of_several(shown, get_plotlyjs() if live else "")
 
@@ -150,9 +150,9 @@ def view_of(result: Diagnosis | Identification, records: Records, validation: Re
     if not isinstance(result, Diagnosis | Identification):
         raise GaidentError(f"result is {type(result).__name__}: give a Diagnosis or an Identification")
     given = _records(records, result.records, "records")
-    held = _records(validation, result.validation_records if isinstance(result, Diagnosis) else (), "validation")
+    held_out = _records(validation, result.validation_records if isinstance(result, Diagnosis) else (), "validation")
     known = {r.digest for r in given}
-    runs = [run_of(result, rec) for rec in (*given, *(r for r in held if r.digest not in known))]
+    runs = [run_of(result, rec) for rec in (*given, *(r for r in held_out if r.digest not in known))]
     fitted = [rec for rec in given if rec.digest in result.digests] or list(given)
     longest = max(fitted, key=len, default=None)
     curve = response = None

@@ -15,7 +15,7 @@ from gaident.control.pi import bare_pi
 from gaident.data.record import Record
 from gaident.diagnosis.experiments.excitation import position_of
 from gaident.diagnosis.explain.missing_torque import missing_torque
-from gaident.diagnosis.gains import IN_SAMPLE, closed_over, free_run_errors, held_from
+from gaident.diagnosis.gains import IN_SAMPLE, closed_over, free_run_errors, held_out_from
 from gaident.diagnosis.records.hygiene import cleaned, outliers
 from gaident.errors import GaidentError
 from gaident.models.drive_torque import torque_of
@@ -37,13 +37,13 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
     digest = rec.digest
     used = "fitted" if digest in result.digests else "new"
     notes: list[str] = []
-    extended = first_held = None
+    extended = first_held_out = None
     if isinstance(result, Diagnosis):
         rec = result.as_used(rec)
         if digest in result.validation_digests:
-            used, first_held = "held out", 0
+            used, first_held_out = "held out", 0
         elif used == "fitted" and not result.validation_digests and result.held_out != IN_SAMPLE:
-            first_held = held_from(rec)
+            first_held_out = held_out_from(rec)
         closed = closed_over(result.controller, (rec,))
         before = _free_run(result.identification.model, rec, closed, "linear", notes)
         if result.model.effects:
@@ -73,7 +73,7 @@ def run_of(result: Diagnosis | Identification, rec: Record) -> RecordView:
         extended=extended,
         dhat=dhat,
         std=std,
-        held_from=first_held,
+        held_out_from=first_held_out,
         notes=tuple(notes),
     )
 

@@ -36,16 +36,22 @@ CLOSE = 0.06  # of the highest order: labels of two peaks that are closer cover 
 
 
 def velocity_panel(
-    time: Vector, measured: Vector, linear: Vector, extended: Vector | None, command: Vector | None, axis: str, held_from: int = 0
+    time: Vector,
+    measured: Vector,
+    linear: Vector,
+    extended: Vector | None,
+    command: Vector | None,
+    axis: str,
+    held_out_from: int = 0,
 ) -> Panel:
-    """Measured against simulated velocity [rad/s] over time [s]; held_from: first sample that was held out, 0 for none."""
+    """Measured against simulated velocity [rad/s] over time [s]; held_out_from: first sample that was held out, 0 for none."""
     traces = [] if command is None else [series(time, command, "command", "faint", dash="dot")]
     traces.append(series(time, measured, "measured", "measured", width=3.0))
     traces.append(series(time, linear, "linear model", "linear"))
     if extended is not None:
         traces.append(series(time, extended, "extended model", "extended", dash="dash"))
-    held = (Mark(float(time[held_from]), "held out from here"),) if held_from else ()
-    return Panel(f"velocity [{velocity_unit(axis)}]", tuple(traces), marks=held, height=1.7)
+    marks = (Mark(float(time[held_out_from]), "held out from here"),) if held_out_from else ()
+    return Panel(f"velocity [{velocity_unit(axis)}]", tuple(traces), marks=marks, height=1.7)
 
 
 def error_panel(

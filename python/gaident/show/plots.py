@@ -40,7 +40,7 @@ def plot_record(rec: Record, axis: str = "rotary", units: Mapping[str, str | flo
         (f"{word('torque', axis)}{measured} [{u}]", 1.0, [(rec.torque, "", GREEN)]),
         (f"{position} [{x}]", 1.0, [(rec.position, "measured", BLUE), (rec.position_command, "command", GREY)]),
     ]
-    rows = [(title, height, held) for title, height, lines in rows if (held := [row for row in lines if row[0] is not None])]
+    rows = [(title, height, drawn) for title, height, lines in rows if (drawn := [row for row in lines if row[0] is not None])]
     fig = new_figure(8.0, 0.6 + 1.6 * sum(height for _, height, _ in rows))
     grid = fig.subplots(len(rows), 1, sharex=True, squeeze=False, height_ratios=[height for _, height, _ in rows])[:, 0]
     for ax, (title, _, lines) in zip(grid, rows, strict=True):

@@ -14,7 +14,7 @@ from drive_cases import random_case
 from drive_rig import skip_without_library
 from fine_integrator import FineCase, integrate
 from gaident.diagnosis.mechanics import MECHANICS, moved
-from gaident.diagnosis.selection.mechanisms import evenly_damped, held, is_mechanism, reduced, rigid
+from gaident.diagnosis.selection.mechanisms import balanced_on_a_spring, evenly_damped, is_mechanism, reduced, rigid
 from gaident.estimation.dataset import DataSet
 from gaident.estimation.noise_model import WHITE
 from gaident.estimation.objective import Fit, Hypothesis
@@ -60,7 +60,7 @@ def test_one_mass_and_pairs_that_do_not_swing() -> None:
 
 
 @pytest.mark.parametrize("damping", [1e-3, 0.2])
-def test_one_mass_that_a_spring_holds(damping: float) -> None:
+def test_one_mass_on_a_spring(damping: float) -> None:
     """J dw/dt = u - D w - k theta, from 1/(J s + D + k/s); the second damping makes its poles real."""
     J, k = 5e-4, 0.8
     model = ga.Model(1.0 / J, np.roots([1.0, damping / J, k / J]), [0.0])
@@ -69,11 +69,11 @@ def test_one_mass_that_a_spring_holds(damping: float) -> None:
     assert list(found.values()) == pytest.approx([J, damping, k, math.sqrt(k / J) / math.tau], rel=1e-9)
 
 
-def test_the_parameters_of_a_held_mass_simulate_its_model() -> None:
+def test_the_parameters_of_a_mass_on_a_spring_simulate_its_model() -> None:
     model = ga.Model(2000.0, [-3.0 + 40.0j, -3.0 - 40.0j], [0.0])
     parameters = Parameterisation.of(model, SCALES, [False])
     x = parameters.start(model)
-    assert parameters.kind == "one mass, held by a spring" and parameters.base == 3 and parameters.starts == (0,)
+    assert parameters.kind == "one mass on a spring" and parameters.base == 3 and parameters.starts == (0,)
     assert parameters.linear(x).poles == pytest.approx(model.poles) and parameters.linear(x).zeros == (0.0,)
     rec = ga.Record(1e-3, velocity=np.zeros(400), torque=np.sin(0.05 * np.arange(400)))
     simulated = OpenLoop(DataSet.of([rec], None)).velocities(parameters, x[None, :])[0]
@@ -106,7 +106,7 @@ def swung(stiffness: float, friction: float = 0.0) -> DataSet:
 @pytest.mark.parametrize("friction", [0.0, 0.01])
 def test_the_balance_of_momentum_finds_a_spring_and_the_sign_of_the_inertia(friction: float) -> None:
     data = swung(0.8, friction)
-    found = held(data)
+    found = balanced_on_a_spring(data)
     assert found is not None and found.zeros == (0.0,) and found.gain > 0.0
     c = float(np.prod(found.poles).real)
     assert c / found.gain == pytest.approx(0.8, rel=0.05)

@@ -509,7 +509,7 @@ def test_demote_keeps_what_needs_two_masses() -> None:
     assert bench.space.demote(bench.fit(A, masses=1)) == []
 
 
-def test_hold_fixes_one_mass_by_a_spring_where_the_error_follows_the_angle(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ground_puts_one_mass_on_a_spring_where_the_error_follows_the_angle(monkeypatch: pytest.MonkeyPatch) -> None:
     def answered(toy: Toy, parameters: Parameterisation, x: Vector, torques: Matrix) -> Matrix:
         """A torque -theta answers as the third base parameter does, which is the spring's; a constant does not."""
         return np.vstack([BASE[2], np.zeros(N)]) if len(torques) == 2 else np.zeros_like(torques)
@@ -517,12 +517,12 @@ def test_hold_fixes_one_mass_by_a_spring_where_the_error_follows_the_angle(monke
     monkeypatch.setattr(Toy, "torque_response", answered)
     bench = Bench({"a": (1.0,)}, extra=0.7 * BASE[2])
     free = bench.fit(A)
-    (held,) = bench.space.hold(free)
-    assert held.parameters.held and not free.parameters.held and held.effects == ("a",)
-    left = [float(np.std(bench.task.objective.error(f))) for f in (held, free)]
+    (sprung,) = bench.space.ground(free)
+    assert sprung.parameters.on_a_spring and not free.parameters.on_a_spring and sprung.effects == ("a",)
+    left = [float(np.std(bench.task.objective.error(f))) for f in (sprung, free)]
     assert left[0] < 1.05 * NOISE and left[1] > 3.0 * NOISE
-    assert bench.space.score(held) < bench.space.score(free)
-    assert Bench({"a": (1.0,)}).space.hold(Bench({"a": (1.0,)}).fit(A)) == []
+    assert bench.space.score(sprung) < bench.space.score(free)
+    assert Bench({"a": (1.0,)}).space.ground(Bench({"a": (1.0,)}).fit(A)) == []
 
 
 def test_close_shows_friction_in_its_loop_where_the_open_one_drifts_away() -> None:

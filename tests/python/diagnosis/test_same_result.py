@@ -31,9 +31,9 @@ def content(dia: ga.Diagnosis) -> dict[str, Any]:
 
 
 def test_two_records_in_either_order_held_out_ones_too_and_a_bootstrap() -> None:
-    records, held = [recorded(0), recorded(1, LEVELS[::-1])], [recorded(2), recorded(3)]
-    one = ga.diagnose(records, CONTROLLER, validation=held, bootstrap=1, seed=5)
-    two = ga.diagnose(records[::-1], CONTROLLER, validation=held[::-1], bootstrap=1, seed=5)
+    records, later = [recorded(0), recorded(1, LEVELS[::-1])], [recorded(2), recorded(3)]
+    one = ga.diagnose(records, CONTROLLER, validation=later, bootstrap=1, seed=5)
+    two = ga.diagnose(records[::-1], CONTROLLER, validation=later[::-1], bootstrap=1, seed=5)
     assert [f.effect for f in one.causes] == ["coulomb_friction"], one.summary()
     assert content(one) == content(two)
     assert one.causes[0].p_value == 0.5 and one.bootstrap == 1  # (1 + 0) / (1 + 1)

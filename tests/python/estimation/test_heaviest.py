@@ -32,7 +32,7 @@ def records(offset: float = 0.0) -> Any:
 
 def model(*effects: str) -> Any:
     terms = tuple(LIBRARY[e] for e in effects)
-    return SimpleNamespace(effects=effects, parameters=SimpleNamespace(terms=terms, held=False))
+    return SimpleNamespace(effects=effects, parameters=SimpleNamespace(terms=terms, on_a_spring=False))
 
 
 def limit(data: Any, terms: tuple[str, ...] | None, cutoff_hz: float) -> float:

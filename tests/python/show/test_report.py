@@ -179,7 +179,7 @@ def test_a_run_that_runs_away_is_drawn_up_to_there(dia: ga.Diagnosis) -> None:
 def test_the_last_part_of_a_record_is_marked_where_it_is_held_out(dia: ga.Diagnosis) -> None:
     alone = replace(dia, validation_digests=(), validation_records=(), held_out="the last 30 % of the record")
     (run,) = view_of(alone, None, None, "rotary").runs
-    assert run.used == "fitted" and run.held_from == 1120
+    assert run.used == "fitted" and run.held_out_from == 1120
     (mark,) = run_chart(run, 0.05, "run", "rotary").panels[0].marks
     assert mark.x == pytest.approx(1.12) and mark.text == "held out from here"
     assert held_out_chart(run, 0.05, "run", "rotary").panels[0].traces[0].x[0] == pytest.approx(1.12)

@@ -22,12 +22,12 @@ __all__ = ["report_command"]
 def report_command(args: argparse.Namespace) -> None:
     """`gaident report RESULT.json... [LOG...]`."""
     named = [args.result, *(path for path in args.logs if path.endswith(".json"))]
-    logs, held = [path for path in args.logs if not path.endswith(".json")], args.validation or []
-    target = target_of(args.out, [*named, *logs, *held])
+    logs, validation_logs = [path for path in args.logs if not path.endswith(".json")], args.validation or []
+    target = target_of(args.out, [*named, *logs, *validation_logs])
     assert target is not None
     results = {path: _loaded(path) for path in named}
     drives = _drives(args, len(results) > 1)
-    records, validation = ([rec for log in listed for rec in _read(log, drives)] for listed in (logs, held))
+    records, validation = ([rec for log in listed for rec in _read(log, drives)] for listed in (logs, validation_logs))
     known = {digest for result in results.values() for digest in _known(result)}
     if len(results) == 1:
         shown: Diagnosis | Identification | dict[str, Diagnosis | Identification] = results[named[0]]

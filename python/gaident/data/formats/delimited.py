@@ -117,8 +117,8 @@ def open_text(path: str, file: Path, options: TextOptions) -> LogTable:
 
 def _without_tail(columns: Sequence[Column]) -> list[Column]:
     """The columns of slower channels end where their time column does; the rows go on for the others."""
-    held = {column.key: np.flatnonzero(np.isfinite(column.whole())) for column in columns}
-    ends = {key: int(rows[-1]) + 1 if rows.size else 0 for key, rows in held.items()}
+    filled = {column.key: np.flatnonzero(np.isfinite(column.whole())) for column in columns}
+    ends = {key: int(rows[-1]) + 1 if rows.size else 0 for key, rows in filled.items()}
     found = []
     for column in columns:
         end = ends[column.clock or column.key]

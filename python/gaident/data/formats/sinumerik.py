@@ -52,7 +52,7 @@ class _Signal:
         self.times: list[float] = []
         self.values: list[float] = []
 
-    def held(self, path: str) -> tuple[float, NDArray[np.float64]]:
+    def samples(self, path: str) -> tuple[float, NDArray[np.float64]]:
         """(time of the first sample [s], all samples, the last value held where nothing was written)."""
         start = self.times[0]
         at = np.rint((np.array(self.times) - start) / self.interval).astype(np.int64)
@@ -119,7 +119,7 @@ class _Trace:
         clocks: dict[tuple[float, float, int], str] = {}
         columns = []
         for signal in written:
-            start, values = signal.held(self.path)
+            start, values = signal.samples(self.path)
             rate = start, signal.interval, values.size
             clock = clocks.setdefault(rate, f"time of {signal.interval:g} s from {start:g} s" if clocks else "time")
             names = tuple(dict.fromkeys(name for name in (signal.description, signal.key) if name and name != signal.name))

@@ -28,7 +28,7 @@ def resampled(
     Linear interpolation is a low-pass of its own (sinc^2 on average: -1.8 dB at a quarter of the log's sample rate) without
     delay. Raises ReadError.
     """
-    held = {}
+    logged = {}
     finest = np.inf
     for name, (time, values) in channels.items():
         there = np.isfinite(time) & np.isfinite(values)
@@ -46,7 +46,7 @@ def resampled(
                 f"frequencies down; give {arg('resample', format(median, '.4g'))} and "
                 f"{arg('decimate', repr(max(2, round(dt / median))))}"
             )
-        held[name] = (t, x)
+        logged[name] = (t, x)
         finest = min(finest, median)
     if dt * POLICY.resample_finer < finest:
         raise ReadError(
@@ -54,13 +54,13 @@ def resampled(
             f"whose steps are {finest:g} s: "
             f"give seconds, for example {arg('resample', format(finest, '.4g'))}"
         )
-    start, stop = max(t[0] for t, _ in held.values()), min(t[-1] for t, _ in held.values())
+    start, stop = max(t[0] for t, _ in logged.values()), min(t[-1] for t, _ in logged.values())
     if stop <= start:
         raise ReadError(f"{path}: the channels were not logged at the same time; name columns of one run")
-    for name, (t, _) in held.items():
+    for name, (t, _) in logged.items():
         _refuse_gaps(path, name, t, start, stop)
     axis = start + dt * np.arange(int(np.floor((stop - start) / dt + 1e-6)) + 1)
-    return {name: np.interp(axis, t, x) for name, (t, x) in held.items()}
+    return {name: np.interp(axis, t, x) for name, (t, x) in logged.items()}
 
 
 def _refuse_gaps(path: str, name: str, t: NDArray[np.float64], start: float, stop: float) -> None:

@@ -199,8 +199,8 @@ def _limit_findings(
     given = data.pi
     assert given is not None
     n, before, after = len(plain), float(plain @ plain), _left_with(data, shown)
-    held = any(r.cause == "anti_windup" for r in off)
-    if not held and shown.limits[1] == given.limits[1]:
+    anti_windup = any(r.cause == "anti_windup" for r in off)
+    if not anti_windup and shown.limits[1] == given.limits[1]:
         notes = []  # the finding says it all
     findings: list[Finding] = []
     effects: dict[str, dict[str, float]] = {}
@@ -215,7 +215,7 @@ def _limit_findings(
         text = say("{} The limit is the {}; no model of the plant is involved.", off[0].sentence, words)
         std = max(*(r.resolution for r in off), float(np.sqrt(after / n)))
         findings.append(_finding(effect, "limit", Estimate(value, std, "N m"), before, after, floor, n, text))
-    if held:
+    if anti_windup:
         notes = [] if findings else notes
         notes.append(
             Text(
@@ -224,7 +224,7 @@ def _limit_findings(
             )
         )
     decided = (*_decided(), *(OF_SETTING[s] for s in SHOWN))
-    return findings, AtController(decided, effects, shown, follows=not held), notes
+    return findings, AtController(decided, effects, shown, follows=not anti_windup), notes
 
 
 def _left_with(data: DataSet, controller: PI) -> float:

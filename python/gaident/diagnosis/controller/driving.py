@@ -74,10 +74,12 @@ class Driving:
 
     def formed(self, other: UnloggedForm) -> Driving:
         """The same under another form of controller, which makes the torque that drives a model; a finding says so."""
-        pairs = [[(driven_by(here, other.controller), here) for here in part] for part in (self.moved.records, self.moved.held)]
-        records, held = (tuple(driven for driven, _ in part) for part in pairs)
+        pairs = [
+            [(driven_by(here, other.controller), here) for here in part] for part in (self.moved.records, self.moved.validation)
+        ]
+        records, validation = (tuple(driven for driven, _ in part) for part in pairs)
         given = {driven.digest: self.moved.given[here.digest] for part in pairs for driven, here in part}
-        moved = replace(self.moved, records=records, held=held, given=given)
+        moved = replace(self.moved, records=records, validation=validation, given=given)
         findings = (*self.findings, other.finding)
         logged = as_logged(records, None)
         return replace(self, moved=moved, controller=other.controller, logged=logged, findings=findings, found=other.found)
@@ -90,16 +92,16 @@ class Driving:
         findings = tuple(replace(f, parameters=_closer(f.parameters, named.get(f.effect, {}))) for f in self.findings)
         numbers = _closer(self.numbers, named.get("", {}))
         moved = self.moved
-        pairs = [[(driven_by(moved.given[r.digest], controller), r) for r in part] for part in (moved.records, moved.held)]
-        records, held = (tuple(driven for driven, _ in part) for part in pairs)
+        pairs = [[(driven_by(moved.given[r.digest], controller), r) for r in part] for part in (moved.records, moved.validation)]
+        records, validation = (tuple(driven for driven, _ in part) for part in pairs)
         given = {driven.digest: moved.given[r.digest] for part in pairs for driven, r in part}
-        moved = replace(moved, records=records, held=held, given=given)
+        moved = replace(moved, records=records, validation=validation, given=given)
         return replace(self, moved=moved, controller=controller, findings=findings, numbers=numbers, found=found)
 
     @property
     def driven(self) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
-        """The records and those held out, as their torque drives a model."""
-        return self.moved.records, self.moved.held
+        """The records and those for validation, as their torque drives a model."""
+        return self.moved.records, self.moved.validation
 
     @property
     def regained_by(self) -> int:
@@ -125,9 +127,9 @@ class Driving:
 
 
 def driving_of(
-    records: Sequence[Record], held: Sequence[Record], asked: Loop, driven: Driven, origin: Mapping[str, Record]
+    records: Sequence[Record], validation: Sequence[Record], asked: Loop, driven: Driven, origin: Mapping[str, Record]
 ) -> Driving:
-    """records, held: as `driven` has them, under the controller of `asked`; origin: digest of a record -> the same as given.
+    """records, validation: as `driven` has them, under the controller of `asked`; origin: digest of a record -> as it was given.
 
     Raises ControllerError where unknown numbers of the controller do not make the torque, and no other form of it does.
     """
@@ -137,10 +139,12 @@ def driving_of(
     lag = lag_shown(records, pi)
     if lag is not None and pi is not None:
         notes = (*notes, lag.note)
-        records, held, origin = _again(records, held, origin, partial(commanded, controller=pi))
+        records, validation, origin = _again(records, validation, origin, partial(commanded, controller=pi))
     follows = controller is not None and not doubts and all(controller.replayable(r) for r in whole)
-    moved = aligned(records, held, pi, follows)
-    form = None if moved.shifts else driver_of(records, held, pi, tuple(n.removeprefix("velocity.") for n in asked.estimates))
+    moved = aligned(records, validation, pi, follows)
+    form = (
+        None if moved.shifts else driver_of(records, validation, pi, tuple(n.removeprefix("velocity.") for n in asked.estimates))
+    )
     findings, numbers, limited, found = asked.findings, asked.estimates, False, asked.found
     if form is None:
         notes = (*(asked.notes or asked.numbers.trusted().notes), *notes)
@@ -150,21 +154,21 @@ def driving_of(
             if other is not None:
                 controller, numbers, notes, doubts = other.controller, other.estimates, (*notes, *doubts, other.note), ()
                 found = other.found
-                records, held, origin = _again(records, held, origin, partial(driven_by, controller=controller))
-                moved = aligned(records, held, None, True)
+                records, validation, origin = _again(records, validation, origin, partial(driven_by, controller=controller))
+                moved = aligned(records, validation, None, True)
             elif not limited and not asked.findings:  # a form that a bare PI lacked was found already
-                form = other_form(whole, [origin.get(r.digest, r) for r in held], controller)
+                form = other_form(whole, [origin.get(r.digest, r) for r in validation], controller)
     if form is not None:
         controller, pi, notes, doubts = form.controller, None, (*notes, *form.notes), ()
         findings, numbers, found = form.findings, form.estimates, form.found
-        pairs = zip((*form.records, *form.held), (*records, *held), strict=True)
+        pairs = zip((*form.records, *form.validation), (*records, *validation), strict=True)
         origin = {changed.digest: origin.get(given.digest, given) for changed, given in pairs}
-        moved = aligned(form.records, form.held, None, True)
+        moved = aligned(form.records, form.validation, None, True)
     elif doubts and driven.slower and not limited:
         # What this controller would make between the lines is not what the drive's made there.
         assert driven.controller is not None
-        records, held, origin = _again(records, held, origin, partial(straight_driven, controller=driven.controller))
-        moved = aligned(records, held, None)
+        records, validation, origin = _again(records, validation, origin, partial(straight_driven, controller=driven.controller))
+        moved = aligned(records, validation, None)
     moved = replace(moved, given={here: origin.get(rec.digest, rec) for here, rec in moved.given.items()})
     logged = as_logged(moved.records, pi)
     used = controller if bare_pi(controller) is None else logged.controller
@@ -172,10 +176,10 @@ def driving_of(
 
 
 def _again(
-    records: Sequence[Record], held: Sequence[Record], origin: Mapping[str, Record], drive: Callable[[Record], Record]
+    records: Sequence[Record], validation: Sequence[Record], origin: Mapping[str, Record], drive: Callable[[Record], Record]
 ) -> tuple[tuple[Record, ...], tuple[Record, ...], dict[str, Record]]:
-    """Records, held ones and origin with another torque; drive: makes it of a record as given."""
-    given = [[origin.get(r.digest, r) for r in part] for part in (records, held)]
+    """Records, those for validation and origin with another torque; drive: makes it of a record as given."""
+    given = [[origin.get(r.digest, r) for r in part] for part in (records, validation)]
     changed = [tuple(map(drive, part)) for part in given]
     pairs = zip((*changed[0], *changed[1]), (*given[0], *given[1]), strict=True)
     return changed[0], changed[1], {now.digest: whole for now, whole in pairs}

@@ -49,7 +49,7 @@ class Driver:
     """Records whose torque drives the model, because the logged torques show this controller; findings and notes on it."""
 
     records: tuple[Record, ...]
-    held: tuple[Record, ...]
+    validation: tuple[Record, ...]
     controller: Cascade
     findings: tuple[Finding, ...]
     notes: tuple[Text, ...]
@@ -58,7 +58,7 @@ class Driver:
 
 
 def driver_of(
-    records: Sequence[Record], held: Sequence[Record], given: PI | None, unknown: tuple[str, ...] = ()
+    records: Sequence[Record], validation: Sequence[Record], given: PI | None, unknown: tuple[str, ...] = ()
 ) -> Driver | None:
     """The controller that the logged torques show where a PI does not make them and nothing simple explains that; else None.
 
@@ -72,9 +72,9 @@ def driver_of(
     shown = form_shown(records, given, tuple(name for name in unknown if name in ("kp", "ki")))
     if shown is None:
         return None
-    driven, held = (tuple(driven_by(r, shown.controller) for r in part) for part in (records, held))
+    driven, validation = (tuple(driven_by(r, shown.controller) for r in part) for part in (records, validation))
     said = findings_of(shown), notes_of(shown, records)
-    return Driver(driven, held, shown.controller, *said, _estimates(shown.estimated), shown.found)
+    return Driver(driven, validation, shown.controller, *said, _estimates(shown.estimated), shown.found)
 
 
 @dataclass(frozen=True)
@@ -229,8 +229,8 @@ def notes_of(shown: Shown, records: Sequence[Record]) -> tuple[Text, ...]:
     ]
     scheme = shown.controller.velocity.anti_windup
     if (OF_SETTING["torque_limit"] in shown.numbers or not shown.numbers) and scheme != "none":
-        held = {"hold": "is held", "tracking": "is set back"}[scheme]
-        notes.append(Text(f"At its limit the integrator {held} (anti-windup {scheme!r}): so the controller comes closest."))
+        does = {"hold": "is held", "tracking": "is set back"}[scheme]
+        notes.append(Text(f"At its limit the integrator {does} (anti-windup {scheme!r}): so the controller comes closest."))
     if shown.rivals:
         others = "; ".join(" and ".join(name.replace("_", " ") for name in names) for names in shown.rivals)
         notes.append(Text(f"The log does not tell this from a controller with, instead: {others}."))

@@ -51,31 +51,31 @@ class Aligned:
     """
 
     records: tuple[Record, ...]
-    held: tuple[Record, ...]
+    validation: tuple[Record, ...]
     notes: tuple[Text, ...] = ()
     shifts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     given: Mapping[str, Record] = field(default_factory=dict)
 
     def noted(self, result: Diagnosis) -> Diagnosis:
         """The result, in terms of the records that were given."""
-        records, held = ([self.given[r.digest] for r in part] for part in (result.records, result.validation_records))
+        records, validation = ([self.given[r.digest] for r in part] for part in (result.records, result.validation_records))
         return replace(
             result,
             notes=(*self.notes, *result.notes),
             log_shifts=self.shifts,
             records=tuple(records),
-            validation_records=tuple(held),
+            validation_records=tuple(validation),
             digests=tuple(r.digest for r in records),
-            validation_digests=tuple(r.digest for r in held),
+            validation_digests=tuple(r.digest for r in validation),
         )
 
 
-def aligned(records: Sequence[Record], held: Sequence[Record], controller: PI | None, follows: bool = False) -> Aligned:
+def aligned(records: Sequence[Record], validation: Sequence[Record], controller: PI | None, follows: bool = False) -> Aligned:
     """The records without shifts of their logs, those that the controller's law shows beyond doubt.
 
     follows: a controller that is no bare PI makes the logged torques, so that these are on the lines of what it read.
     """
-    notes: dict[Text, None] = dict.fromkeys(reading_notes((*records, *held)))
+    notes: dict[Text, None] = dict.fromkeys(reading_notes((*records, *validation)))
     shifts: dict[str, Mapping[str, int]] = {}
     given: dict[str, Record] = {}
 
@@ -84,7 +84,7 @@ def aligned(records: Sequence[Record], held: Sequence[Record], controller: PI | 
         if controller is None and not follows:
             note = _of_motion(rec)
         if note:
-            name = f"{rec.name}: " if len(records) + len(held) > 1 and rec.name else ""
+            name = f"{rec.name}: " if len(records) + len(validation) > 1 and rec.name else ""
             notes[joined("", (name, note))] = None
         moved = rec.shifted(**moves) if moves else rec
         if moves:
@@ -92,7 +92,7 @@ def aligned(records: Sequence[Record], held: Sequence[Record], controller: PI | 
         given[moved.digest] = rec
         return moved
 
-    return Aligned(tuple(map(one, records)), tuple(map(one, held)), tuple(notes), shifts, given)
+    return Aligned(tuple(map(one, records)), tuple(map(one, validation)), tuple(notes), shifts, given)
 
 
 def _of_law(rec: Record, controller: PI | None) -> tuple[Mapping[str, int], Text]:

@@ -94,7 +94,7 @@ def lag_shown(records: Sequence[Record], controller: PI | None) -> Lag | None:
 
 def commanded(rec: Record, controller: PI) -> Record:
     """The record with the torque that the controller makes of command and velocity, from what it held before."""
-    start = 0.0 if rec.torque is None else _held_before(rec, controller)
+    start = 0.0 if rec.torque is None else _stored_before(rec, controller)
     return rec.with_channels(torque_is=COMMANDED, torque=pi_torque(_command(rec), rec.velocity, rec.dt, controller, start))
 
 
@@ -109,7 +109,7 @@ class _Part:
 
 
 def _part(rec: Record, controller: PI) -> _Part:
-    made = pi_torque(_command(rec), rec.velocity, rec.dt, controller, _held_before(rec, controller))
+    made = pi_torque(_command(rec), rec.velocity, rec.dt, controller, _stored_before(rec, controller))
     used = _free(made, controller)
     used[: POLICY.log_late] = False
     return _Part(rec, made, _logged(rec), used)
@@ -132,19 +132,19 @@ def _free(made: Vector, controller: PI) -> NDArray[np.bool_]:
     return free
 
 
-def _held_before(rec: Record, controller: PI) -> float:
+def _stored_before(rec: Record, controller: PI) -> float:
     """What the integrator held before the record [N m], where it is beyond the noise; else 0."""
     logged, command = _logged(rec), _command(rec)
     off = logged - pi_torque(command, rec.velocity, rec.dt, replace(controller, torque_limit=None))
     below = np.abs(logged) < POLICY.noisy_plateau * controller.limits[0]
     if not np.any(below):
         return 0.0
-    held = float(np.median(off[below]))
-    free = _free(pi_torque(command, rec.velocity, rec.dt, controller, held), controller)
+    stored = float(np.median(off[below]))
+    free = _free(pi_torque(command, rec.velocity, rec.dt, controller, stored), controller)
     if not np.any(free):
         return 0.0
-    held = float(np.mean(off[free]))
-    return held if abs(held) > POLICY.above_noise * float(np.std(off[free])) else 0.0
+    stored = float(np.mean(off[free]))
+    return stored if abs(stored) > POLICY.above_noise * float(np.std(off[free])) else 0.0
 
 
 def _command(rec: Record) -> Vector:

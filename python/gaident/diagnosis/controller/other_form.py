@@ -26,14 +26,14 @@ from gaident.policy.table import POLICY
 __all__ = ["other_form"]
 
 
-def other_form(records: Sequence[Record], held: Sequence[Record], given: Controller) -> Driver | None:
+def other_form(records: Sequence[Record], validation: Sequence[Record], given: Controller) -> Driver | None:
     """The form in which a log slower than the given velocity controller shows it; None where no form makes the torques.
 
-    records, held: as they were given.
+    records, validation: as they were given.
     """
     cascade = cascade_of(given)
     pi = PI(kp=cascade.velocity.kp, ki=cascade.velocity.ki)
-    every = {given.log_every(r.dt) for r in (*records, *held)}
+    every = {given.log_every(r.dt) for r in (*records, *validation)}
     bare = Cascade(pi, cascade.period, delay=cascade.delay)
     lacking = cascade.position is not None or any(r.torque is None or r.command is None for r in records)
     if lacking or cascade == bare or len(every) > 1 or every == {1}:
@@ -55,7 +55,7 @@ def other_form(records: Sequence[Record], held: Sequence[Record], given: Control
     added = shown is not None and (shown.numbers or found.velocity.anti_windup not in ("none", cascade.velocity.anti_windup))
     beside = say("{} with {}", " and" if absent else "", parts_of(shown)) if shown is not None and added else ""
     notes = (say(words, without, beside), *(() if shown is None else notes_of(shown, records)[1:]))
-    driven, later = (tuple(driven_by(r, found) for r in part) for part in (records, held))
+    driven, later = (tuple(driven_by(r, found) for r in part) for part in (records, validation))
     numbers = None if shown is None else shown.found.then(lambda one: replace(cascade_of(one), delay=cascade.delay))
     return Driver(driven, later, found, findings, notes, {}, numbers)
 

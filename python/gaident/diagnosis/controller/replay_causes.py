@@ -75,7 +75,7 @@ def explain(command: Vector, velocity: Vector, dt: float, controller: PI, logged
     """The first reason that leaves what `allowed` takes for rounding; else the best, if it leaves white noise."""
     case = _Case(command, velocity, dt, controller, logged)
     best, least = None, np.inf
-    for reason in (_start, _limits, _held, _rate, _linear):
+    for reason in (_start, _limits, _anti_windup, _rate, _linear):
         for found in reason(case):
             off = found.off(logged)
             used = found.controller or controller
@@ -196,7 +196,7 @@ def _acting(torque: Vector, limit: float) -> int:
     return int(np.sum(np.abs(torque) >= POLICY.at_limit * limit))
 
 
-def _held(case: _Case) -> Iterator[Explanation]:
+def _anti_windup(case: _Case) -> Iterator[Explanation]:
     """A torque limit, configured or seen as a plateau of the log, at which the integrator does not wind up."""
     if not case.controller.ki or not np.any(case.logged):
         return
@@ -208,8 +208,8 @@ def _held(case: _Case) -> Iterator[Explanation]:
                 acting = _acting(torque, limit)
                 if acting < POLICY.plateau or not _cuts(case, torque, share):
                     continue
-                held = "It does with {}{} (anti-windup): the limit of {:.4g} {N m} acts at {} samples."
-                sentence = say(held, integral, words, limit, acting)
+                text = "It does with {}{} (anti-windup): the limit of {:.4g} {N m} acts at {} samples."
+                sentence = say(text, integral, words, limit, acting)
                 alike = _trapezoidal(limited, share, case.dt)
                 yield Explanation(torque, "anti_windup", limit, sentence, controller=alike)
 

@@ -27,6 +27,6 @@ CAUSES: tuple[Cause, ...] = (
         excited_by=("holds up and down",),
         alike={NO_REVERSAL: ("constant torque",)},
         regressed=_load_of_regression,
-        unseen=t.held_before,
+        unseen=t.loaded_before,
     ),
 )  # fmt: skip

@@ -248,7 +248,7 @@ def torque_beyond(s: Motions) -> Text | None:
     return say("a limit above {:.3g} {N m} would not have shown: {}", s.highest_torque, why)
 
 
-def held_before(s: Motions) -> Text | None:
+def loaded_before(s: Motions) -> Text | None:
     """A constant load that the integrator of the controller held when a record without a torque began."""
     if s.controller is None or s.controller.gains.ki == 0.0 or all(m.logged for m in s.records):
         return None
@@ -273,8 +273,8 @@ def _integral(m: SeenMotion, controller: Controller) -> float:
     if m.command is None or not controller.one_equation:
         return 0.0
     free = np.abs(m.torque) <= POLICY.at_limit * controller.limits[0]
-    held = np.abs(m.torque - controller.gains.kp * (m.command - m.velocity))[free]
-    return float(held.max(initial=0.0))
+    integral = np.abs(m.torque - controller.gains.kp * (m.command - m.velocity))[free]
+    return float(integral.max(initial=0.0))
 
 
 def slope_beyond(s: Motions) -> Text | None:

@@ -29,7 +29,7 @@ def records_of(rec: Record | Sequence[Record], name: str) -> tuple[Record, ...]:
 
 def checked(
     records: tuple[Record, ...],
-    held: tuple[Record, ...],
+    validation: tuple[Record, ...],
     controller: PI | None,
     idn: Identification | None,
     bootstrap: int,
@@ -42,12 +42,12 @@ def checked(
     period_of(axis, pitch)
     if idn is not None and not isinstance(idn, Identification):
         raise SettingsError(f"identification is {type(idn).__name__}: give what identify() returned, or None")
-    for r in (*records, *held):
+    for r in (*records, *validation):
         if controller is not None and r.command is None:
             raise RecordError(f"record {r.name or '(without a name)'} has no command: give one, or {NO_CONTROLLER} for open loop")
         if controller is None and r.torque is None:
             raise RecordError(f"record {r.name or '(without a name)'} has no torque: give one, or the controller that makes it")
-    if len({r.dt for r in (*records, *held)}) > 1:
+    if len({r.dt for r in (*records, *validation)}) > 1:
         raise RecordError("records have different sample times: a diagnosis needs one; diagnose them apart")
     for i, r in enumerate(records):
         if len(r) < POLICY.least_samples:
@@ -56,7 +56,7 @@ def checked(
                 "good; record a longer motion"
             )
     known = {r.digest for r in records}
-    for i, r in enumerate(held):
+    for i, r in enumerate(validation):
         if r.digest in known:
             raise RecordError(
                 f"validation record {r.name or i + 1} is one that the model is fitted to: give another run, or leave validation "

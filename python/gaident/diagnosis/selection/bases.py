@@ -277,7 +277,7 @@ def heaviest(data: DataSet, fit: Fit) -> float | None:
         return None
     causes = of_inverse_dynamics({name: e.value for name, e in axis.parameters.items()})
     turns_back = any(cause.levels for cause in causes)
-    terms = tuple(term for term in axis.terms if _holds(fit, term, turns_back))
+    terms = tuple(term for term in axis.terms if _contains(fit, term, turns_back))
     if terms != axis.terms:
         try:
             axis = inverse_dynamics(list(data.records), terms=terms, cutoff_hz=axis.cutoff_hz, axis=data.axis)
@@ -287,14 +287,14 @@ def heaviest(data: DataSet, fit: Fit) -> float | None:
     return inertia.value + POLICY.heavier * inertia.std if inertia.value > POLICY.heavier * inertia.std else None
 
 
-def _holds(fit: Fit, term: str, turns_back: bool) -> bool:
+def _contains(fit: Fit, term: str, turns_back: bool) -> bool:
     """Whether a model holds what a term of the regression stands for; friction of either form counts as the same.
 
     turns_back: whether the regression holds dry friction, which it cannot tell from a constant torque in one direction.
     """
     names = [p.name for p in TERMS[term].parameters]
     if "spring" in names:
-        return fit.parameters.held
+        return fit.parameters.on_a_spring
     causes = of_inverse_dynamics(dict.fromkeys(names, 1.0))
     effects = {name_of(effect) for effect in fit.effects}
     there = {name for effect in effects for name in (effect, *equivalents(effect))}

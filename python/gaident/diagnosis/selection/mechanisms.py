@@ -23,14 +23,14 @@ from gaident.models.roots import quadratic_roots
 from gaident.policy.table import POLICY
 
 __all__ = [
-    "as_held",
     "as_one_mass",
     "as_two_masses",
+    "balanced_on_a_spring",
     "evenly_damped",
-    "held",
     "is_mechanism",
     "on_a_shaft",
     "one_mass",
+    "put_on_a_spring",
     "reduced",
     "released",
     "resonant",
@@ -64,8 +64,8 @@ def one_mass(data: DataSet, identified: Model) -> Model:
     return Model(abs(float(K)) or 1.0, [-max(float(a), slow)])
 
 
-def held(data: DataSet) -> Model | None:
-    """One mass that a spring holds, from the same balance with the spring's momentum; None where its stiffness is not positive.
+def balanced_on_a_spring(data: DataSet) -> Model | None:
+    """One mass on a spring, from the same balance with the spring's momentum; None where its stiffness is not positive.
 
         w = K int u dt - a int w dt - c int theta dt + w(0) + (K T0) t,   T0 the torque at the angle where the record starts
 
@@ -84,22 +84,22 @@ def held(data: DataSet) -> Model | None:
     K, a, c = np.linalg.lstsq(gram / np.outer(sizes, sizes), right / sizes, rcond=1e-12)[0] / sizes
     if not (K > 0.0 and c > 0.0):
         return None
-    return _held(float(K), float(a), float(c), data)
+    return _on_a_spring(float(K), float(a), float(c), data)
 
 
-def _held(K: float, a: float, c: float, data: DataSet) -> Model:
+def _on_a_spring(K: float, a: float, c: float, data: DataSet) -> Model:
     slow = 1.0 / max(r.duration for r in data.records)
     return Model(K, quadratic_roots(max(a, slow), c), [0.0])
 
 
-def as_held(fit: Fit, stiffness: float, data: DataSet) -> tuple[Hypothesis, Vector]:
-    """A fit of one mass, with its effects, held by a spring of this stiffness [N m/rad]."""
+def put_on_a_spring(fit: Fit, stiffness: float, data: DataSet) -> tuple[Hypothesis, Vector]:
+    """A fit of one mass, with its effects, on a spring of this stiffness [N m/rad]."""
     K, a = fit.parameters.base_values(fit.x[None, :])[0]
-    return moved_to(_held(float(K), float(a), stiffness * float(K), data), fit)
+    return moved_to(_on_a_spring(float(K), float(a), stiffness * float(K), data), fit)
 
 
 def released(fit: Fit) -> tuple[Hypothesis, Vector]:
-    """A fit of one mass that a spring holds, with its effects, without the spring."""
+    """A fit of one mass on a spring, with its effects, without the spring."""
     K, a, _ = fit.parameters.base_values(fit.x[None, :])[0]
     return moved_to(Model(float(K), [-float(a)]), fit)
 
@@ -253,7 +253,7 @@ def is_mechanism(parameters: Parameterisation, x: Vector) -> bool:
             if max(zp, zz) > AT_BOUND * POLICY.swing_damping:
                 return False
     if parameters.masses == 1:
-        return not parameters.held or bool(parameters.base_values(x[None, :])[0, 2] > 0.0)
+        return not parameters.on_a_spring or bool(parameters.base_values(x[None, :])[0, 2] > 0.0)
     _, a, e1, e0, _, f0 = parameters.base_values(x[None, :])[0]
     return bool(e0 + a * e1 > f0)
 

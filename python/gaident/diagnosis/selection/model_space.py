@@ -95,7 +95,7 @@ class ModelSpace:
         # The penalty is for the number of candidates tried: what the records show by themselves was not found by trying.
         effects = sum(_depth(t) - (t.family in self.shown) for t in fit.parameters.terms)
         searched = sum(t.search_cost for t in fit.parameters.terms)
-        more = fit.parameters.masses - 1 + fit.parameters.held  # a second mass, or a spring, counts as an effect
+        more = fit.parameters.masses - 1 + fit.parameters.on_a_spring  # a second mass, or a spring, counts as an effect
         return fit.bic + self.penalty * (effects + more) + searched
 
     def key(self, fit: Fit) -> Hashable:

@@ -9,7 +9,7 @@ A model is a mechanism (one mass or two) with effects. The moves are
     other side  a shaft effect of two masses at the other end of the shaft
     a load      one mass with effects of its shaft as two masses, these at the load
     resettle    the mechanism's resonance at the place of an extra one
-    hold        one mass by a spring to the ground
+    ground      one mass on a spring to the ground
     demote      two masses to one, or the spring away
     close       the open loop to the closed one
     search      the same model again, from all starts and globally, beside stops and impacts
@@ -28,13 +28,13 @@ from numpy.typing import NDArray
 from gaident.diagnosis.library.equivalences import equivalents
 from gaident.diagnosis.library.terms import LIBRARY
 from gaident.diagnosis.selection.mechanisms import (
-    as_held,
     as_one_mass,
     as_two_masses,
-    held,
+    balanced_on_a_spring,
     is_mechanism,
     moved_to,
     on_a_shaft,
+    put_on_a_spring,
     released,
     resonance,
 )
@@ -90,7 +90,7 @@ class Moves(SideMoves):
             return []
         key = "add", now.key, self.allowed
         self.grown.setdefault((now.parameters.kind, frozenset(now.effects)), []).append(now)
-        return self.objective.once(key, lambda: self._best(now, [*self.hold(now), *self.with_a_load(now), *self._add(now)]))
+        return self.objective.once(key, lambda: self._best(now, [*self.ground(now), *self.with_a_load(now), *self._add(now)]))
 
     def known(self, fit: Fit) -> Fit:
         """A fit of the same model that was grown already, where it is no worse by what swaps a place: its growth is known."""
@@ -143,7 +143,7 @@ class Moves(SideMoves):
     def _promising(self, now: Fit, test: ScoreTest, short: Collection[Fit]) -> list[Fit]:
         """Of short fits beside a model that leaves noise those that are worth a whole one.
 
-        Before whitening anything fits coloured noise. So they are held against this model itself, fitted before whitening too,
+        Before whitening anything fits coloured noise. So they are compared with this model itself, fitted before whitening too,
         each under the filter of what it leaves. A fit may not have come near; what promises something under the noise of this
         model, or of what nothing explains, goes on as well.
         """
@@ -191,8 +191,8 @@ class Moves(SideMoves):
             else:
                 test.add(bare, x, wanted)
 
-    def hold(self, fit: Fit) -> list[Fit]:
-        """One mass with its effects, held by a spring to the ground; none where a spring promises too little.
+    def ground(self, fit: Fit) -> list[Fit]:
+        """One mass with its effects, on a spring to the ground; none where a spring promises too little.
 
         Its stiffness is that of a linear test, a torque -k theta beside the model and a constant, or of the momentum's balance.
         """
@@ -212,8 +212,8 @@ class Moves(SideMoves):
                 fall = gained(power, power - slope * slope / size, self.objective.information)
                 if fall > best:
                     best, stiffness = fall, slope / size
-        starts = [as_held(fit, stiffness, data)] if stiffness > 0.0 and best > self.policy.hope * self.penalty else []
-        if not fit.effects and not self.quiet(fit) and (balanced := held(data)) is not None:
+        starts = [put_on_a_spring(fit, stiffness, data)] if stiffness > 0.0 and best > self.policy.hope * self.penalty else []
+        if not fit.effects and not self.quiet(fit) and (balanced := balanced_on_a_spring(data)) is not None:
             starts.append(moved_to(balanced, fit))
         fits = [self.refitted(h, x, self.policy.long) for h, x in starts]
         return [f for f in fits if f.cost < WORST and is_mechanism(f.parameters, f.x)]
@@ -277,8 +277,8 @@ class Moves(SideMoves):
         return self.continued(hypothesis, fit, x)
 
     def demote(self, fit: Fit) -> list[Fit]:
-        """Two masses with effects as one mass with these effects; one that a spring holds without the spring."""
-        if fit.parameters.held:
+        """Two masses with effects as one mass with these effects; one mass on a spring without the spring."""
+        if fit.parameters.on_a_spring:
             hypothesis, x = released(fit)
             return [self.continued(hypothesis, fit, x, self.policy.long)]
         return self.demoted(fit) if fit.effects else []

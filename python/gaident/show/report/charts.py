@@ -31,7 +31,7 @@ def run_chart(run: RecordView, noise: float, key: str, axis: str) -> Chart:
     limits, said = _error_limits([e for e in errors if e is not None])
     text += said
     panels = [
-        velocity_panel(run.time, run.measured, run.linear, run.extended, run.command, axis, run.held_from or 0),
+        velocity_panel(run.time, run.measured, run.linear, run.extended, run.command, axis, run.held_out_from or 0),
         error_panel(run.time, *errors, noise, axis, limits, labelled=False),
     ]
     if run.torque is not None:
@@ -95,7 +95,7 @@ def missing_over_time(run: RecordView, dhat: Vector, key: str, axis: str) -> Cha
 
 def held_out_chart(run: RecordView, noise: float, key: str, axis: str) -> Chart:
     """What both models miss of data that were held out."""
-    first = run.held_from or 0
+    first = run.held_out_from or 0
     t = run.time[first:]
     linear, extended = _errors(run)
     linear, extended = linear[first:], None if extended is None else extended[first:]

@@ -158,9 +158,9 @@ def _causes(dia: Diagnosis, view: View) -> Section:
         others = (words(a, axis) for a in f.alternatives)
         name = joined((tag("b", cause_words(f, dia, axis)), *(joined((" or ", tag("b", other))) for other in others)))
         rows: list[Row] = [(n, *map(typeset, cells), remark) for n, *cells, remark in map(_row(view), f.parameters.items())]
-        held = "in-sample" if dia.held_out == "in-sample" else "held-out"
+        kind = "in-sample" if dia.held_out == "in-sample" else "held-out"
         place = f"Place: {f.place}. " if f.place else ""
-        figures = f"{place}{f.delta_bic:.0f} BIC units; the {held} error falls by {percent(f.gain)} % of what was left before it."
+        figures = f"{place}{f.delta_bic:.0f} BIC units; the {kind} error falls by {percent(f.gain)} % of what was left before it."
         parts.append(
             box(
                 tag("h3", name, " ", tag("small", "cannot be told apart" if f.alternatives else "named")),
@@ -242,13 +242,13 @@ def _gain(dia: Diagnosis, view: View, drawn: Charts) -> Section:
     if extended and dia.before.rmse > 0.0:
         parts.append(tag("p", typeset(said(fall_words(dia), axis))))
     parts += _force(dia, axis)
-    held = next((r for r in view.runs if r.used == "held out"), None) or next(
-        (r for r in view.runs if r.held_from is not None), None
+    validation = next((r for r in view.runs if r.used == "held out"), None) or next(
+        (r for r in view.runs if r.held_out_from is not None), None
     )
-    if held is not None:
-        if held.used == "held out":
-            parts.append(tag("h3", held.name or "validation record"))
-        parts.append(drawn.put(charts.held_out_chart(held, dia.after.noise_floor, "record", axis)))
+    if validation is not None:
+        if validation.used == "held out":
+            parts.append(tag("h3", validation.name or "validation record"))
+        parts.append(drawn.put(charts.held_out_chart(validation, dia.after.noise_floor, "record", axis)))
     elif view.runs and dia.validation_digests:
         parts.append(box(tag("p", "The validation record is not at hand, so its curves are not drawn."), kind="quiet"))
     else:

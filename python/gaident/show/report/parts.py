@@ -122,7 +122,7 @@ def measured_section(view: View, noise: float, drawn: Charts) -> Section:
         label = {"fitted": "parameters were fitted to it", "held out": "no parameter was fitted to it"}.get(
             run.used, "another record"
         )
-        if run.held_from:
+        if run.held_out_from:
             label += "; for the comparison of before and after, to its first part only"
         parts.append(tag("h3", run.name or f"record {i + 1}", " ", tag("small", label)))
         if run.used == "new":

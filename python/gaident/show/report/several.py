@@ -138,8 +138,8 @@ def _how(results: Sequence[Shown]) -> Section:
     """Which data each result is of."""
     parts: list[str] = []
     for name, result, view in results:
-        held = result.validation_digests if isinstance(result, Diagnosis) else ()
-        parts += [tag("h3", name), records_table(view.runs, result.digests, held)]
+        validation = result.validation_digests if isinstance(result, Diagnosis) else ()
+        parts += [tag("h3", name), records_table(view.runs, result.digests, validation)]
         parts.append(tag("p", f"Made with gaident {result.version or 'of unknown version'}, seed {result.seed}."))
     command = tag("code", "gaident report RESULT.json LOG --drive drive.toml --out report.html", class_="command")
     parts.append(

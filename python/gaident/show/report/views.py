@@ -24,7 +24,7 @@ class RecordView:
     name and digest of the record; used: "fitted", "held out" or "new" (not the record of this result).
     time [s]; measured velocity, command, linear and extended model's velocity [rad/s]; torque of the controller and missing
     torque dhat with its typical deviation std [N m]; position [rad]. torque_logged: False where it was worked out.
-    held_from: first sample that no parameter of the figures "before and after" was fitted to; None: all were used.
+    held_out_from: first sample that no parameter of the figures "before and after" was fitted to; None: all were used.
     notes: what could not be worked out, in plain sentences.
     """
 
@@ -41,7 +41,7 @@ class RecordView:
     extended: Vector | None = None
     dhat: Vector | None = None
     std: float = 0.0
-    held_from: int | None = None
+    held_out_from: int | None = None
     notes: tuple[str, ...] = ()
 
     @property

@@ -1,4 +1,4 @@
-"""Blind: an axis under gravity, or held by a spring to the ground: the right name and sizes, no cogging in gravity's place.
+"""Blind: an axis under gravity, or on a spring to the ground: the right name and sizes, no cogging in gravity's place.
 
 The drive is that of drive_rig.py, which shares no code with the library. Its torque drives the diagnosis, and no angle is logged.
 """
